@@ -1,0 +1,1 @@
+"""Campaigns: which runs to make, and the workers that make them."""

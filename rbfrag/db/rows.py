@@ -1,0 +1,118 @@
+"""What goes into the database and comes out of it: plain frozen data.
+
+This module loads neither SQLAlchemy nor numpy, because `rbfrag predict` needs it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class EarthquakeInfo:
+    """The earthquake a motion belongs to.
+
+    Args:
+        event_id: the key that earthquakes are told apart by.
+        name: name for people.
+        magnitude: magnitude as the source gives it (scale not harmonised), if known.
+        time: origin time or year as text, if known.
+        guessed: True when the event was read off a file header instead of stated by metadata.
+    """
+
+    event_id: str
+    name: str = ""
+    magnitude: float | None = None
+    time: str | None = None
+    guessed: bool = True
+
+
+@dataclass(frozen=True)
+class MotionRow:
+    """One stored motion without its samples; units are in the names."""
+
+    id: int
+    name: str
+    event_id: str
+    event_guessed: bool
+    magnitude: float | None
+    recording: str
+    station: str
+    component: str
+    orientation_deg: float | None
+    is_vertical: bool
+    dt_s: float
+    npts: int
+    pga_g: float
+    pgv_m_s: float
+    pgd_m: float
+    tm_s: float | None
+    final_velocity_m_s: float
+    final_displacement_m: float
+    source_file: str
+    trace_index: int
+    file_format: str
+    processing: str
+    sha256: str
+    flags: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class CombinationTable:
+    """Critical values with the intensity of their motions: columns of equal length.
+
+    What the fits read. `kr_over_pga`, `kr` and `y_m_s` are NaN unless `status` is ``found``;
+    `tm_s` is NaN where the mean period is not defined.
+    """
+
+    combination_id: NDArray[np.int64]
+    motion_id: NDArray[np.int64]
+    event_id: NDArray[np.object_]
+    event_guessed: NDArray[np.bool_]
+    polarity: NDArray[np.object_]
+    p2: NDArray[np.float64]
+    status: NDArray[np.object_]
+    search_limit: NDArray[np.float64]
+    kr_over_pga: NDArray[np.float64]
+    kr: NDArray[np.float64]
+    y_m_s: NDArray[np.float64]
+    pga_g: NDArray[np.float64]
+    pgv_m_s: NDArray[np.float64]
+    pgd_m: NDArray[np.float64]
+    tm_s: NDArray[np.float64]
+    natural_key: NDArray[np.object_]
+
+
+@dataclass(frozen=True)
+class ModelRow:
+    """One fitted fragility model as stored.
+
+    Args:
+        name: unique name.
+        term: intensity term (``pgv``, ``pga_tm``, ``pgd_tm``).
+        method: fit method (``wls``).
+        coefficients: value of each parameter by name, in a fixed order.
+        covariance: covariance of the parameters in that order.
+        domain: fitted range (low, high) of each variable by name.
+        data_fingerprint: hash of the data that were fitted.
+        diagnostics: everything else a report prints (counts, scores, warnings), JSON-able.
+        is_default: True for the model that answers when none is named.
+        created: UTC time of the fit, ISO 8601.
+    """
+
+    name: str
+    term: str
+    method: str
+    coefficients: Mapping[str, float]
+    covariance: tuple[tuple[float, ...], ...]
+    domain: Mapping[str, tuple[float, float]]
+    data_fingerprint: str
+    diagnostics: Mapping[str, object] = field(default_factory=dict)
+    is_default: bool = False
+    created: str = ""

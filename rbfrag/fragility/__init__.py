@@ -1,0 +1,1 @@
+"""Fragility models: intensity terms, fits, prediction."""

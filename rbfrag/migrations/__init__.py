@@ -1,0 +1,1 @@
+"""Alembic migrations, shipped in the wheel so that an installed rbfrag can upgrade."""

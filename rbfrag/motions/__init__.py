@@ -1,0 +1,1 @@
+"""Accelerograms: readers by format, intensity measures, quality signs."""

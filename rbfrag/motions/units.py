@@ -1,0 +1,69 @@
+"""Units of acceleration, and standard gravity."""
+
+from __future__ import annotations
+
+from rbfrag.errors import InputError
+
+STANDARD_GRAVITY_M_S2 = 9.80665
+"""Standard gravity [m/s²], exact by definition (CGPM 1901)."""
+
+_IN_G = {
+    "g": 1.0,
+    "m/s2": 1.0 / STANDARD_GRAVITY_M_S2,
+    "cm/s2": 0.01 / STANDARD_GRAVITY_M_S2,
+    "mm/s2": 0.001 / STANDARD_GRAVITY_M_S2,
+}
+
+_SPELLINGS = {
+    "g": "g",
+    "g's": "g",
+    "gs": "g",
+    "m/s2": "m/s2",
+    "m/sec2": "m/s2",
+    "m/s/s": "m/s2",
+    "m/sec/sec": "m/s2",
+    "cm/s2": "cm/s2",
+    "cm/sec2": "cm/s2",
+    "cm/s/s": "cm/s2",
+    "cm/sec/sec": "cm/s2",
+    "gal": "cm/s2",
+    "gals": "cm/s2",
+    "mm/s2": "mm/s2",
+    "mm/sec2": "mm/s2",
+    "mm/s/s": "mm/s2",
+    "mm/sec/sec": "mm/s2",
+}
+
+ACCELERATION_UNITS = tuple(_IN_G)
+"""The unit names that options and metadata files use."""
+
+
+def acceleration_unit(text: str) -> str:
+    """Return the standard name of an acceleration unit as files spell it.
+
+    Args:
+        text: a spelling such as ``g``, ``g's``, ``cm/sec**2``, ``m/s^2``, ``gal``.
+
+    Returns:
+        One of ``g``, ``m/s2``, ``cm/s2``, ``mm/s2``.
+
+    Raises:
+        InputError: the spelling is not known.
+    """
+    key = text.strip().lower().replace("^", "").replace("**", "").replace("²", "2").replace(" ", "")
+    try:
+        return _SPELLINGS[key]
+    except KeyError:
+        known = ", ".join(ACCELERATION_UNITS)
+        raise InputError(
+            f"unknown unit of acceleration {text!r}: use one of {known} (gal is cm/s2)"
+        ) from None
+
+
+def unit_in_g(unit: str) -> float:
+    """Return how many g one unit of acceleration is (multiply samples by it).
+
+    Args:
+        unit: any spelling that :func:`acceleration_unit` knows.
+    """
+    return _IN_G[acceleration_unit(unit)]

@@ -1,0 +1,1 @@
+"""Every figure, one function each. The only room that imports matplotlib."""

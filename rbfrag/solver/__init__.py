@@ -1,0 +1,1 @@
+"""Rigid-block models: response kernels and the critical search."""

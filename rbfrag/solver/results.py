@@ -1,0 +1,173 @@
+"""What the solver answers: plain frozen data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+NUMERICS_VERSION = "1"
+"""Changes whenever a run of the same input may give other bits; part of every stored key."""
+
+Polarity = Literal["forward", "reverse"]
+POLARITIES: tuple[Polarity, Polarity] = ("forward", "reverse")
+
+Status = Literal["found", "below_limit", "no_motion", "outside_model"]
+
+SEARCH_LIMIT = 0.01
+"""Smallest k_r/PGA that the critical search looks at (the dissertation's)."""
+
+RESOLUTION = 1e-6
+"""Islands of k_r/PGA narrower than this are below the rounding of a recorded accelerogram."""
+
+
+class Outcome(StrEnum):
+    """How a run ended. Each member says in one sentence what to make of it."""
+
+    advice: str
+
+    def __new__(cls, value: str, advice: str) -> Outcome:
+        """Attach the sentence to the member."""
+        member = str.__new__(cls, value)
+        member._value_ = value
+        member.advice = advice
+        return member
+
+    STABLE = "stable", "The block came back to rest on its base."
+    TOPPLED = "toppled", "The block is past recovery, whatever the rest of the record does."
+    UNDETERMINED = (
+        "undetermined",
+        "The block is closer to its critical value than the numerical error: treat it as critical.",
+    )
+    JUMP = (
+        "jump",
+        "The vertical ground motion throws the block off its base (1 + k_v <= 0): the model of "
+        "a block in contact does not apply; use the horizontal motion alone or another method.",
+    )
+    CONTACT_LOST = "contact_lost", "A contact opened: the motion after it is outside the model."
+    INDETERMINATE = "indeterminate", "The rigid-body problem has no unique answer here."
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseHistory:
+    """A block's motion at the samples and events of one run.
+
+    Args:
+        time_s: times [s], shape (n,).
+        theta_rad: forward rotation [rad], shape (n,).
+        theta_dot_rad_s: rotation rate [rad/s], shape (n,).
+        k_h: driving horizontal acceleration, polarity applied [g], shape (n,).
+        k_v: vertical acceleration, upwards positive [g], shape (n,).
+    """
+
+    time_s: FloatArray
+    theta_rad: FloatArray
+    theta_dot_rad_s: FloatArray
+    k_h: FloatArray
+    k_v: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """The answer of one run.
+
+    Args:
+        kind: the model that was run (``toppling``).
+        outcome: how it ended.
+        peak_theta_n: peak rotation over the critical angle; None when the block topples.
+        peak_theta_rad: peak rotation [rad]; None when the block topples.
+        critical_angle_deg: rotation at which the block balances on its toe [deg].
+        started_s: time of the first lift-off [s]; None if the block never moves.
+        toppled_s: time at which toppling became inevitable [s]; None unless it topples.
+        error_estimate: estimated bound on the error of the peak rotation [rad]; for a
+            toppling block, on the rotation at the moment of the verdict.
+        steps: integration steps taken.
+        samples_moved: sample intervals that had to be integrated.
+        samples_total: sample intervals of the record.
+        warnings: sentences about suspicious input.
+        history: the motion in time, only if it was asked for.
+    """
+
+    kind: str
+    outcome: Outcome
+    peak_theta_n: float | None
+    peak_theta_rad: float | None
+    critical_angle_deg: float
+    started_s: float | None
+    toppled_s: float | None
+    error_estimate: float
+    steps: int
+    samples_moved: int
+    samples_total: int
+    warnings: tuple[str, ...] = ()
+    history: ResponseHistory | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class SearchPoints:
+    """Every simulation of one critical search, by falling k_r/PGA.
+
+    Args:
+        kr_over_pga: block strength over PGA, shape (n,).
+        theta_n: peak rotation over the critical angle, shape (n,); NaN where it toppled.
+        outcome: :class:`Outcome` values as text, length n.
+    """
+
+    kr_over_pga: FloatArray
+    theta_n: FloatArray
+    outcome: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class CriticalResult:
+    """The critical block of one motion: the strongest one that it topples.
+
+    Args:
+        p2: the block's frequency parameter p² [1/s²].
+        polarity: ``forward`` or ``reverse``.
+        linear: True for the linear verification model.
+        pga_g: PGA of the horizontal motion [g].
+        status: ``found``; ``below_limit`` (nothing topples down to `search_limit`);
+            ``no_motion`` (no block down to the limit ever lifts); ``outside_model``.
+        search_limit: smallest k_r/PGA looked at.
+        kr_over_pga: the largest k_r/PGA known to topple; None unless found.
+        lower: lower end of the bracket (topples), k_r/PGA.
+        upper: upper end of the bracket (safe), k_r/PGA.
+        kr: the critical k_r itself.
+        y_m_s: critical toppling velocity k_r g/p [m/s].
+        certified: True when every k_r above the bracket is proven not to topple.
+        k_up_over_pga: proven upper bound over fresh starts: nothing above it topples.
+        undecided: length of k_r/PGA above `upper` for which safety is not proven.
+        island_width: width in k_r/PGA of the toppling interval that the bracket caps.
+        kr_over_pga_resolved: the same search with islands narrower than 1e-6 ignored.
+        reentrant: True when a safe island wider than 1e-6 lies below the critical value.
+        n_runs: number of simulations made.
+        warnings: sentences about suspicious input or an uncertain answer.
+        points: every simulated point.
+    """
+
+    p2: float
+    polarity: Polarity
+    linear: bool
+    pga_g: float
+    status: Status
+    search_limit: float
+    kr_over_pga: float | None
+    lower: float | None
+    upper: float | None
+    kr: float | None
+    y_m_s: float | None
+    certified: bool
+    k_up_over_pga: float | None
+    undecided: float | None
+    island_width: float | None
+    kr_over_pga_resolved: float | None
+    reentrant: bool
+    n_runs: int
+    warnings: tuple[str, ...]
+    points: SearchPoints
