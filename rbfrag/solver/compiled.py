@@ -1,0 +1,29 @@
+"""How kernels are compiled: numba, cached on disk where a disk can be written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar, cast
+
+from numba import njit
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function over arrays to machine code.
+
+    The machine code is kept beside the package, or in the user's cache folder when the
+    package is installed read-only. numba writes cache files under a temporary name and
+    renames them, so several workers may start at once. Where neither folder can be
+    written the kernel is compiled anew in each process.
+
+    Floating-point operations keep their written order (no fastmath): the same input gives
+    the same bits.
+    """
+    options = {"nogil": True, "error_model": "numpy"}
+    try:
+        return cast("Callable[P, R]", njit(cache=True, **options)(function))
+    except RuntimeError:  # numba's "cannot cache function": no folder is writable
+        return cast("Callable[P, R]", njit(**options)(function))

@@ -1,0 +1,141 @@
+"""What drives a block: horizontal and vertical ground acceleration at common nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.results import POLARITIES, Polarity
+
+FloatArray = NDArray[np.float64]
+
+BLOCK = 16
+"""Nodes per block of the table of maxima that rest is skipped by."""
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation:
+    """Driving accelerations in g at the nodes, polarity applied; linear between nodes.
+
+    Args:
+        time_s: node times [s], shape (n,).
+        interval_s: interval lengths [s], shape (n - 1,); zero for a jump.
+        k_h: driving horizontal acceleration [g], positive drives forward rotation, shape (n,).
+        w: effective gravity 1 + k_v [-], shape (n,).
+        pga_g: PGA of the horizontal motion, over both signs [g].
+        warnings: sentences about how the two components were brought together.
+    """
+
+    time_s: FloatArray
+    interval_s: FloatArray
+    k_h: FloatArray
+    w: FloatArray
+    pga_g: float
+    warnings: tuple[str, ...] = ()
+
+    @cached_property
+    def jump_node(self) -> int:
+        """First node at which 1 + k_v <= 0 (the block is thrown); n where there is none."""
+        thrown = np.flatnonzero(self.w <= 0.0)
+        return int(thrown[0]) if thrown.size else int(self.w.size)
+
+    @cached_property
+    def q(self) -> FloatArray:
+        """k_h/(1 + k_v): a block lifts when it exceeds k_r. Zero from a jump on."""
+        q = np.zeros_like(self.k_h)
+        usable = slice(0, self.jump_node)
+        q[usable] = self.k_h[usable] / self.w[usable]
+        return q
+
+    @cached_property
+    def tail_min_q(self) -> FloatArray:
+        """Least q from each node to the end, rest after the record included (so <= 0).
+
+        q is a ratio of two straight lines between nodes, hence monotone there, and its
+        least value is at a node. Minus infinity where a jump is still to come: nothing is
+        decided before it.
+        """
+        padded = np.append(self.q, 0.0)
+        padded[self.jump_node : self.w.size] = -np.inf
+        return np.ascontiguousarray(np.minimum.accumulate(padded[::-1])[::-1][:-1])
+
+    @cached_property
+    def block_max_q(self) -> FloatArray:
+        """Greatest q of each block of `BLOCK` nodes."""
+        n = self.q.size
+        padded = np.full(-(-n // BLOCK) * BLOCK, -np.inf)
+        padded[:n] = self.q
+        return padded.reshape(-1, BLOCK).max(axis=1)
+
+    @cached_property
+    def max_q(self) -> float:
+        """Greatest q over the record: no block with k_r at or above it ever lifts."""
+        return float(self.q.max())
+
+
+def excitation(
+    motion: GroundMotion,
+    vertical: GroundMotion | None = None,
+    polarity: Polarity = "forward",
+) -> Excitation:
+    """Bring a horizontal motion and its optional vertical to common nodes.
+
+    Args:
+        motion: horizontal motion; its positive samples drive forward rotation under
+            polarity ``forward``, its negative ones under ``reverse``.
+        vertical: vertical motion (upward positive) of the same recording. It must have the
+            same sampling interval (or, for node motions, the same node times). Where one
+            component is shorter, it is taken as zero after its end, with a warning.
+        polarity: ``forward`` or ``reverse``; the vertical is never reversed.
+
+    Raises:
+        InputError: unknown polarity, or components that cannot be brought together.
+    """
+    if polarity not in POLARITIES:
+        raise InputError(f"polarity must be 'forward' or 'reverse', not {polarity!r}")
+    sign = 1.0 if polarity == "forward" else -1.0
+    # + 0.0 turns the -0.0 of a reversed zero sample into 0.0
+    k_h = sign * motion.acceleration_g + 0.0
+    time_s, interval_s = motion.time_s, motion.interval_s
+    warnings: list[str] = []
+    if vertical is None:
+        w = np.ones_like(k_h)
+    else:
+        _refuse_different_sampling(motion, vertical)
+        k_v = vertical.acceleration_g
+        if k_v.size != k_h.size:
+            longer = motion if k_h.size > k_v.size else vertical
+            short = "vertical" if longer is motion else "horizontal"
+            warnings.append(
+                f"the {short} component has {min(k_h.size, k_v.size)} samples, the other "
+                f"{longer.npts}: it is taken as zero after its end"
+            )
+            time_s, interval_s = longer.time_s, longer.interval_s
+            k_h = np.pad(k_h, (0, longer.npts - k_h.size))
+            k_v = np.pad(k_v, (0, longer.npts - k_v.size))
+        w = 1.0 + k_v
+    return Excitation(
+        time_s=np.array(time_s),
+        interval_s=np.array(interval_s),
+        k_h=k_h,
+        w=w,
+        pga_g=float(np.abs(motion.acceleration_g).max()),
+        warnings=tuple(warnings),
+    )
+
+
+def _refuse_different_sampling(motion: GroundMotion, vertical: GroundMotion) -> None:
+    if motion.node_time_s is None and vertical.node_time_s is None:
+        if motion.dt_s != vertical.dt_s:
+            raise InputError(
+                f"the vertical component has dt = {vertical.dt_s:g} s, the horizontal "
+                f"{motion.dt_s:g} s: bring both to one sampling interval first"
+            )
+        return
+    if not np.array_equal(motion.time_s, vertical.time_s):
+        raise InputError("the vertical component must have the same node times as the horizontal")

@@ -1,0 +1,459 @@
+"""Kernel of the toppling block: one run over one record.
+
+    moving: theta'' = p² [k_h cos(theta_c - theta) - (1 + k_v) sin(theta_c - theta)]
+    rest:   theta = theta' = 0 while k_h <= (1 + k_v) k_r
+
+theta is the forward rotation about the toe; theta_c = atan(k_r). In the linear model, kept
+for verification against closed forms, sin is replaced by its argument, cos by 1, and
+theta_c = k_r. Events: lift-off (an upward crossing of the threshold), re-seat (theta back
+to 0, without rebound; motion restarts at once if the threshold is exceeded), and the
+verdict "irrecoverable". After the last sample the ground is at rest and the verdict is
+closed-form, by energy.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.solver.compiled import kernel
+from rbfrag.solver.excitation import BLOCK
+from rbfrag.solver.taylor import (
+    MACHINE_EPSILON,
+    bracketed_root,
+    fill_coefficients,
+    rotation,
+    value,
+)
+
+FloatArray = NDArray[np.float64]
+
+STABLE, TOPPLED, UNDETERMINED, JUMP = 0, 1, 2, 3
+
+
+class Run(NamedTuple):
+    """What the kernel returns.
+
+    `peak_rad` is NaN unless the block stays; times are NaN where nothing happened.
+    """
+
+    outcome: int
+    peak_rad: float
+    started_s: float
+    verdict_s: float
+    error_rad: float
+    steps: int
+    samples_moved: int
+    history_length: int
+
+
+@kernel
+def next_lifting_node(
+    q: FloatArray, block_max_q: FloatArray, start: int, stop: int, kr: float
+) -> int:
+    """First node in [start, stop) with q > kr, or `stop`; skips rest by block maxima."""
+    i = start
+    while i < stop:
+        if i % BLOCK == 0 and block_max_q[i // BLOCK] <= kr:
+            i += BLOCK
+        elif q[i] > kr:
+            return i
+        else:
+            i += 1
+    return stop
+
+
+@kernel
+def examine_step(
+    theta: float, u: FloatArray, order: int, theta_end: float, u_end: float, v_end: float
+) -> tuple[float, float, float]:
+    """Find what happens inside one step: (tau of the re-seat or -1, peak, tau of the peak).
+
+    The step is cut at the turning points of theta into monotone stretches, so a peak and a
+    re-seat in one step, or a dip below zero between two positive ends, are all seen. The
+    peak is -1 where theta has no maximum before the re-seat.
+    """
+    v_start = u[1]
+    # a start from rest has U = 0: its direction is that of the acceleration
+    u_start = u[0] if u[0] != 0.0 else v_start
+    first = -1.0
+    second = -1.0
+    if (v_start > 0.0 and v_end < 0.0) or (v_start < 0.0 and v_end > 0.0):
+        extremum = bracketed_root(2, theta, u, order, 0.0, 1.0)
+        u_mid = value(u, order, extremum)
+        if (u_start > 0.0 and u_mid <= 0.0) or (u_start < 0.0 and u_mid >= 0.0):
+            first = bracketed_root(1, theta, u, order, 0.0, extremum)
+        if (u_mid > 0.0 and u_end <= 0.0) or (u_mid < 0.0 and u_end >= 0.0):
+            second = bracketed_root(1, theta, u, order, extremum, 1.0)
+    elif (u_start > 0.0 and u_end <= 0.0) or (u_start < 0.0 and u_end >= 0.0):
+        first = bracketed_root(1, theta, u, order, 0.0, 1.0)
+
+    peak = -1.0
+    peak_tau = -1.0
+    rising = u_start > 0.0
+    left = 0.0
+    theta_left = theta
+    for stretch in range(3):
+        right = 1.0
+        if stretch == 0:
+            if first < 0.0:
+                continue
+            right = first
+        elif stretch == 1:
+            if second < 0.0:
+                continue
+            right = second
+        theta_right = theta_end if stretch == 2 else rotation(theta, u, order, right)
+        if rising:
+            if stretch < 2 and theta_right > peak:
+                peak = theta_right
+                peak_tau = right
+        elif theta_right <= 0.0:
+            if theta_left <= 0.0:
+                return left, peak, peak_tau
+            return bracketed_root(0, theta, u, order, left, right), peak, peak_tau
+        rising = not rising
+        left = right
+        theta_left = theta_right
+    return -1.0, peak, peak_tau
+
+
+@kernel
+def run_toppling(
+    time_s: FloatArray,
+    interval_s: FloatArray,
+    k_h: FloatArray,
+    w: FloatArray,
+    q: FloatArray,
+    tail_min_q: FloatArray,
+    block_max_q: FloatArray,
+    jump_node: int,
+    kr: float,
+    p: float,
+    linear: bool,
+    order: int,
+    ph_max: float,
+    first_interval: int,
+    one_excursion: bool,
+    history: FloatArray,
+) -> tuple[int, float, float, float, float, int, int, int]:
+    """Run one block over one record; the fields of :class:`Run` in order.
+
+    Args:
+        time_s: node times [s], shape (n,).
+        interval_s: interval lengths [s], shape (n - 1,).
+        k_h: driving acceleration at the nodes [g].
+        w: 1 + k_v at the nodes.
+        q: k_h/(1 + k_v) at the nodes.
+        tail_min_q: least q from each node on, rest after the record included.
+        block_max_q: greatest q of each block of nodes.
+        jump_node: first node with 1 + k_v <= 0, or n.
+        kr: rocking acceleration coefficient k_r (linear model: critical angle [rad]).
+        p: frequency parameter [1/s].
+        linear: the linear verification model.
+        order: degree of the Taylor step.
+        ph_max: greatest p·h of one step.
+        first_interval: interval that the block enters at rest; 0 for the whole record.
+        one_excursion: stop, with outcome stable, when the block first re-seats.
+        history: shape (3, m) to be filled with time, theta, theta'; (3, 0) for none. With a
+            history the run goes on after the verdict until the block lies beyond 90 degrees.
+    """
+    n = k_h.size
+    last = min(n, jump_node) - 1
+    if linear:
+        theta_c = kr
+        s_rest = kr
+        c_rest = 1.0
+    else:
+        theta_c = math.atan(kr)
+        c_rest = 1.0 / math.sqrt(1.0 + kr * kr)
+        s_rest = kr * c_rest
+    u = np.empty(order + 1)
+    s = np.empty(order + 1)
+    c = np.empty(order + 1)
+
+    room = history.shape[1]
+    filled = 0
+    started_s = math.nan
+    verdict_s = math.nan
+    peak = 0.0
+    peak_error = 0.0
+    steps = 0
+    moved = 0
+    counted = -1
+    decided = False
+    verdict_error = 0.0
+
+    i = first_interval
+    tau = 0.0  # position inside interval i
+    moving = False
+    fresh = False  # starting at an upward crossing: no re-seat is possible in the first step
+    theta = 0.0
+    rate = 0.0  # theta'/p
+    error = 0.0  # bound on |error of theta| + |error of theta'/p|
+
+    while i < last:
+        g0 = k_h[i] - w[i] * kr
+        g1 = k_h[i + 1] - w[i + 1] * kr
+        if not moving:
+            if tau == 0.0:
+                if g0 > 0.0:
+                    moving = True
+                elif g1 <= 0.0:
+                    i = next_lifting_node(q, block_max_q, i + 2, last + 1, kr) - 1
+                    continue
+                else:
+                    tau = -g0 / (g1 - g0)
+                    moving = True
+                    fresh = True
+            elif g1 > 0.0:  # at rest inside the interval, after a re-seat
+                tau = min(max(tau, -g0 / (g1 - g0)), 1.0)
+                moving = True
+                fresh = True
+            else:
+                i += 1
+                tau = 0.0
+                continue
+            theta = 0.0
+            rate = 0.0
+            s[0] = s_rest
+            c[0] = c_rest
+            if math.isnan(started_s):
+                started_s = time_s[i] + tau * interval_s[i]
+            if filled < room:
+                history[0, filled] = time_s[i] + tau * interval_s[i]
+                history[1, filled] = 0.0
+                history[2, filled] = 0.0
+                filled += 1
+
+        left = interval_s[i] * (1.0 - tau)
+        reseat_at = -1.0
+        if left > 0.0:
+            if i != counted:
+                counted = i
+                moved += 1
+            pieces = max(1, math.ceil(p * left / ph_max))
+            part = (1.0 - tau) / pieces
+            ph = p * left / pieces
+            da = (k_h[i + 1] - k_h[i]) * part
+            dw = (w[i + 1] - w[i]) * part
+            for piece in range(pieces):
+                at = tau + piece * part
+                a0 = k_h[i] + (k_h[i + 1] - k_h[i]) * at
+                w0 = w[i] + (w[i + 1] - w[i]) * at
+                u[0] = ph * rate
+                fill_coefficients(u, s, c, order, ph * ph, a0, da, w0, dw, linear)
+                steps += 1
+                sum_theta = 0.0
+                sum_u = 0.0
+                sum_s = 0.0
+                sum_c = 0.0
+                v_end = 0.0
+                for k in range(order, 0, -1):
+                    sum_theta += u[k] / (k + 1)
+                    sum_u += u[k]
+                    sum_s += s[k]
+                    sum_c += c[k]
+                    v_end += k * u[k]
+                theta_end = theta + (u[0] + sum_theta)
+                u_end = u[0] + sum_u
+
+                a_size = abs(a0) + abs(da)
+                w_size = abs(w0) + abs(dw)
+                growth = ph * max(1.0, a_size * abs(s[0]) + w_size * abs(c[0]))
+                # the first two omitted terms, from u[k+2] ~ (p·h)² D u[k]/((k+1)(k+2)): one
+                # alone is fooled, since from rest under constant a every other one vanishes
+                omitted = 2.0 * ph * (a_size + w_size) / (order * (order + 1))
+                truncation = omitted * (abs(u[order]) + abs(u[order - 1]))
+                rounding = MACHINE_EPSILON * (
+                    2.0 * (abs(theta_end) + abs(rate) + abs(s[0])) + 4.0 * ph * (a_size + w_size)
+                )
+                error = error * math.exp(growth) + truncation + rounding
+
+                if fresh:
+                    fresh = False
+                    if theta_end <= 0.0 or u_end <= 0.0:
+                        theta_end = 0.0
+                        reseat_at = at + part
+                else:
+                    u_start = u[0]
+                    v_start = u[1]
+                    look = theta_end <= 0.0
+                    if u_start > 0.0 and u_end > 0.0:
+                        # theta may dip only if U falls and rises again; V is monotone in a step
+                        look = look or (v_start < 0.0 and v_end > 0.0 and u_start + v_start <= 0.0)
+                    elif u_start < 0.0 and u_end < 0.0:
+                        look = look or (v_start > 0.0 and v_end < 0.0 and u_start + v_start >= 0.0)
+                    else:
+                        look = True
+                    if look:
+                        x, top, top_at = examine_step(theta, u, order, theta_end, u_end, v_end)
+                        if top > peak:
+                            peak = top
+                            peak_error = error
+                        if top > 0.0 and filled < room:
+                            history[0, filled] = time_s[i] + (at + part * top_at) * interval_s[i]
+                            history[1, filled] = top
+                            history[2, filled] = 0.0
+                            filled += 1
+                        if x >= 0.0:
+                            reseat_at = at + part * x
+                            rate = value(u, order, x) / ph
+                if reseat_at >= 0.0:
+                    break
+                theta = theta_end
+                rate = u_end / ph
+                s[0] += sum_s
+                c[0] += sum_c
+
+        if reseat_at >= 0.0:
+            if one_excursion:
+                return STABLE, peak, started_s, math.nan, peak_error, steps, moved, filled
+            moving = False
+            stuck = reseat_at <= tau
+            tau = min(reseat_at, 1.0)
+            g = g0 + (g1 - g0) * tau
+            impact = abs(rate)
+            if impact <= error:
+                # a graze: whether it touches at all is below the error, which lives on
+                pass
+            elif g > 0.0:
+                # motion restarts at once; only the error of its starting time is left
+                error = min(error, g * error / impact)
+            else:
+                error = 0.0
+            if filled < room:
+                history[0, filled] = time_s[i] + tau * interval_s[i]
+                history[1, filled] = 0.0
+                history[2, filled] = 0.0
+                filled += 1
+            if stuck:
+                # The threshold is exceeded by less than rounding. A falling drive leaves the
+                # block at rest; a rising one starts it as an upward crossing does.
+                if g1 > g0:
+                    moving = True
+                    fresh = True
+                    theta = 0.0
+                    rate = 0.0
+                    s[0] = s_rest
+                    c[0] = c_rest
+                else:
+                    i += 1
+                    tau = 0.0
+            elif g > 0.0 and tau < 1.0:
+                moving = True
+                theta = 0.0
+                rate = 0.0
+                s[0] = s_rest
+                c[0] = c_rest
+            elif tau >= 1.0:
+                i += 1
+                tau = 0.0
+            continue
+
+        i += 1
+        tau = 0.0
+        if filled < room:
+            history[0, filled] = time_s[i]
+            history[1, filled] = theta
+            history[2, filled] = rate * p
+            filled += 1
+        if not decided:
+            excess = c[0] * tail_min_q[i] - s[0]
+            if rate > error and s[0] < 0.0 and excess > error * (1.0 - tail_min_q[i]):
+                decided = True
+                verdict_s = time_s[i]
+                verdict_error = error
+                if room == 0:
+                    return TOPPLED, math.nan, started_s, verdict_s, error, steps, moved, 0
+        elif theta > theta_c + 0.5 * math.pi:
+            break
+
+    if decided:
+        return TOPPLED, math.nan, started_s, verdict_s, verdict_error, steps, moved, filled
+    if last < n - 1:
+        verdict_s = time_s[0]
+        if last >= 0:
+            verdict_s = time_s[last] + interval_s[last] * w[last] / (w[last] - w[last + 1])
+        return JUMP, math.nan, started_s, verdict_s, error, steps, moved, filled
+    if not moving:
+        return STABLE, peak, started_s, math.nan, peak_error, steps, moved, filled
+
+    # Free motion after the record: energy decides.
+    if linear:
+        x = s[0]
+        half = abs(x)
+    else:
+        x = math.atan2(s[0], c[0])
+        half = 2.0 * abs(math.sin(0.5 * x))
+    margin = abs(rate) - half
+    topples = margin > 0.0 and rate > 0.0 if x > 0.0 else not (rate < 0.0 and margin > 0.0)
+    if abs(margin) <= error:
+        return UNDETERMINED, math.nan, started_s, time_s[n - 1], error, steps, moved, filled
+    if topples:
+        return TOPPLED, math.nan, started_s, time_s[n - 1], error, steps, moved, filled
+    if rate > 0.0:
+        # 1 - cos is conserved up to the kinetic energy: sin²(x_top/2) = sin²(x/2) - rate²/4
+        rest = math.sqrt((half - rate) * (half + rate))
+        if linear:
+            x_top = rest
+            amplification = (half + rate) / rest
+        else:
+            x_top = 2.0 * math.asin(0.5 * rest)
+            amplification = (abs(math.sin(x)) + rate) / math.sin(x_top)
+        if theta_c - x_top > peak:
+            peak = theta_c - x_top
+            peak_error = error * amplification
+    return STABLE, peak, started_s, math.nan, peak_error, steps, moved, filled
+
+
+@kernel
+def fresh_starts_that_topple(
+    time_s: FloatArray,
+    interval_s: FloatArray,
+    k_h: FloatArray,
+    w: FloatArray,
+    q: FloatArray,
+    tail_min_q: FloatArray,
+    block_max_q: FloatArray,
+    kr: float,
+    p: float,
+    linear: bool,
+    order: int,
+    ph_max: float,
+    windows: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """Run one excursion from every rise of q above k_r that lies in the given windows.
+
+    Args:
+        time_s: as in :func:`run_toppling`; likewise the arguments up to `ph_max`.
+        windows: node ranges [first, end) to look in, shape (m, 2), ascending.
+
+    Returns:
+        The node ranges (stretches of q > k_r) whose fresh excursion does not come back
+        for certain, shape (number, 2).
+    """
+    n = q.size
+    nothing = np.empty((3, 0))
+    found = np.empty((n, 2), dtype=np.int64)
+    count = 0
+    for m in range(windows.shape[0]):
+        stop = windows[m, 1]
+        node = next_lifting_node(q, block_max_q, windows[m, 0], stop, kr)
+        while node < stop:
+            end = node
+            while end < n and q[end] > kr:
+                end += 1
+            result = run_toppling(
+                time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, n, kr, p, linear,
+                order, ph_max, max(node - 1, 0), True, nothing,
+            )  # fmt: skip
+            if result[0] != STABLE:
+                found[count, 0] = node
+                found[count, 1] = end
+                count += 1
+            node = next_lifting_node(q, block_max_q, end, stop, kr)
+    return found[:count].copy()
