@@ -1,0 +1,37 @@
+"""Writing earthquakes: told apart by their id, and guessed from stated."""
+
+from __future__ import annotations
+
+from sqlalchemy import Connection, select, update
+
+from rbfrag.db.insert import insert_if_new
+from rbfrag.db.rows import EarthquakeInfo
+from rbfrag.db.schema import earthquake
+
+
+def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording: str) -> int:
+    """Return the row id of an earthquake, made when new.
+
+    A guessed event never becomes a stated one of the same id: both stand side by side. What
+    is said first about an event stays (sources give one event several names and
+    magnitudes); what was not known is filled in.
+
+    Args:
+        connection: inside the caller's transaction.
+        info: the earthquake. Without an event_id nothing is known, and the recording
+            stands for an event of its own.
+        recording: name of the recording.
+    """
+    event_id = info.event_id or f"unknown event of {recording}"
+    guessed = info.guessed or not info.event_id
+    known = {"name": info.name, "magnitude": info.magnitude, "time": info.time}
+    insert_if_new(connection, earthquake, {"event_id": event_id, "guessed": guessed, **known})
+    row = connection.execute(
+        select(earthquake).where(
+            earthquake.c.event_id == event_id, earthquake.c.guessed.is_(guessed)
+        )
+    ).one()
+    missing = {key: value for key, value in known.items() if value and not row._mapping[key]}
+    if missing:
+        connection.execute(update(earthquake).where(earthquake.c.id == row.id).values(**missing))
+    return int(row.id)

@@ -1,0 +1,339 @@
+"""Writing and reading accelerograms."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from sqlalchemy import Connection, RowMapping, Select, and_, delete, exists, select, update
+
+from rbfrag.db import schema
+from rbfrag.db.clock import utc_now
+from rbfrag.db.earthquake_store import earthquake_id_for
+from rbfrag.db.insert import insert_if_new
+from rbfrag.db.rows import EarthquakeInfo, MotionRow
+from rbfrag.db.suite_store import add_to_suite, require_suite, suite_names
+from rbfrag.errors import DatabaseError, InputError
+from rbfrag.motions.ground_motion import GroundMotion
+
+__all__ = ["add_motion", "load_motion", "motion_row", "motion_rows", "suite_names"]
+
+
+def add_motion(
+    connection: Connection,
+    motion: GroundMotion,
+    *,
+    earthquake: EarthquakeInfo,
+    is_vertical: bool,
+    recording: str = "",
+    station: str = "",
+    component: str = "",
+    processing: str = "",
+    flags: Sequence[str] = (),
+    suite: str | None = None,
+) -> tuple[int, bool]:
+    """Store a motion, or find it when the same samples are there already.
+
+    A motion is its samples and their interval; labels do not make another one. Where it is
+    there already, a stated earthquake replaces a guessed one together with all labels
+    (recording, station, component, vertical or not, processing, flags); a guess replaces
+    nothing; what was stated before stays, and stating another earthquake or direction is
+    refused.
+
+    Args:
+        connection: inside the caller's transaction.
+        motion: equally spaced samples [g].
+        earthquake: where it belongs; without an event_id it stands for itself alone.
+        is_vertical: True for a vertical component.
+        recording: what all components of one recording share; when empty, the motion's own,
+            or else file and trace, so that strangers never become companions.
+        station: station; when empty, the motion's own.
+        component: component; when empty, the motion's own.
+        processing: what was done to the samples, in words.
+        flags: quality signs, such as ``event_guessed``.
+        suite: suite to put the motion into; made when new.
+
+    Returns:
+        The motion's id, and True when it was not there before.
+
+    Raises:
+        InputError: a motion from nodes; another earthquake or direction was stated before.
+    """
+    if motion.dt_s is None:
+        raise InputError(
+            f"{motion.label}: the database holds equally spaced samples only; "
+            "sample the motion first"
+        )
+    recording = recording or motion.recording or _own_name(motion)
+    labels: dict[str, Any] = {
+        "component": component or motion.component,
+        "orientation_deg": motion.orientation_deg,
+        "is_vertical": is_vertical,
+        "processing": processing,
+        "flags": json.dumps(list(flags)),
+        "remarks": json.dumps(list(motion.remarks)),
+        "source_file": motion.source_file,
+        "trace_index": motion.trace_index,
+        "file_format": motion.file_format,
+    }
+    place = (earthquake, recording, station or motion.station)
+    stored = _find(connection, motion)
+    if stored is None:
+        labels["recording_id"] = _recording_id_for(connection, *place)
+        values = {**_measured(motion), **labels, "added": utc_now()}
+        new = insert_if_new(connection, schema.motion, values)
+        stored = _find(connection, motion)
+        assert stored is not None
+    else:
+        new = False
+        if stored["guessed"] and not earthquake.guessed:
+            labels["recording_id"] = _recording_id_for(connection, *place)
+            connection.execute(
+                update(schema.motion).where(schema.motion.c.id == stored["id"]).values(**labels)
+            )
+            _delete_orphans(connection, stored["recording_id"])
+        elif not earthquake.guessed:
+            _refuse_contradiction(motion, stored, earthquake, is_vertical)
+    if suite is not None:
+        add_to_suite(connection, suite, stored["id"])
+    return stored["id"], new
+
+
+def motion_rows(connection: Connection, *, suite: str | None = None) -> list[MotionRow]:
+    """Return the stored motions without their samples, by id.
+
+    Args:
+        connection: the database.
+        suite: only those of this suite.
+
+    Raises:
+        InputError: there is no such suite.
+    """
+    query = _row_query()
+    if suite is not None:
+        suite_id = require_suite(connection, suite)
+        query = query.join(
+            schema.suite_motion,
+            and_(
+                schema.suite_motion.c.motion_id == schema.motion.c.id,
+                schema.suite_motion.c.suite_id == suite_id,
+            ),
+        )
+    return [
+        _motion_row(row)
+        for row in connection.execute(query.order_by(schema.motion.c.id)).mappings()
+    ]
+
+
+def motion_row(connection: Connection, motion_id: int) -> MotionRow:
+    """Return one stored motion without its samples.
+
+    Raises:
+        InputError: there is no motion of that id.
+    """
+    row = (
+        connection.execute(_row_query().where(schema.motion.c.id == motion_id))
+        .mappings()
+        .one_or_none()
+    )
+    if row is None:
+        raise _no_such_motion(motion_id)
+    return _motion_row(row)
+
+
+def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
+    """Return a stored motion with its samples, bit for bit as it was stored.
+
+    Raises:
+        InputError: there is no motion of that id, or a reference file left its samples out.
+        DatabaseError: the samples are not those that were stored.
+    """
+    query = _row_query().add_columns(schema.motion.c.samples, schema.motion.c.remarks)
+    row = connection.execute(query.where(schema.motion.c.id == motion_id)).mappings().one_or_none()
+    if row is None:
+        raise _no_such_motion(motion_id)
+    if row["samples"] is None:
+        raise InputError(
+            f"motion {motion_id}: this database was written without samples; add the record's file"
+        )
+    blob = bytes(row["samples"])
+    if hashlib.sha256(blob).hexdigest() != row["samples_sha256"] or len(blob) != 8 * row["npts"]:
+        raise DatabaseError(
+            f"motion {motion_id}: the stored samples are damaged (their sha256 differs): restore "
+            "the database from a copy; rbfrag db check lists what else is wrong"
+        )
+    return GroundMotion(
+        np.frombuffer(blob, dtype="<f8").astype(np.float64),
+        row["dt_s"],
+        station=row["station"],
+        event=row["event_name"] or row["event_id"],
+        component=row["component"],
+        orientation_deg=row["orientation_deg"],
+        is_vertical=row["is_vertical"],
+        recording=row["recording"],
+        source_file=row["source_file"],
+        trace_index=row["trace_index"],
+        file_format=row["file_format"],
+        remarks=tuple(json.loads(row["remarks"])),
+    )
+
+
+def _find(connection: Connection, motion: GroundMotion) -> RowMapping | None:
+    return (
+        connection.execute(
+            select(
+                schema.motion.c.id,
+                schema.motion.c.recording_id,
+                schema.motion.c.is_vertical,
+                schema.motion.c.source_file,
+                schema.earthquake.c.event_id,
+                schema.earthquake.c.guessed,
+            )
+            .select_from(schema.motion.join(schema.recording).join(schema.earthquake))
+            .where(
+                schema.motion.c.samples_sha256 == motion.sha256, schema.motion.c.dt_s == motion.dt_s
+            )
+        )
+        .mappings()
+        .one_or_none()
+    )
+
+
+def _measured(motion: GroundMotion) -> dict[str, Any]:
+    measures = motion.measures
+    values = {
+        "dt_s": motion.dt_s,
+        "npts": motion.npts,
+        "pga_g": measures.pga_g,
+        "pgv_m_s": measures.pgv_m_s,
+        "pgd_m": measures.pgd_m,
+        "tm_s": measures.tm_s,
+        "final_velocity_m_s": measures.final_velocity_m_s,
+        "final_displacement_m": measures.final_displacement_m,
+    }
+    for name, value in values.items():
+        if value is not None and not math.isfinite(value):
+            raise InputError(
+                f"{motion.label}: {name} is {value}: samples of up to "
+                f"{np.max(np.abs(motion.acceleration_g)):g} g are no accelerogram; check "
+                "the units"
+            )
+    return {
+        **values,
+        "samples_sha256": motion.sha256,
+        "samples": motion.acceleration_g.astype("<f8").tobytes(),
+    }
+
+
+def _own_name(motion: GroundMotion) -> str:
+    if motion.source_file:
+        return f"{motion.source_file}#{motion.trace_index}"
+    return motion.sha256[:12]
+
+
+def _recording_id_for(
+    connection: Connection, event: EarthquakeInfo, name: str, station: str
+) -> int:
+    earthquake_id = earthquake_id_for(connection, event, recording=name)
+    values = {"earthquake_id": earthquake_id, "name": name, "station": station}
+    insert_if_new(connection, schema.recording, values)
+    found: int = connection.execute(select(schema.recording.c.id).filter_by(**values)).scalar_one()
+    return found
+
+
+def _delete_orphans(connection: Connection, recording_id: int) -> None:
+    # The guess that nothing refers to any more.
+    connection.execute(
+        delete(schema.recording).where(
+            schema.recording.c.id == recording_id,
+            ~exists().where(schema.motion.c.recording_id == schema.recording.c.id),
+        )
+    )
+    connection.execute(
+        delete(schema.earthquake).where(
+            schema.earthquake.c.guessed,
+            ~exists().where(schema.recording.c.earthquake_id == schema.earthquake.c.id),
+        )
+    )
+
+
+def _refuse_contradiction(
+    motion: GroundMotion, stored: RowMapping, stated: EarthquakeInfo, is_vertical: bool
+) -> None:
+    name = motion.source_file or motion.label
+    known = f"the same samples are stored as motion {stored['id']} (from {stored['source_file']})"
+    if stored["event_id"] != stated.event_id:
+        raise InputError(
+            f"{name}: {known} of event {stored['event_id']!r}, not {stated.event_id!r}: "
+            "correct the metadata"
+        )
+    if stored["is_vertical"] != is_vertical:
+        direction = "vertical" if stored["is_vertical"] else "horizontal"
+        raise InputError(f"{name}: {known}, a {direction} component: correct the metadata")
+
+
+def _row_query() -> Select[Any]:
+    return select(
+        schema.motion.c.id,
+        schema.earthquake.c.event_id,
+        schema.earthquake.c.guessed,
+        schema.earthquake.c.name.label("event_name"),
+        schema.earthquake.c.magnitude,
+        schema.recording.c.name.label("recording"),
+        schema.recording.c.station,
+        schema.motion.c.component,
+        schema.motion.c.orientation_deg,
+        schema.motion.c.is_vertical,
+        schema.motion.c.dt_s,
+        schema.motion.c.npts,
+        schema.motion.c.pga_g,
+        schema.motion.c.pgv_m_s,
+        schema.motion.c.pgd_m,
+        schema.motion.c.tm_s,
+        schema.motion.c.final_velocity_m_s,
+        schema.motion.c.final_displacement_m,
+        schema.motion.c.source_file,
+        schema.motion.c.trace_index,
+        schema.motion.c.file_format,
+        schema.motion.c.processing,
+        schema.motion.c.samples_sha256,
+        schema.motion.c.flags,
+    ).select_from(schema.motion.join(schema.recording).join(schema.earthquake))
+
+
+def _motion_row(row: RowMapping) -> MotionRow:
+    label = " ".join(part for part in (row["station"], row["component"]) if part)
+    return MotionRow(
+        id=row["id"],
+        name=label or f"{row['source_file']}#{row['trace_index']}",
+        event_id=row["event_id"],
+        event_guessed=row["guessed"],
+        magnitude=row["magnitude"],
+        recording=row["recording"],
+        station=row["station"],
+        component=row["component"],
+        orientation_deg=row["orientation_deg"],
+        is_vertical=row["is_vertical"],
+        dt_s=row["dt_s"],
+        npts=row["npts"],
+        pga_g=row["pga_g"],
+        pgv_m_s=row["pgv_m_s"],
+        pgd_m=row["pgd_m"],
+        tm_s=row["tm_s"],
+        final_velocity_m_s=row["final_velocity_m_s"],
+        final_displacement_m=row["final_displacement_m"],
+        source_file=row["source_file"],
+        trace_index=row["trace_index"],
+        file_format=row["file_format"],
+        processing=row["processing"],
+        sha256=row["samples_sha256"],
+        flags=tuple(json.loads(row["flags"])),
+    )
+
+
+def _no_such_motion(motion_id: int) -> InputError:
+    return InputError(f"there is no motion {motion_id}: rbfrag motions list  shows the ids")

@@ -1,0 +1,190 @@
+"""One SQLite file on disk: opening, recognising it, and its errors in words.
+
+Standard library only: `rbfrag predict` reads its model through this module.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from pathlib import Path
+from urllib.parse import quote
+
+from rbfrag.db.revision import APPLICATION_ID, VERSION_TABLE, check_revision
+from rbfrag.errors import (
+    DatabaseBusyError,
+    DatabaseError,
+    DatabaseNotFoundError,
+    DatabaseReadOnlyError,
+    NotADatabaseError,
+)
+
+_MAGIC = b"SQLite format 3\x00"
+# Primary result codes; extended codes hold them in the low byte (sqlite.org/rescode.html).
+_BUSY, _LOCKED, _READONLY, _IOERR, _CORRUPT, _FULL, _CANTOPEN, _NOTADB = 5, 6, 8, 10, 11, 13, 14, 26
+
+
+def require_sqlite_file(path: Path) -> None:
+    """Check from outside that a file can be an SQLite database.
+
+    Args:
+        path: the file.
+
+    Raises:
+        DatabaseNotFoundError: there is no such file.
+        NotADatabaseError: a folder, an empty file, or content that is not SQLite's.
+        DatabaseError: the file may not be read.
+    """
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(len(_MAGIC))
+    except FileNotFoundError:
+        raise DatabaseNotFoundError(
+            f"there is no database at {path}: name another with --db, or make it with  "
+            "rbfrag motions add FILES"
+        ) from None
+    except IsADirectoryError:
+        raise NotADatabaseError(f"{path} is a folder: --db wants the database file") from None
+    except NotADirectoryError:
+        raise DatabaseNotFoundError(
+            f"there is no database at {path}: a part of that path is a file, not a folder"
+        ) from None
+    except OSError as error:
+        if path.is_dir():  # Windows answers with a permission error
+            raise NotADatabaseError(f"{path} is a folder: --db wants the database file") from None
+        raise DatabaseError(f"cannot read the database {path}: {error.strerror or error}") from None
+    if not head:
+        raise NotADatabaseError(f"{path} is empty: delete it, or name another database with --db")
+    if head != _MAGIC:
+        raise NotADatabaseError(
+            f"{path} is no database: its content is not SQLite's; name another with --db"
+        )
+
+
+def connect_sqlite(
+    path: Path, *, read_only: bool, busy_timeout_s: float = 30.0, check_same_thread: bool = True
+) -> sqlite3.Connection:
+    """Open an existing SQLite file with rbfrag's settings.
+
+    A read-only connection still opens the file for writing where it may and forbids writes
+    by `query_only`: only so does SQLite tidy up its -wal and -shm files behind the last
+    reader. Where file or folder cannot be written, a file in WAL mode can only be read as
+    `immutable`, which is safe as long as no -wal file with content lies beside it.
+
+    Args:
+        path: the file.
+        read_only: forbid writes.
+        busy_timeout_s: how long to wait for another process's lock [s].
+        check_same_thread: as for :func:`sqlite3.connect`.
+
+    Raises:
+        DatabaseError: one of its kinds, in words.
+    """
+    require_sqlite_file(path)
+    try:
+        try:
+            return _connect(path, "mode=rw", read_only, busy_timeout_s, check_same_thread)
+        except sqlite3.Error as error:
+            if not read_only or _primary_code(error) not in (_READONLY, _CANTOPEN):
+                raise
+            _refuse_unreadable_log(path)
+            return _connect(path, "mode=ro&immutable=1", True, busy_timeout_s, check_same_thread)
+    except sqlite3.Error as error:
+        raise sqlite_error_in_words(error, path) from error
+
+
+def _connect(
+    path: Path, mode: str, read_only: bool, busy_timeout_s: float, check_same_thread: bool
+) -> sqlite3.Connection:
+    uri = f"file:{quote(str(path.absolute()))}?{mode}"
+    connection = sqlite3.connect(
+        uri,
+        uri=True,
+        timeout=busy_timeout_s,
+        isolation_level=None,  # transactions are begun by hand: the module's own are half of them
+        check_same_thread=check_same_thread,
+    )
+    try:
+        # The first statement that really reads the file, and so the one that finds it unusable.
+        connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        connection.execute("PRAGMA foreign_keys = ON")
+        connection.execute("PRAGMA synchronous = FULL")
+        if read_only:
+            connection.execute("PRAGMA query_only = ON")
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+def _refuse_unreadable_log(path: Path) -> None:
+    log = path.with_name(path.name + "-wal")
+    if log.exists() and log.stat().st_size > 0:
+        raise DatabaseReadOnlyError(
+            f"{path}: newer rows are still in {log.name}, which cannot be read in a folder that "
+            "cannot be written: copy both files to another folder"
+        )
+
+
+def check_sqlite_database(connection: sqlite3.Connection, path: Path) -> None:
+    """Check from inside that an SQLite file is an rbfrag database of this schema.
+
+    Raises:
+        NotADatabaseError: another program's database.
+        SchemaVersionError: an older or newer schema.
+    """
+    try:
+        (application,) = connection.execute("PRAGMA application_id").fetchone()
+        if application != APPLICATION_ID:
+            raise NotADatabaseError(
+                f"{path} is an SQLite database, but not one of rbfrag's: name another with --db"
+            )
+        (found,) = connection.execute(
+            "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?", (VERSION_TABLE,)
+        ).fetchone()
+        row = (
+            connection.execute(f"SELECT version_num FROM {VERSION_TABLE}").fetchone()
+            if found
+            else None
+        )
+    except sqlite3.Error as error:
+        raise sqlite_error_in_words(error, path) from error
+    if row is None:
+        raise NotADatabaseError(
+            f"{path} is marked as rbfrag's but holds no schema: restore it from a copy"
+        )
+    check_revision(row[0], str(path))
+
+
+def sqlite_error_in_words(error: sqlite3.Error, path: Path | str) -> DatabaseError:
+    """Return the rbfrag error that says in words what SQLite ran into."""
+    code = _primary_code(error)
+    if code in (_BUSY, _LOCKED):
+        return DatabaseBusyError(
+            f"{path} is locked by another process: wait for it to finish and try again"
+        )
+    if code == _READONLY:
+        return DatabaseReadOnlyError(
+            f"{path} cannot be written: make the file and its folder writable, or copy the "
+            "database elsewhere and name it with --db"
+        )
+    if code == _CANTOPEN:
+        return DatabaseReadOnlyError(
+            f"{path} cannot be opened: its folder must be writable and hold the file ({error})"
+        )
+    if code == _FULL:
+        return DatabaseError(f"{path} cannot grow: the disk is full; what was finished is kept")
+    if code == _NOTADB:
+        return NotADatabaseError(f"{path} is no SQLite database: name another with --db")
+    if code == _CORRUPT:
+        return DatabaseError(
+            f"{path} is damaged ({error}): run  rbfrag db check  and restore it from a copy"
+        )
+    if code == _IOERR:
+        return DatabaseError(f"{path} cannot be read or written: {error}; check the disk")
+    return DatabaseError(f"{path}: the database refused: {error}")
+
+
+def _primary_code(error: sqlite3.Error) -> int | None:
+    # Errors that the sqlite3 module raises by itself carry no code.
+    code: int | None = getattr(error, "sqlite_errorcode", None)
+    return None if code is None else code & 0xFF

@@ -1,0 +1,38 @@
+"""Run by Alembic: migrate over the connection that rbfrag hands it.
+
+Developers run Alembic themselves to write a new migration; then ``-x db=PATH`` names
+the database that the schema is compared with.
+"""
+
+from __future__ import annotations
+
+from alembic import context
+from sqlalchemy import Connection
+
+from rbfrag.db.engine import unchecked_engine
+from rbfrag.db.location import locate
+from rbfrag.db.revision import VERSION_TABLE
+from rbfrag.db.schema import metadata
+
+
+def _run(connection: Connection) -> None:
+    context.configure(
+        connection=connection,
+        target_metadata=metadata,
+        version_table=VERSION_TABLE,
+        # SQLite can alter little: Alembic then rebuilds the table.
+        render_as_batch=connection.dialect.name == "sqlite",
+        # One transaction for everything: a killed upgrade leaves the old schema.
+        transactional_ddl=True,
+    )
+    with context.begin_transaction():
+        context.run_migrations()
+
+
+_given: Connection | None = context.config.attributes.get("connection")
+if _given is not None:
+    _run(_given)
+else:
+    _place = locate(context.get_x_argument(as_dictionary=True).get("db"))
+    with unchecked_engine(_place, foreign_keys=False).begin() as _connection:
+        _run(_connection)
