@@ -1,0 +1,72 @@
+"""Seismic fragility of rock blocks.
+
+Accelerations are in g, velocities in m/s, displacements in m, times in s, p2 in 1/s²,
+angles in degrees wherever a name ends in ``_deg``. Names are loaded when first used, so
+that ``import rbfrag`` itself costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from rbfrag.version import __version__
+
+if TYPE_CHECKING:
+    from rbfrag.campaign.add_motions import add_motions as add_motions
+    from rbfrag.campaign.simulate import simulate as simulate
+    from rbfrag.errors import DatabaseError as DatabaseError
+    from rbfrag.errors import FitError as FitError
+    from rbfrag.errors import InputError as InputError
+    from rbfrag.errors import MotionFileError as MotionFileError
+    from rbfrag.errors import RbfragError as RbfragError
+    from rbfrag.errors import UnknownModelError as UnknownModelError
+    from rbfrag.errors import WorkFailedError as WorkFailedError
+    from rbfrag.fragility.fitting import fit as fit
+    from rbfrag.fragility.prediction import predict as predict
+    from rbfrag.motions.ground_motion import GroundMotion as GroundMotion
+    from rbfrag.motions.recognise import read_motions as read_motions
+    from rbfrag.solver.critical import critical as critical
+    from rbfrag.solver.respond import respond as respond
+    from rbfrag.solver.results import CriticalResult as CriticalResult
+    from rbfrag.solver.results import Outcome as Outcome
+    from rbfrag.solver.results import Response as Response
+
+_HOME = {
+    "CriticalResult": "rbfrag.solver.results",
+    "DatabaseError": "rbfrag.errors",
+    "FitError": "rbfrag.errors",
+    "GroundMotion": "rbfrag.motions.ground_motion",
+    "InputError": "rbfrag.errors",
+    "MotionFileError": "rbfrag.errors",
+    "Outcome": "rbfrag.solver.results",
+    "RbfragError": "rbfrag.errors",
+    "Response": "rbfrag.solver.results",
+    "UnknownModelError": "rbfrag.errors",
+    "WorkFailedError": "rbfrag.errors",
+    "add_motions": "rbfrag.campaign.add_motions",
+    "critical": "rbfrag.solver.critical",
+    "fit": "rbfrag.fragility.fitting",
+    "predict": "rbfrag.fragility.prediction",
+    "read_motions": "rbfrag.motions.recognise",
+    "respond": "rbfrag.solver.respond",
+    "simulate": "rbfrag.campaign.simulate",
+}
+
+__all__ = [*sorted(_HOME), "__version__"]
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name when it is first used (PEP 562)."""
+    try:
+        home = _HOME[name]
+    except KeyError:
+        raise AttributeError(f"module 'rbfrag' has no attribute {name!r}") from None
+    value = getattr(import_module(home), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return __all__

@@ -1,0 +1,50 @@
+"""`rbfrag critical`: the strongest block that a motion topples."""
+
+from __future__ import annotations
+
+from rbfrag.cli import options
+from rbfrag.cli.motion_argument import find_motion
+from rbfrag.cli.output import print_json, print_pairs, print_warnings
+
+EXAMPLE = "Example:  rbfrag critical record.AT2 --p2 3 --json"
+
+STATUS = {
+    "found": "the largest k_r/PGA that topples lies in [lower, upper]",
+    "below_limit": "no block down to the search limit topples",
+    "no_motion": "no block down to the search limit ever lifts off its base",
+    "outside_model": "the motion throws the block off its base",
+}
+
+
+def critical(
+    motion: options.Motion,
+    p2: options.P2,
+    vertical: options.Vertical = None,
+    reverse: options.Reverse = False,
+    linear: options.Linear = False,
+    units: options.Units = None,
+    dt: options.Dt = None,
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Find the largest k_r/PGA that one accelerogram topples, with its bracket."""
+    from rbfrag.solver.critical import critical as search
+    from rbfrag.solver.critical_report import as_dict
+
+    ground = find_motion(motion, db=db, units=units, dt_s=dt)
+    upward = find_motion(vertical, db=db, units=units, dt_s=dt) if vertical else None
+    result = search(
+        ground,
+        p2=p2,
+        vertical=upward,
+        polarity="reverse" if reverse else "forward",
+        linear=linear,
+    )
+    answer = as_dict(result)
+    if json:
+        print_json(answer)
+        return
+    answer.pop("warnings")
+    print_pairs(answer)
+    print(f"{result.status}: {STATUS[result.status]}")
+    print_warnings(result.warnings)

@@ -1,0 +1,92 @@
+"""Options that several commands share, with one wording each."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+Json = Annotated[
+    bool, typer.Option("--json", help="Print one JSON document on standard output, nothing else.")
+]
+
+Db = Annotated[
+    str | None,
+    typer.Option(
+        "--db",
+        metavar="URL",
+        help="Database: a path or an SQLAlchemy URL. Default: RBFRAG_DB, else rbfrag.db in the "
+        "current folder.",
+        show_default=False,
+    ),
+]
+
+Motion = Annotated[
+    str,
+    typer.Argument(
+        metavar="MOTION",
+        help="Accelerogram: a file, FILE#INDEX for one trace of several, or a database id.",
+        show_default=False,
+    ),
+]
+
+Vertical = Annotated[
+    str | None,
+    typer.Option(
+        "--vertical",
+        metavar="MOTION",
+        help="Vertical accelerogram of the same recording, upward positive.",
+        show_default=False,
+    ),
+]
+
+Reverse = Annotated[
+    bool,
+    typer.Option("--reverse", help="Positive samples drive backward: k_h(t) = -a(t)."),
+]
+
+P2 = Annotated[
+    float,
+    typer.Option("--p2", help="Frequency parameter p² of the block [1/s²].", show_default=False),
+]
+
+Kr = Annotated[
+    float,
+    typer.Option(
+        "--kr",
+        help="Rocking acceleration coefficient k_r = tan(critical angle) [g].",
+        show_default=False,
+    ),
+]
+
+Linear = Annotated[
+    bool,
+    typer.Option(
+        "--linear",
+        help="Linear model, for verification against closed forms only; k_r is then the "
+        "critical angle in radians.",
+    ),
+]
+
+Units = Annotated[
+    str | None,
+    typer.Option(
+        "--units",
+        help="Unit of acceleration of a text file that does not state it: g, m/s2, cm/s2 or mm/s2.",
+        show_default=False,
+    ),
+]
+
+Dt = Annotated[
+    float | None,
+    typer.Option(
+        "--dt",
+        help="Sampling interval [s] of a text file that holds accelerations only.",
+        show_default=False,
+    ),
+]
+
+Suite = Annotated[
+    str | None,
+    typer.Option("--suite", help="Only the motions of this suite.", show_default=False),
+]

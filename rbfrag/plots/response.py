@@ -1,0 +1,129 @@
+"""The response plot: acceleration against k_r(theta), and theta over the critical angle."""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rbfrag.errors import InputError
+from rbfrag.plots.canvas import new_figure, save_figure
+from rbfrag.solver.results import Outcome, Response
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+GROUND = "#7f7f7f"
+STRENGTH = "#c44e52"
+BLOCK = "#1f4e79"
+
+QUIET_BEFORE_S = 1.0
+QUIET_AFTER_S = 2.0
+
+
+def plot_response(
+    response: Response,
+    path: str | os.PathLike[str],
+    *,
+    p2: float,
+    kr: float,
+    linear: bool = False,
+    reverse: bool = False,
+    title: str = "",
+) -> None:
+    """Draw one response as the dissertation reads it and write it to `path`.
+
+    The upper panel shows the driving acceleration k_h/(1 + k_v) against the strength left
+    at the present rotation, k_r(theta) = tan(theta_c - theta): the block accelerates
+    forward where the first is above the second. The lower panel shows theta/theta_c, where
+    1 is the point of balance.
+
+    Args:
+        response: a response asked for with its history.
+        path: .png, .pdf or .svg.
+        p2: the block's p² [1/s²], for the title.
+        kr: the block's k_r, for the title.
+        linear: the linear model was run.
+        reverse: polarity was reversed, for the title.
+        title: name of the motion.
+
+    Raises:
+        InputError: no history, an unknown suffix, a folder that cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    history = response.history
+    if history is None:
+        raise InputError("this response holds no history: ask for it with history=True")
+    theta_c = math.radians(response.critical_angle_deg)
+    ratio = history.theta_rad / theta_c
+    remaining = theta_c - history.theta_rad
+    # tan runs away beyond 90 degrees past balance, where strength means nothing any more
+    strength = remaining if linear else np.tan(np.clip(remaining, -1.4, 1.4))
+    drive = history.k_h / (1.0 + history.k_v)
+
+    figure = new_figure(width_in=7.5, height_in=5.6)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.25, 1.0])
+    upper.plot(history.time_s, drive, color=GROUND, lw=0.7, label="ground: $k_h/(1+k_v)$")
+    upper.plot(
+        history.time_s, strength, color=STRENGTH, lw=1.3,
+        label=r"block: $k_r(\theta)=\tan(\theta_c-\theta)$" if not linear
+        else r"block: $\theta_c-\theta$ (linear)",
+    )  # fmt: skip
+    top = 1.15 * max(float(np.abs(drive).max()), kr)
+    upper.set_ylim(-top, top)
+    upper.axhline(0.0, color="black", lw=0.5)
+    upper.set_ylabel("acceleration [g]")
+    upper.legend(loc="upper right", fontsize=8, ncols=2, framealpha=0.9)
+
+    lower.plot(history.time_s, ratio, color=BLOCK, lw=1.3)
+    lower.axhline(1.0, color=STRENGTH, lw=0.8, ls="--")
+    lower.set_ylabel(r"rotation $\theta/\theta_c$")
+    lower.set_xlabel("time [s]")
+    tallest = float(ratio.max(initial=0.0))
+    lower.set_ylim(-0.05 * max(1.0, min(tallest, 2.0)), 1.15 * max(1.0, min(tallest, 2.0)))
+    lower.annotate(
+        "balance", (0.005, 1.0), xycoords=("axes fraction", "data"), va="bottom", fontsize=8,
+        color=STRENGTH,
+    )  # fmt: skip
+    if response.toppled_s is not None:
+        for axes in (upper, lower):
+            axes.axvline(response.toppled_s, color="black", lw=0.8, ls=":")
+        lower.annotate(
+            f"toppling inevitable at {response.toppled_s:.2f} s",
+            (response.toppled_s, 0.97), xycoords=("data", "axes fraction"), rotation=90,
+            ha="right", va="top", fontsize=8,
+        )  # fmt: skip
+    lower.set_xlim(*_window(history.time_s, ratio, response))
+    for axes in (upper, lower):
+        axes.grid(visible=True, lw=0.3, alpha=0.6)
+    polarity = ", reversed" if reverse else ""
+    figure.suptitle(f"{title}{polarity}\n{_verdict(response, p2, kr)}", fontsize=10)
+    save_figure(figure, path)
+
+
+def _window(
+    time_s: NDArray[np.float64], ratio: NDArray[np.float64], response: Response
+) -> tuple[float, float]:
+    """Show the whole motion of the block with a little rest on both sides."""
+    if response.started_s is None:
+        return float(time_s[0]), float(max(time_s[-1], time_s[0] + 1e-3))
+    first = response.started_s - QUIET_BEFORE_S
+    moving = time_s[ratio > 0.0]
+    last = float(moving[-1]) if moving.size else response.started_s
+    beyond = time_s[ratio > 2.0]
+    if response.toppled_s is not None and beyond.size:
+        last = max(float(beyond[0]), response.toppled_s)
+    return float(first), last + QUIET_AFTER_S
+
+
+def _verdict(response: Response, p2: float, kr: float) -> str:
+    block = f"block $p^2$ = {p2:g} s$^{{-2}}$, $k_r$ = {kr:g}"
+    if response.outcome is Outcome.TOPPLED:
+        return f"{block}: topples"
+    if response.peak_theta_n is None:
+        return f"{block}: {response.outcome.value}"
+    if response.started_s is None:
+        return f"{block}: never lifts off its base"
+    return f"{block}: stays, peak rotation {response.peak_theta_n:.3g} of the critical angle"

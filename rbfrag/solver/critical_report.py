@@ -1,0 +1,31 @@
+"""A critical result as scripts read it: a dictionary of plain values."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rbfrag.solver.results import CriticalResult
+
+
+def as_dict(result: CriticalResult) -> dict[str, Any]:
+    """Return the answer with the keys of the JSON contract."""
+    return {
+        "kr_over_pga": result.kr_over_pga,
+        "lower": result.lower,
+        "upper": result.upper,
+        "kr": result.kr,
+        "y_m_s": result.y_m_s,
+        "status": result.status,
+        "search_limit": result.search_limit,
+        "certified": result.certified,
+        "k_up_over_pga": result.k_up_over_pga,
+        "undecided": result.undecided,
+        "island_width": result.island_width,
+        "kr_over_pga_resolved": result.kr_over_pga_resolved,
+        "reentrant": result.reentrant,
+        "n_runs": result.n_runs,
+        "p2": result.p2,
+        "polarity": result.polarity,
+        "pga_g": result.pga_g,
+        "warnings": list(result.warnings),
+    }
