@@ -1,0 +1,119 @@
+"""Intensity terms: what the shaking is measured by, in m/s.
+
+Each is pure arithmetic on single numbers or arrays and loads no library.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.functions import Functions, N
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+
+@dataclass(frozen=True)
+class Term:
+    """One intensity term.
+
+    Args:
+        name: name in options and in the database.
+        title: name for people.
+        symbol: symbol of the nomenclature.
+        inputs: measures of the motion it needs, as named in `predict`; the first one says
+            how strong the shaking is, and is zero when there is none.
+        formula: the term from its inputs, in the order of `inputs`.
+        variance_degree: degree of the dissertation's variance polynomial in this term.
+    """
+
+    name: str
+    title: str
+    symbol: str
+    inputs: tuple[str, ...]
+    formula: Callable[..., Any]
+    variance_degree: int
+
+    @property
+    def label(self) -> str:
+        """Axis label with the unit."""
+        return f"{self.title}, {self.symbol} [m/s]"
+
+    def intensity_m_s(self, measures: Mapping[str, N]) -> N:
+        """Return the term [m/s] from measures by name (more than it needs may be given)."""
+        result: N = self.formula(*(measures[name] for name in self.inputs))
+        return result
+
+
+def toppling_velocity_m_s(p2: N, kr: N, functions: Functions[N]) -> N:
+    """Return a block's toppling velocity y = k_r g/p [m/s].
+
+    Args:
+        p2: frequency parameter p² [1/s²].
+        kr: toppling yield acceleration coefficient at rest [-].
+        functions: functions for the kind of number given.
+
+    Equation (4.30) of the dissertation with M = 1.
+    """
+    return kr * STANDARD_GRAVITY_M_S2 / functions.sqrt(p2)
+
+
+def pgv_m_s(pgv_m_s: N) -> N:
+    """Return the peak ground velocity [m/s] itself."""
+    return pgv_m_s
+
+
+def pga_tm_m_s(pga_g: N, tm_s: N) -> N:
+    """Return PGA·g·Tm/2π [m/s] from PGA [g] and the mean period [s] (equation 4.31)."""
+    return pga_g * STANDARD_GRAVITY_M_S2 * tm_s / (2.0 * math.pi)
+
+
+def pgd_tm_m_s(pgd_m: N, tm_s: N) -> N:
+    """Return 2π·PGD/Tm [m/s] from PGD [m] and the mean period [s] (equation 4.31)."""
+    return pgd_m * (2.0 * math.pi) / tm_s
+
+
+TERMS: Mapping[str, Term] = {
+    term.name: term
+    for term in (
+        Term("pgv", "peak ground velocity", "PGV", ("pgv_m_s",), pgv_m_s, 1),
+        Term(
+            "pga_tm",
+            "peak ground acceleration over mean frequency",
+            "PGA·g·Tm/2π",
+            ("pga_g", "tm_s"),
+            pga_tm_m_s,
+            1,
+        ),
+        Term(
+            "pgd_tm",
+            "peak ground displacement times mean frequency",
+            "2π·PGD/Tm",
+            ("pgd_m", "tm_s"),
+            pgd_tm_m_s,
+            2,
+        ),
+    )
+}
+"""The terms by name, the one that predicts best first (physics: PGV, PGA·Tm, PGD/Tm)."""
+
+
+def intensity_term(name: str) -> Term:
+    """Return the term of that name.
+
+    Raises:
+        InputError: there is none.
+    """
+    try:
+        return TERMS[name]
+    except KeyError:
+        raise InputError(
+            f"unknown intensity term {name!r}: use one of {', '.join(TERMS)}"
+        ) from None
+
+
+def terms_from(given: Collection[str]) -> tuple[str, ...]:
+    """Return the names of the terms that the given measures suffice for, best first."""
+    return tuple(name for name, term in TERMS.items() if set(term.inputs) <= set(given))
