@@ -20,6 +20,7 @@ __all__ = [
     "finish_campaign",
     "insert_combination",
     "known_keys",
+    "known_statuses",
     "start_campaign",
 ]
 
@@ -58,16 +59,27 @@ def finish_campaign(connection: Connection, campaign_id: int) -> None:
     )
 
 
-def known_keys(connection: Connection, keys: Iterable[str]) -> set[str]:
-    """Return those natural keys whose combinations are stored already."""
+def known_statuses(connection: Connection, keys: Iterable[str]) -> dict[str, str]:
+    """Return the status of each combination that is stored already, by natural key.
+
+    Args:
+        connection: the database.
+        keys: the natural keys asked about; those that are not stored are left out.
+    """
     wanted = list(dict.fromkeys(keys))
-    query = select(combination.c.natural_key).where(
+    query = select(combination.c.natural_key, combination.c.status).where(
         combination.c.natural_key.in_(bindparam("keys", expanding=True))
     )
-    found: set[str] = set()
+    found: dict[str, str] = {}
     for start in range(0, len(wanted), _KEYS_AT_ONCE):
-        found.update(connection.scalars(query, {"keys": wanted[start : start + _KEYS_AT_ONCE]}))
+        some = {"keys": wanted[start : start + _KEYS_AT_ONCE]}
+        found.update(connection.execute(query, some).tuples().all())
     return found
+
+
+def known_keys(connection: Connection, keys: Iterable[str]) -> set[str]:
+    """Return those natural keys whose combinations are stored already."""
+    return set(known_statuses(connection, keys))
 
 
 def insert_combination(
@@ -160,5 +172,5 @@ def _simulation_rows(combination_id: int, points: SearchPoints) -> list[dict[str
 
 
 def _number(value: float | None) -> float | None:
-    # numpy's scalars are not all understood by the database drivers
-    return None if value is None else float(value)
+    # Drivers do not all understand numpy's scalars, and databases disagree about NaN.
+    return None if value is None or math.isnan(value) else float(value)

@@ -1,0 +1,128 @@
+"""What a database says, apart from when and in which order it was written.
+
+Equal databases in the sense used here: the same rows by natural key, row ids, times and
+campaigns left out. A campaign that was killed and run again ends equal to one that was not.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from typing import Any
+
+from sqlalchemy import Connection, Select, select
+
+from rbfrag.db.schema import (
+    combination,
+    earthquake,
+    fragility_model,
+    motion,
+    outcome_interval,
+    recording,
+    response,
+    simulation,
+    suite,
+    suite_motion,
+    toppling_spectrum,
+)
+
+# When, by which run and under which row number something was written.
+_INCIDENTAL = {"id", "campaign_id", "added", "created"}
+
+_motion_key = (motion.c.samples_sha256, motion.c.dt_s)
+_vertical = motion.alias("vertical")
+
+
+def content_digest(connection: Connection) -> str:
+    """Return a hash that is the same for equal databases.
+
+    Args:
+        connection: the database, inside one transaction, so that no table changes meanwhile.
+    """
+    digest = hashlib.sha256()
+    for table in _QUERIES:
+        digest.update(f"table {table}\n".encode())
+        for row in table_rows_by_natural_key(connection, table):
+            digest.update(repr(row).encode())
+            digest.update(b"\n")
+    return digest.hexdigest()
+
+
+def table_rows_by_natural_key(connection: Connection, table: str) -> Iterator[tuple[object, ...]]:
+    """Yield a table's rows sorted by natural key, what is incidental left out.
+
+    Args:
+        connection: the database.
+        table: one of :data:`CONTENT_TABLES`.
+
+    Returns:
+        Tuples that start with the natural key; BLOBs as their sha256.
+    """
+    rows = (tuple(map(_plain, row)) for row in connection.execute(_QUERIES[table]))
+    # Sorted here: two databases may not agree on how text sorts.
+    yield from sorted(rows, key=repr)
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, bytes | memoryview):
+        return hashlib.sha256(value).hexdigest()
+    return value
+
+
+def _own(table: Any, *without: str) -> list[Any]:
+    skipped = _INCIDENTAL.union(without)
+    return [column for column in table.c if column.name not in skipped]
+
+
+def _queries() -> dict[str, Select[Any]]:
+    event_key = (earthquake.c.event_id, earthquake.c.guessed)
+    combination_key = combination.c.natural_key
+    with_vertical = (
+        combination.join(motion, motion.c.id == combination.c.motion_id),
+        response.join(motion, motion.c.id == response.c.motion_id),
+    )
+    labelled = {
+        table: select(
+            table.c.natural_key,
+            *_motion_key,
+            _vertical.c.samples_sha256,
+            _vertical.c.dt_s,
+            *_own(table, "natural_key", "motion_id", "vertical_motion_id"),
+        ).select_from(joined.outerjoin(_vertical, _vertical.c.id == table.c.vertical_motion_id))
+        for table, joined in zip((combination, response), with_vertical, strict=True)
+    }
+    return {
+        "earthquake": select(*_own(earthquake)),
+        "recording": select(*event_key, *_own(recording, "earthquake_id")).select_from(
+            recording.join(earthquake)
+        ),
+        "motion": select(
+            *_motion_key,
+            *event_key,
+            recording.c.name,
+            recording.c.station,
+            *_own(motion, "recording_id", "samples_sha256", "dt_s"),
+        ).select_from(motion.join(recording).join(earthquake)),
+        "suite": select(*_own(suite)),
+        "suite_motion": select(suite.c.name, *_motion_key).select_from(
+            suite_motion.join(suite).join(motion)
+        ),
+        "toppling_spectrum": select(
+            *_motion_key, *_own(toppling_spectrum, "motion_id")
+        ).select_from(toppling_spectrum.join(motion)),
+        "combination": labelled[combination],
+        "outcome_interval": select(
+            combination_key, *_own(outcome_interval, "combination_id")
+        ).select_from(outcome_interval.join(combination)),
+        "simulation": select(combination_key, *_own(simulation, "combination_id")).select_from(
+            simulation.join(combination)
+        ),
+        "response": labelled[response],
+        "fragility_model": select(*_own(fragility_model)),
+    }
+
+
+_QUERIES = _queries()
+
+CONTENT_TABLES = tuple(_QUERIES)
+"""The tables that make databases equal or not."""

@@ -1,0 +1,103 @@
+"""Writing and reading fitted models."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sqlalchemy import Connection, Select, delete, insert, select, update
+
+from rbfrag.db.clock import utc_now
+from rbfrag.db.engine import database_label
+from rbfrag.db.model_record import COLUMNS, decode_model, encode_model, unknown_model
+from rbfrag.db.rows import ModelRow
+from rbfrag.db.schema import fragility_model
+from rbfrag.errors import InputError, UnknownModelError
+
+
+def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) -> ModelRow:
+    """Store a fitted model.
+
+    The first model of a database becomes its default; a later one only when it asks to be.
+    A model that is replaced passes its being the default on.
+
+    Args:
+        connection: inside the caller's transaction.
+        row: the model; without a time of creation it is now.
+        replace: overwrite a model of the same name.
+
+    Returns:
+        The model as stored.
+
+    Raises:
+        InputError: there is a model of that name already; a value that cannot be stored.
+    """
+    values = encode_model(row)
+    values["created"] = row.created or utc_now()
+    query = select(fragility_model.c.name, fragility_model.c.is_default)
+    defaults: dict[str, bool] = dict(connection.execute(query).tuples().all())
+    if row.name in defaults and not replace:
+        raise InputError(
+            f"there is a model {row.name!r} already: give another --name, or replace it with "
+            "--replace"
+        )
+    values["is_default"] = row.is_default or defaults.get(row.name, False) or not defaults
+    if values["is_default"]:
+        _clear_default(connection)
+    connection.execute(delete(fragility_model).where(fragility_model.c.name == row.name))
+    connection.execute(insert(fragility_model).values(**values))
+    return load_model(connection, row.name)
+
+
+def model_rows(connection: Connection) -> list[ModelRow]:
+    """Return all models, sorted by name."""
+    rows = [decode_model(row) for row in connection.execute(_model_query())]
+    return sorted(rows, key=lambda model: model.name)
+
+
+def load_model(connection: Connection, name: str | None = None) -> ModelRow:
+    """Return one model.
+
+    Args:
+        connection: the database.
+        name: its name; None for the default.
+
+    Raises:
+        UnknownModelError: there is none; the message lists the names there are.
+    """
+    query = _model_query()
+    if name is None:
+        query = query.where(fragility_model.c.is_default)
+    else:
+        query = query.where(fragility_model.c.name == name)
+    row = connection.execute(query).one_or_none()
+    if row is None:
+        raise _unknown(connection, name)
+    return decode_model(row)
+
+
+def set_default(connection: Connection, name: str) -> None:
+    """Make a model the one that answers when none is named.
+
+    Raises:
+        UnknownModelError: there is none of that name.
+    """
+    load_model(connection, name)
+    _clear_default(connection)
+    connection.execute(
+        update(fragility_model).where(fragility_model.c.name == name).values(is_default=True)
+    )
+
+
+def _clear_default(connection: Connection) -> None:
+    connection.execute(
+        update(fragility_model).where(fragility_model.c.is_default).values(is_default=False)
+    )
+
+
+def _model_query() -> Select[Any]:
+    return select(*(fragility_model.c[column] for column in COLUMNS))
+
+
+def _unknown(connection: Connection, name: str | None) -> UnknownModelError:
+    known = sorted(connection.scalars(select(fragility_model.c.name)))
+    return UnknownModelError(unknown_model(name, known, database_label(connection.engine.url)))

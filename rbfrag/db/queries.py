@@ -1,0 +1,192 @@
+"""The named queries: what the fits and the reports read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from sqlalchemy import Connection, Select, and_, func, select
+
+from rbfrag.db.revision import SCHEMA_REVISION
+from rbfrag.db.rows import CombinationTable
+from rbfrag.db.schema import (
+    combination,
+    earthquake,
+    fragility_model,
+    metadata,
+    motion,
+    recording,
+    simulation,
+    suite_motion,
+)
+from rbfrag.db.suite_store import require_suite
+from rbfrag.errors import InputError
+from rbfrag.solver.results import NUMERICS_VERSION, SearchPoints
+
+Vertical = Literal["without", "with", "both"]
+
+
+@dataclass(frozen=True)
+class DatabaseInfo:
+    """What a database holds.
+
+    Args:
+        revision: its schema.
+        dialect: ``sqlite`` or ``postgresql``.
+        rows: number of rows by table.
+        combinations_by_status: number of combinations by status.
+        numerics_versions: versions of the solver that made its combinations.
+        default_model: name of the model that answers when none is named, if there is one.
+    """
+
+    revision: str
+    dialect: str
+    rows: dict[str, int]
+    combinations_by_status: dict[str, int]
+    numerics_versions: tuple[str, ...]
+    default_model: str | None
+
+
+def combination_table(
+    connection: Connection,
+    *,
+    suite: str | None = None,
+    vertical: Vertical = "without",
+    kind: str = "toppling",
+    numerics_version: str = NUMERICS_VERSION,
+) -> CombinationTable:
+    """Return the critical values of the non-linear model with their motions' intensity.
+
+    A pair of motion, polarity and p² appears once, though several campaigns may have searched
+    it with different settings: the search that went lowest counts (of equals, the one of the
+    smaller natural key). Versions of the numerics never mix.
+
+    Args:
+        connection: the database.
+        suite: only motions of this suite.
+        vertical: ``without`` vertical motion, ``with`` it, or ``both``.
+        kind: response kind.
+        numerics_version: of the solver.
+
+    Returns:
+        Columns of equal length, sorted by natural key: equal databases give equal tables.
+
+    Raises:
+        InputError: there is no such suite; `vertical` is none of the three.
+    """
+    if vertical not in ("without", "with", "both"):
+        raise InputError(f"vertical must be without, with or both, not {vertical!r}")
+    query = _combination_query().where(
+        combination.c.kind == kind,
+        combination.c.numerics_version == numerics_version,
+        combination.c.linear.is_(False),
+    )
+    if vertical != "both":
+        column = combination.c.vertical_motion_id
+        query = query.where(column.is_(None) if vertical == "without" else column.is_not(None))
+    if suite is not None:
+        suite_id = require_suite(connection, suite)
+        query = query.join(
+            suite_motion,
+            and_(suite_motion.c.motion_id == motion.c.id, suite_motion.c.suite_id == suite_id),
+        )
+    order = (combination.c.search_limit, combination.c.natural_key)
+    rows: dict[tuple[Any, ...], Any] = {}
+    for row in connection.execute(query.order_by(*order)).mappings():
+        pair = (row["motion_id"], row["vertical_motion_id"], row["polarity"], row["p2"])
+        rows.setdefault(pair, row)
+    kept = sorted(rows.values(), key=lambda row: str(row["natural_key"]))
+
+    def floats(name: str) -> Any:
+        return np.array([np.nan if r[name] is None else r[name] for r in kept], dtype=np.float64)
+
+    def objects(name: str) -> Any:
+        column = np.empty(len(kept), dtype=object)
+        column[:] = [row[name] for row in kept]
+        return column
+
+    return CombinationTable(
+        combination_id=np.array([row["id"] for row in kept], dtype=np.int64),
+        motion_id=np.array([row["motion_id"] for row in kept], dtype=np.int64),
+        event_id=objects("event_id"),
+        event_guessed=np.array([row["guessed"] for row in kept], dtype=np.bool_),
+        polarity=objects("polarity"),
+        p2=floats("p2"),
+        status=objects("status"),
+        search_limit=floats("search_limit"),
+        kr_over_pga=floats("kr_over_pga"),
+        kr=floats("kr"),
+        y_m_s=floats("y_m_s"),
+        pga_g=floats("pga_g"),
+        pgv_m_s=floats("pgv_m_s"),
+        pgd_m=floats("pgd_m"),
+        tm_s=floats("tm_s"),
+        natural_key=objects("natural_key"),
+    )
+
+
+def simulation_points(connection: Connection, combination_id: int) -> SearchPoints:
+    """Return every simulated point of a combination, by falling k_r/PGA.
+
+    Raises:
+        InputError: there is no combination of that id.
+    """
+    known = connection.scalar(select(combination.c.id).where(combination.c.id == combination_id))
+    if known is None:
+        raise InputError(f"there is no combination {combination_id} in the database")
+    rows = connection.execute(
+        select(simulation.c.kr_over_pga, simulation.c.theta_n, simulation.c.outcome)
+        .where(simulation.c.combination_id == combination_id)
+        .order_by(simulation.c.kr_over_pga.desc())
+    ).all()
+    return SearchPoints(
+        kr_over_pga=np.array([k for k, _, _ in rows], dtype=np.float64),
+        theta_n=np.array([np.nan if t is None else t for _, t, _ in rows], dtype=np.float64),
+        outcome=tuple(outcome for _, _, outcome in rows),
+    )
+
+
+def database_info(connection: Connection) -> DatabaseInfo:
+    """Return what the database holds, counted."""
+    by_status = select(combination.c.status, func.count()).group_by(combination.c.status)
+    versions = select(combination.c.numerics_version).distinct()
+    return DatabaseInfo(
+        revision=SCHEMA_REVISION,  # opening refuses any other
+        dialect=connection.dialect.name,
+        rows={
+            name: int(connection.scalar(select(func.count()).select_from(table)) or 0)
+            for name, table in sorted(metadata.tables.items())
+        },
+        combinations_by_status=dict(sorted(connection.execute(by_status).tuples())),
+        numerics_versions=tuple(sorted(connection.scalars(versions))),
+        default_model=connection.scalar(
+            select(fragility_model.c.name).where(fragility_model.c.is_default)
+        ),
+    )
+
+
+def _combination_query() -> Select[Any]:
+    return select(
+        combination.c.id,
+        combination.c.natural_key,
+        combination.c.motion_id,
+        combination.c.vertical_motion_id,
+        combination.c.polarity,
+        combination.c.p2,
+        combination.c.status,
+        combination.c.search_limit,
+        combination.c.kr_over_pga,
+        combination.c.kr,
+        combination.c.y_m_s,
+        motion.c.pga_g,
+        motion.c.pgv_m_s,
+        motion.c.pgd_m,
+        motion.c.tm_s,
+        earthquake.c.event_id,
+        earthquake.c.guessed,
+    ).select_from(
+        combination.join(motion, motion.c.id == combination.c.motion_id)
+        .join(recording)
+        .join(earthquake)
+    )
