@@ -21,6 +21,8 @@ from rbfrag.fragility.wls_method import MethodResult, fit_wls
 if TYPE_CHECKING:
     from sqlalchemy import Connection
 
+    from rbfrag.db.queries import Vertical
+
 METHODS: Mapping[str, Callable[..., MethodResult]] = {"wls": fit_wls}
 """The methods of fitting: ``method(data, term, seed=…)``."""
 
@@ -32,7 +34,7 @@ def fit(
     method: str = "wls",
     suite: str | None = None,
     name: str | None = None,
-    vertical: str = "without",
+    vertical: Vertical = "without",
     seed: int = 0,
 ) -> FitReport:
     """Fit a fragility model; nothing is stored.

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from os import PathLike
 from pathlib import Path
 
 from rbfrag.db.location import locate
+from rbfrag.db.model_record import unknown_model
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.fragility.model import FragilityModel
@@ -34,13 +35,8 @@ def find_model(
         DatabaseError: the database cannot be read.
     """
     measures = [name for name in given if name not in _BLOCK]
-    if not terms_from(measures):
-        raise InputError(
-            f"{_known(measures)} does not suffice for any model: give "
-            f"{', or '.join(' and '.join(term.inputs) for term in TERMS.values())}"
-        )
     if model is None:
-        return _suited(_stored(db), measures)
+        return _suited(db, measures)
     if isinstance(model, str):
         model = _named(model, db)
     chosen = model if isinstance(model, FragilityModel) else FragilityModel.from_row(model)
@@ -50,32 +46,37 @@ def find_model(
 
 
 def _known(measures: Collection[str]) -> str:
-    return " and ".join(measures) or "nothing about the motion, which"
+    return " and ".join(measures) or "nothing about the motion"
 
 
 def _wanting(model: FragilityModel, measures: Collection[str]) -> str:
     return (
         f"model {model.name!r} needs {' and '.join(model.term.inputs)} "
-        f"({model.term.title}); given is {' and '.join(measures)}: give what it needs, or "
+        f"({model.term.title}); given is {_known(measures)}: give what it needs, or "
         "choose a model of another term"
     )
 
 
-def _suited(rows: Sequence[ModelRow], measures: Collection[str]) -> FragilityModel:
+def _suited(db: str | PathLike[str] | None, measures: Collection[str]) -> FragilityModel:
+    possible = terms_from(measures)
+    if not possible:
+        wanted = ", or ".join(" and ".join(term.inputs) for term in TERMS.values())
+        raise InputError(f"{_known(measures)} is given: a prediction needs {wanted}")
+    rows = _stored(db)
     if not rows:
-        raise UnknownModelError("the database holds no fitted model yet: make one with  rbfrag fit")
-    by_preference = sorted(rows, key=lambda row: not row.is_default)
-    default = FragilityModel.from_row(by_preference[0])
-    if default.term.name in terms_from(measures):
-        return default
-    for term in terms_from(measures):
-        for row in by_preference:
+        raise UnknownModelError(unknown_model(None, [], str(locate(db))))
+    for row in rows:
+        if row.is_default and row.term in possible:
+            return FragilityModel.from_row(row)
+    for term in possible:
+        for row in rows:
             if row.term == term:
                 return FragilityModel.from_row(row)
-    have = ", ".join(f"{row.name} ({row.term})" for row in by_preference)
+    have = ", ".join(f"{row.name} ({row.term})" for row in rows)
+    terms = " or ".join(possible)
     raise InputError(
-        f"no stored model works with {' and '.join(measures)}; stored: {have}. "
-        f"{_wanting(default, measures)}"
+        f"no stored model works with {_known(measures)}; stored are {have}: give the measures "
+        f"that one of them needs, or fit another with  rbfrag fit --term {terms}"
     )
 
 
@@ -93,7 +94,7 @@ def _named(name: str, db: str | PathLike[str] | None) -> ModelRow:
         return load_model(connection, name)
 
 
-def _stored(db: str | PathLike[str] | None) -> Sequence[ModelRow]:
+def _stored(db: str | PathLike[str] | None) -> list[ModelRow]:
     place = locate(db)
     if isinstance(place, Path):
         from rbfrag.db.model_file import read_models

@@ -53,8 +53,9 @@ def plot_fit(table: CombinationTable, model: FragilityModel, path: str | PathLik
         raise InputError(
             f"there is no critical value with the term {term.name} to draw: run  rbfrag simulate"
         )
-    figure = new_figure(7.2, 5.4)
-    from matplotlib.colors import LogNorm
+    figure = new_figure(7.6, 5.6)
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap, LogNorm
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
     x, y = x[shown], table.y_m_s[shown]
@@ -64,25 +65,29 @@ def plot_fit(table: CombinationTable, model: FragilityModel, path: str | PathLik
         mean_m_s(model.parameters, line_x),
         np.sqrt(variance_m2_s2(model.parameters, line_x)),
     )
-    top = 1.05 * max(float(y.max()), float((mean + _LINES[0][0] * sigma)[-1]))
+    # The data fill the sheet; a line far above them may leave it.
+    highest = float((mean + _LINES[0][0] * sigma).max())
+    top = max(float(y.max()), min(highest, 1.3 * float(y.max()))) * 1.05
 
     axes = figure.add_subplot()
-    # Hexagons of the same height as width on the sheet.
+    # Neither white for a single block nor so dark that a line disappears.
+    greys = ListedColormap(colormaps["Greys"](np.linspace(0.18, 0.72, 256)))
+    # As many cells upwards as make the hexagons regular on the sheet.
     cells = axes.hexbin(
         x,
         y,
-        gridsize=(48, 20),
+        gridsize=(60, 25),
         extent=(0.0, right, 0.0, top),
         mincnt=1,
-        cmap="Greys",
+        cmap=greys,
         linewidths=0.2,
     )
-    counts = np.asarray(cells.get_array())
-    most = max(int(counts.max()), 2)
-    # From half a block, so that a single one is not white.
-    cells.set_norm(LogNorm(0.5, most))
+    most = max(int(np.asarray(cells.get_array()).max()), 2)
+    cells.set_norm(LogNorm(1, most))
     for factor, style, colour, words in _LINES:
-        axes.plot(line_x, mean + factor * sigma, style, color=colour, linewidth=1.8, label=words)
+        line = mean + factor * sigma
+        label = words if line.max() > 0.01 * top else f"{words}\n(not above zero)"
+        axes.plot(line_x, line, style, color=colour, linewidth=1.8, label=label)
     axes.set_xlim(0.0, right)
     axes.set_ylim(0.0, top)
     axes.set_xlabel(term.label)
@@ -91,14 +96,13 @@ def plot_fit(table: CombinationTable, model: FragilityModel, path: str | PathLik
     n_censored = int(np.isin(table.status.astype(str), ("below_limit", "no_motion")).sum())
     axes.set_title(
         f"{model.name}: {x.size} critical blocks of {n_events} earthquakes\n"
-        f"{n_censored} more lie below the search limit and are not shown",
+        f"not shown: {n_censored} whose critical block lies below the search limit",
         fontsize=10,
     )
-    axes.legend(loc="upper left", framealpha=0.95, fontsize=9)
+    figure.legend(loc="outside lower center", ncols=len(_LINES), fontsize=8.5, frameon=False)
     bar = figure.colorbar(cells, ax=axes, label="critical blocks per cell")
     ticks = [t * 10**k for k in range(7) for t in (1, 2, 5) if t * 10**k <= most]
     bar.ax.yaxis.set_major_locator(FixedLocator(ticks))
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0f}"))
     bar.ax.yaxis.set_minor_locator(NullLocator())
-    bar.ax.set_ylim(1.0 if most > 2 else 0.5, most)
     return save_figure(figure, path)
