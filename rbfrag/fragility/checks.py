@@ -1,6 +1,7 @@
 """What can be wrong or doubtful about the input of a prediction.
 
-Every check is written once and looks at single numbers or at arrays.
+Every check is written once and looks at single numbers or at arrays. No sentence holds a
+semicolon, which separates the reasons of an array's element.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ _WORDS = {
     "p2": ("1/s²", "p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m"),
     "kr": (
         "",
-        "the block's yield acceleration coefficient at rest, tan(critical angle); a block with "
-        "k_r <= 0 falls without an earthquake",
+        "the block's yield acceleration coefficient at rest, tan(critical angle) (a block "
+        "with k_r <= 0 falls without an earthquake)",
     ),
     "pgv_m_s": ("m/s", "the peak ground velocity in m/s, 0 or more"),
     "pga_g": ("g", "the peak ground acceleration in g, 0 or more"),
@@ -35,11 +36,11 @@ _WORDS = {
 _LOWEST_P2, _HIGHEST = 1e-9, 1e9
 
 _SUSPECTS = (
-    ("pgv_m_s", 0.0, 5.0, "larger than ever recorded; it is in m/s: did you mean cm/s?"),
-    ("pga_g", 0.0, 5.0, "larger than ever recorded; it is in g: did you mean cm/s² or m/s²?"),
-    ("pgd_m", 0.0, 20.0, "larger than ever recorded; it is in m: did you mean cm?"),
-    ("tm_s", 0.02, 10.0, "not the mean period of an earthquake; it is in s: is it a frequency?"),
-    ("kr", 0.0, 5.0, "steeper than 78°; it is the tangent of the critical angle, not degrees"),
+    ("pgv_m_s", 0.0, 5.0, "larger than ever recorded (it is in m/s): did you mean cm/s?"),
+    ("pga_g", 0.0, 5.0, "larger than ever recorded (it is in g): did you mean cm/s² or m/s²?"),
+    ("pgd_m", 0.0, 20.0, "larger than ever recorded (it is in m): did you mean cm?"),
+    ("tm_s", 0.02, 10.0, "not the mean period of an earthquake (it is in s): is it a frequency?"),
+    ("kr", 0.0, 5.0, "steeper than 78°: it is the tangent of the critical angle, not degrees"),
 )
 
 

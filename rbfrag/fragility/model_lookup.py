@@ -86,9 +86,8 @@ def _named(name: str, db: str | PathLike[str] | None) -> ModelRow:
         from rbfrag.db.model_file import read_model
 
         return read_model(place, name)
-    from rbfrag.db.model_store import load_model
-
     from rbfrag.db.engine import opened_database
+    from rbfrag.db.model_store import load_model
 
     with opened_database(place, read_only=True) as engine, engine.connect() as connection:
         return load_model(connection, name)
@@ -100,9 +99,8 @@ def _stored(db: str | PathLike[str] | None) -> list[ModelRow]:
         from rbfrag.db.model_file import read_models
 
         return read_models(place)
-    from rbfrag.db.model_store import model_rows
-
     from rbfrag.db.engine import opened_database
+    from rbfrag.db.model_store import model_rows
 
     with opened_database(place, read_only=True) as engine, engine.connect() as connection:
         return model_rows(connection)

@@ -99,8 +99,6 @@ def predict_many(
         answer[missing] = np.nan
         answer[falls] = 1.0
         answer[still] = 0.0
-    for derived in (x, y):
-        derived[missing] = np.nan
     reasons.add(falls, "unstable")
     reasons.add(still, "no shaking: P = 0 by definition, not by the model")
     return PredictionArray(
@@ -109,8 +107,9 @@ def predict_many(
         ci_high=high,
         in_domain=in_domain,
         reason=reasons.texts(),
-        y_m_s=y,
-        intensity_m_s=x,
+        # Copies: the intensity may be the caller's own array.
+        y_m_s=np.where(missing, np.nan, y),
+        intensity_m_s=np.where(missing, np.nan, x),
         level=level,
         model=model.name,
         term=model.term.name,

@@ -1,0 +1,48 @@
+import math
+
+import numpy as np
+import pytest
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.terms import TERMS, intensity_term, terms_from
+
+
+def test_terms_of_one_harmonic_motion_agree():
+    # A sine of velocity amplitude V at Tm has PGA = V·2π/Tm and PGD = V·Tm/2π.
+    v, tm = 0.4, 0.7
+    measures = {
+        "pgv_m_s": v,
+        "pga_g": v * 2 * math.pi / tm / 9.80665,
+        "pgd_m": v * tm / (2 * math.pi),
+        "tm_s": tm,
+    }
+    for term in TERMS.values():
+        assert term.intensity_m_s(measures) == pytest.approx(v, rel=1e-14)
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_array_and_scalar_have_the_same_bits(name):
+    random = np.random.default_rng(3)
+    columns = {key: random.uniform(0.01, 2.0, 200) for key in ("pgv_m_s", "pga_g", "pgd_m", "tm_s")}
+    together = TERMS[name].intensity_m_s(columns)
+    for i in range(200):
+        one = TERMS[name].intensity_m_s({key: float(col[i]) for key, col in columns.items()})
+        assert one == together[i]
+
+
+def test_labels_name_the_unit():
+    for name, term in TERMS.items():
+        assert term.name == name
+        assert term.symbol in term.label
+        assert term.label.endswith("[m/s]")
+
+
+def test_terms_that_measures_suffice_for():
+    assert terms_from(["tm_s", "pga_g"]) == ("pga_tm",)
+    assert terms_from(["pgv_m_s", "pgd_m", "tm_s"]) == ("pgv", "pgd_tm")
+    assert terms_from(["pga_g"]) == ()
+
+
+def test_unknown_term_lists_the_known_ones():
+    with pytest.raises(InputError, match=r"'pgx'.*pgv, pga_tm, pgd_tm"):
+        intensity_term("pgx")
