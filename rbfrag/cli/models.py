@@ -1,0 +1,85 @@
+"""`rbfrag models`: the fitted fragility models of a database."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from rbfrag.cli import options
+from rbfrag.cli.output import print_json, print_table
+
+app = typer.Typer(
+    help="List, show and choose fitted fragility models.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    epilog="Example:  rbfrag models show wls-pgv",
+)
+
+Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the model.", show_default=False)]
+
+
+@app.command("list", epilog="Example:  rbfrag models list --json")
+def list_models(db: options.Db = None, json: options.Json = False) -> None:
+    """List the fitted models; the default answers when none is named."""
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.model_store import model_rows
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        rows = model_rows(connection)
+    if json:
+        print_json(
+            [
+                {
+                    "name": row.name,
+                    "term": row.term,
+                    "method": row.method,
+                    "is_default": row.is_default,
+                    "n": row.diagnostics.get("n"),
+                    "events": row.diagnostics.get("events"),
+                    "created": row.created,
+                }
+                for row in rows
+            ]
+        )
+        return
+    print_table(
+        ("name", "term", "method", "default", "n", "earthquakes", "fitted"),
+        [
+            (
+                row.name,
+                row.term,
+                row.method,
+                row.is_default,
+                row.diagnostics.get("n"),
+                row.diagnostics.get("events"),
+                row.created,
+            )
+            for row in rows
+        ],
+    )
+
+
+@app.command("show", epilog="Example:  rbfrag models show wls-pgv")
+def show_model(name: Name, db: options.Db = None, json: options.Json = False) -> None:
+    """Print the report of a fitted model from its stored row."""
+    from rbfrag.cli.fit import print_report
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.model_store import load_model
+    from rbfrag.fragility.model import FragilityModel
+    from rbfrag.fragility.report import FitReport
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        row = load_model(connection, name)
+    print_report(FitReport.from_model(FragilityModel.from_row(row)), json=json)
+
+
+@app.command("default", epilog="Example:  rbfrag models default wls-pgv")
+def set_default_model(name: Name, db: options.Db = None) -> None:
+    """Make a model the one that answers when none is named."""
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.model_store import set_default
+
+    with opened_database(db) as engine, engine.begin() as connection:
+        set_default(connection, name)
+    print(f"{name} is the default model now")

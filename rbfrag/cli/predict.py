@@ -1,0 +1,68 @@
+"""`rbfrag predict`: the probability that a block topples."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from rbfrag.cli import options
+from rbfrag.cli.output import print_json, print_pairs, print_warnings
+
+EXAMPLE = "Example:  rbfrag predict --p2 3 --kr 0.1 --pgv 0.6 --json"
+
+
+def predict(
+    p2: options.P2,
+    kr: options.Kr,
+    pgv: Annotated[
+        float | None,
+        typer.Option("--pgv", help="Peak ground velocity [m/s].", show_default=False),
+    ] = None,
+    pga: Annotated[
+        float | None,
+        typer.Option("--pga", help="Peak ground acceleration [g].", show_default=False),
+    ] = None,
+    tm: Annotated[
+        float | None, typer.Option("--tm", help="Mean period [s].", show_default=False)
+    ] = None,
+    pgd: Annotated[
+        float | None,
+        typer.Option("--pgd", help="Peak ground displacement [m].", show_default=False),
+    ] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            "--model",
+            help="Name of a stored model. Default: the database's default if the given "
+            "measures suffice for it, else the best that they suffice for.",
+            show_default=False,
+        ),
+    ] = None,
+    level: Annotated[
+        float, typer.Option("--level", help="Confidence level of the interval.")
+    ] = 0.95,
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Print the probability that a block topples, with its confidence interval."""
+    from rbfrag.fragility.prediction import predict as answer
+
+    prediction = answer(
+        p2,
+        kr,
+        pgv_m_s=pgv,
+        pga_g=pga,
+        tm_s=tm,
+        pgd_m=pgd,
+        model=model,
+        level=level,
+        db=db,
+    )
+    document = prediction.as_dict()
+    if json:
+        print_json(document)
+        return
+    document.pop("warnings")
+    print_pairs(document)
+    print_warnings(prediction.warnings)

@@ -1,0 +1,119 @@
+"""Signs that a motion is not what it should be, each with a sentence for people."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.intensity import TM_BAND_HZ
+
+LONGEST_DT_S = 0.1
+"""Strong-motion instruments sample at 0.001 to 0.02 s; above 0.1 s the dt is likely wrong."""
+
+SHORTEST_DT_S = 1e-4
+
+LARGEST_PGA_G = 5.0
+"""The largest recorded ground accelerations are near 4 g."""
+
+LARGEST_PGV_M_S = 5.0
+"""The largest recorded ground velocities are near 4 m/s."""
+
+END_VELOCITY_SHARE = 0.05
+"""A corrected record ends at rest; 5 % of PGV left over means that it was not corrected."""
+
+END_DISPLACEMENT_M = 5.0
+"""Permanent displacements are real near a fault, but hardly beyond 5 m at one site."""
+
+EDGE_SHARE = 0.1
+"""A record that starts or ends above 10 % of PGA was cut out of a longer one."""
+
+FEW_SAMPLES = 100
+
+
+@dataclass(frozen=True)
+class QualityFlag:
+    """One doubt about a motion.
+
+    Args:
+        code: short name, as stored and listed.
+        sentence: the value, the limit and what it means.
+    """
+
+    code: str
+    sentence: str
+
+
+def quality_flags(motion: GroundMotion) -> tuple[QualityFlag, ...]:
+    """Return every doubt about a motion; an ordinary corrected record has none.
+
+    Args:
+        motion: any ground motion. Motions from nodes are taken to be analytic: only their
+            amplitudes are looked at.
+    """
+    measures = motion.measures
+    found: list[QualityFlag] = []
+
+    def doubt(code: str, sentence: str) -> None:
+        found.append(QualityFlag(code, sentence))
+
+    if measures.pga_g == 0.0:
+        doubt("all_zero", "every sample is zero: this is no motion")
+        return tuple(found)
+    if measures.pga_g > LARGEST_PGA_G:
+        doubt(
+            "pga_suspicious",
+            f"PGA of {measures.pga_g:.3g} g is above {LARGEST_PGA_G:g} g, more than was ever "
+            "recorded: check the unit of acceleration",
+        )
+    if measures.pgv_m_s > LARGEST_PGV_M_S:
+        doubt(
+            "pgv_suspicious",
+            f"PGV of {measures.pgv_m_s:.3g} m/s is above {LARGEST_PGV_M_S:g} m/s, more than was "
+            "ever recorded: check unit, dt and baseline",
+        )
+    if motion.dt_s is None:
+        return tuple(found)
+    if not SHORTEST_DT_S <= motion.dt_s <= LONGEST_DT_S:
+        doubt(
+            "dt_suspicious",
+            f"dt of {motion.dt_s:g} s is outside {SHORTEST_DT_S:g} to {LONGEST_DT_S:g} s: check "
+            "that it is in seconds",
+        )
+    nyquist_hz = 0.5 / motion.dt_s
+    if nyquist_hz < TM_BAND_HZ[1] * (1.0 - 1e-9):
+        doubt(
+            "coarse_for_tm",
+            f"dt of {motion.dt_s:g} s resolves {nyquist_hz:g} Hz, but the mean period needs "
+            f"{TM_BAND_HZ[1]:g} Hz: Tm is taken over what there is",
+        )
+    if motion.npts < FEW_SAMPLES:
+        doubt("short_record", f"{motion.npts} samples are few for an accelerogram")
+    if abs(measures.final_velocity_m_s) > END_VELOCITY_SHARE * measures.pgv_m_s:
+        doubt(
+            "final_velocity",
+            f"the record ends at {measures.final_velocity_m_s:.3g} m/s, more than "
+            f"{END_VELOCITY_SHARE:.0%} of its PGV: its baseline is not corrected, and PGD means "
+            "little",
+        )
+    if abs(measures.final_displacement_m) > END_DISPLACEMENT_M:
+        doubt(
+            "final_displacement",
+            f"the record ends at {measures.final_displacement_m:.3g} m, more than "
+            f"{END_DISPLACEMENT_M:g} m: its baseline drifts, and PGD means little",
+        )
+    edges = np.abs(motion.acceleration_g[[0, -1]])
+    for code, where, edge in zip(
+        ("first_sample_not_zero", "last_sample_not_zero"),
+        ("starts", "ends"),
+        edges.tolist(),
+        strict=True,
+    ):
+        if edge > EDGE_SHARE * measures.pga_g:
+            doubt(
+                code,
+                f"the record {where} at {edge:.3g} g, more than {EDGE_SHARE:.0%} of its PGA: it "
+                "was cut out of a longer one; the ground is taken to be at rest outside it",
+            )
+    return tuple(found)
