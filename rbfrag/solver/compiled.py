@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 from numba import njit
 
@@ -22,7 +22,19 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     Floating-point operations keep their written order (no fastmath): the same input gives
     the same bits.
     """
-    options = {"nogil": True, "error_model": "numpy"}
+    return _compile(function, {})
+
+
+def fused_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile like :func:`kernel`, but let a product and a sum be rounded once (FMA).
+
+    Faster, and more accurate if anything; the last bits then depend on the processor.
+    """
+    return _compile(function, {"fastmath": {"contract"}})
+
+
+def _compile(function: Callable[P, R], extra: dict[str, Any]) -> Callable[P, R]:
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", **extra}
     try:
         return cast("Callable[P, R]", njit(cache=True, **options)(function))
     except RuntimeError:  # numba's "cannot cache function": no folder is writable

@@ -165,11 +165,13 @@ def _history(drive: Excitation, *, p2: float, kr: float, linear: bool) -> Respon
     time_s, theta, rate = store[:, : run.history_length]
     if not time_s.size or time_s[0] > 0.0:
         start = drive.time_s[0]
-        time_s, theta, rate = (np.concatenate([[x], y]) for x, y in
-                               ((start, time_s), (0.0, theta), (0.0, rate)))
+        time_s, theta, rate = (
+            np.concatenate([[x], y]) for x, y in ((start, time_s), (0.0, theta), (0.0, rate))
+        )
     if time_s[-1] < end and theta[-1] == 0.0:
-        time_s, theta, rate = (np.concatenate([y, [x]]) for x, y in
-                               ((end, time_s), (0.0, theta), (0.0, rate)))
+        time_s, theta, rate = (
+            np.concatenate([y, [x]]) for x, y in ((end, time_s), (0.0, theta), (0.0, rate))
+        )
     return ResponseHistory(
         time_s=np.array(time_s),
         theta_rad=np.array(theta),

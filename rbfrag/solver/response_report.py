@@ -73,4 +73,6 @@ def write_history(response: Response, path: str | os.PathLike[str]) -> None:
         partial.replace(target)
     except OSError as error:
         partial.unlink(missing_ok=True)
-        raise InputError(f"cannot write {target}: {error.strerror}; name a folder you may write") from None
+        raise InputError(
+            f"cannot write {target}: {error.strerror}; name a folder you may write"
+        ) from None

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.solver.compiled import kernel
+from rbfrag.solver.compiled import fused_kernel, kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -61,6 +61,85 @@ def fill_coefficients(
                 sum_c += u[j] * s[k - j]
             s[k + 1] = -sum_s / (k + 1)
             c[k + 1] = sum_c / (k + 1)
+
+
+@fused_kernel
+def step8(
+    u: FloatArray,
+    ph: float,
+    rate: float,
+    s0: float,
+    c0: float,
+    a0: float,
+    da: float,
+    w0: float,
+    dw: float,
+) -> tuple[float, float, float, float, float]:
+    """One non-linear step of order 8, the recurrence written out.
+
+    Args:
+        u: filled with the coefficients of U, for whoever has to look inside the step.
+        ph: p times the step length.
+        rate: theta'/p at the start.
+        s0: sin(phi) at the start.
+        c0: cos(phi) at the start.
+        a0: driving acceleration at the start [g].
+        da: its change over the step.
+        w0: effective gravity at the start.
+        dw: its change over the step.
+
+    Returns:
+        theta(1) - theta(0), U(1), U'(1), s(1) - s(0), c(1) - c(0).
+    """
+    u0 = ph * rate
+    big_p = ph * ph
+    u1 = big_p * (a0 * c0 - w0 * s0)
+    s1 = -u0 * c0
+    c1 = u0 * s0
+    u2 = (big_p / 2.0) * (a0 * c1 - w0 * s1 + da * c0 - dw * s0)
+    s2 = -(u0 * c1 + u1 * c0) * (1.0 / 2.0)
+    c2 = (u0 * s1 + u1 * s0) * (1.0 / 2.0)
+    u3 = (big_p / 3.0) * (a0 * c2 - w0 * s2 + da * c1 - dw * s1)
+    s3 = -(u0 * c2 + u1 * c1 + u2 * c0) * (1.0 / 3.0)
+    c3 = (u0 * s2 + u1 * s1 + u2 * s0) * (1.0 / 3.0)
+    u4 = (big_p / 4.0) * (a0 * c3 - w0 * s3 + da * c2 - dw * s2)
+    s4 = -(u0 * c3 + u1 * c2 + u2 * c1 + u3 * c0) * (1.0 / 4.0)
+    c4 = (u0 * s3 + u1 * s2 + u2 * s1 + u3 * s0) * (1.0 / 4.0)
+    u5 = (big_p / 5.0) * (a0 * c4 - w0 * s4 + da * c3 - dw * s3)
+    s5 = -(u0 * c4 + u1 * c3 + u2 * c2 + u3 * c1 + u4 * c0) * (1.0 / 5.0)
+    c5 = (u0 * s4 + u1 * s3 + u2 * s2 + u3 * s1 + u4 * s0) * (1.0 / 5.0)
+    u6 = (big_p / 6.0) * (a0 * c5 - w0 * s5 + da * c4 - dw * s4)
+    s6 = -(u0 * c5 + u1 * c4 + u2 * c3 + u3 * c2 + u4 * c1 + u5 * c0) * (1.0 / 6.0)
+    c6 = (u0 * s5 + u1 * s4 + u2 * s3 + u3 * s2 + u4 * s1 + u5 * s0) * (1.0 / 6.0)
+    u7 = (big_p / 7.0) * (a0 * c6 - w0 * s6 + da * c5 - dw * s5)
+    s7 = -(u0 * c6 + u1 * c5 + u2 * c4 + u3 * c3 + u4 * c2 + u5 * c1 + u6 * c0) * (1.0 / 7.0)
+    c7 = (u0 * s6 + u1 * s5 + u2 * s4 + u3 * s3 + u4 * s2 + u5 * s1 + u6 * s0) * (1.0 / 7.0)
+    u8 = (big_p / 8.0) * (a0 * c7 - w0 * s7 + da * c6 - dw * s6)
+    s8 = -(u0 * c7 + u1 * c6 + u2 * c5 + u3 * c4 + u4 * c3 + u5 * c2 + u6 * c1 + u7 * c0) * (
+        1.0 / 8.0
+    )
+    c8 = (u0 * s7 + u1 * s6 + u2 * s5 + u3 * s4 + u4 * s3 + u5 * s2 + u6 * s1 + u7 * s0) * (
+        1.0 / 8.0
+    )
+
+    u[0] = u0
+    u[1] = u1
+    u[2] = u2
+    u[3] = u3
+    u[4] = u4
+    u[5] = u5
+    u[6] = u6
+    u[7] = u7
+    u[8] = u8
+    tail = u8 * (1.0 / 9.0) + u7 * 0.125 + u6 * (1.0 / 7.0) + u5 * (1.0 / 6.0) + u4 * 0.2
+    turned = u0 + (u1 * 0.5 + (u2 * (1.0 / 3.0) + (u3 * 0.25 + tail)))
+    u_end = u0 + (u1 + (u2 + (u3 + (u4 + (u5 + (u6 + (u7 + u8)))))))
+    v_end = u1 + (
+        2.0 * u2 + (3.0 * u3 + (4.0 * u4 + (5.0 * u5 + (6.0 * u6 + (7.0 * u7 + 8.0 * u8)))))
+    )
+    s_change = s1 + (s2 + (s3 + (s4 + (s5 + (s6 + (s7 + s8))))))
+    c_change = c1 + (c2 + (c3 + (c4 + (c5 + (c6 + (c7 + c8))))))
+    return turned, u_end, v_end, s_change, c_change
 
 
 @kernel

@@ -26,6 +26,7 @@ from rbfrag.solver.taylor import (
     bracketed_root,
     fill_coefficients,
     rotation,
+    step8,
     value,
 )
 
@@ -64,6 +65,14 @@ def next_lifting_node(
         else:
             i += 1
     return stop
+
+
+@kernel
+def _exponential(x: float) -> float:
+    """Upper bound of exp(x) for 0 <= x, close for the small x of one step."""
+    if x > 1.0:
+        return math.exp(x)
+    return 1.0 + x * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x * 0.06)))
 
 
 @kernel
@@ -244,22 +253,24 @@ def run_toppling(
                 at = tau + piece * part
                 a0 = k_h[i] + (k_h[i + 1] - k_h[i]) * at
                 w0 = w[i] + (w[i + 1] - w[i]) * at
-                u[0] = ph * rate
-                fill_coefficients(u, s, c, order, ph * ph, a0, da, w0, dw, linear)
                 steps += 1
-                sum_theta = 0.0
-                sum_u = 0.0
-                sum_s = 0.0
-                sum_c = 0.0
-                v_end = 0.0
-                for k in range(order, 0, -1):
-                    sum_theta += u[k] / (k + 1)
-                    sum_u += u[k]
-                    sum_s += s[k]
-                    sum_c += c[k]
-                    v_end += k * u[k]
-                theta_end = theta + (u[0] + sum_theta)
-                u_end = u[0] + sum_u
+                if order == 8 and not linear:
+                    turned, u_end, v_end, s_change, c_change = step8(
+                        u, ph, rate, s[0], c[0], a0, da, w0, dw
+                    )
+                else:
+                    u[0] = ph * rate
+                    fill_coefficients(u, s, c, order, ph * ph, a0, da, w0, dw, linear)
+                    turned, u_end, v_end, s_change, c_change = 0.0, 0.0, 0.0, 0.0, 0.0
+                    for k in range(order, 0, -1):
+                        turned += u[k] / (k + 1)
+                        u_end += u[k]
+                        v_end += k * u[k]
+                        s_change += s[k]
+                        c_change += c[k]
+                    turned += u[0]
+                    u_end += u[0]
+                theta_end = theta + turned
 
                 a_size = abs(a0) + abs(da)
                 w_size = abs(w0) + abs(dw)
@@ -271,7 +282,7 @@ def run_toppling(
                 rounding = MACHINE_EPSILON * (
                     2.0 * (abs(theta_end) + abs(rate) + abs(s[0])) + 4.0 * ph * (a_size + w_size)
                 )
-                error = error * math.exp(growth) + truncation + rounding
+                error = error * _exponential(growth) + truncation + rounding
 
                 if fresh:
                     fresh = False
@@ -306,8 +317,8 @@ def run_toppling(
                     break
                 theta = theta_end
                 rate = u_end / ph
-                s[0] += sum_s
-                c[0] += sum_c
+                s[0] += s_change
+                c[0] += c_change
 
         if reseat_at >= 0.0:
             if one_excursion:
