@@ -73,7 +73,7 @@ def known_statuses(connection: Connection, keys: Iterable[str]) -> dict[str, str
     found: dict[str, str] = {}
     for start in range(0, len(wanted), _KEYS_AT_ONCE):
         some = {"keys": wanted[start : start + _KEYS_AT_ONCE]}
-        found.update(connection.execute(query, some).tuples().all())
+        found.update({row.natural_key: row.status for row in connection.execute(query, some)})
     return found
 
 

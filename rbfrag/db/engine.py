@@ -94,7 +94,8 @@ def open_database(
         create_if_missing(place, busy_timeout_s=busy_timeout_s)
     engine = unchecked_engine(place, read_only=read_only, busy_timeout_s=busy_timeout_s)
     try:
-        with engine.connect() as connection:
+        # A transaction, so that what cannot be written is found out now and not after hours.
+        with engine.begin() as connection:
             if isinstance(place, Path):
                 check_sqlite_database(raw_sqlite(connection), place)
             else:

@@ -34,7 +34,7 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
     values = encode_model(row)
     values["created"] = row.created or utc_now()
     query = select(fragility_model.c.name, fragility_model.c.is_default)
-    defaults: dict[str, bool] = dict(connection.execute(query).tuples().all())
+    defaults = {stored.name: stored.is_default for stored in connection.execute(query)}
     if row.name in defaults and not replace:
         raise InputError(
             f"there is a model {row.name!r} already: give another --name, or replace it with "

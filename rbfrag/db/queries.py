@@ -149,7 +149,9 @@ def simulation_points(connection: Connection, combination_id: int) -> SearchPoin
 
 def database_info(connection: Connection) -> DatabaseInfo:
     """Return what the database holds, counted."""
-    by_status = select(combination.c.status, func.count()).group_by(combination.c.status)
+    by_status = select(combination.c.status, func.count().label("number")).group_by(
+        combination.c.status
+    )
     versions = select(combination.c.numerics_version).distinct()
     return DatabaseInfo(
         revision=SCHEMA_REVISION,  # opening refuses any other
@@ -158,7 +160,9 @@ def database_info(connection: Connection) -> DatabaseInfo:
             name: int(connection.scalar(select(func.count()).select_from(table)) or 0)
             for name, table in sorted(metadata.tables.items())
         },
-        combinations_by_status=dict(sorted(connection.execute(by_status).tuples())),
+        combinations_by_status={
+            row.status: row.number for row in connection.execute(by_status.order_by("status"))
+        },
         numerics_versions=tuple(sorted(connection.scalars(versions))),
         default_model=connection.scalar(
             select(fragility_model.c.name).where(fragility_model.c.is_default)

@@ -1,0 +1,195 @@
+"""Databases, motions and results for the tests of the store."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sqlalchemy import Engine
+
+from rbfrag.db.campaign_store import combination_key, insert_combination
+from rbfrag.db.engine import open_database
+from rbfrag.db.rows import ModelRow
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.results import CriticalResult, SearchPoints
+
+NOBODY = 65534
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    """Where a database is to be made: a path, or a schema of its own on a server."""
+    if request.param == "sqlite":
+        yield str(tmp_path / "test.db")
+        return
+    url = os.environ.get("RBFRAG_TEST_POSTGRES")
+    if not url:
+        pytest.skip("no server: set RBFRAG_TEST_POSTGRES to postgresql://user@host:port/name")
+    import psycopg
+    from psycopg import sql
+
+    name = sql.Identifier(schema := f"rbfrag_test_{secrets.token_hex(6)}")
+    with psycopg.connect(url, autocommit=True) as server:
+        server.execute(sql.SQL("CREATE SCHEMA {}").format(name))
+        try:
+            yield f"{url}?options=-csearch_path%3D{schema}"
+        finally:
+            server.execute("SET client_min_messages = warning")
+            server.execute(sql.SQL("DROP SCHEMA {} CASCADE").format(name))
+
+
+@pytest.fixture
+def engine(place: str) -> Iterator[Engine]:
+    """An empty database."""
+    made = open_database(place, create=True)
+    yield made
+    made.dispose()
+
+
+@pytest.fixture
+def sqlite_file(tmp_path: Path) -> Path:
+    """An empty database in a file, closed."""
+    path = tmp_path / "test.db"
+    open_database(path, create=True).dispose()
+    return path
+
+
+@pytest.fixture
+def make_motion() -> Callable[..., GroundMotion]:
+    """A little noise; another seed is another motion."""
+
+    def make(seed: int = 0, **labels: Any) -> GroundMotion:
+        samples = np.random.default_rng(seed).normal(scale=0.2, size=64)
+        given = {"station": "HVSC", "component": "000", "source_file": f"{seed}.txt", **labels}
+        return GroundMotion(samples, 0.01, **given)
+
+    return make
+
+
+@pytest.fixture
+def make_result() -> Callable[..., CriticalResult]:
+    """A consistent answer of the solver for a motion of the given PGA."""
+
+    def make(pga_g: float = 0.5, *, p2: float = 3.0, k: float = 0.4, **changes: Any) -> Any:
+        found = changes.get("status", "found") == "found"
+        kr = k * pga_g
+        points = SearchPoints(
+            kr_over_pga=np.array([0.9, k + 0.01, k, k]),
+            theta_n=np.array([0.1, 0.7, np.nan, np.nan]),
+            outcome=("stable", "stable", *["toppled" if found else "undetermined"] * 2),
+        )
+        values: dict[str, Any] = {
+            "p2": p2,
+            "polarity": "forward",
+            "linear": False,
+            "pga_g": pga_g,
+            "status": "found",
+            "search_limit": 0.01,
+            "kr_over_pga": k if found else None,
+            "lower": k if found else None,
+            "upper": k + 1e-12 if found else None,
+            "kr": kr if found else None,
+            "y_m_s": kr * 9.80665 / abs(p2) ** 0.5 if found else None,
+            "certified": True,
+            "k_up_over_pga": 1.0,
+            "undecided": 0.0,
+            "island_width": 0.1,
+            "kr_over_pga_resolved": k if found else None,
+            "reentrant": False,
+            "n_runs": 40,
+            "warnings": ("a warning",),
+            "points": points,
+        }
+        return CriticalResult(**{**values, **changes})
+
+    return make
+
+
+@pytest.fixture
+def store_result() -> Callable[..., str]:
+    """Write an answer of the solver under its natural key, and return the key."""
+
+    def store(
+        connection: Any,
+        campaign_id: int,
+        motion: GroundMotion,
+        motion_id: int,
+        result: CriticalResult,
+        **changes: Any,
+    ) -> str:
+        settings = changes.pop("settings", {"search_limit": result.search_limit})
+        version = changes.pop("numerics_version", "1")
+        vertical = changes.pop("vertical", None)
+        key = combination_key(
+            motion_sha256=motion.sha256,
+            dt_s=motion.dt_s or 0.0,
+            vertical_sha256=None if vertical is None else vertical[1].sha256,
+            polarity=result.polarity,
+            kind="toppling",
+            p2=result.p2,
+            settings=settings,
+            numerics_version=version,
+            linear=result.linear,
+        )
+        insert_combination(
+            connection,
+            campaign_id=campaign_id,
+            natural_key=key,
+            motion_id=motion_id,
+            vertical_motion_id=None if vertical is None else vertical[0],
+            result=result,
+            settings=settings,
+            numerics_version=version,
+        )
+        return key
+
+    return store
+
+
+@pytest.fixture
+def model() -> ModelRow:
+    """A fitted model with numbers that no short decimal holds."""
+    return ModelRow(
+        name="pgv-wls",
+        term="pgv",
+        method="wls",
+        coefficients={"slope": 0.1 + 0.2, "intercept": -1.0 / 3.0, "a": 5e-324},
+        covariance=((1.0, 0.1, 0.0), (0.1, 2.0, 1e-300), (0.0, 1e-300, 3.0)),
+        domain={"pgv_m_s": (0.01, 2.0 / 3.0)},
+        data_fingerprint="f" * 64,
+        diagnostics={"n": 12, "warnings": ["Zürich"], "scores": {"log": -1.5}},
+        created="2024-01-01T00:00:00+00:00",
+    )
+
+
+@pytest.fixture
+def locked_folder() -> Iterator[Callable[[], AbstractContextManager[Path]]]:
+    """A folder that cannot be written inside the with block, even when root runs the tests."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o755)
+
+        @contextmanager
+        def lock() -> Iterator[Path]:
+            for file in folder.iterdir():
+                file.chmod(0o444)
+            folder.chmod(0o555)
+            was_root = os.geteuid() == 0
+            if was_root:
+                os.seteuid(NOBODY)
+            try:
+                yield folder
+            finally:
+                if was_root:
+                    os.seteuid(0)
+                folder.chmod(0o755)
+
+        lock.folder = folder  # type: ignore[attr-defined]
+        yield lock
