@@ -90,14 +90,14 @@ def test_stronger_shaking_and_weaker_blocks_topple_no_less(model, p2, kr, pgv, f
 def test_where_the_line_is_not_monotone_it_says_so(row):
     model = row(coefficients={"c0": 0.02, "c1": 0.5, "v0": 1e-3, "v1": 0.0, "v2": 0.04},
                 covariance=((1e-8,) * 5,) * 5, term="pgd_tm")  # fmt: skip
-    low, high = (predict(3.0, 1e-4, pgd_m=d, tm_s=1.0, model=model) for d in (0.2, 0.4))
-    if high.probability < low.probability:
-        assert any("falls with growing intensity" in w for w in low.warnings)
-    weak = predict(3.0, 1e-4, pgd_m=0.7, tm_s=1.0, model=model)
-    near = predict(3.0, 1e-4, pgd_m=0.71, tm_s=1.0, model=model)
-    assert any("falls with growing intensity" in w for w in weak.warnings) == (
-        near.probability < weak.probability
-    )
+    # With y -> 0 the score (0.02 + 0.5 x)/sqrt(0.001 + 0.04 x²) falls beyond x = 0.625 m/s.
+    for x, falls in ((0.5, False), (1.0, True)):
+        low, high = (
+            predict(3.0, 1e-6, pgd_m=v / (2 * math.pi), tm_s=1.0, model=model)
+            for v in (x, 1.001 * x)
+        )
+        assert (high.probability < low.probability) is falls
+        assert any("falls with growing intensity" in w for w in low.warnings) is falls
 
 
 def test_negative_mass_near_zero_is_said(row):

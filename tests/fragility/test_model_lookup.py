@@ -1,0 +1,105 @@
+import os
+import subprocess
+import sys
+
+import pytest
+
+from rbfrag.db.engine import opened_database
+from rbfrag.db.model_store import load_model, save_model, set_default
+from rbfrag.errors import DatabaseNotFoundError, InputError, UnknownModelError
+from rbfrag.fragility.model_lookup import find_model
+from rbfrag.fragility.prediction import predict
+
+
+@pytest.fixture
+def database(tmp_path, row):
+    """A database that holds models named by their terms, and its path."""
+
+    def make(*terms, default=None):
+        path = tmp_path / "models.db"
+        with opened_database(path, create=True) as engine, engine.begin() as connection:
+            for term in terms:
+                save_model(connection, row(term))
+            if default is not None:
+                set_default(connection, f"wls-{default}")
+        return path
+
+    return make
+
+
+def test_the_default_answers_when_it_can(database):
+    path = database("pgv", "pga_tm", "pgd_tm", default="pga_tm")
+    assert find_model(None, ["pgv_m_s", "pga_g", "tm_s"], path).name == "wls-pga_tm"
+
+
+@pytest.mark.parametrize(
+    ("measures", "name"),
+    [
+        (["pgv_m_s"], "wls-pgv"),
+        (["pgd_m", "tm_s"], "wls-pgd_tm"),
+        (["pga_g", "tm_s"], "wls-pga_tm"),
+        (["pgv_m_s", "pga_g", "tm_s"], "wls-pgv"),
+    ],
+)
+def test_otherwise_the_best_that_the_measures_suffice_for(database, measures, name):
+    path = database("pga_tm", "pgv", "pgd_tm", default="pgd_tm")
+    assert find_model(None, measures, path).name == name
+
+
+def test_a_named_model_is_asked_whatever_the_default(database):
+    path = database("pgv", "pga_tm")
+    assert predict(3, 0.1, pga_g=0.4, tm_s=0.5, model="wls-pga_tm", db=path).term == "pga_tm"
+    with pytest.raises(InputError, match=r"'wls-pga_tm' needs pga_g and tm_s .*given is pgv_m_s"):
+        predict(3, 0.1, pgv_m_s=0.4, model="wls-pga_tm", db=path)
+    with pytest.raises(UnknownModelError, match=r"'nobody'.*wls-pga_tm, wls-pgv"):
+        predict(3, 0.1, pgv_m_s=0.4, model="nobody", db=path)
+
+
+def test_measures_that_no_stored_model_works_with(database):
+    path = database("pga_tm")
+    with pytest.raises(InputError, match=r"no stored model works with pgv_m_s.*wls-pga_tm"):
+        predict(3, 0.1, pgv_m_s=0.4, db=path)
+    with pytest.raises(InputError, match=r"pga_g is given: a prediction needs pgv_m_s, or pga_g"):
+        predict(3, 0.1, pga_g=0.4, db=path)
+
+
+def test_a_database_without_models_says_how_to_make_one(database):
+    with pytest.raises(UnknownModelError, match="rbfrag fit"):
+        predict(3, 0.1, pgv_m_s=0.4, db=database())
+
+
+def test_no_database_at_all(tmp_path):
+    with pytest.raises(DatabaseNotFoundError):
+        predict(3, 0.1, pgv_m_s=0.4, db=tmp_path / "none.db")
+
+
+def test_a_model_answers_the_same_before_and_after_storage(database, row):
+    path = database("pgv")
+    assert predict(3, 0.1, pgv_m_s=0.4, db=path) == predict(3, 0.1, pgv_m_s=0.4, model=row())
+    with opened_database(path, read_only=True) as engine, engine.connect() as connection:
+        stored = load_model(connection, "wls-pgv")
+    assert predict(3, 0.1, pgv_m_s=0.4, model=stored) == predict(3, 0.1, pgv_m_s=0.4, db=path)
+
+
+def test_the_database_of_the_environment_and_folder_without_heavy_libraries(database):
+    path = database("pgv")
+    program = """
+import sys
+from rbfrag.fragility.prediction import predict
+print(predict(3.0, 0.1, pgv_m_s=0.6).model)
+heavy = {"numpy", "scipy", "pandas", "statsmodels", "numba", "matplotlib", "sqlalchemy"}
+print(sorted(heavy & set(sys.modules)))
+"""
+    path = path.rename(path.with_name("rbfrag.db"))
+    plain = {key: value for key, value in os.environ.items() if key != "RBFRAG_DB"}
+    plain["PYTHONPATH"] = os.pathsep.join(p for p in sys.path if p)
+    for folder, extra in ((path.parent, {}), (path.parent.parent, {"RBFRAG_DB": str(path)})):
+        done = subprocess.run(
+            [sys.executable, "-c", program],
+            capture_output=True,
+            text=True,
+            cwd=folder,
+            env={**plain, **extra},
+        )
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.split("\n")[:2] == ["wls-pgv", "[]"]

@@ -1,0 +1,138 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from rbfrag.db.rows import CombinationTable, ModelRow
+from rbfrag.errors import InputError
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.plots import fit as fit_module
+from rbfrag.plots.fit import plot_fit
+
+N = 400
+
+
+@pytest.fixture
+def table():
+    random = np.random.default_rng(6)
+    pgv = np.exp(random.uniform(-4, 0.3, N))
+    y = np.abs(0.72 * pgv + random.normal(size=N) * np.sqrt(1e-4 + 2e-3 * pgv))
+    found = np.arange(N) % 10 != 0
+    keep = np.where(found, 1.0, np.nan)
+    return CombinationTable(
+        combination_id=np.arange(N),
+        motion_id=np.arange(N),
+        event_id=np.array([f"event-{i % 7}" for i in range(N)], dtype=object),
+        event_guessed=np.zeros(N, dtype=bool),
+        polarity=np.full(N, "forward", dtype=object),
+        p2=np.ones(N),
+        status=np.where(found, "found", "below_limit").astype(object),
+        search_limit=np.full(N, 0.01),
+        kr_over_pga=keep * 0.5,
+        kr=keep * y / 9.80665,
+        y_m_s=keep * y,
+        pga_g=np.full(N, 0.5),
+        pgv_m_s=pgv,
+        pgd_m=0.1 * pgv,
+        tm_s=np.full(N, 0.5),
+        natural_key=np.arange(N).astype(str).astype(object),
+    )
+
+
+@pytest.fixture
+def model():
+    return FragilityModel.from_row(
+        ModelRow(
+            name="wls-pgv",
+            term="pgv",
+            method="wls",
+            coefficients={"c0": 0.002, "c1": 0.72, "v0": 1e-4, "v1": 2e-3},
+            covariance=tuple(map(tuple, (1e-8 * np.eye(4)).tolist())),
+            domain={},
+            data_fingerprint="",
+        )
+    )
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """The figures that were made."""
+    made = []
+
+    def remember(*args):
+        made.append(new_figure(*args))
+        return made[-1]
+
+    new_figure = fit_module.new_figure
+    monkeypatch.setattr(fit_module, "new_figure", remember)
+    return made
+
+
+@pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
+def test_the_file_is_written(table, model, tmp_path, suffix):
+    path = tmp_path / f"fit.{suffix}"
+    assert plot_fit(table, model, path) == path
+    assert path.stat().st_size > 5000
+
+
+def test_what_the_figure_says(table, model, tmp_path, drawn):
+    plot_fit(table, model, tmp_path / "fit.png")
+    figure = drawn[0]
+    axes, bar = figure.axes
+    assert axes.get_xlabel() == "peak ground velocity, PGV [m/s]"
+    assert "[m/s]" in axes.get_ylabel()
+    assert "360 critical blocks of 7 earthquakes" in axes.get_title()
+    assert "40 whose critical block lies below the search limit" in axes.get_title()
+    assert bar.get_ylabel() == "critical blocks per cell"
+    assert int(axes.collections[0].get_array().sum()) == 360
+
+
+def test_the_failure_lines_have_their_probabilities(table, model, tmp_path, drawn):
+    from rbfrag.fragility.prediction import predict
+
+    plot_fit(table, model, tmp_path / "fit.png")
+    lines = {line.get_label(): line for line in drawn[0].axes[0].lines}
+    expected = {
+        "2.5 % probability of failure": 0.025,
+        "mean critical velocity": 0.5,
+        "97.5 % probability of failure": 0.975,
+    }
+    assert set(lines) == set(expected)
+    for label, probability in expected.items():
+        x, y = (values[300] for values in lines[label].get_data())
+        answer = predict(1.0, y / 9.80665, pgv_m_s=x, model=model)
+        assert answer.probability == pytest.approx(probability, rel=1e-9)
+
+
+def test_nothing_overlaps(table, model, tmp_path, drawn):
+    for term in ("pgv", "pgd_tm"):
+        other = FragilityModel.from_row(replace(model.row, term=term))
+        plot_fit(table, other, tmp_path / "fit.png")
+        figure = drawn[-1]
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        renderer = canvas.get_renderer()
+        axes, bar = figure.axes
+        boxes = [
+            axes.title.get_window_extent(renderer),
+            axes.xaxis.label.get_window_extent(renderer),
+            axes.yaxis.label.get_window_extent(renderer),
+            axes.get_window_extent(renderer),
+            bar.get_window_extent(renderer),
+            bar.yaxis.label.get_window_extent(renderer),
+            figure.legends[0].get_window_extent(renderer),
+        ]
+        for i, box in enumerate(boxes):
+            assert figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1
+            assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1
+            assert not any(box.overlaps(other) for other in boxes[:i])
+
+
+def test_nothing_to_draw_is_refused(table, model, tmp_path):
+    empty = replace(table, status=np.full(N, "below_limit", dtype=object))
+    with pytest.raises(InputError, match="no critical value"):
+        plot_fit(empty, model, tmp_path / "fit.png")
+    with pytest.raises(InputError, match=r"\.jpg"):
+        plot_fit(table, model, tmp_path / "fit.jpg")
+    assert list(tmp_path.iterdir()) == []
