@@ -68,9 +68,7 @@ def plan_campaign(
         MotionPlan(
             motion_id=row.id,
             name=row.name,
-            cases=tuple(
-                _case(row, polarity, value) for value in sizes for polarity in POLARITIES
-            ),
+            cases=tuple(_case(row, polarity, value) for value in sizes for polarity in POLARITIES),
         )
         for row in rows
     ]

@@ -68,9 +68,7 @@ def check(db: options.Db = None, json: options.Json = False) -> None:
     if json:
         print_json({"sound": not findings, "findings": [asdict(found) for found in findings]})
     elif findings:
-        print_table(
-            ("table", "row", "problem"), [(f.table, f.row, f.problem) for f in findings]
-        )
+        print_table(("table", "row", "problem"), [(f.table, f.row, f.problem) for f in findings])
     else:
         print("sound: nothing is wrong with this database")
     if findings:

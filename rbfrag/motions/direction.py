@@ -1,0 +1,50 @@
+"""What a component's name says: its azimuth, and whether it is vertical."""
+
+from __future__ import annotations
+
+import re
+
+VERTICAL_NAMES = frozenset(
+    {"UP", "DOWN", "DWN", "DN", "VER", "VERT", "VERTICAL", "V", "Z", "U", "UD", "U-D", "HNZ", "HLZ"}
+)
+
+_COMPASS = {
+    "N": 0.0, "NORTH": 0.0, "NS": 0.0, "N-S": 0.0,
+    "E": 90.0, "EAST": 90.0, "EW": 90.0, "E-W": 90.0,
+    "S": 180.0, "SOUTH": 180.0,
+    "W": 270.0, "WEST": 270.0,
+}  # fmt: skip
+
+_BEARING = re.compile(r"([NS])\s*(\d{1,2}(?:\.\d+)?)\s*([EW])")
+_AZIMUTH = re.compile(r"\d{1,3}(?:\.\d+)?")
+
+
+def is_vertical_name(component: str) -> bool | None:
+    """Return whether a component is vertical; None when its name does not say.
+
+    Args:
+        component: as the file names it: ``UP``, ``360``, ``N10E``.
+    """
+    if component.strip().upper() in VERTICAL_NAMES:
+        return True
+    return False if azimuth_deg(component) is not None else None
+
+
+def azimuth_deg(component: str) -> float | None:
+    """Return the azimuth of a component [deg], clockwise from north; None if not stated.
+
+    Args:
+        component: as the file names it: ``360``, ``N10E``, ``S62W``, ``EAST``.
+    """
+    name = component.strip().upper()
+    if name in _COMPASS:
+        return _COMPASS[name]
+    if bearing := _BEARING.fullmatch(name):
+        angle = float(bearing[2])
+        if angle > 90.0:
+            return None
+        turned = angle if bearing[3] == "E" else -angle
+        return (turned if bearing[1] == "N" else 180.0 - turned) % 360.0
+    if _AZIMUTH.fullmatch(name) and float(name) <= 360.0:
+        return float(name) % 360.0
+    return None

@@ -1,0 +1,119 @@
+"""The text of a record's file, with troubles named by line."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import MotionFileError
+
+LARGEST_FILE_BYTES = 512 * 1024**2
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file: byte-order mark removed, newlines as ``\\n``.
+
+    Raises:
+        MotionFileError: there is no such file, it is a folder, empty, binary or too large.
+    """
+    if path.is_dir():
+        raise MotionFileError(path, "this is a folder, not a file: name a file in it")
+    try:
+        size = path.stat().st_size
+        if size > LARGEST_FILE_BYTES:
+            raise MotionFileError(
+                path, f"{size / 1024**2:.0f} MiB are too large for an accelerogram in text"
+            )
+        raw = path.read_bytes()
+    except FileNotFoundError:
+        raise MotionFileError(path, "there is no such file: check the path") from None
+    except OSError as error:
+        raise MotionFileError(path, f"the file cannot be read: {error.strerror}") from None
+    if not raw.strip():
+        raise MotionFileError(path, "the file is empty: export the record again")
+    if b"\0" in raw:
+        raise MotionFileError(
+            path, "the file is binary, not text: export the record in one of the text formats"
+        )
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        # every byte has a meaning in Latin-1, which older networks write
+        text = raw.decode("latin-1")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def free_numbers(
+    path: Path, lines: Sequence[str], first_line: int, what: str
+) -> NDArray[np.float64]:
+    """Return blank-separated numbers; a bad one is named with its line.
+
+    Args:
+        path: for messages.
+        lines: the lines that hold the numbers.
+        first_line: 1-based number of the first of them in the file.
+        what: what the numbers are, for messages.
+    """
+    tokens = " ".join(lines).split()
+    try:
+        numbers = np.array(tokens, dtype=np.float64)
+    except ValueError:
+        numbers = np.array([np.nan])
+    # numpy also reads 'nan', 'inf' and '1_000', which no instrument writes
+    if not np.isfinite(numbers).all() or any("_" in token for token in tokens):
+        for number, line in enumerate(lines, first_line):
+            for token in line.split():
+                finite_number(path, token, number, what)
+    return numbers
+
+
+def fixed_width_numbers(
+    path: Path, lines: Sequence[str], first_line: int, width: int, what: str
+) -> NDArray[np.float64]:
+    """Return numbers in columns of a fixed width, which may touch.
+
+    Args:
+        path: for messages.
+        lines: the lines that hold the numbers.
+        first_line: 1-based number of the first of them in the file.
+        width: characters a field.
+        what: what the numbers are, for messages.
+    """
+    numbers = []
+    for number, line in enumerate(lines, first_line):
+        padded = line.rstrip()
+        for start in range(0, len(padded), width):
+            field = padded[start : start + width].strip()
+            numbers.append(finite_number(path, field, number, what))
+    return np.array(numbers, dtype=np.float64)
+
+
+def finite_number(path: Path, text: str, line: int, what: str) -> float:
+    """Return one number of a file, or refuse it with its line.
+
+    Args:
+        path: for messages.
+        text: the number as the file has it.
+        line: 1-based line number.
+        what: what the number is.
+
+    Raises:
+        MotionFileError: it is no number, or not finite.
+    """
+    if _NUMBER.fullmatch(text):
+        value = float(text)
+        if math.isfinite(value):
+            return value
+        raise MotionFileError(path, f"{what} {text!r} is too large", line=line)
+    raise MotionFileError(
+        path,
+        f"{what} {text!r} is not a finite number: repair the line or export the record again",
+        line=line,
+    )
