@@ -1,0 +1,78 @@
+# make demo and make test start from nothing but git, make, python3 and python3-venv.
+# PYTHON=python3.12 and VENV=somewhere choose another interpreter and another folder.
+
+PYTHON ?= python3
+VENV ?= .venv
+
+BIN := $(VENV)/bin
+RUN := $(BIN)/python -m
+PIP := $(RUN) pip install --quiet --disable-pip-version-check
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.PHONY: help demo test lint types docs unit format cli-reference wheel clean
+
+help:  ## this list
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 16
+
+demo: $(VENV)/.installed-demo  ## from recorded earthquakes to a failure probability, in one go
+	$(BIN)/rbfrag demo
+
+test: lint types docs unit  ## every check: style, types, documentation, tests
+
+lint: $(VENV)/.installed-dev  ## style
+	$(RUN) ruff check .
+	$(RUN) ruff format --check .
+
+types: $(VENV)/.installed-dev  ## static types
+	$(RUN) mypy
+
+# -E: an unchanged page whose warning stopped the last build would pass this one.
+docs: $(VENV)/.installed-dev  ## the documentation, into docs/_build/html
+	$(BIN)/python docs/generate_cli_reference.py --check
+	$(RUN) sphinx -E -W --keep-going -q -b html docs docs/_build/html
+
+# The folder of matplotlib's settings is given because HOME may not be writable.
+unit: $(VENV)/.installed-dev  ## the tests alone
+	MPLCONFIGDIR="$(abspath $(VENV))/matplotlib" $(RUN) pytest
+
+format: $(VENV)/.installed-dev  ## put the source in the style that lint asks for
+	$(RUN) ruff check --fix .
+	$(RUN) ruff format .
+
+cli-reference: $(VENV)/.installed-dev  ## write docs/reference/cli.md anew from --help
+	$(BIN)/python docs/generate_cli_reference.py
+
+wheel: $(VENV)/.installed-dev  ## the wheel, into dist/
+	$(RUN) pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+
+clean:  ## remove what make made
+	rm -rf $(VENV) docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find rbfrag tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(VENV)/.installed-demo: pyproject.toml | $(VENV)/.made
+	@echo "installing rbfrag[plot,samples] into $(VENV) ..."
+	@$(PIP) --editable '.[plot,samples]'
+	@touch $@
+
+$(VENV)/.installed-dev: pyproject.toml | $(VENV)/.made
+	@echo "installing rbfrag[dev,samples] into $(VENV) ..."
+	@$(PIP) --editable '.[dev,samples]'
+	@touch $@
+
+$(VENV)/.made:
+	@command -v $(PYTHON) >/dev/null 2>&1 || { \
+	  echo "$(PYTHON) is missing. On Debian or Ubuntu:  sudo apt install python3 python3-venv" >&2; \
+	  exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "$$($(PYTHON) --version) is too old: rbfrag needs Python 3.11 or newer." >&2; \
+	  echo "Debian 12 and Ubuntu 24.04 have it:  sudo apt install python3 python3-venv" >&2; \
+	  echo "Where another one is installed, name it:  make PYTHON=python3.12 $(MAKECMDGOALS)" >&2; \
+	  exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+	  echo "$(PYTHON) cannot make virtual environments. On Debian or Ubuntu:  sudo apt install" \
+	    "$$($(PYTHON) -c 'import sys; print("python3-venv" if sys.argv[1] == "python3" else \
+	    "python%d.%d-venv" % sys.version_info[:2])' $(notdir $(PYTHON)))" >&2; \
+	  exit 1; }
+	@$(PYTHON) -m venv $(VENV)
+	@touch $@

@@ -1,0 +1,122 @@
+"""What the documentation says can be typed, exists."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import shlex
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import rbfrag
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted(p for p in (ROOT / "docs").rglob("*.md") if "_build" not in p.parts),
+]
+
+
+@cache
+def commands() -> dict[tuple[str, ...], Any]:
+    script = ROOT / "docs" / "generate_cli_reference.py"
+    spec = importlib.util.spec_from_file_location("generate_cli_reference", script)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return {words: command for words, command, _ in module.commands()}
+
+
+def blocks(text: str, *languages: str) -> Iterator[str]:
+    """Fenced blocks of a Markdown text in one of the languages."""
+    for language, body in re.findall(r"^```(\w+)\n(.*?)^```", text, re.M | re.S):
+        if language in languages:
+            yield body
+
+
+def command_lines(text: str) -> Iterator[list[str]]:
+    """Words of every `rbfrag ...` line of the shell blocks, comments and prompts taken off."""
+    for body in blocks(text, "sh", "console"):
+        for line in body.replace("\\\n", " ").splitlines():
+            words = shlex.split(line.removeprefix("$ "), comments=True)
+            if words[:1] == ["rbfrag"]:
+                yield words
+
+
+def complaint(words: list[str]) -> str | None:
+    """Return what is wrong with a command line, or None."""
+    known = commands()
+    depth = 1
+    while depth < len(words) and tuple(words[: depth + 1]) in known:
+        depth += 1
+    command = known[tuple(words[:depth])]
+    rest = words[depth:]
+    if hasattr(command, "list_commands") and rest and not rest[0].startswith("-"):
+        return f"no command {' '.join(words[: depth + 1])}"
+    options = {name for parameter in command.params for name in parameter.opts} | {"--help"}
+    for word in rest:
+        if word.startswith("--") and word.split("=")[0] not in options:
+            return f"{' '.join(words[:depth])} has no option {word}"
+    return None
+
+
+def test_the_check_sees_wrong_commands() -> None:
+    lines = list(command_lines("```sh\n$ rbfrag predict \\\n  --p2 3 # three\nls\n```\n"))
+    assert lines == [["rbfrag", "predict", "--p2", "3"]]
+    assert complaint(lines[0]) is None
+    assert complaint(["rbfrag", "predict", "--p3", "3"]) == "rbfrag predict has no option --p3"
+    assert complaint(["rbfrag", "models", "burn"]) == "no command rbfrag models burn"
+    assert complaint(["rbfrag", "topple"]) == "no command rbfrag topple"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_documented_commands_and_options_exist(page: Path) -> None:
+    for words in command_lines(page.read_text(encoding="utf-8")):
+        assert complaint(words) is None, words
+
+
+def test_make_targets_in_the_documentation_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    targets = set(re.findall(r"^([a-z-]+):", makefile, re.M))
+    named = set()
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        named |= set(re.findall(r"`make ([a-z-]+)`", text))
+        for body in blocks(text, "sh"):
+            named |= set(re.findall(r"^make ([a-z-]+)", body, re.M))
+    assert {"demo", "test"} <= named
+    assert named <= targets
+
+
+def test_readme_starts_with_the_two_commands() -> None:
+    first = next(blocks((ROOT / "README.md").read_text(encoding="utf-8"), "sh"))
+    assert [line.split("#")[0].strip() for line in first.splitlines()] == ["make demo", "make test"]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_local_links_lead_somewhere(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.S)
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
+        if "://" not in target:
+            assert (page.parent / target).exists(), target
+
+
+def test_every_public_name_is_in_the_reference_with_a_docstring() -> None:
+    text = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
+    documented = set(re.findall(r"^\.\. auto\w+:: rbfrag\.(\w+)$", text, re.M))
+    public = set(rbfrag.__all__) - {"__version__"}
+    assert documented == public
+    for name in public:
+        assert getattr(rbfrag, name).__doc__, name
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_python_examples_compile(page: Path) -> None:
+    for body in blocks(page.read_text(encoding="utf-8"), "python"):
+        compile(body, str(page), "exec")
