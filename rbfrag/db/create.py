@@ -34,13 +34,18 @@ def create_if_missing(place: Path | str, *, busy_timeout_s: float) -> None:
     if isinstance(place, str):
         _create_on_server(place)
         return
-    if place.exists() or place.is_symlink():
-        return
-    folder = place.absolute().parent
-    if not folder.is_dir():
-        raise DatabaseNotFoundError(
-            f"cannot make the database {place}: there is no folder {folder}; make it first"
-        )
+    try:
+        if place.is_symlink() or place.exists():
+            return
+        folder = place.absolute().parent
+        if not folder.is_dir():
+            raise DatabaseNotFoundError(
+                f"cannot make the database {place}: there is no folder {folder}; make it first"
+            )
+    except OSError as error:
+        raise DatabaseError(
+            f"cannot make the database {place}: {error.strerror or error}"
+        ) from error
     draft = _draft_file(place, folder)
     try:
         _build(draft, busy_timeout_s)

@@ -7,6 +7,8 @@ from sqlalchemy import Connection, select, update
 from rbfrag.db.insert import insert_if_new
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.schema import earthquake
+from rbfrag.db.stored_text import storable
+from rbfrag.errors import InputError
 
 
 def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording: str) -> int:
@@ -21,10 +23,21 @@ def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording
         info: the earthquake. Without an event_id nothing is known, and the recording
             stands for an event of its own.
         recording: name of the recording.
+
+    Raises:
+        InputError: a magnitude that no earthquake has.
     """
-    event_id = info.event_id or f"unknown event of {recording}"
+    if info.magnitude is not None and not -5.0 < info.magnitude < 11.0:
+        raise InputError(
+            f"event {info.event_id}: {info.magnitude} is no magnitude of an earthquake"
+        )
+    event_id = storable(info.event_id) or f"unknown event of {recording}"
     guessed = info.guessed or not info.event_id
-    known = {"name": info.name, "magnitude": info.magnitude, "time": info.time}
+    known = {
+        "name": storable(info.name),
+        "magnitude": info.magnitude,
+        "time": None if info.time is None else storable(info.time),
+    }
     insert_if_new(connection, earthquake, {"event_id": event_id, "guessed": guessed, **known})
     row = connection.execute(
         select(earthquake).where(

@@ -30,6 +30,8 @@ def locate(db: str | PathLike[str] | None) -> Path | str:
     text = os.fspath(db)
     if not text:
         raise InputError("the database name is empty: give --db a path or an SQLAlchemy URL")
+    if "\0" in text:
+        raise InputError(f"the database name {text!r} holds a NUL character")
     if "://" not in text:
         return Path(text)
     scheme, _, rest = text.partition("://")

@@ -38,6 +38,8 @@ def encode_model(row: ModelRow) -> dict[str, Any]:
     """
     if not row.name.strip():
         raise InputError("the name of a model must not be empty")
+    if not row.name.isprintable():
+        raise InputError(f"the name of a model must be printable text, not {row.name!r}")
     n = len(row.coefficients)
     if len(row.covariance) != n or any(len(line) != n for line in row.covariance):
         raise InputError(f"model {row.name}: the covariance is not {n} by {n}")

@@ -16,11 +16,14 @@ from rbfrag.db.clock import utc_now
 from rbfrag.db.earthquake_store import earthquake_id_for
 from rbfrag.db.insert import insert_if_new
 from rbfrag.db.rows import EarthquakeInfo, MotionRow
+from rbfrag.db.stored_text import storable
 from rbfrag.db.suite_store import add_to_suite, require_suite, suite_names
 from rbfrag.errors import DatabaseError, InputError
 from rbfrag.motions.ground_motion import GroundMotion
 
 __all__ = ["add_motion", "load_motion", "motion_row", "motion_rows", "suite_names"]
+
+_ID_LIMIT = 2**31  # drivers refuse larger integers in words of their own
 
 
 def add_motion(
@@ -68,19 +71,19 @@ def add_motion(
             f"{motion.label}: the database holds equally spaced samples only; "
             "sample the motion first"
         )
-    recording = recording or motion.recording or _own_name(motion)
+    recording = storable(recording or motion.recording or _own_name(motion))
     labels: dict[str, Any] = {
-        "component": component or motion.component,
+        "component": storable(component or motion.component),
         "orientation_deg": motion.orientation_deg,
         "is_vertical": is_vertical,
-        "processing": processing,
+        "processing": storable(processing),
         "flags": json.dumps(list(flags)),
         "remarks": json.dumps(list(motion.remarks)),
-        "source_file": motion.source_file,
+        "source_file": storable(motion.source_file),
         "trace_index": motion.trace_index,
         "file_format": motion.file_format,
     }
-    place = (earthquake, recording, station or motion.station)
+    place = (earthquake, recording, storable(station or motion.station))
     stored = _find(connection, motion)
     if stored is None:
         labels["recording_id"] = _recording_id_for(connection, *place)
@@ -135,14 +138,7 @@ def motion_row(connection: Connection, motion_id: int) -> MotionRow:
     Raises:
         InputError: there is no motion of that id.
     """
-    row = (
-        connection.execute(_row_query().where(schema.motion.c.id == motion_id))
-        .mappings()
-        .one_or_none()
-    )
-    if row is None:
-        raise _no_such_motion(motion_id)
-    return _motion_row(row)
+    return _motion_row(_row_of(connection, _row_query(), motion_id))
 
 
 def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
@@ -153,9 +149,7 @@ def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
         DatabaseError: the samples are not those that were stored.
     """
     query = _row_query().add_columns(schema.motion.c.samples, schema.motion.c.remarks)
-    row = connection.execute(query.where(schema.motion.c.id == motion_id)).mappings().one_or_none()
-    if row is None:
-        raise _no_such_motion(motion_id)
+    row = _row_of(connection, query, motion_id)
     if row["samples"] is None:
         raise InputError(
             f"motion {motion_id}: this database was written without samples; add the record's file"
@@ -335,5 +329,13 @@ def _motion_row(row: RowMapping) -> MotionRow:
     )
 
 
-def _no_such_motion(motion_id: int) -> InputError:
-    return InputError(f"there is no motion {motion_id}: rbfrag motions list  shows the ids")
+def _row_of(connection: Connection, query: Select[Any], motion_id: int) -> RowMapping:
+    row = None
+    if 0 < motion_id < _ID_LIMIT:
+        found = connection.execute(query.where(schema.motion.c.id == motion_id))
+        row = found.mappings().one_or_none()
+    if row is None:
+        raise InputError(
+            f"there is no motion {motion_id} in the database: rbfrag motions list  shows the ids"
+        )
+    return row

@@ -132,8 +132,8 @@ def simulation_points(connection: Connection, combination_id: int) -> SearchPoin
     Raises:
         InputError: there is no combination of that id.
     """
-    known = connection.scalar(select(combination.c.id).where(combination.c.id == combination_id))
-    if known is None:
+    query = select(combination.c.id).where(combination.c.id == combination_id)
+    if not 0 < combination_id < 2**31 or connection.scalar(query) is None:
         raise InputError(f"there is no combination {combination_id} in the database")
     rows = connection.execute(
         select(simulation.c.kr_over_pga, simulation.c.theta_n, simulation.c.outcome)

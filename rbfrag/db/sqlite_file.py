@@ -6,8 +6,8 @@ Standard library only: `rbfrag predict` reads its model through this module.
 from __future__ import annotations
 
 import sqlite3
+import stat
 from pathlib import Path
-from urllib.parse import quote
 
 from rbfrag.db.revision import APPLICATION_ID, VERSION_TABLE, check_revision
 from rbfrag.errors import (
@@ -35,6 +35,11 @@ def require_sqlite_file(path: Path) -> None:
         DatabaseError: the file may not be read.
     """
     try:
+        kind = path.stat().st_mode
+        if stat.S_ISDIR(kind):
+            raise NotADatabaseError(f"{path} is a folder: --db wants the database file")
+        if not stat.S_ISREG(kind):
+            raise NotADatabaseError(f"{path} is no ordinary file: --db wants the database file")
         with path.open("rb") as stream:
             head = stream.read(len(_MAGIC))
     except FileNotFoundError:
@@ -42,15 +47,11 @@ def require_sqlite_file(path: Path) -> None:
             f"there is no database at {path}: name another with --db, or make it with  "
             "rbfrag motions add FILES"
         ) from None
-    except IsADirectoryError:
-        raise NotADatabaseError(f"{path} is a folder: --db wants the database file") from None
     except NotADirectoryError:
         raise DatabaseNotFoundError(
             f"there is no database at {path}: a part of that path is a file, not a folder"
         ) from None
     except OSError as error:
-        if path.is_dir():  # Windows answers with a permission error
-            raise NotADatabaseError(f"{path} is a folder: --db wants the database file") from None
         raise DatabaseError(f"cannot read the database {path}: {error.strerror or error}") from None
     if not head:
         raise NotADatabaseError(f"{path} is empty: delete it, or name another database with --db")
@@ -95,9 +96,8 @@ def connect_sqlite(
 def _connect(
     path: Path, mode: str, read_only: bool, busy_timeout_s: float, check_same_thread: bool
 ) -> sqlite3.Connection:
-    uri = f"file:{quote(str(path.absolute()))}?{mode}"
     connection = sqlite3.connect(
-        uri,
+        f"{path.absolute().as_uri()}?{mode}",
         uri=True,
         timeout=busy_timeout_s,
         isolation_level=None,  # transactions are begun by hand: the module's own are half of them

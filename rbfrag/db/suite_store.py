@@ -6,6 +6,7 @@ from sqlalchemy import Connection, select
 
 from rbfrag.db.insert import insert_if_new
 from rbfrag.db.schema import suite, suite_motion
+from rbfrag.db.stored_text import storable
 from rbfrag.errors import InputError
 
 
@@ -17,6 +18,7 @@ def add_to_suite(connection: Connection, name: str, motion_id: int) -> None:
     """
     if not name.strip():
         raise InputError("the name of a suite must not be empty")
+    name = storable(name)
     insert_if_new(connection, suite, {"name": name})
     suite_id = connection.execute(select(suite.c.id).where(suite.c.name == name)).scalar_one()
     insert_if_new(connection, suite_motion, {"suite_id": suite_id, "motion_id": motion_id})
@@ -33,7 +35,7 @@ def require_suite(connection: Connection, name: str) -> int:
     Raises:
         InputError: there is no such suite; the message lists those there are.
     """
-    suite_id = connection.scalar(select(suite.c.id).where(suite.c.name == name))
+    suite_id = connection.scalar(select(suite.c.id).where(suite.c.name == storable(name)))
     if suite_id is None:
         known = ", ".join(suite_names(connection)) or "none"
         raise InputError(f"there is no suite {name!r}; the database holds: {known}")

@@ -1,8 +1,8 @@
-"""Intensity measures of an accelerogram, as supplied: no detrending, no filter.
+"""Intensity measures of an accelerogram that is linear between its samples.
 
-The record is piecewise linear between its samples. Its velocity and displacement are then
-known exactly, and so are their extremes, which lie inside intervals: velocity is extreme
-where the acceleration vanishes, displacement where the velocity does.
+Velocity and displacement are the exact integrals of that record, started from rest, with
+no detrending: PGV and PGD are the extremes of those integrals, inside intervals as well as
+at samples, so they do not depend on where the samples happen to lie.
 """
 
 from __future__ import annotations
@@ -13,28 +13,32 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]
 
 TM_BAND_HZ = (0.25, 20.0)
-"""Frequencies that the mean period is taken over, ends included."""
+"""Frequencies that the mean period uses, both edges included [Hz]."""
 
 TM_FREQUENCY_STEP_HZ = 0.05
-"""Widest step between the frequencies of the mean period; shorter records are padded."""
+"""Largest frequency step of the mean period [Hz]; a shorter record is padded to it, no further."""
+
+_EDGE_TOLERANCE = 1e-9
+_LONGEST_PADDED_FFT = 1 << 22
 
 
 @dataclass(frozen=True)
 class IntensityMeasures:
-    """The intensity measures of one component.
+    """Intensity measures of one motion.
 
     Args:
-        pga_g: peak ground acceleration max|a| [g].
-        pgv_m_s: peak ground velocity, the extreme of the exact integral [m/s].
-        pgd_m: peak ground displacement, the extreme of the exact double integral [m].
-        tm_s: mean period [s]; None where it is not defined.
-        final_velocity_m_s: velocity at the end of the record [m/s]; a sign of quality.
-        final_displacement_m: displacement at the end of the record [m].
+        pga_g: peak ground acceleration, max|a| over both signs [g].
+        pgv_m_s: peak ground velocity, extreme of the exact integral [m/s].
+        pgd_m: peak ground displacement, extreme of the exact double integral [m].
+        tm_s: mean period [s]; None where :func:`mean_period` is not defined.
+        final_velocity_m_s: velocity at the last sample [m/s]; a quality sign, 0 for rest.
+        final_displacement_m: displacement at the last sample [m].
     """
 
     pga_g: float
@@ -48,106 +52,170 @@ class IntensityMeasures:
 def intensity_measures(
     acceleration_g: FloatArray, interval_s: FloatArray, dt_s: float | None
 ) -> IntensityMeasures:
-    """Return all intensity measures of one component, from rest over the whole record.
+    """Return all intensity measures of a piecewise-linear record.
 
     Args:
-        acceleration_g: samples [g], shape (n,).
-        interval_s: interval lengths [s], shape (n - 1,); zero for a jump.
-        dt_s: sampling interval [s]; None where samples are not equally spaced, and the
-            mean period is not defined.
+        acceleration_g: samples [g], shape (n,), n >= 1.
+        interval_s: lengths of the intervals between them [s], shape (n - 1,), >= 0; a zero
+            is a jump.
+        dt_s: the sampling interval [s], or None for samples that are not equally spaced
+            (then there is no mean period).
+
+    Raises:
+        InputError: the integrals exceed the range of floating-point numbers.
     """
-    a = acceleration_g * STANDARD_GRAVITY_M_S2
-    v = velocity_m_s(acceleration_g, interval_s)
-    d = displacement_m(acceleration_g, interval_s)
-    return IntensityMeasures(
-        pga_g=float(np.abs(acceleration_g).max()),
-        pgv_m_s=_peak(v, _velocity_extremes(a, v, interval_s)),
-        pgd_m=_peak(d, _displacement_extremes(a, v, d, interval_s)),
+    scaled, scale = _scaled(acceleration_g)
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        velocity = velocity_m_s(scaled, interval_s)
+        displacement = displacement_m(scaled, interval_s)
+        inner_velocity = _velocity_extremes(scaled, interval_s, velocity)
+        inner_displacement = _displacement_extremes(scaled, interval_s, velocity, displacement)
+    measures = IntensityMeasures(
+        pga_g=float(np.max(np.abs(acceleration_g))),
+        pgv_m_s=scale * _largest(velocity, inner_velocity),
+        pgd_m=scale * _largest(displacement, inner_displacement),
         tm_s=None if dt_s is None else mean_period(acceleration_g, dt_s),
-        final_velocity_m_s=float(v[-1]),
-        final_displacement_m=float(d[-1]),
+        final_velocity_m_s=scale * float(velocity[-1]),
+        final_displacement_m=scale * float(displacement[-1]),
     )
+    if not (math.isfinite(measures.pgv_m_s) and math.isfinite(measures.pgd_m)):
+        raise InputError(
+            f"the velocity or displacement of a motion with PGA {measures.pga_g:g} g lasting "
+            f"{float(np.sum(interval_s)):g} s is too large to compute: check its units and time step"
+        )
+    return measures
 
 
 def velocity_m_s(acceleration_g: FloatArray, interval_s: FloatArray) -> FloatArray:
-    """Return the velocity at the samples [m/s], from rest; the trapezoid is exact here.
+    """Return the ground velocity at each sample, from rest [m/s], shape (n,).
+
+    The trapezoidal sum, which is exact for a piecewise-linear record.
 
     Args:
         acceleration_g: samples [g], shape (n,).
-        interval_s: interval lengths [s], shape (n - 1,).
+        interval_s: lengths of the intervals between them [s], shape (n - 1,).
     """
-    a = acceleration_g * STANDARD_GRAVITY_M_S2
-    return _running_sum(0.5 * (a[:-1] + a[1:]) * interval_s)
+    steps = (0.5 * STANDARD_GRAVITY_M_S2) * interval_s * (acceleration_g[:-1] + acceleration_g[1:])
+    return _running_sum(steps)
 
 
 def displacement_m(acceleration_g: FloatArray, interval_s: FloatArray) -> FloatArray:
-    """Return the displacement at the samples [m], from rest, exact for linear pieces.
+    """Return the ground displacement at each sample, from rest [m], shape (n,).
+
+    Exact for a piecewise-linear record: an interval adds v dt + (2 a0 + a1) dt²/6.
 
     Args:
         acceleration_g: samples [g], shape (n,).
-        interval_s: interval lengths [s], shape (n - 1,).
+        interval_s: lengths of the intervals between them [s], shape (n - 1,).
     """
-    a = acceleration_g * STANDARD_GRAVITY_M_S2
-    v = velocity_m_s(acceleration_g, interval_s)
-    return _running_sum(v[:-1] * interval_s + (2.0 * a[:-1] + a[1:]) * interval_s**2 / 6.0)
+    velocity = velocity_m_s(acceleration_g, interval_s)
+    bend = (STANDARD_GRAVITY_M_S2 / 6.0) * interval_s * interval_s
+    steps = velocity[:-1] * interval_s + bend * (2.0 * acceleration_g[:-1] + acceleration_g[1:])
+    return _running_sum(steps)
 
 
 def mean_period(acceleration_g: FloatArray, dt_s: float) -> float | None:
-    """Return the mean period Tm [s]; None where the band holds no power.
+    """Return the mean period T_m [s] of an equally spaced record.
 
-    Tm = sum(C²/f)/sum(C²) over 0.25 <= f <= 20 Hz, C the Fourier amplitudes of the
-    acceleration, frequency step <= 0.05 Hz, no taper (Rathje, Abrahamson & Bray 1998,
-    "Simplified frequency content estimates of earthquake ground motions").
+    T_m = Σ C_i²/f_i / Σ C_i², with C_i the Fourier amplitudes of the acceleration at
+    0.25 Hz <= f_i <= 20 Hz; nfft = max(n, ceil(1 / (0.05 dt))), no taper, no further padding
+    (Rathje, Abrahamson & Bray 1998, J. Geotech. Geoenviron. Eng. 124(2), 150-159).
 
     Args:
-        acceleration_g: equally spaced samples [g], shape (n,).
-        dt_s: sampling interval [s].
+        acceleration_g: samples, shape (n,); the unit does not matter.
+        dt_s: sampling interval [s]. Above 0.025 s the band ends at the Nyquist frequency.
+
+    Returns:
+        The mean period, or None where the record has no power in the band.
     """
-    # rounded first: 1/(0.05*0.005) is 4000.0000000000005 in binary
-    n_fft = max(acceleration_g.size, math.ceil(round(1.0 / (TM_FREQUENCY_STEP_HZ * dt_s), 6)))
-    frequency = np.arange(n_fft // 2 + 1) / (n_fft * dt_s)
-    # a band edge that is a frequency of the transform must not be lost to its last bit
-    slack = 1e-9
-    inside = (frequency >= TM_BAND_HZ[0] * (1.0 - slack)) & (
-        frequency <= TM_BAND_HZ[1] * (1.0 + slack)
-    )
-    power = np.abs(np.fft.rfft(acceleration_g, n_fft)[inside]) ** 2
-    total = float(power.sum())
-    if not total > 0.0:
+    scaled, _ = _scaled(acceleration_g)
+    padded = _ceil(1.0 / TM_FREQUENCY_STEP_HZ / dt_s)
+    nfft = max(float(scaled.size), padded)
+    window_s = nfft * dt_s
+    if not math.isfinite(window_s):
         return None
-    return float((power / frequency[inside]).sum() / total)
+    lowest, highest = TM_BAND_HZ
+    first = _ceil(lowest * window_s)
+    last = min(-_ceil(-highest * window_s), nfft // 2)
+    if last < first:
+        return None
+    numbers = np.arange(first, last + 1.0)
+    if nfft > max(scaled.size, _LONGEST_PADDED_FFT):
+        power = _power_by_direct_sum(scaled, numbers / nfft)
+    else:
+        spectrum = np.fft.rfft(scaled, int(nfft))[int(first) : int(last) + 1]
+        power = np.square(spectrum.real) + np.square(spectrum.imag)
+    total = float(np.sum(power))
+    # A constant or zero record leaves only the rounding of the transform in the band.
+    if not total > (1e-15 * float(np.sum(np.abs(scaled)))) ** 2:
+        return None
+    return float(np.sum(power / numbers)) * window_s / total
 
 
-def _velocity_extremes(a: FloatArray, v: FloatArray, interval_s: FloatArray) -> FloatArray:
-    """Velocity where the acceleration vanishes inside an interval."""
-    a0, a1 = a[:-1], a[1:]
-    crossing = a0 * a1 < 0.0
-    a0, a1 = a0[crossing], a1[crossing]
-    # the triangle between the sample and the crossing
-    return v[:-1][crossing] + 0.5 * a0 * interval_s[crossing] * a0 / (a0 - a1)
+def _power_by_direct_sum(samples: FloatArray, cycles_per_sample: FloatArray) -> FloatArray:
+    # An extremely short interval would pad the transform to gigabytes for some 400 frequencies.
+    index = np.arange(samples.size, dtype=np.float64)
+    power = np.empty(cycles_per_sample.size)
+    for i, cycles in enumerate(cycles_per_sample):
+        phase = (2.0 * math.pi) * cycles * index
+        real, imaginary = np.dot(samples, np.cos(phase)), np.dot(samples, np.sin(phase))
+        power[i] = real * real + imaginary * imaginary
+    return power
 
 
-def _displacement_extremes(
-    a: FloatArray, v: FloatArray, d: FloatArray, interval_s: FloatArray
-) -> FloatArray:
-    """Displacement where the velocity vanishes inside an interval."""
-    h = interval_s
-    slope = (a[1:] - a[:-1]) * h
-    # velocity over the interval: v0 + b tau + slope tau²/2
-    v0, b, half = v[:-1], a[:-1] * h, 0.5 * slope
-    with np.errstate(divide="ignore", invalid="ignore"):
-        root = np.sqrt(b * b - 4.0 * half * v0)
-        # the form without cancellation gives one root, their product the other
-        k = -0.5 * (b + np.copysign(root, b))
-        candidates = np.stack([k / half, v0 / k])
-    inside = (candidates > 0.0) & (candidates < 1.0)
-    tau = np.where(inside, candidates, 0.0)
-    return (d[:-1] + v0 * h * tau + h * (b * tau**2 / 2.0 + slope * tau**3 / 6.0)).ravel()
+def _scaled(acceleration_g: FloatArray) -> tuple[FloatArray, float]:
+    # By a power of two, hence exactly: squares then neither overflow nor vanish.
+    exponent = math.frexp(float(np.max(np.abs(acceleration_g))))[1]
+    if abs(exponent) < 64:
+        return acceleration_g, 1.0
+    return np.ldexp(acceleration_g, -exponent), math.ldexp(1.0, min(exponent, 1023))
+
+
+def _ceil(x: float) -> float:
+    # 1/(0.05*dt) and the band edges are whole numbers for usual dt, up to rounding.
+    nearest = round(x) if math.isfinite(x) else x
+    if abs(x - nearest) <= _EDGE_TOLERANCE * max(1.0, abs(x)):
+        return float(nearest)
+    return float(math.ceil(x))
 
 
 def _running_sum(steps: FloatArray) -> FloatArray:
-    return np.concatenate([[0.0], np.cumsum(steps)])
+    total = np.zeros(steps.size + 1)
+    np.cumsum(steps, out=total[1:])
+    return total
 
 
-def _peak(at_samples: FloatArray, inside: FloatArray) -> float:
-    return float(max(np.abs(at_samples).max(), np.abs(inside).max(initial=0.0)))
+def _largest(*values: FloatArray) -> float:
+    return max((float(np.max(np.abs(v))) for v in values if v.size), default=0.0)
+
+
+def _velocity_extremes(a: FloatArray, h: FloatArray, v: FloatArray) -> FloatArray:
+    # v is extreme where a = 0: at the fraction a0/(a0-a1) of an interval that a crosses.
+    inside = np.flatnonzero((np.sign(a[:-1]) * np.sign(a[1:]) < 0.0) & (h > 0.0))
+    a0, a1 = a[inside], a[inside + 1]
+    fraction = a0 / (a0 - a1)
+    return v[inside] + (0.5 * STANDARD_GRAVITY_M_S2) * h[inside] * a0 * fraction
+
+
+def _displacement_extremes(
+    a: FloatArray, h: FloatArray, v: FloatArray, d: FloatArray
+) -> FloatArray:
+    # d is extreme where v = C + B s + A s² = 0, s the fraction of the interval, v in g h.
+    inside = np.flatnonzero(h > 0.0)
+    a0, a1, length = a[inside], a[inside + 1], h[inside]
+    curvature = 0.5 * (a1 - a0)
+    start = v[inside] / (STANDARD_GRAVITY_M_S2 * length)
+    discriminant = a0 * a0 - 4.0 * curvature * start
+    real = discriminant >= 0.0
+    inside, a0, a1, length = inside[real], a0[real], a1[real], length[real]
+    curvature, start = curvature[real], start[real]
+    # The form without cancellation: q/A and C/q.
+    q = -0.5 * (a0 + np.copysign(np.sqrt(discriminant[real]), a0))
+    found = []
+    for numerator, denominator in ((q, curvature), (start, q)):
+        root = np.divide(numerator, denominator, out=np.full(q.size, -1.0), where=denominator != 0)
+        ok = (root > 0.0) & (root < 1.0)
+        s, at, step = root[ok], inside[ok], length[ok]
+        bend = STANDARD_GRAVITY_M_S2 * step * step * s * s
+        found.append(d[at] + v[at] * step * s + bend * (0.5 * a0[ok] + (a1[ok] - a0[ok]) * s / 6.0))
+    return np.concatenate(found)

@@ -162,6 +162,13 @@ class TestCreation:
         with locked_folder() as folder, pytest.raises(DatabaseReadOnlyError, match=r"x\.db"):
             open_database(folder / "x.db", create=True)
 
+    def test_signs_with_a_meaning_in_urls(self, tmp_path: Path) -> None:
+        path = tmp_path / "a?b#c%20 ü&mode=memory.db"
+        open_database(path, create=True).dispose()
+        with opened_database(path, read_only=True) as engine:
+            assert _count(engine) == 0
+        assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
     def test_rights_are_those_of_any_file(self, sqlite_file: Path) -> None:
         other = sqlite_file.with_name("other")
         other.touch()
@@ -182,6 +189,20 @@ class TestRefusals:
     def test_folder(self, tmp_path: Path, create: bool) -> None:
         with pytest.raises(NotADatabaseError, match="is a folder"):
             open_database(tmp_path, create=create)
+
+    def test_a_device(self) -> None:
+        with pytest.raises(NotADatabaseError, match="no ordinary file"):
+            open_database(os.devnull, create=True)
+
+    def test_a_folder_that_cannot_be_entered(self, locked_folder: Any) -> None:
+        inner = locked_folder.folder / "inner"
+        inner.mkdir()
+        with locked_folder():
+            inside = inner / "x.db"
+            with pytest.raises(DatabaseError, match="denied"):
+                open_database(inside, create=True)
+            with pytest.raises(DatabaseError, match="denied"):
+                open_database(inside)
 
     @pytest.mark.parametrize("create", [False, True])
     def test_empty_file(self, tmp_path: Path, create: bool) -> None:

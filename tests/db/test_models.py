@@ -92,6 +92,8 @@ class TestStore:
         "change",
         [
             {"name": " "},
+            {"name": "a\x00b"},
+            {"name": "a\udcff"},
             {"coefficients": {"slope": float("nan"), "intercept": 0.0, "a": 1.0}},
             {"covariance": ((1.0,),)},
             {"domain": {"pgv_m_s": (0.0, float("inf"))}},

@@ -214,12 +214,46 @@ def test_suites(engine: Engine, make_motion: MakeMotion) -> None:
             add_motion(connection, make_motion(1), earthquake=GUESS, is_vertical=False, suite=" ")
 
 
-def test_an_unknown_id_is_refused(engine: Engine) -> None:
+@pytest.mark.parametrize("motion_id", [7, 0, -1, 2**31, 10**30])
+def test_an_unknown_id_is_refused(engine: Engine, motion_id: int) -> None:
     with engine.connect() as connection:
-        with pytest.raises(InputError, match="no motion 7"):
-            load_motion(connection, 7)
-        with pytest.raises(InputError, match="no motion 7"):
-            motion_row(connection, 7)
+        with pytest.raises(InputError, match=f"no motion {motion_id} "):
+            load_motion(connection, motion_id)
+        with pytest.raises(InputError, match=f"no motion {motion_id} "):
+            motion_row(connection, motion_id)
+
+
+def test_names_that_are_no_text_are_stored_visibly(engine: Engine, make_motion: MakeMotion) -> None:
+    motion = make_motion(source_file="rec\udcff.txt", station="A\x00B", component="ü")
+    with engine.begin() as connection:
+        motion_id, _ = add_motion(
+            connection, motion, earthquake=EarthquakeInfo("E\x00"), is_vertical=False, suite="s\x00"
+        )
+        row = motion_row(connection, motion_id)
+        assert [m.id for m in motion_rows(connection, suite="s\x00")] == [motion_id]
+    assert (row.source_file, row.station, row.component) == ("rec\\udcff.txt", "A\\x00B", "ü")
+
+
+@pytest.mark.parametrize("magnitude", [62.0, float("nan"), float("inf")])
+def test_impossible_magnitudes_are_refused(
+    engine: Engine, make_motion: MakeMotion, magnitude: float
+) -> None:
+    quake = replace(STATED, magnitude=magnitude)
+    with (
+        engine.begin() as connection,
+        pytest.raises(InputError, match=r"christchurch-2011.*no magnitude"),
+    ):
+        add_motion(connection, make_motion(), earthquake=quake, is_vertical=False)
+
+
+def test_samples_beyond_all_accelerations_are_refused(engine: Engine) -> None:
+    motion = GroundMotion(np.array([0.0, 1e308, 1e308, 0.0]), 10.0)
+    with (
+        engine.begin() as connection,
+        np.errstate(all="ignore"),
+        pytest.raises(InputError, match="check the units"),
+    ):
+        add_motion(connection, motion, earthquake=GUESS, is_vertical=False)
 
 
 def test_nodes_are_refused(engine: Engine) -> None:
