@@ -9,10 +9,14 @@ acceleration and w(tau) = w0 + dw tau the effective gravity, both in g::
     theta(tau) = theta + sum_k U[k] tau^(k+1)/(k+1)
 
 The record is linear between samples, so no step crosses a kink. s and c are carried from
-step to step: the loop calls no sine or cosine.
+step to step by turning through the small increment of theta: the loop calls no sine or
+cosine, and s² + c² stays 1. (Summing the truncated series of s and c instead loses all
+terms in theta³ beyond the order, which is the greatest error where theta grows from rest.)
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +78,7 @@ def step8(
     da: float,
     w0: float,
     dw: float,
-) -> tuple[float, float, float, float, float]:
+) -> tuple[float, float, float]:
     """One non-linear step of order 8, the recurrence written out.
 
     Args:
@@ -89,7 +93,7 @@ def step8(
         dw: its change over the step.
 
     Returns:
-        theta(1) - theta(0), U(1), U'(1), s(1) - s(0), c(1) - c(0).
+        theta(1) - theta(0), U(1), U'(1).
     """
     u0 = ph * rate
     big_p = ph * ph
@@ -115,12 +119,6 @@ def step8(
     s7 = -(u0 * c6 + u1 * c5 + u2 * c4 + u3 * c3 + u4 * c2 + u5 * c1 + u6 * c0) * (1.0 / 7.0)
     c7 = (u0 * s6 + u1 * s5 + u2 * s4 + u3 * s3 + u4 * s2 + u5 * s1 + u6 * s0) * (1.0 / 7.0)
     u8 = (big_p / 8.0) * (a0 * c7 - w0 * s7 + da * c6 - dw * s6)
-    s8 = -(u0 * c7 + u1 * c6 + u2 * c5 + u3 * c4 + u4 * c3 + u5 * c2 + u6 * c1 + u7 * c0) * (
-        1.0 / 8.0
-    )
-    c8 = (u0 * s7 + u1 * s6 + u2 * s5 + u3 * s4 + u4 * s3 + u5 * s2 + u6 * s1 + u7 * s0) * (
-        1.0 / 8.0
-    )
 
     u[0] = u0
     u[1] = u1
@@ -137,9 +135,21 @@ def step8(
     v_end = u1 + (
         2.0 * u2 + (3.0 * u3 + (4.0 * u4 + (5.0 * u5 + (6.0 * u6 + (7.0 * u7 + 8.0 * u8)))))
     )
-    s_change = s1 + (s2 + (s3 + (s4 + (s5 + (s6 + (s7 + s8))))))
-    c_change = c1 + (c2 + (c3 + (c4 + (c5 + (c6 + (c7 + c8))))))
-    return turned, u_end, v_end, s_change, c_change
+    return turned, u_end, v_end
+
+
+@kernel
+def turn(s: float, c: float, angle: float) -> tuple[float, float]:
+    """Changes of s = sin(phi) and c = cos(phi) when phi falls by `angle`."""
+    if abs(angle) <= 0.125:  # series exact to rounding
+        x = angle * angle
+        sine = angle * (1.0 - x / 6.0 * (1.0 - x / 20.0 * (1.0 - x / 42.0 * (1.0 - x / 72.0))))
+        versine = 0.5 * x * (1.0 - x / 12.0 * (1.0 - x / 30.0 * (1.0 - x / 56.0)))
+    else:
+        sine = math.sin(angle)
+        half = math.sin(0.5 * angle)
+        versine = 2.0 * half * half
+    return -s * versine - c * sine, s * sine - c * versine
 
 
 @kernel

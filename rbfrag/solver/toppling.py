@@ -27,6 +27,7 @@ from rbfrag.solver.taylor import (
     fill_coefficients,
     rotation,
     step8,
+    turn,
     value,
 )
 
@@ -207,6 +208,10 @@ def run_toppling(
     while i < last:
         g0 = k_h[i] - w[i] * kr
         g1 = k_h[i + 1] - w[i + 1] * kr
+        if not moving and interval_s[i] == 0.0:  # nothing lifts in no time
+            i += 1
+            tau = 0.0
+            continue
         if not moving:
             if tau == 0.0:
                 if g0 > 0.0:
@@ -240,7 +245,11 @@ def run_toppling(
 
         left = interval_s[i] * (1.0 - tau)
         reseat_at = -1.0
-        if left > 0.0:
+        if left <= 0.0:
+            # a jump, or a start at the very end of the interval: what follows decides
+            moving = theta != 0.0 or rate != 0.0
+            fresh = False
+        else:
             if i != counted:
                 counted = i
                 moved += 1
@@ -255,19 +264,15 @@ def run_toppling(
                 w0 = w[i] + (w[i + 1] - w[i]) * at
                 steps += 1
                 if order == 8 and not linear:
-                    turned, u_end, v_end, s_change, c_change = step8(
-                        u, ph, rate, s[0], c[0], a0, da, w0, dw
-                    )
+                    turned, u_end, v_end = step8(u, ph, rate, s[0], c[0], a0, da, w0, dw)
                 else:
                     u[0] = ph * rate
                     fill_coefficients(u, s, c, order, ph * ph, a0, da, w0, dw, linear)
-                    turned, u_end, v_end, s_change, c_change = 0.0, 0.0, 0.0, 0.0, 0.0
+                    turned, u_end, v_end = 0.0, 0.0, 0.0
                     for k in range(order, 0, -1):
                         turned += u[k] / (k + 1)
                         u_end += u[k]
                         v_end += k * u[k]
-                        s_change += s[k]
-                        c_change += c[k]
                     turned += u[0]
                     u_end += u[0]
                 theta_end = theta + turned
@@ -317,8 +322,12 @@ def run_toppling(
                     break
                 theta = theta_end
                 rate = u_end / ph
-                s[0] += s_change
-                c[0] += c_change
+                if linear:
+                    s[0] -= turned
+                else:
+                    s_change, c_change = turn(s[0], c[0], turned)
+                    s[0] += s_change
+                    c[0] += c_change
 
         if reseat_at >= 0.0:
             if one_excursion:
@@ -400,8 +409,9 @@ def run_toppling(
     else:
         x = math.atan2(s[0], c[0])
         half = 2.0 * abs(math.sin(0.5 * x))
-    margin = abs(rate) - half
-    topples = margin > 0.0 and rate > 0.0 if x > 0.0 else not (rate < 0.0 and margin > 0.0)
+    # the states that come to rest upright: the border between falling over and falling back
+    margin = rate - math.copysign(half, x)
+    topples = margin > 0.0
     if abs(margin) <= error:
         return UNDETERMINED, math.nan, started_s, time_s[n - 1], error, steps, moved, filled
     if topples:
