@@ -47,7 +47,8 @@ wheel: $(VENV)/.installed-dev  ## the wheel, into dist/
 	$(RUN) pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
 
 clean:  ## remove what make made
-	rm -rf $(VENV) docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	test ! -f $(VENV)/pyvenv.cfg || rm -rf $(VENV)
+	rm -rf docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find rbfrag tests docs -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.installed-demo: pyproject.toml | $(VENV)/.made
