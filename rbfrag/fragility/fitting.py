@@ -58,6 +58,8 @@ def fit(
     chosen_term = intensity_term(term)
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}: use one of {', '.join(METHODS)}")
+    if seed < 0:
+        raise InputError(f"seed = {seed}: give a whole number from 0 up")
     if name is not None and not name.strip():
         raise InputError("the name of the model is empty: give a name or leave it out")
     if isinstance(source, CombinationTable):

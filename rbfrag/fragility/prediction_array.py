@@ -29,9 +29,6 @@ class _Reasons:
             self._bits[where] |= np.uint64(1 << len(self._sentences))
             self._sentences.append(sentence)
 
-    def clear(self, where: NDArray[np.bool_]) -> None:
-        self._bits[where] = 0
-
     def texts(self) -> NDArray[np.object_]:
         kinds, which = np.unique(self._bits, return_inverse=True)
         lines = np.empty(kinds.shape, dtype=object)

@@ -20,6 +20,9 @@ TOLERANCE = 1e-8
 
 MOST_ITERATIONS = 200
 
+FEWEST_POINTS = 6
+"""A line with a variance of three parameters needs more than five points."""
+
 
 @dataclass(frozen=True, eq=False)
 class LineFit:
@@ -127,7 +130,8 @@ def event_bootstrap(
     """Return parameters fitted to resampled earthquakes, shape (replicates, parameters).
 
     Whole earthquakes are drawn with replacement, because the points of one earthquake
-    are not independent. A draw whose intensities are all equal is drawn again.
+    are not independent. A draw with fewer than six points, or with equal intensities, tells
+    nothing about scatter and is drawn again.
 
     Args:
         bins: bins over the rising intensities, kept fixed.
@@ -149,7 +153,8 @@ def event_bootstrap(
         while True:
             drawn = np.bincount(random.integers(count, size=count), minlength=count)
             multiplicity = drawn[events].astype(np.float64)
-            if np.ptp(bins.x[multiplicity > 0.0]) > 0.0:
+            drawn_x = bins.x[multiplicity > 0.0]
+            if drawn_x.size >= FEWEST_POINTS and np.ptp(drawn_x) > 0.0:
                 break
         fit = iterate(bins, y, multiplicity, degree, start)
         result[i] = fit.parameters

@@ -86,7 +86,7 @@ def plot_fit(table: CombinationTable, model: FragilityModel, path: str | PathLik
     cells.set_norm(LogNorm(1, most))
     for factor, style, colour, words in _LINES:
         line = mean + factor * sigma
-        label = words if line.max() > 0.01 * top else f"{words}\n(not above zero)"
+        label = words if line.max() > 0.01 * top else f"{words}\n(near or below zero)"
         axes.plot(line_x, line, style, color=colour, linewidth=1.8, label=label)
     axes.set_xlim(0.0, right)
     axes.set_ylim(0.0, top)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from rbfrag.db.engine import opened_database
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fitting import fit
@@ -212,3 +213,23 @@ def test_unknown_names_are_refused(table):
         fit(table, term="pgx")
     with pytest.raises(InputError, match="name of the model is empty"):
         fit(table, term="pgv", name=" ")
+    with pytest.raises(InputError, match="seed = -1"):
+        fit(table, term="pgv", seed=-1)
+
+
+def test_a_database_without_critical_values_is_refused(tmp_path):
+    with (
+        opened_database(tmp_path / "empty.db", create=True) as engine,
+        engine.connect() as connection,
+        pytest.raises(FitError, match="no critical values to fit"),
+    ):
+        fit(connection, term="pgv")
+
+
+def test_earthquakes_of_a_single_point_do_not_break_the_resamples(draw):
+    table = draw(events=4, motions=1)
+    chosen = np.flatnonzero(table.event_id == "event-0").tolist()
+    chosen += [int(np.flatnonzero(table.event_id == f"event-{i}")[0]) for i in (1, 2, 3)]
+    report = fit(rows_of(table, np.array(chosen)), term="pgv")
+    assert report.events == 4
+    assert np.all(np.isfinite(report.model.row.covariance))
