@@ -1,0 +1,140 @@
+"""Campaigns: equal databases whatever happens on the way."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from rbfrag.campaign.add_motions import add_motions
+from rbfrag.campaign.simulate import CampaignProgress, simulate
+from rbfrag.db.content import content_digest
+from rbfrag.db.engine import opened_database
+from rbfrag.db.queries import database_info
+from rbfrag.errors import InputError
+from tests.synthetic import write_suite
+
+P2 = (10.0, 1.0)
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Path:
+    place = tmp_path / "a.db"
+    add_motions([write_suite(tmp_path / "records")], db=place, suite="s")
+    return place
+
+
+def _copy(database: Path, name: str) -> Path:
+    other = database.with_name(name)
+    other.write_bytes(database.read_bytes())
+    return other
+
+
+def _digest(database: Path) -> str:
+    with opened_database(database, read_only=True) as engine, engine.connect() as connection:
+        return content_digest(connection)
+
+
+def _combinations(database: Path) -> int:
+    with opened_database(database, read_only=True) as engine, engine.connect() as connection:
+        return database_info(connection).rows["combination"]
+
+
+def test_one_and_two_workers_give_equal_databases(database: Path) -> None:
+    other = _copy(database, "b.db")
+    one = simulate(database, p2=P2, jobs=1)
+    two = simulate(other, p2=P2, jobs=2)
+    assert (one.combinations, one.found, one.runs) == (two.combinations, two.found, two.runs)
+    assert one.found > 0
+    assert _digest(database) == _digest(other)
+
+
+def test_progress_is_told_after_each_motion(database: Path) -> None:
+    seen: list[CampaignProgress] = []
+    simulate(database, p2=P2, jobs=1, on_progress=seen.append)
+    assert [progress.done for progress in seen] == [0, 4, 8, 12, 16, 20, 24]
+    assert seen[-1].total == 24
+    assert seen[-1].seconds_left == 0.0
+    assert seen[3].rate_per_s > 0.0
+
+
+def test_repeating_adds_nothing(database: Path) -> None:
+    first = simulate(database, p2=P2, jobs=1)
+    before = _digest(database)
+    again = simulate(database, p2=P2, jobs=1)
+    assert (again.resumed, again.runs) == (first.combinations, 0)
+    assert _digest(database) == before
+
+
+def test_a_wider_list_reuses_what_is_stored(database: Path) -> None:
+    simulate(database, p2=P2, jobs=1)
+    wider = simulate(database, p2=(10.0, 3.0, 1.0), jobs=1)
+    assert (wider.combinations, wider.resumed) == (36, 24)
+
+
+def test_interruption_keeps_what_is_done(database: Path) -> None:
+    undisturbed = _copy(database, "b.db")
+    simulate(undisturbed, p2=P2, jobs=1)
+
+    def stop(progress: CampaignProgress) -> None:
+        if progress.done >= 8:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        simulate(database, p2=P2, jobs=2, on_progress=stop)
+    assert 8 <= _combinations(database) < 24
+    simulate(database, p2=P2, jobs=2)
+    assert _digest(database) == _digest(undisturbed)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_killed_campaign_is_resumed(tmp_path: Path, jobs: int) -> None:
+    database = tmp_path / "a.db"
+    add_motions([write_suite(tmp_path / "records", 12)], db=database)
+    undisturbed = _copy(database, "b.db")
+    p2 = "30,10,3,1,0.3,0.1"
+    sizes = [float(value) for value in p2.split(",")]
+    simulate(undisturbed, p2=sizes, jobs=1)
+
+    # every combination is slowed down, so that the kill surely comes half-way
+    program = (
+        "import time, rbfrag.campaign.simulate as s\n"
+        "store = s._store\n"
+        "def slow(*arguments):\n"
+        "    time.sleep(0.2)\n"
+        "    store(*arguments)\n"
+        "s._store = slow\n"
+        "if __name__ == '__main__':\n"
+        f"    s.simulate({str(database)!r}, p2={sizes!r}, jobs={jobs})\n"
+    )
+    script = tmp_path / "slow.py"
+    script.write_text(program)
+    running = subprocess.Popen(
+        [sys.executable, str(script)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    deadline = time.monotonic() + 60.0
+    while _combinations(database) < 24:
+        assert running.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    running.send_signal(signal.SIGKILL)
+    running.wait()
+    assert 24 <= _combinations(database) < 144
+    resumed = simulate(database, p2=sizes, jobs=jobs)
+    assert 24 <= resumed.resumed < 144
+    assert _digest(database) == _digest(undisturbed)
+
+
+def test_nothing_to_run_is_said(tmp_path: Path) -> None:
+    database = tmp_path / "a.db"
+    add_motions([write_suite(tmp_path / "records", 1)], db=database)
+    with pytest.raises(InputError, match="twice"):
+        simulate(database, p2=(3.0, 3.0))
+    with pytest.raises(InputError, match="empty"):
+        simulate(database, p2=())

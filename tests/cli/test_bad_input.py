@@ -1,0 +1,155 @@
+"""Bad input: exit status 2, one message that names the value and the remedy, nothing lost."""
+
+from __future__ import annotations
+
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Refuses, Shell
+from tests.synthetic import shaking, write_at2, write_suite
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Path:
+    return write_at2(tmp_path / "record.AT2", shaking(3))
+
+
+@pytest.mark.parametrize("value", ["0", "-1", "nan", "inf"])
+@pytest.mark.parametrize("option", ["--p2", "--kr"])
+def test_block_values(refuses: Refuses, record: Path, option: str, value: str) -> None:
+    values = {"--p2": "3", "--kr": "0.1", option: value}
+    message = refuses("respond", record, *(part for pair in values.items() for part in pair))
+    assert option.removeprefix("--") in message
+    assert value.lstrip("-") in message
+
+
+@pytest.mark.parametrize("value", ["0", "-1", "nan"])
+def test_critical_values(refuses: Refuses, record: Path, value: str) -> None:
+    assert "p2 must be a positive" in refuses("critical", record, "--p2", value)
+
+
+def test_missing_file(refuses: Refuses) -> None:
+    message = refuses("respond", "nowhere.AT2", "--p2", "3", "--kr", "0.1")
+    assert "nowhere.AT2" in message
+    assert "no such file" in message
+
+
+def test_bad_sample_is_named_with_its_line(refuses: Refuses, record: Path) -> None:
+    lines = record.read_text().split("\n")
+    lines[10] = lines[10].replace(lines[10].split()[2], "NaN", 1)
+    record.write_text("\n".join(lines))
+    message = refuses("critical", record, "--p2", "3")
+    assert "line 11" in message
+    assert "NaN" in message
+
+
+def test_wrong_kind_of_record(refuses: Refuses, record: Path) -> None:
+    record.write_text(record.read_text().replace("ACCELERATION TIME", "VELOCITY TIME"))
+    assert "velocity" in refuses("motions", "show", record)
+
+
+def test_no_database(refuses: Refuses, tmp_path: Path) -> None:
+    for command in (
+        ("motions", "list"),
+        ("simulate",),
+        ("fit", "--term", "pgv"),
+        ("models", "list"),
+        ("db", "info"),
+        ("db", "check"),
+        ("db", "upgrade"),
+        ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6"),
+    ):
+        assert "rbfrag.db" in refuses(*command)
+    assert not list(tmp_path.glob("*.db"))
+
+
+def test_file_that_is_no_database(refuses: Refuses, tmp_path: Path) -> None:
+    place = tmp_path / "notes.db"
+    place.write_text("this is a text file of some length, not a database at all\n" * 20)
+    for command in (("motions", "list"), ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")):
+        assert "notes.db" in refuses(*command, "--db", place)
+    assert place.read_text().startswith("this is a text file")
+
+
+def test_database_of_another_program(refuses: Refuses, tmp_path: Path) -> None:
+    place = tmp_path / "other.db"
+    with sqlite3.connect(place) as connection:
+        connection.execute("CREATE TABLE t (x)")
+    connection.close()
+    for command in (("db", "info"), ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")):
+        assert "other.db" in refuses(*command, "--db", place)
+
+
+@pytest.mark.parametrize("revision", ["0000", "9999"])
+def test_older_or_newer_schema(
+    shell: Shell, refuses: Refuses, record: Path, tmp_path: Path, revision: str
+) -> None:
+    shell("motions", "add", record)
+    connection = sqlite3.connect(tmp_path / "rbfrag.db")
+    connection.execute("UPDATE alembic_version SET version_num = ?", (revision,))
+    connection.commit()
+    connection.close()
+    for command in (("motions", "list"), ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")):
+        message = refuses(*command)
+        assert "rbfrag.db" in message
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (("--p2", "0", "--kr", "0.1", "--pgv", "0.6"), "p2"),
+        (("--p2", "3", "--kr", "-0.1", "--pgv", "0.6"), "kr"),
+        (("--p2", "3", "--kr", "0", "--pgv", "0.6"), "kr"),
+        (("--p2", "3", "--kr", "0.1", "--pgv", "-0.6"), "pgv"),
+        (("--p2", "3", "--kr", "0.1", "--pgv", "nan"), "pgv"),
+        (("--p2", "3", "--kr", "nan", "--pgv", "0.6"), "kr"),
+        (("--p2", "3", "--kr", "0.1"), "pgv"),
+        (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--model", "nobody"), "nobody"),
+        (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--level", "2"), "level"),
+    ],
+)
+def test_predict(
+    shell: Shell, refuses: Refuses, tmp_path: Path, options: tuple[str, ...], word: str
+) -> None:
+    shell("motions", "add", write_suite(tmp_path / "records"))
+    shell("simulate", "--p2", "10,1", "--jobs", "1")
+    shell("fit", "--term", "pgv")
+    assert word in refuses("predict", *options)
+
+
+def test_simulate(shell: Shell, refuses: Refuses, record: Path) -> None:
+    shell("motions", "add", record)
+    assert "'x'" in refuses("simulate", "--p2", "3,x")
+    assert "twice" in refuses("simulate", "--p2", "3,1,3")
+    assert "p2" in refuses("simulate", "--p2", "3,-1")
+    assert "--jobs" in refuses("simulate", "--jobs", "0")
+    assert "'nobody'" in refuses("simulate", "--suite", "nobody")
+    assert shell.json("db", "info")["rows"]["campaign"] == 0
+
+
+def test_fit(shell: Shell, refuses: Refuses, record: Path) -> None:
+    shell("motions", "add", record)
+    assert "'pgx'" in refuses("fit", "--term", "pgx")
+    assert "'ols'" in refuses("fit", "--term", "pgv", "--method", "ols")
+    refuses("fit", "--term", "pgv")
+    assert shell.json("models", "list") == []
+
+
+def test_plot_folder_and_suffix(shell: Shell, refuses: Refuses, record: Path) -> None:
+    options = ("respond", record, "--p2", "3", "--kr", "0.1", "--plot")
+    assert "nofolder" in refuses(*options, "nofolder/a.png")
+    assert ".xyz" in refuses(*options, "a.xyz")
+
+
+def test_missing_option_is_a_usage_error(shell: Shell, record: Path) -> None:
+    result = shell("respond", record, "--p2", "3", expect=2)
+    assert "--kr" in result.stderr
+    shell("nonsense", expect=2)
+
+
+def test_suspicious_dt_is_answered_with_a_warning(shell: Shell, tmp_path: Path) -> None:
+    slow = write_at2(tmp_path / "slow.AT2", shaking(3), dt_s=5.0)
+    answer = shell.json("respond", slow, "--p2", "3", "--kr", "0.1")
+    assert any("dt of 5 s" in sentence for sentence in answer["warnings"])
