@@ -284,6 +284,14 @@ class TestRefusals:
         with pytest.raises(MissingExtraError, match="postgres"):
             open_database("postgresql://nobody@127.0.0.1:1/none")
 
+    def test_no_server(self) -> None:
+        expected = (
+            DatabaseNotFoundError if importlib.util.find_spec("psycopg") else MissingExtraError
+        )
+        with pytest.raises(expected) as caught:
+            open_database("postgresql://nobody:secret@127.0.0.1:1/none")
+        assert "secret" not in str(caught.value)
+
 
 class TestReadOnly:
     def test_writes_are_refused(self, place: str) -> None:

@@ -12,13 +12,14 @@ from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Engine, create_engine, inspect, text
+from sqlalchemy import Connection, Engine, create_engine, inspect, text
 
+import rbfrag.db.upgrade
 import rbfrag.migrations
 from rbfrag.db.engine import open_database, unchecked_engine
 from rbfrag.db.revision import REVISIONS, SCHEMA_REVISION, VERSION_TABLE
 from rbfrag.db.schema import metadata
-from rbfrag.db.upgrade import upgrade_database
+from rbfrag.db.upgrade import migrate, upgrade_database
 
 
 def _config() -> Config:
@@ -91,6 +92,28 @@ def test_downgrade_leaves_no_table(place: str) -> None:
             config = _config()
             config.attributes["connection"] = connection
             command.downgrade(config, "base")
+        assert inspect(engine).get_table_names() == [VERSION_TABLE]
+    finally:
+        engine.dispose()
+
+
+def test_an_upgrade_that_fails_is_undone(
+    sqlite_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    engine = unchecked_engine(sqlite_file, foreign_keys=False)
+    try:
+        with engine.begin() as connection:
+            config = _config()
+            config.attributes["connection"] = connection
+            command.downgrade(config, "base")
+
+        def unsound(connection: Connection) -> None:
+            assert len(inspect(connection).get_table_names()) > 10
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(rbfrag.db.upgrade, "_require_sound_references", unsound)
+        with pytest.raises(KeyboardInterrupt):
+            migrate(engine)
         assert inspect(engine).get_table_names() == [VERSION_TABLE]
     finally:
         engine.dispose()
