@@ -96,8 +96,9 @@ class TestCreation:
         with opened_database(place, create=True) as engine:
             assert _count(engine) == 1
 
-    def test_nothing_lies_beside_a_closed_database(self, sqlite_file: Path) -> None:
-        assert [file.name for file in sqlite_file.parent.iterdir()] == [sqlite_file.name]
+    def test_nothing_lies_beside_a_closed_database(self, tmp_path: Path) -> None:
+        open_database(tmp_path / "x.db", create=True).dispose()
+        assert [file.name for file in tmp_path.iterdir()] == ["x.db"]
 
     def test_an_interrupted_creation_leaves_nothing(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -169,10 +170,11 @@ class TestCreation:
             assert _count(engine) == 0
         assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
-    def test_rights_are_those_of_any_file(self, sqlite_file: Path) -> None:
-        other = sqlite_file.with_name("other")
+    def test_rights_are_those_of_any_file(self, tmp_path: Path) -> None:
+        path, other = tmp_path / "x.db", tmp_path / "other"
+        open_database(path, create=True).dispose()
         other.touch()
-        assert sqlite_file.stat().st_mode == other.stat().st_mode
+        assert path.stat().st_mode == other.stat().st_mode
 
 
 class TestRefusals:
