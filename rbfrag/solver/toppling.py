@@ -279,10 +279,13 @@ def run_toppling(
 
                 a_size = abs(a0) + abs(da)
                 w_size = abs(w0) + abs(dw)
-                growth = ph * max(1.0, a_size * abs(s[0]) + w_size * abs(c[0]))
+                stiffness = w_size * abs(c[0])
+                if not linear:
+                    stiffness += a_size * abs(s[0])
+                growth = ph * max(1.0, stiffness)
                 # the first two omitted terms, from u[k+2] ~ (p·h)² D u[k]/((k+1)(k+2)): one
                 # alone is fooled, since from rest under constant a every other one vanishes
-                omitted = 2.0 * ph * (a_size + w_size) / (order * (order + 1))
+                omitted = 16.0 * ph * (a_size + w_size) / (order * (order + 1))
                 truncation = omitted * (abs(u[order]) + abs(u[order - 1]))
                 rounding = MACHINE_EPSILON * (
                     2.0 * (abs(theta_end) + abs(rate) + abs(s[0])) + 4.0 * ph * (a_size + w_size)
@@ -328,6 +331,18 @@ def run_toppling(
                     s_change, c_change = turn(s[0], c[0], turned)
                     s[0] += s_change
                     c[0] += c_change
+                if piece < pieces - 1 and not decided:
+                    # in a long interval the block could swing right round before its end
+                    least = tail_min_q[i]
+                    excess = c[0] * least - s[0]
+                    if rate > error and s[0] < 0.0 and excess > error * (1.0 - least):
+                        decided = True
+                        verdict_s = time_s[i] + (at + part) * interval_s[i]
+                        verdict_error = error
+                        if room == 0:
+                            return (
+                                TOPPLED, math.nan, started_s, verdict_s, error, steps, moved, 0,
+                            )  # fmt: skip
 
         if reseat_at >= 0.0:
             if one_excursion:
