@@ -41,12 +41,15 @@ def blocks(text: str, *languages: str) -> Iterator[str]:
 
 
 def command_lines(text: str) -> Iterator[list[str]]:
-    """Words of every `rbfrag ...` line of the shell blocks, comments and prompts taken off."""
-    for body in blocks(text, "sh", "console"):
-        for line in body.replace("\\\n", " ").splitlines():
-            words = shlex.split(line.removeprefix("$ "), comments=True)
-            if words[:1] == ["rbfrag"]:
-                yield words
+    """Words of every `rbfrag ...` command: lines of sh blocks, prompts of console blocks."""
+    joined = text.replace("\\\n", " ")
+    lines = [line for body in blocks(joined, "sh") for line in body.splitlines()]
+    for body in blocks(joined, "console"):
+        lines += [line[2:] for line in body.splitlines() if line.startswith("$ ")]
+    for line in lines:
+        words = shlex.split(line, comments=True)
+        if words[:1] == ["rbfrag"]:
+            yield words
 
 
 def complaint(words: list[str]) -> str | None:
@@ -67,8 +70,10 @@ def complaint(words: list[str]) -> str | None:
 
 
 def test_the_check_sees_wrong_commands() -> None:
-    lines = list(command_lines("```sh\n$ rbfrag predict \\\n  --p2 3 # three\nls\n```\n"))
-    assert lines == [["rbfrag", "predict", "--p2", "3"]]
+    text = "```sh\nrbfrag predict \\\n  --p2 3 # three\nls\n```\n"
+    text += "```console\n$ rbfrag models list\nrbfrag's output\n```\n"
+    lines = list(command_lines(text))
+    assert lines == [["rbfrag", "predict", "--p2", "3"], ["rbfrag", "models", "list"]]
     assert complaint(lines[0]) is None
     assert complaint(["rbfrag", "predict", "--p3", "3"]) == "rbfrag predict has no option --p3"
     assert complaint(["rbfrag", "models", "burn"]) == "no command rbfrag models burn"
