@@ -1,0 +1,65 @@
+"""Print the deviations from closed forms that the verification page quotes.
+
+The pulses and closed forms are those of tests/physics; the tests set bounds, this tells how
+far below the bounds the solver stays.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from rbfrag.motions.ground_motion import GroundMotion
+from tests.physics import test_closed_forms as closed
+from tests.physics import test_reversal_pulses as reversal
+from tests.physics.pulses import sine_lobes
+
+
+def deviation(motion: GroundMotion, expected: float) -> float:
+    """Return the relative deviation of the linear critical value from the closed form."""
+    found = closed.critical_angle(motion).kr_over_pga
+    assert found is not None
+    return abs(found / expected - 1.0)
+
+
+def main() -> None:
+    print("Largest relative deviation of the linear critical k_r/PGA, f = 0.1 ... 5")
+    for name, (make, closed_form) in closed.EXACT.items():
+        worst = max(
+            deviation(make(f / closed.P, closed.AMPLITUDE_G), closed_form(f)) for f in closed.F
+        )
+        print(f"  {name:<28} {worst:.1e}")
+    a = closed.AMPLITUDE_G
+    for name, lobes, samples, closed_form in (
+        ("half-sine, 2000 samples", (a,), 2000, closed.half_sine),
+        ("sine cycle, 6000 samples", (a, -a), 3000, closed.full_sine),
+    ):
+        worst = max(
+            deviation(sine_lobes(f / closed.P, lobes, samples), closed_form(f)) for f in closed.F
+        )
+        print(f"  {name:<28} {worst:.1e}")
+    print("Half-sine of f = 1 by the number of samples")
+    for samples in (50, 100, 200, 400):
+        pulse = sine_lobes(1.0 / closed.P, (a,), samples)
+        print(f"  {samples:<28} {deviation(pulse, closed.half_sine(1.0)):.1e}")
+    print("Critical k_r of reversal pulses, non-linear, p2 = 2, lobes of 0.25 s, 1 g and -r g")
+    for r in (0.0, 0.35, 0.65, 1.0, 1.25):
+        print(f"  r = {r:<24g} {reversal.found(reversal.reversal(r), 2.0).kr:.7f}")
+    print("Peak over the critical angle of the weakest block that stays")
+    for r in (0.88, 0.9, 1.0):
+        print(f"  r = {r:<24g} {reversal.boundary_peak(r):.5f}")
+    print("Rectangular full cycle, 1 g, lobes of 1/6 s: linear theta_c, non-linear k_r/PGA")
+    for p2 in (1.0, 4.6, 21.5, 100.0):
+        wave = closed.rectangular_cycle(1.0 / 6.0, 1.0)
+        linear = reversal.found(wave, p2, linear=True).kr
+        assert linear is not None
+        exact = math.expm1(-math.sqrt(p2) / 6.0) ** 2
+        kr = reversal.found(wave, p2).kr_over_pga
+        print(f"  p2 = {p2:<23g} {linear:.6f} (closed form {exact:.6f})   {kr:.6f}")
+
+
+if __name__ == "__main__":
+    main()
