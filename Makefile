@@ -34,7 +34,7 @@ docs: $(VENV)/.installed-dev  ## the documentation, into docs/_build/html
 
 # The folder of matplotlib's settings is given because HOME may not be writable.
 unit: $(VENV)/.installed-dev  ## the tests alone
-	MPLCONFIGDIR="$(abspath $(VENV))/matplotlib" $(RUN) pytest
+	MPLCONFIGDIR="$$(cd $(VENV) && pwd)/matplotlib" $(RUN) pytest
 
 format: $(VENV)/.installed-dev  ## put the source in the style that lint asks for
 	$(RUN) ruff check --fix .
