@@ -81,7 +81,7 @@ def intensity_measures(
     if not (math.isfinite(measures.pgv_m_s) and math.isfinite(measures.pgd_m)):
         raise InputError(
             f"the velocity or displacement of a motion with PGA {measures.pga_g:g} g lasting "
-            f"{float(np.sum(interval_s)):g} s is too large to compute: check its units and time step"
+            f"{float(np.sum(interval_s)):g} s is too large to compute: check units and time step"
         )
     return measures
 

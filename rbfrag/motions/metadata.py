@@ -1,0 +1,228 @@
+"""What a table states about the traces of record files, which their headers do not."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rbfrag.errors import InputError, MotionFileError
+from rbfrag.motions.text_file import read_text
+from rbfrag.motions.units import acceleration_unit
+
+COLUMNS = (
+    "file", "trace_index", "event_id", "units", "file_units", "is_vertical", "companion_group",
+    "magnitude", "processing", "earthquake", "year", "station", "component", "dt_s",
+)  # fmt: skip
+"""The columns that are read; only ``file`` must be there, and others are ignored."""
+
+_TRUTH = {
+    "1": True, "yes": True, "true": True,
+    "0": False, "no": False, "false": False,
+    "": None,
+}  # fmt: skip
+
+LARGEST_MAGNITUDE = 10.0
+
+
+@dataclass(frozen=True)
+class TraceMetadata:
+    """What the table states about one trace; empty or None where it states nothing.
+
+    Args:
+        file: the file as the table names it.
+        line: line of the table, from 1.
+        trace_index: position of the trace in its file, from 0.
+        event_id: key of the earthquake.
+        units: unit of acceleration; from the column ``file_units`` it may be any words.
+        is_vertical: whether the trace is the vertical component.
+        companion_group: a name that all components of one recording share.
+        magnitude: magnitude of the earthquake.
+        processing: what was done to the record.
+        earthquake: name of the earthquake for people.
+        year: year or time of the earthquake, as text.
+        station: station.
+        component: component.
+        dt_s: sampling interval [s].
+    """
+
+    file: str
+    line: int
+    trace_index: int = 0
+    event_id: str = ""
+    units: str | None = None
+    is_vertical: bool | None = None
+    companion_group: str = ""
+    magnitude: float | None = None
+    processing: str = ""
+    earthquake: str = ""
+    year: str | None = None
+    station: str = ""
+    component: str = ""
+    dt_s: float | None = None
+
+
+@dataclass(frozen=True)
+class MotionMetadata:
+    """The rows of a metadata table, found by file and trace.
+
+    Args:
+        path: the table.
+        rows: every row, in the table's order.
+    """
+
+    path: str
+    rows: tuple[TraceMetadata, ...]
+    _by_file: Mapping[Path, tuple[TraceMetadata, ...]] = field(repr=False, compare=False)
+
+    def file(self, path: str | os.PathLike[str]) -> list[TraceMetadata]:
+        """Return the rows of a file by trace index; none when the table does not name it."""
+        return list(self._by_file.get(_place(Path(path)), ()))
+
+    def trace(self, path: str | os.PathLike[str], trace_index: int) -> TraceMetadata | None:
+        """Return the row of one trace, or None when the table does not name it."""
+        for row in self.file(path):
+            if row.trace_index == trace_index:
+                return row
+        return None
+
+
+def read_metadata(path: str | os.PathLike[str]) -> MotionMetadata:
+    """Return what a CSV states about the traces of record files.
+
+    Args:
+        path: CSV with the columns of :data:`COLUMNS` (``file`` at least). Files are named
+            relative to the folder of the CSV. A ``trace_index`` left out means 0.
+
+    Raises:
+        MotionFileError: the table cannot be used: no column ``file``, a value that cannot be
+            read, a trace given twice; the message names the line.
+    """
+    table = Path(path)
+    rows: list[TraceMetadata] = []
+    seen: dict[tuple[Path, int], int] = {}
+    by_file: dict[Path, list[TraceMetadata]] = {}
+    header: list[str] | None = None
+    folder = table.absolute().parent
+    for line, cells in _numbered_rows(table):
+        if header is None:
+            header = _header(table, cells, line)
+            continue
+        if len(cells) != len(header):
+            raise MotionFileError(
+                table,
+                f"{len(cells)} cells, but the header has {len(header)} columns: repair the row "
+                "(a comma in a text needs quotes around the text)",
+                line=line,
+            )
+        stated = dict(zip(header, (cell.strip() for cell in cells), strict=True))
+        row = _row(table, stated, line)
+        place = _place(folder / row.file)
+        first = seen.setdefault((place, row.trace_index), line)
+        if first != line:
+            raise MotionFileError(
+                table,
+                f"trace {row.trace_index} of {row.file} was given in line {first}: keep one row",
+                line=line,
+            )
+        rows.append(row)
+        by_file.setdefault(place, []).append(row)
+    if header is None:
+        raise MotionFileError(table, "the table is empty: its first row names the columns")
+    found = {
+        place: tuple(sorted(traces, key=lambda row: row.trace_index))
+        for place, traces in by_file.items()
+    }
+    return MotionMetadata(os.fspath(path), tuple(rows), found)
+
+
+def _numbered_rows(table: Path) -> Iterator[tuple[int, list[str]]]:
+    reader = csv.reader(io.StringIO(read_text(table)), strict=True)
+    try:
+        for cells in reader:
+            if any(cell.strip() for cell in cells):
+                yield reader.line_num, cells
+    except csv.Error as error:
+        raise MotionFileError(
+            table, f"this is no CSV: {error}; repair the quotes", line=reader.line_num
+        ) from None
+
+
+def _header(table: Path, cells: list[str], line: int) -> list[str]:
+    header = [cell.strip().lower() for cell in cells]
+    if "file" not in header:
+        shown = ", ".join(header[:8])
+        raise MotionFileError(
+            table,
+            f"no column 'file' among {shown}: a metadata table is a CSV, separated by commas, "
+            "with the columns file, trace_index, event_id, units, ...",
+            line=line,
+        )
+    for name in COLUMNS:
+        if header.count(name) > 1:
+            raise MotionFileError(table, f"the column {name!r} is there twice", line=line)
+    return header
+
+
+def _row(table: Path, stated: Mapping[str, str], line: int) -> TraceMetadata:
+    def text(name: str) -> str:
+        return stated.get(name, "")
+
+    def number(name: str, ok: Callable[[float], bool], rule: str) -> float | None:
+        if not text(name):
+            return None
+        try:
+            value = float(text(name))
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and ok(value)):
+            raise MotionFileError(table, f"{name} {text(name)!r} must be {rule}", line=line)
+        return value
+
+    if not text("file"):
+        raise MotionFileError(table, "the cell 'file' is empty: name the record's file", line=line)
+    index = text("trace_index") or "0"
+    if not (index.isascii() and index.isdigit() and len(index) < 10):
+        raise MotionFileError(
+            table, f"trace_index {index!r} must be a whole number from 0", line=line
+        )
+    vertical = text("is_vertical")
+    if vertical.lower() not in _TRUTH:
+        raise MotionFileError(table, f"is_vertical {vertical!r} must be 0 or 1", line=line)
+    if text("units"):
+        try:
+            acceleration_unit(text("units"))
+        except InputError as error:
+            raise MotionFileError(table, str(error), line=line) from None
+    return TraceMetadata(
+        file=text("file"),
+        line=line,
+        trace_index=int(index),
+        event_id=text("event_id"),
+        units=text("units") or text("file_units") or None,
+        is_vertical=_TRUTH[vertical.lower()],
+        companion_group=text("companion_group"),
+        magnitude=number(
+            "magnitude",
+            lambda value: abs(value) <= LARGEST_MAGNITUDE,
+            f"a number up to {LARGEST_MAGNITUDE:g}",
+        ),
+        processing=text("processing"),
+        earthquake=text("earthquake"),
+        year=text("year") or None,
+        station=text("station"),
+        component=text("component"),
+        dt_s=number("dt_s", lambda value: value > 0.0, "a positive number of seconds"),
+    )
+
+
+def _place(path: Path) -> Path:
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError, ValueError):
+        # a loop of links or a name that no file can have: it matches itself only
+        return path.absolute()
