@@ -50,11 +50,11 @@ def fit(
     from rbfrag.fragility.model import FragilityModel
     from rbfrag.fragility.report import FitReport
 
-    with opened_database(db) as engine:
-        with engine.connect() as connection:
-            report = run(connection, term=term, method=method, suite=suite, name=name, seed=seed)
-        with engine.begin() as connection:
-            row = save_model(connection, report.model.row, replace=replace)
+    # reading takes no lock, so that a campaign may go on meanwhile
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        report = run(connection, term=term, method=method, suite=suite, name=name, seed=seed)
+    with opened_database(db) as engine, engine.begin() as connection:
+        row = save_model(connection, report.model.row, replace=replace)
     print_report(FitReport.from_model(FragilityModel.from_row(row)), json=json)
 
 

@@ -25,10 +25,10 @@ def find_motion(
         InputError: no such file, trace or id.
     """
     if text.isascii() and text.isdigit() and not Path(text).exists():
-        from rbfrag.db.engine import open_database
+        from rbfrag.db.engine import opened_database
         from rbfrag.db.motion_store import load_motion
 
-        with open_database(db, read_only=True).connect() as connection:
+        with opened_database(db, read_only=True) as engine, engine.connect() as connection:
             return load_motion(connection, int(text))
     from rbfrag.motions.recognise import read_motion
 

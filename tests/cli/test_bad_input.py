@@ -88,7 +88,7 @@ def test_older_or_newer_schema(
 ) -> None:
     shell("motions", "add", record)
     connection = sqlite3.connect(tmp_path / "rbfrag.db")
-    connection.execute("UPDATE alembic_version SET version_num = ?", (revision,))
+    connection.execute("UPDATE rbfrag_revision SET version_num = ?", (revision,))
     connection.commit()
     connection.close()
     for command in (("motions", "list"), ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")):
