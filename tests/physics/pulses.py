@@ -1,0 +1,33 @@
+"""Analytic pulses as ground motions, exact where the pulse is made of straight lines."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rbfrag.motions.ground_motion import GroundMotion
+
+
+def rectangle(duration_s: float, amplitude_g: float) -> GroundMotion:
+    return GroundMotion.from_nodes(
+        [0.0, 0.0, duration_s, duration_s], [0.0, amplitude_g, amplitude_g, 0.0]
+    )
+
+
+def triangle(duration_s: float, amplitude_g: float) -> GroundMotion:
+    return GroundMotion.from_nodes([0.0, 0.5 * duration_s, duration_s], [0.0, amplitude_g, 0.0])
+
+
+def rectangular_cycle(duration_s: float, amplitude_g: float) -> GroundMotion:
+    """Two rectangular lobes of `duration_s` each, the first positive."""
+    times = [0.0, 0.0, duration_s, duration_s, 2.0 * duration_s, 2.0 * duration_s]
+    a = amplitude_g
+    return GroundMotion.from_nodes(times, [0.0, a, a, -a, -a, 0.0])
+
+
+def sine_lobes(
+    duration_s: float, amplitudes_g: tuple[float, ...], samples_per_lobe: int
+) -> GroundMotion:
+    """Half-sines of `duration_s` each, equally sampled."""
+    phase = np.linspace(0.0, np.pi, samples_per_lobe, endpoint=False)
+    lobes = [amplitude * np.sin(phase) for amplitude in amplitudes_g]
+    return GroundMotion(np.append(np.concatenate(lobes), 0.0), duration_s / samples_per_lobe)

@@ -1,0 +1,124 @@
+"""Non-linear reference values of section 6 of the theory: pulses with a reversal.
+
+Gravity cancels: the published values are ratios, or are given in g.
+"""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
+from rbfrag.solver.critical import critical
+from rbfrag.solver.respond import respond
+from rbfrag.solver.results import CriticalResult, Outcome
+from tests.physics.pulses import rectangular_cycle, sine_lobes
+
+SAMPLES = 500
+
+
+def reversal(r: float) -> GroundMotion:
+    """Half-sine lobes of 1 g and -r g, 0.25 s each."""
+    return sine_lobes(0.25, (1.0, -r) if r else (1.0,), SAMPLES)
+
+
+def found(motion: GroundMotion, p2: float, *, linear: bool = False) -> CriticalResult:
+    result = critical(motion, p2=p2, linear=linear)
+    assert result.status == "found"
+    assert result.certified
+    return result
+
+
+def boundary_peak(r: float) -> float:
+    """Peak over the critical angle of the weakest block that stays."""
+    result = found(reversal(r), 2.0)
+    assert result.kr is not None
+    run = respond(reversal(r), p2=2.0, kr=result.kr * (1.0 + 1e-10))
+    assert run.outcome is Outcome.STABLE
+    assert run.peak_theta_n is not None
+    return run.peak_theta_n
+
+
+@pytest.mark.parametrize(
+    ("r", "kr"), [(0.0, 0.19071), (0.35, 0.14338), (0.65, 0.10305), (1.0, 0.05636), (1.25, 0.02328)]
+)
+def test_critical_kr_of_reversal_pulses(r: float, kr: float) -> None:
+    assert found(reversal(r), 2.0).kr == pytest.approx(kr, abs=6e-6)
+
+
+def test_a_block_can_pass_its_critical_angle_and_come_back() -> None:
+    assert boundary_peak(1.0) == pytest.approx(1.264, abs=6e-4)
+
+
+def test_reversal_that_brings_back_a_block_from_beyond_its_critical_angle() -> None:
+    # without a strong reversal the border is the upright position itself
+    assert boundary_peak(0.88) == pytest.approx(1.0, abs=1e-4)
+    assert boundary_peak(0.88) <= 1.0
+    assert boundary_peak(0.90) > 1.0
+
+
+def test_the_linear_critical_angle_lies_above_except_at_r_1_25() -> None:
+    for r in (0.0, 0.35, 0.65, 1.0):
+        linear = found(reversal(r), 2.0, linear=True).kr
+        kr = found(reversal(r), 2.0).kr
+        assert linear is not None
+        assert kr is not None
+        assert 0.0 < math.tan(linear) / kr - 1.0 < 0.18
+        assert 0.0 < linear / math.atan(kr) - 1.0 < 0.016 + 1e-3
+    assert found(reversal(1.25), 2.0, linear=True).kr == pytest.approx(0.02316, abs=6e-6)
+
+
+@pytest.mark.parametrize(
+    ("p2", "theta_c", "tan_ratio", "kr_over_pga"),
+    [
+        (1.0, 0.0236, 0.0236, 0.0235),
+        (4.6, 0.0903, 0.0906, 0.0898),
+        (21.5, 0.2897, 0.2981, 0.2852),
+        (100.0, 0.6579, 0.7728, 0.6570),
+    ],
+)
+def test_rectangular_full_cycle_of_1_g(
+    p2: float, theta_c: float, tan_ratio: float, kr_over_pga: float
+) -> None:
+    # (4.21): lobes of 1/6 s
+
+    wave = rectangular_cycle(1.0 / 6.0, 1.0)
+    linear = found(wave, p2, linear=True).kr
+    assert linear == pytest.approx(theta_c, abs=6e-5)
+    assert linear is not None
+    assert math.tan(linear) == pytest.approx(tan_ratio, abs=6e-5)
+    assert found(wave, p2).kr_over_pga == pytest.approx(kr_over_pga, abs=6e-5)
+
+
+@pytest.mark.parametrize("velocity_m_s", [0.05, 0.5, 2.0, 5.0])
+@pytest.mark.parametrize("p2", [0.3, 3.0, 30.0])
+def test_impulse_limit(velocity_m_s: float, p2: float) -> None:
+    # k_r g/p = V cos(theta_c/2) for a velocity step
+    duration = 1e-5 / math.sqrt(p2)
+    amplitude = velocity_m_s / G / duration
+    pulse = GroundMotion.from_nodes([0.0, 0.0, duration, duration], [0.0, amplitude, amplitude, 0])
+    result = critical(pulse, p2=p2, search_limit=1e-9)
+    assert result.kr is not None
+    assert result.y_m_s is not None
+    half_angle = 0.5 * math.atan(result.kr)
+    assert result.y_m_s == pytest.approx(velocity_m_s * math.cos(half_angle), rel=2e-4)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(st.floats(-1.0, 1.0, width=32), min_size=2, max_size=25),
+    st.sampled_from([0.1, 1.0, 10.0, 100.0]),
+    st.sampled_from([0.01, 0.05, 0.3]),
+)
+def test_linear_toppling_velocity_is_at_most_twice_pgv(
+    samples: list[float], p2: float, dt_s: float
+) -> None:
+    motion = GroundMotion([*samples, 0.0], dt_s)  # type: ignore[arg-type]
+    result = critical(motion, p2=p2, linear=True)
+    if result.status == "found":
+        assert result.y_m_s is not None
+        assert result.y_m_s <= 2.0 * motion.pgv_m_s * (1.0 + 1e-9)
