@@ -1,86 +1,94 @@
-"""Delimited text: time and acceleration in two columns, or accelerations in one.
+"""Delimited text: time and acceleration in two columns, or acceleration alone.
 
-Columns are separated by comma, semicolon, tab or blanks. Lines beginning with ``#`` are
-comments; a last comment line, or a first line of words, may name the columns with their
-units, as in ``# Time (s),Acceleration (g's)``. A unit is never guessed.
+Columns are separated by comma, semicolon, tab or blanks. Above them stand ``#`` lines, or one
+line with the names of the columns. The unit comes from there, or from the caller::
+
+    # Time Series: Chi-Chi, Taiwan 1999 - TCU068-090
+    # Time (s),Acceleration (g's)
+    0.0,-6.67772E-4
 """
 
 from __future__ import annotations
 
 import re
-from decimal import Decimal
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rbfrag.errors import InputError, MotionFileError, UnknownFormatError
+from rbfrag.errors import MotionFileError
+from rbfrag.motions.column_header import event_station_component, stated_unit
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text_file import finite_number
-from rbfrag.motions.units import acceleration_unit, unit_in_g
+from rbfrag.motions.time_column import sampling_interval
+from rbfrag.motions.units import unit_in_g
 
 FORMAT = "delimited text"
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_DATA_LINE = re.compile(rf"\s*{_NUMBER}(?:\s*[,;\s]\s*{_NUMBER})?\s*[,;]?\s*")
-_SEPARATOR = re.compile(r"\s*[,;]\s*|\s+")
-_ACCELERATION = re.compile(r"\bacc(?:el(?:eration)?)?\b|\ba\b", re.IGNORECASE)
-_UNIT = re.compile(r"[(\[]\s*([^()\[\]]+?)\s*[)\]]")
-_SUFFIX_UNIT = re.compile(r"\bacc(?:eleration)?_(g|m_s2|cm_s2|mm_s2)\b", re.IGNORECASE)
-_TITLE = re.compile(r"#\s*Time Series:\s*(.+?)\s+-\s+(\S+)-([^\s,]+)[\s,]*$")
+COMMENT = "#"
+
+_NUMBER_LIKE = re.compile(
+    r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE
+)
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*[;\s]\s*[+-]?\d*,\d+\S*\s*")
 
 
 def recognises(head: str) -> bool:
-    """Return whether the first lines after comments and one header line are numbers."""
-    return _first_data_line(head.split("\n")[:-1] or head.split("\n")) is not None
+    """Return whether the first rows are numbers, below comments or one line of names."""
+    rows = [line for line in head.split("\n") if line.strip() and not line.startswith(COMMENT)]
+    if rows and not _is_numeric(rows[0]):
+        del rows[0]
+    if not rows:
+        return False
+    if _DECIMAL_COMMA.fullmatch(rows[0]):
+        return True
+    width = len(_fields(rows[0]))
+    if width > 2 and (len(rows) < 2 or len(_fields(rows[1])) != width):
+        return False
+    return all(map(_is_numeric, rows[: 1 if width <= 2 else 2]))
 
 
 def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
-    """Return the one motion of a text file.
+    """Return the one motion of a delimited text file.
 
     Args:
         path: for labels and messages.
         text: the file's text.
-        units: unit of acceleration, if the file does not state it.
-        dt_s: sampling interval [s], if the file has no column of times.
+        units: unit of acceleration that the caller states; refused when the file states another.
+        dt_s: sampling interval that the caller states [s]; needed where there is no time
+            column, refused where it contradicts one.
 
     Raises:
-        MotionFileError: a line that cannot be used, an unknown unit or sampling interval.
+        MotionFileError: a header or value that cannot be used, with its line.
     """
     lines = text.split("\n")
-    first = _first_data_line(lines)
-    if first is None:
-        raise UnknownFormatError(path, "no line of numbers was found")
-    numbered = [
-        (number, line.strip())
-        for number, line in enumerate(lines[first:], first + 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    columns = len(_SEPARATOR.split(numbered[0][1].rstrip(",; ")))
-    rows = [_fields(path, line, number, columns) for number, line in numbered]
-    unit = _unit(path, lines[:first], units)
-    values = np.array(
-        [_number(path, row[-1], n) for row, (n, _) in zip(rows, numbered, strict=True)]
-    )
-    if columns == 2:
-        dt = _interval(path, [row[0] for row in rows], [number for number, _ in numbered])
-        if dt_s is not None and dt_s != dt:
+    start = _first_data_line(lines)
+    header = [(number, line) for number, line in enumerate(lines[:start], 1) if line.strip()]
+    rows = _rows(path, lines, start)
+    unit = stated_unit(path, header, units)
+    if len(rows[0][1]) == 1:
+        samples = _numbers(path, rows, 0, "acceleration")
+        _refuse_gaps(path, rows)
+        if dt_s is None:
             raise MotionFileError(
-                path, f"the column of times says dt = {dt:g} s, not {dt_s:g}: leave --dt out"
+                path,
+                "the file holds one column and states no sampling interval: give it in seconds, "
+                "as in  --dt 0.005",
             )
-    elif dt_s is None:
-        raise MotionFileError(
-            path,
-            "the file holds one column of accelerations and no times: give the sampling "
-            "interval with --dt",
-        )
+        dt, first_s = dt_s, 0.0
     else:
-        dt = dt_s
-    event, station, component = _names(lines[:first])
+        times = _numbers(path, rows, 0, "time")
+        samples = _numbers(path, rows, 1, "acceleration")
+        tokens = [fields[0].strip() for _, fields in rows]
+        dt = sampling_interval(path, tokens, times, [number for number, _ in rows], dt_s)
+        first_s = float(times[0])
+    event, station, component = event_station_component(header)
     factor = unit_in_g(unit)
     return [
         GroundMotion(
-            values * factor if factor != 1.0 else values,
+            samples * factor if factor != 1.0 else samples,
             dt,
             station=station,
             event=event,
@@ -90,95 +98,99 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             recording=f"{event} {station}".strip(),
             source_file=path.name,
             file_format=FORMAT,
+            remarks=(f"times in the file start at {first_s:g} s; here they start at 0",)
+            if first_s != 0.0
+            else (),
         )
     ]
 
 
-def _first_data_line(lines: list[str]) -> int | None:
-    """Index of the first line of numbers: after comments, blanks and one line of words."""
-    words = 0
-    for index, line in enumerate(lines):
-        if not line.strip() or line.lstrip().startswith("#"):
+def _fields(row: str) -> list[str]:
+    for mark in (";", ","):
+        if mark in row:
+            return row.split(mark)
+    return row.split()
+
+
+def _is_numeric(row: str) -> bool:
+    return all(_NUMBER_LIKE.fullmatch(field.strip()) for field in _fields(row))
+
+
+def _holds_a_number(row: str) -> bool:
+    return any(_NUMBER_LIKE.fullmatch(field.strip()) for field in _fields(row))
+
+
+def _first_data_line(lines: list[str]) -> int:
+    """Index of the first row; a row with any number in it is data, not names."""
+    named = False
+    for at, line in enumerate(lines):
+        if not line.strip() or line.startswith(COMMENT):
             continue
-        if _DATA_LINE.fullmatch(line):
-            return index
-        words += 1
-        if words > 1:
-            return None
-    return None
+        if named or _holds_a_number(line) or _DECIMAL_COMMA.fullmatch(line):
+            return at
+        named = True
+    return len(lines)
 
 
-def _fields(path: Path, line: str, number: int, columns: int) -> list[str]:
-    fields = _SEPARATOR.split(line.rstrip(",; "))
-    if len(fields) != columns:
+def _rows(path: Path, lines: list[str], start: int) -> list[tuple[int, list[str]]]:
+    """Line number and fields of every row, all of one width."""
+    rows = [
+        (number, _fields(line))
+        for number, line in enumerate(lines[start:], start + 1)
+        if line.strip()
+    ]
+    if not rows:
+        raise MotionFileError(path, "no values follow the header: export the record again")
+    first, fields = rows[0]
+    if _DECIMAL_COMMA.fullmatch(lines[first - 1]):
         raise MotionFileError(
-            path, f"{len(fields)} columns where the first line has {columns}", line=number
+            path,
+            f"{lines[first - 1].strip()!r} has decimal commas: write decimal points, as in 0.005",
+            line=first,
         )
-    return fields
-
-
-def _number(path: Path, text: str, line: int) -> float:
-    return finite_number(path, text, line, "acceleration")
-
-
-def _unit(path: Path, header: list[str], stated: str | None) -> str:
-    found = _header_unit(path, header)
-    if found is None:
-        if stated is None:
+    width = len(fields)
+    if width > 2:
+        raise MotionFileError(
+            path,
+            f"{width} columns: keep two, the time and one component's acceleration, or one with "
+            "the acceleration alone",
+            line=first,
+        )
+    for number, fields in rows:
+        if len(fields) != width:
             raise MotionFileError(
                 path,
-                "the file states no unit of acceleration: give it with --units g, m/s2, cm/s2 "
-                "or mm/s2",
+                f"{lines[number - 1].strip()[:60]!r} has {len(fields)} columns where the rows "
+                f"above have {width}: repair the line or export the record again",
+                line=number,
             )
-        return acceleration_unit(stated)
-    if stated is not None and acceleration_unit(stated) != found:
-        raise MotionFileError(path, f"the header says {found}, not {stated}: leave --units out")
-    return found
+    return rows
 
 
-def _header_unit(path: Path, header: list[str]) -> str | None:
-    for number, line in reversed(list(enumerate(header, 1))):
-        if suffix := _SUFFIX_UNIT.search(line):
-            return acceleration_unit(suffix[1].replace("_", "/"))
-        named = _ACCELERATION.search(line)
-        unit = _UNIT.search(line, named.end()) if named else None
-        if unit:
-            try:
-                return acceleration_unit(unit[1])
-            except InputError as error:
-                raise MotionFileError(path, str(error), line=number) from None
-    return None
+def _numbers(
+    path: Path, rows: list[tuple[int, list[str]]], column: int, what: str
+) -> NDArray[np.float64]:
+    tokens = [fields[column] for _, fields in rows]
+    try:
+        numbers = np.array(tokens, dtype=np.float64)
+    except ValueError:
+        numbers = np.array([np.nan])
+    # float() also reads 'nan', 'inf', '1_000' and digits of other scripts
+    plain = all(token.isascii() and "_" not in token for token in tokens)
+    if not plain or not np.isfinite(numbers).all():
+        return np.array(
+            [finite_number(path, fields[column].strip(), n, what) for n, fields in rows]
+        )
+    return numbers
 
 
-def _interval(path: Path, times: list[str], lines: list[int]) -> float:
-    """Sampling interval: the shortest decimal that gives every time as printed."""
-    if len(times) < 2:
-        raise MotionFileError(path, "one line of data has no sampling interval", line=lines[0])
-    value = np.array(
-        [finite_number(path, text, n, "time") for text, n in zip(times, lines, strict=True)]
-    )
-    # half a unit of the last digit of each printed time
-    half = np.array([0.5 * 10.0 ** int(Decimal(text).as_tuple().exponent) for text in times])
-    slack = half + half[0] + 1e-12 * np.abs(value)
-    count = np.arange(len(times))
-    mean = float((value[-1] - value[0]) / count[-1])
-    if not mean > 0.0:
-        raise MotionFileError(path, "times do not rise", line=lines[-1])
-    for digits in range(1, 17):
-        dt = float(f"{mean:.{digits}g}")
-        if (np.abs(value - value[0] - count * dt) <= slack).all():
-            return dt
-    wrong = int(np.argmax(np.abs(np.diff(value) - mean))) + 1
-    raise MotionFileError(
-        path,
-        f"times are not equally spaced: {times[wrong - 1]} s is followed by {times[wrong]} s, "
-        f"elsewhere the step is about {mean:g} s",
-        line=lines[wrong],
-    )
-
-
-def _names(header: list[str]) -> tuple[str, str, str]:
-    for line in header:
-        if title := _TITLE.match(line):
-            return title[1], title[2], title[3]
-    return "", "", ""
+def _refuse_gaps(path: Path, rows: list[tuple[int, list[str]]]) -> None:
+    # without times an empty line may be a missing sample
+    for (above, _), (number, _) in pairwise(rows):
+        if number != above + 1:
+            raise MotionFileError(
+                path,
+                "an empty line among the accelerations may be a missing sample: remove it, or "
+                "add a time column",
+                line=above + 1,
+            )
