@@ -22,6 +22,9 @@ BLOCK = "#1f4e79"
 QUIET_BEFORE_S = 1.0
 QUIET_AFTER_S = 2.0
 
+TALLEST_SHOWN = 6.0
+"""Rotation over the critical angle beyond which a toppling block is of no interest."""
+
 
 def plot_response(
     response: Response,
@@ -81,8 +84,9 @@ def plot_response(
     lower.axhline(1.0, color=STRENGTH, lw=0.8, ls="--")
     lower.set_ylabel(r"rotation $\theta/\theta_c$")
     lower.set_xlabel("time [s]")
-    tallest = float(ratio.max(initial=0.0))
-    lower.set_ylim(-0.05 * max(1.0, min(tallest, 2.0)), 1.15 * max(1.0, min(tallest, 2.0)))
+    seen = ratio if response.toppled_s is None else ratio[history.time_s <= response.toppled_s]
+    tallest = min(max(1.0, float(seen.max(initial=0.0))), TALLEST_SHOWN)
+    lower.set_ylim(-0.05 * tallest, 1.15 * tallest)
     lower.annotate(
         "balance", (0.005, 1.0), xycoords=("axes fraction", "data"), va="bottom", fontsize=8,
         color=STRENGTH,
@@ -112,7 +116,7 @@ def _window(
     first = response.started_s - QUIET_BEFORE_S
     moving = time_s[ratio > 0.0]
     last = float(moving[-1]) if moving.size else response.started_s
-    beyond = time_s[ratio > 2.0]
+    beyond = time_s[ratio > TALLEST_SHOWN]
     if response.toppled_s is not None and beyond.size:
         last = max(float(beyond[0]), response.toppled_s)
     return float(first), last + QUIET_AFTER_S

@@ -146,7 +146,7 @@ class _Search:
             self.certified = True
             return
         if not self._bound_from_above():
-            self.certified = True
+            self._certify(self.limit)
             return
         ratios = np.geomspace(self._top, self.limit, SCAN_POINTS)
         ratios[0], ratios[-1] = self._top, self.limit
@@ -239,8 +239,7 @@ class _Search:
         first = topples.index(True)
         if first == 0:
             self.lower, self.upper = float(ratios[0]), self.k_up
-            self.certified = True
-            self.undecided = 0.0
+            self._certify(self.upper)
         else:
             self.lower, self.upper = self._refine(float(ratios[first]), float(ratios[first - 1]))
             self.undecided = self.k_up - self.upper
@@ -254,6 +253,21 @@ class _Search:
         self.resolved = self.lower
         if self.island_width < RESOLUTION and below is not None:
             self.resolved = self._next_island(ratios, topples, below)
+
+    def _certify(self, safe_above: float) -> None:
+        """Call the bracket proven, unless the record is too strong for the argument.
+
+        That an excursion topples is monotone in k_r as long as the drive grows with theta;
+        max(q) max(-q) <= 1 is enough for that in every state short of the verdict.
+        """
+        drive = self.drive
+        self.certified = self.linear or drive.max_q * float(-drive.q.min()) <= 1.0
+        self.undecided = 0.0
+        if not self.certified:
+            self.undecided = drive.max_q / drive.pga_g - safe_above
+            self.warnings.append(
+                "not certified: the record exceeds 1 g both ways, beyond what the proof covers"
+            )
 
     def _refine(self, topples: float, safe: float) -> tuple[float, float]:
         """Bisect between a toppling ratio and a safer one to the bracket width."""

@@ -12,16 +12,16 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.quality import quality_flags
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.results import Outcome, Polarity, Response, ResponseHistory
+from rbfrag.solver.results import FloatArray, Outcome, Polarity, Response, ResponseHistory
 from rbfrag.solver.taylor import ORDER, PH_MAX
-from rbfrag.solver.toppling import Run, run_toppling
+from rbfrag.solver.toppling import TOPPLED, Run, run_toppling
 
 Kind = Literal["toppling"]
 
 OUTCOMES = (Outcome.STABLE, Outcome.TOPPLED, Outcome.UNDETERMINED, Outcome.JUMP)
 """Outcome of each kernel code."""
 
-_NO_HISTORY = np.empty((3, 0))
+_NO_HISTORY = np.empty((4, 0))
 
 TAIL_PERIODS = 12.0
 """Length of the free motion shown after the record, in units of 1/p."""
@@ -160,24 +160,35 @@ def _history(drive: Excitation, *, p2: float, kr: float, linear: bool) -> Respon
         pga_g=drive.pga_g,
     )
     # nodes, and at most a start, a peak and a re-seat twice in an interval
-    store = np.empty((3, 7 * longer.time_s.size + 8))
+    store = np.empty((4, 7 * longer.time_s.size + 8))
     run = Run(*_kernel_call(longer, kr, p, linear, ORDER, PH_MAX, store))
-    time_s, theta, rate = store[:, : run.history_length]
-    if not time_s.size or time_s[0] > 0.0:
-        start = drive.time_s[0]
-        time_s, theta, rate = (
-            np.concatenate([[x], y]) for x, y in ((start, time_s), (0.0, theta), (0.0, rate))
-        )
-    if time_s[-1] < end and theta[-1] == 0.0:
-        time_s, theta, rate = (
-            np.concatenate([y, [x]]) for x, y in ((end, time_s), (0.0, theta), (0.0, rate))
-        )
+    store = store[:, : run.history_length]
+    # The kernel skips rest. Its nodes are put back, as far as the record goes.
+    at_node = store[3] >= 0.0
+    theta = np.zeros(longer.time_s.size)
+    rate = np.zeros(longer.time_s.size)
+    moved = store[3, at_node].astype(np.int64)
+    theta[moved] = store[1, at_node]
+    rate[moved] = store[2, at_node]
+    shown = max(drive.time_s.size, int(moved[-1]) + 1) if moved.size else drive.time_s.size
+    if run.outcome == TOPPLED and moved.size:
+        shown = int(moved[-1]) + 1
+    event = store[:3, ~at_node]
+    time_s = np.concatenate([longer.time_s[:shown], event[0]])
+    order = np.argsort(time_s, kind="stable")
+
+    def merged(at_nodes: FloatArray, at_events: FloatArray) -> FloatArray:
+        return np.concatenate([at_nodes[:shown], at_events])[order]
+
+    def between(values: FloatArray) -> FloatArray:
+        return np.interp(event[0], longer.time_s, values)
+
     return ResponseHistory(
-        time_s=np.array(time_s),
-        theta_rad=np.array(theta),
-        theta_dot_rad_s=np.array(rate),
-        k_h=np.interp(time_s, drive.time_s, drive.k_h, right=0.0),
-        k_v=np.interp(time_s, drive.time_s, drive.w - 1.0, right=0.0),
+        time_s=time_s[order],
+        theta_rad=merged(theta, event[1]),
+        theta_dot_rad_s=merged(rate, event[2]),
+        k_h=merged(longer.k_h, between(longer.k_h)),
+        k_v=merged(longer.w - 1.0, between(longer.w - 1.0)),
     )
 
 

@@ -52,7 +52,9 @@ class Run(NamedTuple):
     history_length: int
 
 
-@kernel
+kernel
+
+
 def next_lifting_node(
     q: FloatArray, block_max_q: FloatArray, start: int, stop: int, kr: float
 ) -> int:
@@ -68,7 +70,9 @@ def next_lifting_node(
     return stop
 
 
-@kernel
+kernel
+
+
 def _exponential(x: float) -> float:
     """Upper bound of exp(x) for 0 <= x, close for the small x of one step."""
     if x > 1.0:
@@ -76,7 +80,9 @@ def _exponential(x: float) -> float:
     return 1.0 + x * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x * 0.06)))
 
 
-@kernel
+kernel
+
+
 def examine_step(
     theta: float, u: FloatArray, order: int, theta_end: float, u_end: float, v_end: float
 ) -> tuple[float, float, float]:
@@ -131,7 +137,9 @@ def examine_step(
     return -1.0, peak, peak_tau
 
 
-@kernel
+kernel
+
+
 def run_toppling(
     time_s: FloatArray,
     interval_s: FloatArray,
@@ -168,7 +176,8 @@ def run_toppling(
         ph_max: greatest p·h of one step.
         first_interval: interval that the block enters at rest; 0 for the whole record.
         one_excursion: stop, with outcome stable, when the block first re-seats.
-        history: shape (3, m) to be filled with time, theta, theta'; (3, 0) for none. With a
+        history: shape (4, m) to be filled with time, theta, theta' and node (-1 for an event
+            between nodes); (4, 0) for none. With a
             history the run goes on after the verdict until the block lies beyond 90 degrees.
     """
     n = k_h.size
@@ -241,6 +250,7 @@ def run_toppling(
                 history[0, filled] = time_s[i] + tau * interval_s[i]
                 history[1, filled] = 0.0
                 history[2, filled] = 0.0
+                history[3, filled] = -1.0
                 filled += 1
 
         left = interval_s[i] * (1.0 - tau)
@@ -320,6 +330,7 @@ def run_toppling(
                             history[0, filled] = time_s[i] + (at + part * top_at) * interval_s[i]
                             history[1, filled] = top
                             history[2, filled] = 0.0
+                            history[3, filled] = -1.0
                             filled += 1
                         if x >= 0.0:
                             reseat_at = at + part * x
@@ -367,6 +378,7 @@ def run_toppling(
                 history[0, filled] = time_s[i] + tau * interval_s[i]
                 history[1, filled] = 0.0
                 history[2, filled] = 0.0
+                history[3, filled] = -1.0
                 filled += 1
             if stuck:
                 # The threshold is exceeded by less than rounding. A falling drive leaves the
@@ -398,6 +410,7 @@ def run_toppling(
             history[0, filled] = time_s[i]
             history[1, filled] = theta
             history[2, filled] = rate * p
+            history[3, filled] = i
             filled += 1
         if not decided:
             excess = c[0] * tail_min_q[i] - s[0]
@@ -449,7 +462,9 @@ def run_toppling(
     return STABLE, peak, started_s, math.nan, peak_error, steps, moved, filled
 
 
-@kernel
+kernel
+
+
 def fresh_starts_that_topple(
     time_s: FloatArray,
     interval_s: FloatArray,
@@ -476,7 +491,7 @@ def fresh_starts_that_topple(
         for certain, shape (number, 2).
     """
     n = q.size
-    nothing = np.empty((3, 0))
+    nothing = np.empty((4, 0))
     found = np.empty((n, 2), dtype=np.int64)
     count = 0
     for m in range(windows.shape[0]):
