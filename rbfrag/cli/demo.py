@@ -30,6 +30,7 @@ def demo(
     if not home.is_dir():
         raise InputError(f"--folder: there is no folder {home}; make it first")
     database = home / "rbfrag-demo.db"
+    response_png, fit_png = home / "rbfrag-demo-response.png", home / "rbfrag-demo-fit.png"
     for leftover in ("", "-wal", "-shm"):
         database.with_name(database.name + leftover).unlink(missing_ok=True)
     started = time.perf_counter()
@@ -39,17 +40,16 @@ def demo(
     for arguments in (
         ("motions", "add", *map(str, records), "--suite", "demo", *db),
         ("motions", "list", *db),
-        ("respond", "1", "--p2", "3", "--kr", "0.1", *db)
-        + ("--plot", str(home / "rbfrag-demo-response.png")),
+        ("respond", "1", "--p2", "3", "--kr", "0.1", "--plot", str(response_png), *db),
         ("critical", "1", "--p2", "3", *db),
         ("simulate", "--suite", "demo", *db),
         ("fit", "--term", "pgv", "--suite", "demo", *db),
-        ("plot", "fit", "--out", str(home / "rbfrag-demo-fit.png"), *db),
+        ("plot", "fit", "--out", str(fit_png), *db),
         ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6", *db),
     ):
         _run(arguments)
     print(f"\ndone in {time.perf_counter() - started:.0f} s; written:")
-    for path in (database, home / "rbfrag-demo-response.png", home / "rbfrag-demo-fit.png"):
+    for path in (database, response_png, fit_png):
         print(f"  {path}")
 
 

@@ -61,7 +61,7 @@ class GroundMotion:
         if self.node_time_s is None:
             if self.dt_s is None or not np.isfinite(self.dt_s) or self.dt_s <= 0.0:
                 raise InputError(
-                    f"the sampling interval dt must be a positive number of seconds, not {self.dt_s}"
+                    f"the sampling interval dt must be a positive number of seconds: {self.dt_s}"
                 )
             object.__setattr__(self, "dt_s", float(self.dt_s))
             return
@@ -76,7 +76,8 @@ class GroundMotion:
         if falls.size:
             i = int(falls[0])
             raise InputError(
-                f"node times must not fall: node {i + 1} at {times[i + 1]:g} s follows {times[i]:g} s"
+                f"node times must not fall: node {i + 1} at {times[i + 1]:g} s follows "
+                f"{times[i]:g} s"
             )
         object.__setattr__(self, "node_time_s", times)
 
@@ -121,10 +122,10 @@ class GroundMotion:
     def interval_s(self) -> FloatArray:
         """Length of each interval between samples [s], shape (npts - 1,)."""
         if self.node_time_s is not None:
-            steps = np.diff(self.node_time_s)
+            steps: FloatArray = np.diff(self.node_time_s)
         else:
             # not diff(time): i*dt rounds, and the steps of an equally spaced record are equal
-            steps = np.full(self.npts - 1, self.dt_s)
+            steps = np.full(self.npts - 1, self.dt_s, dtype=np.float64)
         steps.flags.writeable = False
         return steps
 
@@ -133,7 +134,8 @@ class GroundMotion:
         """Time of each sample [s], shape (npts,); starts at 0 for equally spaced samples."""
         if self.node_time_s is not None:
             return self.node_time_s
-        times = np.arange(self.npts) * self.dt_s
+        assert self.dt_s is not None
+        times: FloatArray = np.arange(self.npts, dtype=np.float64) * self.dt_s
         times.flags.writeable = False
         return times
 

@@ -70,7 +70,8 @@ class Excitation:
         n = self.q.size
         padded = np.full(-(-n // BLOCK) * BLOCK, -np.inf)
         padded[:n] = self.q
-        return padded.reshape(-1, BLOCK).max(axis=1)
+        largest: FloatArray = padded.reshape(-1, BLOCK).max(axis=1)
+        return largest
 
     @cached_property
     def max_q(self) -> float:

@@ -181,7 +181,8 @@ def _history(drive: Excitation, *, p2: float, kr: float, linear: bool) -> Respon
         return np.concatenate([at_nodes[:shown], at_events])[order]
 
     def between(values: FloatArray) -> FloatArray:
-        return np.interp(event[0], longer.time_s, values)
+        there: FloatArray = np.interp(event[0], longer.time_s, values)
+        return there
 
     return ResponseHistory(
         time_s=time_s[order],

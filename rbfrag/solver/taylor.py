@@ -155,7 +155,7 @@ def turn(s: float, c: float, angle: float) -> tuple[float, float]:
 @kernel
 def value(x: FloatArray, order: int, tau: float) -> float:
     """Polynomial sum_k x[k] tau^k, k = 0..order."""
-    total = x[order]
+    total: float = x[order]
     for k in range(order - 1, -1, -1):
         total = total * tau + x[k]
     return total
@@ -164,7 +164,7 @@ def value(x: FloatArray, order: int, tau: float) -> float:
 @kernel
 def slope(x: FloatArray, order: int, tau: float) -> float:
     """Derivative of :func:`value` with respect to tau."""
-    total = order * x[order]
+    total: float = order * x[order]
     for k in range(order - 1, 0, -1):
         total = total * tau + k * x[k]
     return total
@@ -173,7 +173,7 @@ def slope(x: FloatArray, order: int, tau: float) -> float:
 @kernel
 def curvature(x: FloatArray, order: int, tau: float) -> float:
     """Second derivative of :func:`value` with respect to tau."""
-    total = order * (order - 1) * x[order]
+    total: float = order * (order - 1) * x[order]
     for k in range(order - 1, 1, -1):
         total = total * tau + k * (k - 1) * x[k]
     return total
@@ -182,7 +182,7 @@ def curvature(x: FloatArray, order: int, tau: float) -> float:
 @kernel
 def rotation(theta: float, u: FloatArray, order: int, tau: float) -> float:
     """Rotation theta(tau) on the step that starts at `theta`."""
-    total = u[order] / (order + 1)
+    total: float = u[order] / (order + 1)
     for k in range(order - 1, -1, -1):
         total = total * tau + u[k] / (k + 1)
     return theta + tau * total

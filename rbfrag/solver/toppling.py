@@ -52,9 +52,7 @@ class Run(NamedTuple):
     history_length: int
 
 
-kernel
-
-
+@kernel
 def next_lifting_node(
     q: FloatArray, block_max_q: FloatArray, start: int, stop: int, kr: float
 ) -> int:
@@ -70,9 +68,7 @@ def next_lifting_node(
     return stop
 
 
-kernel
-
-
+@kernel
 def _exponential(x: float) -> float:
     """Upper bound of exp(x) for 0 <= x, close for the small x of one step."""
     if x > 1.0:
@@ -80,9 +76,7 @@ def _exponential(x: float) -> float:
     return 1.0 + x * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x * 0.06)))
 
 
-kernel
-
-
+@kernel
 def examine_step(
     theta: float, u: FloatArray, order: int, theta_end: float, u_end: float, v_end: float
 ) -> tuple[float, float, float]:
@@ -137,9 +131,7 @@ def examine_step(
     return -1.0, peak, peak_tau
 
 
-kernel
-
-
+@kernel
 def run_toppling(
     time_s: FloatArray,
     interval_s: FloatArray,
@@ -462,9 +454,7 @@ def run_toppling(
     return STABLE, peak, started_s, math.nan, peak_error, steps, moved, filled
 
 
-kernel
-
-
+@kernel
 def fresh_starts_that_topple(
     time_s: FloatArray,
     interval_s: FloatArray,
