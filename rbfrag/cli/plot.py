@@ -8,6 +8,7 @@ import typer
 
 from rbfrag.cli import options
 from rbfrag.cli.motion_argument import find_motion
+from rbfrag.cli.output import print_warnings
 
 app = typer.Typer(
     help="Draw fits and responses (.png, .pdf, .svg).",
@@ -34,6 +35,7 @@ def plot_fit(
     from rbfrag.db.engine import opened_database
     from rbfrag.db.model_store import load_model
     from rbfrag.db.queries import combination_table
+    from rbfrag.fragility.fit_data import fit_data
     from rbfrag.fragility.model import FragilityModel
     from rbfrag.plots.fit import plot_fit as draw
 
@@ -43,6 +45,13 @@ def plot_fit(
         table = combination_table(connection, suite=None if suite is None else str(suite))
     draw(table, fitted, out)
     print(out)
+    if fit_data(table, fitted.term).fingerprint != fitted.row.data_fingerprint:
+        print_warnings(
+            [
+                f"the data have changed since {fitted.name} was fitted: the points are those of "
+                "today; rbfrag fit --replace  fits them anew"
+            ]
+        )
 
 
 @app.command("response", epilog="Example:  rbfrag plot response 1 --p2 3 --kr 0.1 --out a.png")

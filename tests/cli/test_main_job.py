@@ -121,6 +121,27 @@ def test_from_files_to_a_probability(shell: Shell, tmp_path: Path) -> None:
     assert "<svg" in (tmp_path / "response.svg").read_text()
 
 
+def test_plot_says_when_the_data_have_changed(shell: Shell, tmp_path: Path) -> None:
+    shell("motions", "add", write_suite(tmp_path / "records"))
+    shell("simulate", "--p2", "10,1", "--jobs", "1")
+    shell("fit", "--term", "pgv")
+    assert shell("plot", "fit", "--out", "fit.png").stderr == ""
+    shell("simulate", "--p2", "3", "--jobs", "1")
+    assert "have changed" in shell("plot", "fit", "--out", "fit.png").stderr
+
+
+def test_ctrl_c_ends_with_130(shell: Shell, record: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shell("motions", "add", record)
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rbfrag.campaign.simulate._store", interrupted)
+    shell("simulate", "--p2", "3", "--jobs", "1", expect=130)
+    monkeypatch.undo()
+    assert shell.json("db", "check", "--db", record.parent / "rbfrag.db")["sound"]
+
+
 def test_stored_motion_answers_like_its_file(shell: Shell, record: Path) -> None:
     shell("motions", "add", record)
     by_id = shell.json("critical", "1", "--p2", "3")
