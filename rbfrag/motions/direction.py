@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 VERTICAL_NAMES = frozenset(
-    {"UP", "DOWN", "DWN", "DN", "VER", "VERT", "VERTICAL", "V", "Z", "U", "UD", "U-D", "HNZ", "HLZ"}
+    {"UP", "DOWN", "DWN", "DN", "VER", "VRT", "VERT", "VERTICAL", "V", "Z", "U", "UD", "U-D"}
 )
 
 _COMPASS = {
@@ -16,6 +16,8 @@ _COMPASS = {
 }  # fmt: skip
 
 _BEARING = re.compile(r"([NS])\s*(\d{1,2}(?:\.\d+)?)\s*([EW])")
+# SEED channel names of seismometers and accelerometers: band, instrument, then Z for vertical
+_SEED_VERTICAL = re.compile(r"[A-Z][HLNG]Z")
 _AZIMUTH = re.compile(r"\d{1,3}(?:\.\d+)?")
 
 
@@ -23,9 +25,11 @@ def is_vertical_name(component: str) -> bool | None:
     """Return whether a component is vertical; None when its name does not say.
 
     Args:
-        component: as the file names it: ``UP``, ``360``, ``N10E``.
+        component: as the file names it: ``UP``, ``-UP``, ``HNZ``, ``360``, ``N10E``.
     """
-    if component.strip().upper() in VERTICAL_NAMES:
+    # file names join station and component by a dash, which some headers keep
+    name = component.strip().upper().lstrip("-")
+    if name in VERTICAL_NAMES or _SEED_VERTICAL.fullmatch(name):
         return True
     return False if azimuth_deg(component) is not None else None
 
