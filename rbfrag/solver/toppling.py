@@ -289,8 +289,9 @@ def run_toppling(
                 # alone is fooled, since from rest under constant a every other one vanishes
                 omitted = 16.0 * ph * (a_size + w_size) / (order * (order + 1))
                 truncation = omitted * (abs(u[order]) + abs(u[order - 1]))
-                # and the terms in theta³, which from rest come three places apart
-                truncation += abs(u[order - 2] * turned) / ph
+                if not linear:
+                    # and the terms in theta³, which from rest come three places apart
+                    truncation += abs(u[order - 2] * turned) / ph
                 drive = a_size * abs(c[0]) + w_size * (abs(s[0]) + abs(turned))
                 rounding = MACHINE_EPSILON * (
                     2.0 * (abs(theta_end) + abs(rate) + abs(s[0])) + 4.0 * ph * drive

@@ -257,3 +257,23 @@ def test_any_short_record(
     if run.outcome is Outcome.UNDETERMINED:
         return
     agree(motion, p2, kr, vertical, rel=1e-6)
+
+
+def test_the_shorter_component_drops_to_zero_at_its_last_sample() -> None:
+    horizontal = GroundMotion(np.array([0.0, 0.3, 0.5]), 0.1)
+    vertical = GroundMotion(np.array([0.0, 0.1, 0.2, 0.3, 0.0]), 0.1)
+    drive = excitation(horizontal, vertical)
+    assert drive.time_s.tolist() == pytest.approx([0.0, 0.1, 0.2, 0.2, 0.3, 0.4])
+    assert drive.interval_s.tolist() == [0.1, 0.1, 0.0, 0.1, 0.1]
+    assert drive.k_h.tolist() == [0.0, 0.3, 0.5, 0.0, 0.0, 0.0]
+    assert drive.w.tolist() == [1.0, 1.1, 1.2, 1.2, 1.3, 1.0]
+    assert "horizontal component has 3 samples" in drive.warnings[0]
+    swapped = excitation(vertical, horizontal)
+    assert swapped.k_h.tolist() == [0.0, 0.1, 0.2, 0.2, 0.3, 0.0]
+    assert swapped.w.tolist() == [1.0, 1.3, 1.5, 1.0, 1.0, 1.0]
+
+
+def test_a_block_too_small_to_be_meant_is_refused() -> None:
+    motion = GroundMotion(np.array([0.0, 0.3, 0.0]), 0.1)
+    with pytest.raises(InputError, match="p2 = 1e\\+30"):
+        respond(motion, p2=1e30, kr=0.1)
