@@ -17,10 +17,12 @@ COUNTS = {
     "slammer_csv": 13,
     "geonet_v2a": 9,
     "geer_chihshang_2022_acc": 57,
+    "fema_p695_far_field": 32,
 }
 """Traces by set."""
 
-STATES_NO_UNIT = {"geer_chihshang_2022_acc"}
+STATES_NO_UNIT = {"geer_chihshang_2022_acc", "fema_p695_far_field"}
+STATES_NO_DT = {"fema_p695_far_field"}
 
 
 def manifest(records_dir: Path) -> list[dict[str, str]]:
@@ -35,7 +37,8 @@ def test_npts_dt_and_pga(records_dir: Path, name: str) -> None:
     for row in rows:
         units = row["file_units"] if name in STATES_NO_UNIT else None
         path = records_dir / row["file"]
-        motions = read_motions(path, units=units)
+        dt_s = float(row["dt_s"]) if name in STATES_NO_DT else None
+        motions = read_motions(path, units=units, dt_s=dt_s)
         assert len(motions) == sum(other["file"] == row["file"] for other in rows)
         motion = motions[int(row["trace_index"])]
         assert motion.trace_index == int(row["trace_index"])
