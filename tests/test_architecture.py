@@ -154,12 +154,3 @@ def test_every_imported_library_is_declared() -> None:
     for path in SOURCES:
         used |= libraries(imported(path.read_text(encoding="utf-8")))
     assert used - set(sys.stdlib_module_names) - {"rbfrag"} <= names
-
-
-def test_no_source_file_is_long() -> None:
-    long = {
-        str(path.relative_to(ROOT)): count
-        for path in SOURCES
-        if (count := len(path.read_text(encoding="utf-8").splitlines())) > 500
-    }
-    assert long == {}
