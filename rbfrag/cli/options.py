@@ -59,6 +59,35 @@ Kr = Annotated[
     ),
 ]
 
+P2OrFile = Annotated[
+    float | None,
+    typer.Option(
+        "--p2",
+        help="Frequency parameter p² of the block [1/s²], with --kr.",
+        show_default=False,
+    ),
+]
+
+KrOrFile = Annotated[
+    float | None,
+    typer.Option(
+        "--kr",
+        help="Rocking acceleration coefficient k_r = tan(critical angle) [g], with --p2.",
+        show_default=False,
+    ),
+]
+
+BlockFile = Annotated[
+    str | None,
+    typer.Option(
+        "--block",
+        metavar="FILE",
+        help="Block file (.toml or .csv) with beta_deg and phi_deg, instead of --p2 and --kr; "
+        "refused unless the block topples.",
+        show_default=False,
+    ),
+]
+
 Linear = Annotated[
     bool,
     typer.Option(

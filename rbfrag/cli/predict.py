@@ -7,14 +7,16 @@ from typing import Annotated
 import typer
 
 from rbfrag.cli import options
+from rbfrag.cli.block_argument import toppling_block
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
 
 EXAMPLE = "Example:  rbfrag predict --p2 3 --kr 0.1 --pgv 0.6 --json"
 
 
 def predict(
-    p2: options.P2,
-    kr: options.Kr,
+    p2: options.P2OrFile = None,
+    kr: options.KrOrFile = None,
+    block: options.BlockFile = None,
     pgv: Annotated[
         float | None,
         typer.Option("--pgv", help="Peak ground velocity [m/s].", show_default=False),
@@ -48,6 +50,7 @@ def predict(
     """Print the probability that a block topples, with its confidence interval."""
     from rbfrag.fragility.prediction import predict as answer
 
+    p2, kr, remarks = toppling_block(p2, kr, block)
     prediction = answer(
         p2,
         kr,
@@ -60,9 +63,10 @@ def predict(
         db=db,
     )
     document = prediction.as_dict()
+    document["warnings"] = [*remarks, *prediction.warnings]
     if json:
         print_json(document)
         return
     document.pop("warnings")
     print_pairs(document)
-    print_warnings(prediction.warnings)
+    print_warnings([*remarks, *prediction.warnings])

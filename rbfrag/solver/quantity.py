@@ -63,3 +63,14 @@ def friction_angle(value: object, name: str) -> float:
     if not 0.0 <= result < 90.0:
         raise InputError(f"{name} = {result:.10g} is out of range: give {what}")
     return result
+
+
+def vertical_g(value: object) -> float:
+    """Return a vertical ground acceleration above -1 g, or refuse it [g]."""
+    result = number(value, "kv", "the vertical acceleration of the ground in g, up positive")
+    if result <= -1.0:
+        raise InputError(
+            f"kv = {result:g}: at -1 g or below the ground falls away under the block (a jump), "
+            "which the model of a block in contact does not cover: give a value above -1"
+        )
+    return result

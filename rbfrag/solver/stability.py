@@ -27,7 +27,7 @@ from rbfrag.solver.mechanism import (
     state_code,
     yield_coefficient,
 )
-from rbfrag.solver.quantity import angle, friction_angle, not_negative, number, positive
+from rbfrag.solver.quantity import angle, friction_angle, not_negative, positive, vertical_g
 from rbfrag.solver.stability_warnings import Finding, warnings_about
 from rbfrag.solver.tangent import tan_deg
 
@@ -130,7 +130,7 @@ def stability(
     beta_deg = angle(beta_deg, "beta_deg", -90.0, 90.0)
     phi_deg = friction_angle(phi_deg, "phi_deg")
     phi_back_deg = phi_deg if phi_back_deg is None else friction_angle(phi_back_deg, "phi_back_deg")
-    kv = _vertical(kv)
+    kv = vertical_g(kv)
     bond = _bond(block, cohesion_pa, density_kg_m3)
 
     tb, mu1, mu2 = (tan_deg(value, SCALAR) for value in (beta_deg, phi_deg, phi_back_deg))
@@ -208,16 +208,6 @@ def stability(
         cohesion=_cohesion(mu1, tb, weight, bond, ky) if bond else None,
         warnings=warnings_about(block, finding),
     )
-
-
-def _vertical(kv: object) -> float:
-    value = number(kv, "kv", "the vertical acceleration of the ground in g, up positive")
-    if value <= -1.0:
-        raise InputError(
-            f"kv = {value:g}: at -1 g or below the ground falls away under the block (a jump), "
-            "which the model of a block in contact does not cover: give a value above -1"
-        )
-    return value
 
 
 def _bond(block: Block, cohesion_pa: object, density_kg_m3: object) -> float:

@@ -81,8 +81,11 @@ def _about_back_plane(block: Block, found: Finding) -> Iterator[str]:
             "at rest the block leans on the back plane (beta is below alpha1): after sliding it "
             "falls back, its angles grow, and it may become a slump"
         )
-    if found.mode == "slump" and found.ky < found.k < math.inf:
-        yield "the slump's yield exceeds that of sliding, for the back plane is much the rougher"
+    if found.mode in ("slide", "slump") and found.phi_back_deg > found.phi_deg + block.gamma_deg:
+        yield (
+            f"phi_back = {found.phi_back_deg:.6g} degrees exceeds phi + gamma: friction on a back "
+            "plane so much rougher than the base could hold the block beyond this acceleration"
+        )
     dip = math.fmod(block.gamma_deg + found.beta_deg, 180.0)
     steepness = min(abs(dip), 180.0 - abs(dip))
     if steepness < abs(found.beta_deg):
