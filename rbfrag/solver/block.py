@@ -249,14 +249,14 @@ class Block:
     @property
     def inertia_toe_m2(self) -> float:
         """Moment of inertia about the toe per mass, I_toe/m [m²]."""
-        return self.inertia_m2 + self.toe[0] ** 2 + self.toe[1] ** 2
+        return self.inertia_m2 + _squared(self.toe)
 
     @property
     def shape_factor(self) -> float:
         """F_s = m r3²/I_toe (eq. 4.27); 3/4 for a rectangle."""
         if self.is_parallelogram:
             return shape_factor(self.tan_alpha1, self.tan_alpha3)
-        return (self.toe[0] ** 2 + self.toe[1] ** 2) / self.inertia_toe_m2
+        return _squared(self.toe) / self.inertia_toe_m2
 
     @property
     def p2(self) -> float:
@@ -287,6 +287,10 @@ class Block:
         )
 
 
+def _squared(arm: Point) -> float:
+    return arm[0] * arm[0] + arm[1] * arm[1]
+
+
 def _parallelogram(
     alpha1_deg: float,
     alpha3_deg: float,
@@ -313,7 +317,7 @@ def _parallelogram(
         toe=toe,
         lowest_on_back=heel,
         area_m2=base_m * 2.0 * h,
-        inertia_m2=(heel[0] ** 2 + toe[0] ** 2 + 2.0 * h * h) / 6.0,
+        inertia_m2=(heel[0] * heel[0] + toe[0] * toe[0] + 2.0 * h * h) / 6.0,
         outline=(heel, toe, front, back),
         is_parallelogram=True,
     )

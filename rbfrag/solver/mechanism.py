@@ -16,7 +16,7 @@ cot γ are enough.
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 from rbfrag.solver.elementwise import Elementwise, N
 
@@ -108,6 +108,31 @@ def yield_coefficient(
     level = denominator <= _SQUARE * abs(numerator)
     k = numerator / where(level, 1.0, denominator)
     result: N = where(level, where(numerator > 0.0, math.inf, -math.inf), k)
+    return result
+
+
+def wedges(cot: N, mu1: N, mu2: N) -> Any:
+    """Return whether both planes hold a confined topple between them: γ + φ1 + φ2 > 180°."""
+    return (cot - mu2) * mu1 + cot * mu2 + 1.0 < 0.0
+
+
+def on_its_branch(k: N, ky: N, rises: object, functions: Elementwise[N]) -> N:
+    """Return k with the sign of infinity that continuity gives it.
+
+    As the back plane takes load, δ* leaves φ1 in one sense and turns by less than 180°. A δ*
+    that rises can lock the block but not free it, and one that falls the reverse, although
+    beyond ±180° sine and cosine say otherwise.
+
+    Args:
+        k: yield acceleration coefficient of a mechanism with two contacts.
+        ky: that of sliding, at which δ* = φ1.
+        rises: whether δ* rises from φ1.
+        functions: the functions for this kind of number.
+    """
+    where = functions.where
+    risen = where((k == -math.inf) | (ky == math.inf), math.inf, k)
+    fallen = where((k == math.inf) & (ky < math.inf), -math.inf, k)
+    result: N = where(rises, risen, fallen)
     return result
 
 

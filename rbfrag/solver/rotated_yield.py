@@ -13,7 +13,13 @@ from typing import TYPE_CHECKING, Any, overload
 from rbfrag.errors import InputError
 from rbfrag.solver.block import Block
 from rbfrag.solver.elementwise import SCALAR, Elementwise, array_elementwise
-from rbfrag.solver.mechanism import confined_topple, slump, yield_coefficient
+from rbfrag.solver.mechanism import (
+    confined_topple,
+    on_its_branch,
+    slump,
+    wedges,
+    yield_coefficient,
+)
 from rbfrag.solver.polygon import Point
 from rbfrag.solver.quantity import angle, friction_angle, number, vertical_g
 from rbfrag.solver.tangent import tan_deg
@@ -187,6 +193,8 @@ def kct_after_rotation(
         InputError: a value outside its range, or a block that is not confined.
     """
     tb, mu1, mu2, weight = _surroundings(beta_deg, phi_deg, phi_back_deg, kv)
+    ky = yield_coefficient(mu1, 1.0, tb, weight, SCALAR)
+    wedged = wedges(block.cot_gamma, mu1, mu2)
     if not block.confines or block.tan_alpha3 > mu1:
         raise InputError(
             f"alpha3 = {block.alpha3_deg:.6g}, gamma = {block.gamma_deg:.6g} and phi_deg = "
@@ -199,6 +207,7 @@ def kct_after_rotation(
         low = _turned(block.arms.lowest_on_back, cosine, -sine)
         x, y, r_base, _ = confined_topple(*toe, *low, block.cot_gamma, mu1, mu2)
         k = yield_coefficient(x, y, tb, weight, functions)
+        k = on_its_branch(k, ky, wedged, functions)
         return functions.where(r_base <= 0.0, math.inf, k)
 
     why = "the base edge stands normal to the back plane"

@@ -22,9 +22,11 @@ from rbfrag.solver.mechanism import (
     confined_topple,
     mode_code,
     mode_code_without_back,
+    on_its_branch,
     slump,
     slump_bond,
     state_code,
+    wedges,
     yield_coefficient,
 )
 from rbfrag.solver.quantity import angle, friction_angle, not_negative, positive, vertical_g
@@ -145,12 +147,13 @@ def stability(
     else:
         code = int(mode_code_without_back(t1, t3, limit, tb, SCALAR))
     backward = not back_fracture and tb < t1
-    untenable = False
+    untenable = lifts = False
     if code == SLUMP and back_fracture:
         contacts = (*block.arms.heel, *block.arms.back, cot)
         sine, cosine, r_base, _ = slump(*contacts, mu1, mu2)
         share = bond_term * slump_bond(*contacts, mu2) if bond else 0.0
         k = yield_coefficient(sine, cosine, tb, weight, SCALAR, share)
+        k = on_its_branch(k, ky, phi_back_deg > phi_deg + block.gamma_deg, SCALAR)
         if r_base <= 0.0:
             untenable, k = True, -math.inf
     elif code == CONFINED_TOPPLE:
@@ -158,8 +161,11 @@ def stability(
         sine, cosine, r_base, _ = confined_topple(*contacts, mu1, mu2)
         share = bond_term * confined_bond(*contacts, mu2) if bond else 0.0
         k = yield_coefficient(sine, cosine, tb, weight, SCALAR, share)
+        k = on_its_branch(k, ky, wedges(cot, mu1, mu2), SCALAR)
         if r_base <= 0.0:
             k = math.inf
+        if bond and math.isfinite(k):
+            lifts = _base_lifts(block, r_base, cosine, mu2, tb, weight, bond, k)
     elif code == TOPPLE:
         k = yield_coefficient(t3, 1.0, tb, weight, SCALAR)
     else:
@@ -182,6 +188,7 @@ def stability(
         back_fracture=back_fracture,
         backward=backward,
         untenable=untenable,
+        lifts=lifts,
     )
     around = Surroundings(
         beta_deg=beta_deg,
@@ -244,6 +251,22 @@ def _friction_that_slides_at(
     # of (1 + k_v) (T cos β - sin β) + C = k (cos β + T sin β) with k = (1 + k_v) tan(α - β)
     alpha = math.radians(alpha_deg)
     return degrees_of(math.tan(alpha) - bond * math.cos(tilt) / (weight * math.cos(alpha)))
+
+
+def _base_lifts(
+    block: Block,
+    r_base: float,
+    cosine: float,
+    mu2: float,
+    tb: float,
+    weight: float,
+    bond: float,
+    k: float,
+) -> bool:
+    """Whether the toe would have to pull at the yield of a confined topple with a bond."""
+    normal = (weight - k * tb) / math.sqrt(1.0 + tb * tb)
+    pressed = normal * r_base + bond * block.arms.toe[1] * (block.cot_gamma - mu2)
+    return pressed <= 0.0 < cosine or pressed >= 0.0 > cosine
 
 
 def _cohesion(mu1: float, tb: float, weight: float, bond: float, ky: float) -> Cohesion:

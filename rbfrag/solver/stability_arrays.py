@@ -22,8 +22,10 @@ from rbfrag.solver.mechanism import (
     confined_topple,
     mode_code,
     mode_code_without_back,
+    on_its_branch,
     slump,
     state_code,
+    wedges,
     yield_coefficient,
 )
 from rbfrag.solver.parallelogram import cot_gamma, frequency_parameter, shape_factor
@@ -146,6 +148,10 @@ def stability_arrays(
             mode = mode_code(t1, t3, mu1, cot < 0.0, functions)
             sine, cosine = _direction(mode, t1, t3, cot, mu1, mu2)
             k = yield_coefficient(sine, cosine, tb, weight, functions)
+            confined = mode == CONFINED_TOPPLE
+            if confined.any():
+                branch = on_its_branch(k, ky, wedges(cot, mu1, mu2), functions)
+                k = np.where(confined, branch, k)
             state = state_code(k, functions)
         else:
             mode = mode_code_without_back(t1, t3, mu1, tb, functions)

@@ -25,6 +25,7 @@ class Finding:
         back_fracture: whether there is a back plane.
         backward: whether the block turns back about its heel for want of a back plane.
         untenable: whether the back contact cannot hold the block.
+        lifts: whether the bond of the base would have to bear tension at the yield.
     """
 
     mode: ModeName
@@ -37,6 +38,7 @@ class Finding:
     back_fracture: bool
     backward: bool
     untenable: bool
+    lifts: bool
 
 
 def warnings_about(block: Block, found: Finding) -> tuple[str, ...]:
@@ -59,6 +61,11 @@ def _sentences(block: Block, found: Finding) -> Iterator[str]:
         yield "the block fails at rest: its yield acceleration is negative"
     if found.state == "locked":
         yield "the block is wedged: no horizontal acceleration moves it in this mode"
+    if found.lifts:
+        yield (
+            "the bond of the base is so strong that the toe lifts off before it slides: the "
+            "acceleration given is an upper bound"
+        )
     if found.back_fracture:
         yield from _about_back_plane(block, found)
 
