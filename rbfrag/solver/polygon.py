@@ -110,6 +110,8 @@ def _points(vertices: object) -> tuple[Point, ...]:
     for i, row in enumerate(rows):
         try:
             x, y = row
+            if isinstance(x, bool | str) or isinstance(y, bool | str):
+                raise TypeError
             point = (float(x), float(y))
         except (TypeError, ValueError):
             raise InputError(f"vertex {i} must be a pair (x, y) in metres, not {row!r}") from None
