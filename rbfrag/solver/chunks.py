@@ -12,7 +12,7 @@ from rbfrag.errors import InputError
 
 FloatArray = NDArray[np.float64]
 
-CHUNK = 1 << 13
+CHUNK = 1 << 14
 """Elements of one piece."""
 
 

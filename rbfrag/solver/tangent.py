@@ -27,12 +27,11 @@ def tan_deg(angle_deg: N, functions: Elementwise[N]) -> N:
         functions: the functions for this kind of number.
     """
     where = functions.where
-    size = abs(angle_deg)
-    steep = size > 45.0
-    # 90 - size is exact for these angles
-    small = _tan_to_45(where(steep, 90.0 - size, size))
-    tangent = where(steep, 1.0 / where(steep, small, 1.0), small)
-    result: N = where(angle_deg < 0.0, -tangent, tangent)
+    steep = abs(angle_deg) > 45.0
+    # the complement is exact for these angles
+    rest = where(steep, where(angle_deg < 0.0, -90.0, 90.0) - angle_deg, angle_deg)
+    above, below = _tangent_parts(rest)
+    result: N = where(steep, below, above) / where(steep, above, below)
     return result
 
 
@@ -44,19 +43,19 @@ def cot_deg(angle_deg: N, functions: Elementwise[N]) -> N:
         functions: the functions for this kind of number.
     """
     where = functions.where
-    obtuse = angle_deg > 90.0
-    acute = where(obtuse, 180.0 - angle_deg, angle_deg)
-    flat = acute < 45.0
-    small = _tan_to_45(where(flat, acute, 90.0 - acute))
-    cotangent = where(flat, 1.0 / where(flat, small, 1.0), small)
-    result: N = where(obtuse, -cotangent, cotangent)
+    steep = abs(angle_deg - 90.0) <= 45.0
+    # complement and supplement are exact for these angles
+    flat = where(angle_deg > 90.0, angle_deg - 180.0, angle_deg)
+    above, below = _tangent_parts(where(steep, 90.0 - angle_deg, flat))
+    result: N = where(steep, above, below) / where(steep, below, above)
     return result
 
 
-def _tan_to_45(angle_deg: N) -> N:
+def _tangent_parts(angle_deg: N) -> tuple[N, N]:
+    """Return two numbers whose quotient is the tangent of an angle up to 45 degrees."""
     y = angle_deg * _RADIAN
     z = y * y
-    return y * _polynomial(_NUMERATOR, z) / _polynomial(_DENOMINATOR, z)
+    return y * _polynomial(_NUMERATOR, z), _polynomial(_DENOMINATOR, z)
 
 
 def _polynomial(coefficients: tuple[float, ...], z: N) -> N:
