@@ -30,6 +30,11 @@ class Case:
     phi2: float
     kv: float = 0.0
     bond: float = 0.0  # strength of the base's cohesion over the weight
+    low: Vector | None = None  # lowest point on the back plane, if it is not the heel
+
+    @property
+    def lowest(self) -> Vector:
+        return self.heel if self.low is None else self.low
 
 
 def parallelogram(
@@ -140,7 +145,7 @@ def limit_of_equilibrium(case: Case, back_plane: bool = True) -> Limit | None:
     contacts = [(case.heel, base_low), (case.heel, base_high)]
     contacts += [(case.toe, base_low), (case.toe, base_high)]
     if back_plane:
-        for arm in (case.heel, case.back):
+        for arm in (case.lowest, case.back):
             contacts += [(arm, normal - t2 * up), (arm, normal + t2 * up)]
     size = float(np.hypot(*case.toe))
     columns = [[*force, moment(arm, force) / size] for arm, force in contacts]
@@ -169,4 +174,3 @@ def limit_of_equilibrium(case: Case, back_plane: bool = True) -> Limit | None:
         back_high=float(high),
         base_shear_left=float(forces[1] + forces[3]),
     )
-

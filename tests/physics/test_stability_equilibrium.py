@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rbfrag.errors import InputError
 from rbfrag.solver.block import Block
 from rbfrag.solver.stability import Stability, stability
 from tests.physics import equilibrium as statics
@@ -166,6 +167,59 @@ def test_limit_analysis_without_a_back_plane() -> None:
             assert found.state == "unstable"
     assert agreed["slide"] > 50
     assert agreed["topple"] > 50
+
+
+def random_polygon(random: np.random.Generator) -> tuple[Block, statics.Case]:
+    """A pentagon on its planes, every other one without the corner at its heel."""
+    while True:
+        gamma = random.uniform(20.0, 160.0)
+        up = np.array([-1.0 / math.tan(math.radians(gamma)), 1.0])
+        base, height = random.uniform(0.3, 3.0, 2)
+        back = up * height * random.uniform(0.5, 1.0)
+        front = np.array([base * random.uniform(0.7, 1.6), height * random.uniform(0.3, 1.0)])
+        top = np.array([back[0] + base * random.uniform(0.1, 0.7), max(back[1], front[1]) + 0.2])
+        corners = [np.zeros(2), np.array([base, 0.0]), front, top, back]
+        low = np.zeros(2)
+        if random.random() < 0.5:
+            low = back * random.uniform(0.05, 0.3)
+            corners[0] = np.array([base * random.uniform(0.05, 0.3), 0.0])
+            corners.append(low)
+        try:
+            block = Block.from_polygon([tuple(c) for c in corners], 0, 4, 1, gamma)
+        except InputError:  # edges that cross, or a corner behind the back plane
+            continue
+        centroid = np.array(block.toe) - corners[1]
+        phi1, phi2 = random.uniform(1.0, 60.0), random.uniform(0.0, 60.0)
+        case = statics.Case(
+            a1=block.alpha1_deg, a3=block.alpha3_deg, gamma=gamma,
+            heel=corners[0] + centroid, back=back + centroid, toe=corners[1] + centroid,
+            beta=random.uniform(-30.0, 40.0), phi1=phi1, phi2=phi2, low=low + centroid,
+        )  # fmt: skip
+        return block, case
+
+
+def test_polygons_whole_and_with_a_broken_heel() -> None:
+    random = np.random.default_rng(16)
+    agreed: Counter[str] = Counter()
+    for _ in range(1200):
+        block, case = random_polygon(random)
+        found = stability(block, beta_deg=case.beta, phi_deg=case.phi1, phi_back_deg=case.phi2)
+        k = found.yield_acceleration
+        if found.mode == "confined_topple":
+            r_base, r_back, solved = statics.two_contacts(case, case.toe, case.lowest, -1)
+            if math.isfinite(k):
+                assert min(r_base, r_back) > 0.0
+                assert close(k, solved)
+        elif found.mode == "slump" and math.isfinite(k):
+            r_base, r_back, solved = statics.slump(case)
+            assert min(r_base, r_back) > 0.0
+            assert close(k, solved)
+        limit = statics.limit_of_equilibrium(case)
+        if limit is not None and math.isfinite(k) and is_unique(case, found.mode):
+            assert close(k, limit.k), (case, found, limit)
+            agreed[found.mode] += 1
+    assert min(agreed.values()) > 10
+    assert len(agreed) == 4
 
 
 @pytest.mark.parametrize("share", [0.05, 0.4])
