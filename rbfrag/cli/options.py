@@ -119,3 +119,32 @@ Suite = Annotated[
     str | None,
     typer.Option("--suite", help="Only the motions of this suite.", show_default=False),
 ]
+
+Pgv = Annotated[
+    float | None,
+    typer.Option("--pgv", help="Peak ground velocity [m/s].", show_default=False),
+]
+
+Pga = Annotated[
+    float | None,
+    typer.Option("--pga", help="Peak ground acceleration [g].", show_default=False),
+]
+
+Tm = Annotated[float | None, typer.Option("--tm", help="Mean period [s].", show_default=False)]
+
+Pgd = Annotated[
+    float | None,
+    typer.Option("--pgd", help="Peak ground displacement [m].", show_default=False),
+]
+
+Model = Annotated[
+    str | None,
+    typer.Option(
+        "--model",
+        help="Name of a stored model. Default: the database's default if the given "
+        "measures suffice for it, else the best that they suffice for.",
+        show_default=False,
+    ),
+]
+
+Level = Annotated[float, typer.Option("--level", help="Confidence level of the interval.")]

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
 from rbfrag.cli import options
 from rbfrag.cli.block_argument import toppling_block
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
@@ -17,33 +13,12 @@ def predict(
     p2: options.P2OrFile = None,
     kr: options.KrOrFile = None,
     block: options.BlockFile = None,
-    pgv: Annotated[
-        float | None,
-        typer.Option("--pgv", help="Peak ground velocity [m/s].", show_default=False),
-    ] = None,
-    pga: Annotated[
-        float | None,
-        typer.Option("--pga", help="Peak ground acceleration [g].", show_default=False),
-    ] = None,
-    tm: Annotated[
-        float | None, typer.Option("--tm", help="Mean period [s].", show_default=False)
-    ] = None,
-    pgd: Annotated[
-        float | None,
-        typer.Option("--pgd", help="Peak ground displacement [m].", show_default=False),
-    ] = None,
-    model: Annotated[
-        str | None,
-        typer.Option(
-            "--model",
-            help="Name of a stored model. Default: the database's default if the given "
-            "measures suffice for it, else the best that they suffice for.",
-            show_default=False,
-        ),
-    ] = None,
-    level: Annotated[
-        float, typer.Option("--level", help="Confidence level of the interval.")
-    ] = 0.95,
+    pgv: options.Pgv = None,
+    pga: options.Pga = None,
+    tm: options.Tm = None,
+    pgd: options.Pgd = None,
+    model: options.Model = None,
+    level: options.Level = 0.95,
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
