@@ -110,7 +110,7 @@ def _component(
             f"lines of data, but {len(data)} follow: the file is truncated or its header wrong",
             line=npts_line,
         )
-    values = fixed_width_numbers(path, data[:rows], first + 1, WIDTH, "acceleration")
+    values = fixed_width_numbers(path, data[:rows], first + 1, WIDTH, PER_LINE, "acceleration")
     if values.size != npts:
         raise MotionFileError(
             path,
