@@ -59,7 +59,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
     lines = text.split("\n")
     return [
         _component(path, lines, span, index, units, dt_s)
-        for index, span in enumerate(blocks(lines, _BLOCK))
+        for index, span in enumerate(blocks(path, lines, _BLOCK))
     ]
 
 

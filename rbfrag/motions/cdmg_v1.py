@@ -61,7 +61,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         MotionFileError: a header or value that cannot be used, with its line.
     """
     lines = text.split("\n")
-    channels = [_channel(path, lines, span, units, dt_s) for span in blocks(lines, _BLOCK)]
+    channels = [_channel(path, lines, span, units, dt_s) for span in blocks(path, lines, _BLOCK)]
     moving = [channel for channel in channels if channel.acceleration_g.any()]
     still = [channel.component for channel in channels if not channel.acceleration_g.any()]
     if not moving:

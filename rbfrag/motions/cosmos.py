@@ -77,7 +77,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
     lines = text.split("\n")
     motions: list[GroundMotion] = []
     others: list[str] = []
-    for span in blocks(lines, _BLOCK):
+    for span in blocks(path, lines, _BLOCK):
         series = find_field(path, lines, span, _SERIES, "line '... acceleration pts, ...'")
         quantity = _POINTS.search(series.text)
         if quantity and not quantity[2].lower().startswith("accel"):

@@ -191,15 +191,24 @@ def refuse_other_count(path: Path, stated: float, found: int, line: int, what: s
         )
 
 
-def blocks(lines: Sequence[str], first: re.Pattern[str]) -> list[range]:
+def blocks(path: Path, lines: Sequence[str], first: re.Pattern[str]) -> list[range]:
     """Return the spans of a file's blocks: each begins with a line of its own and ends at the next.
 
     Args:
+        path: for messages.
         lines: the lines of the file.
         first: matches the first line of each block at its beginning.
+
+    Raises:
+        MotionFileError: no line begins a block.
     """
     starts = [at for at, line in enumerate(lines) if first.match(line)]
-    return [range(start, end) for start, end in zip(starts, [*starts[1:], len(lines)], strict=True)]
+    if not starts:
+        raise MotionFileError(
+            path, "the first line of the header is damaged: export the record again", line=1
+        )
+    ends = [*starts[1:], len(lines)]
+    return [range(start, end) for start, end in zip(starts, ends, strict=True)]
 
 
 class NamedFields:
