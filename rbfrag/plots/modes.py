@@ -27,13 +27,20 @@ MOST_POINTS = 300
 CELL_DEG = 2.0
 """Cell of the histogram [deg]."""
 
-_STEP_DEG = 0.25
+_STEP_DEG = 0.5
 _HATCHED = (
-    (UNSTABLE, "....", "unstable at rest"),
+    (UNSTABLE, "////", "unstable at rest"),
     (LOCKED, "xxx", "locked: no acceleration\nmoves it in this mode"),
 )
 _LEVELS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0)
 _NARROW_G = 0.4
+# An image keeps vector files small.
+_WHOLE_CHART: dict[str, Any] = {
+    "extent": (-90.0, 90.0, -90.0, 90.0),
+    "origin": "lower",
+    "interpolation": "none",
+    "aspect": "equal",
+}
 _FINE_LEVELS = tuple(0.05 * i for i in range(1, 60))
 
 
@@ -81,7 +88,7 @@ def plot_modes(
         nan="raise",
     )
     shown = _pairs(alpha1_deg, alpha3_deg)
-    figure = new_figure(7.4 if len(shown[0]) > MOST_POINTS else 6.6, 6.4)
+    figure = new_figure(6.4 if len(shown[0]) > MOST_POINTS else 5.6, 5.5)
     axes = figure.add_subplot()
     _draw_regions(axes, nodes, is_block, found)
     _draw_yields(axes, nodes, is_block, found)
@@ -131,18 +138,13 @@ def _draw_regions(
 ) -> None:
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
-    edges = np.linspace(-90.0, 90.0, nodes.size + 1)
-    colours = ListedColormap([COLOURS[mode] for mode in MODES])
-    axes.pcolormesh(
-        edges,
-        edges,
+    axes.imshow(
         np.ma.masked_where(~is_block, found.mode_code),
-        cmap=colours,
+        cmap=ListedColormap([COLOURS[mode] for mode in MODES]),
         norm=BoundaryNorm(np.arange(-0.5, len(MODES)), len(MODES)),
         alpha=0.30,
-        # One image instead of half a million cells keeps vector files small.
-        rasterized=True,
         zorder=1,
+        **_WHOLE_CHART,
     )
     for code, hatch, _ in _HATCHED:
         here = is_block & (found.state_code == code)
@@ -267,8 +269,8 @@ def _draw_blocks(
     from matplotlib.colors import ListedColormap
 
     greys = ListedColormap(colormaps["Greys"](np.linspace(0.25, 0.95, 256)))
-    cells = axes.pcolormesh(
-        edges, edges, np.ma.masked_equal(counts, 0.0), cmap=greys, zorder=2.5, alpha=0.85
+    cells = axes.imshow(
+        np.ma.masked_equal(counts, 0.0), cmap=greys, zorder=2.5, alpha=0.85, **_WHOLE_CHART
     )
     axes.figure.colorbar(
         cells, ax=axes, label=f"blocks per cell of {CELL_DEG:g}° x {CELL_DEG:g}°", shrink=0.8
