@@ -19,6 +19,7 @@ from rbfrag.motions.header_field import (
     blocks,
     find_field,
     interval_of_duration,
+    missing_channels,
     optional_field,
     refuse_other_count,
 )
@@ -61,12 +62,15 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         MotionFileError: a header or value that cannot be used, with its line.
     """
     lines = text.split("\n")
-    channels = [_channel(path, lines, span, units, dt_s) for span in blocks(path, lines, _BLOCK)]
+    spans = blocks(path, lines, _BLOCK)
+    channels = [_channel(path, lines, span, units, dt_s) for span in spans]
     moving = [channel for channel in channels if channel.acceleration_g.any()]
     still = [channel.component for channel in channels if not channel.acceleration_g.any()]
     if not moving:
         raise MotionFileError(path, "every sample of every channel is zero: this is no record")
-    remarks = (f"the channel {', '.join(still)} holds zeros only and is left out",) if still else ()
+    remarks = missing_channels(lines, spans[0], len(spans))
+    if still:
+        remarks += (f"the channel {', '.join(still)} holds zeros only and is left out",)
     return [
         replace(channel, trace_index=index, remarks=remarks) for index, channel in enumerate(moving)
     ]

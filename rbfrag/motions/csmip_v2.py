@@ -14,8 +14,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+from rbfrag.errors import MotionFileError
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.header_field import (
@@ -24,6 +26,7 @@ from rbfrag.motions.header_field import (
     agreed_unit_in_g,
     blocks,
     find_field,
+    missing_channels,
     optional_field,
     positive_number,
     refuse_other_count,
@@ -36,6 +39,8 @@ from rbfrag.motions.text_file import (
 )
 
 FORMAT = "CSMIP/CDMG V2"
+
+END = "/&"
 
 LAYOUT = (8, 10)
 """Fields a line and characters a field, where the file does not say."""
@@ -70,9 +75,11 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         MotionFileError: a header or value that cannot be used, with its line.
     """
     lines = text.split("\n")
+    spans = blocks(path, lines, _BLOCK)
+    remarks = missing_channels(lines, spans[0], len(spans))
     return [
-        _channel(path, lines, span, index, units, dt_s)
-        for index, span in enumerate(blocks(path, lines, _BLOCK))
+        replace(_channel(path, lines, span, index, units, dt_s), remarks=remarks)
+        for index, span in enumerate(spans)
     ]
 
 
@@ -90,6 +97,13 @@ def _channel(
         path, find_field(path, lines, here, _UNIT, "unit of acceleration"), units
     )
     per_line, width = field_layout(lines[points.line - 1], LAYOUT) or LAYOUT
+    if not any(lines[at].startswith(END) for at in span):
+        raise MotionFileError(
+            path,
+            f"channel {index} does not end with a line {END}: the file is truncated; export the "
+            "record again",
+            line=span.stop,
+        )
     end = next((at for at in span if at >= points.line and _SERIES_END.match(lines[at])), span.stop)
     data = without_blank_end(lines[points.line : end])
     values = fixed_width_numbers(path, data, points.line + 1, width, per_line, "acceleration")

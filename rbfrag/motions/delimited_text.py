@@ -34,7 +34,7 @@ LONGEST_HEADER_LINE = 500
 """Characters of a header line that are looked at."""
 
 _NUMBER_LIKE = re.compile(
-    r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[ed][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE
+    r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[ed][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE
 )
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*[;\s]\s*[+-]?\d*,\d+\S*\s*")
 

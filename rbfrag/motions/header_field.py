@@ -23,6 +23,8 @@ ROUNDING = 1e-9
 
 MOST_DIGITS = 17
 
+_CHANNELS = re.compile(r"\(\s*(\d{1,3})\s+chns\s+of", re.IGNORECASE | re.ASCII)
+
 LONGEST_LINE = 1000
 """Characters of a header line that are looked at."""
 
@@ -211,6 +213,22 @@ def blocks(path: Path, lines: Sequence[str], first: re.Pattern[str]) -> list[ran
     return [range(start, end) for start, end in zip(starts, ends, strict=True)]
 
 
+def missing_channels(lines: Sequence[str], span: range, found: int) -> tuple[str, ...]:
+    """Return a remark if a file holds fewer channels than its header says; else nothing.
+
+    Some agencies split a recording into one file a channel, so that this is no error.
+
+    Args:
+        lines: the lines of the file.
+        span: indices of the lines of its first block.
+        found: channels in the file.
+    """
+    stated = optional_field(lines, span, _CHANNELS)
+    if stated is None or int(stated.text) <= found:
+        return ()
+    return (f"the header says {stated.text} channels, but the file holds {found}",)
+
+
 class NamedFields:
     """Header lines ``name: value``, looked up by name.
 
@@ -224,7 +242,7 @@ class NamedFields:
         self.path = path
         self._fields: dict[str, Field] = {}
         for at in span:
-            name, colon, value = lines[at].partition(":")
+            name, colon, value = lines[at][:LONGEST_LINE].partition(":")
             if colon and name.strip():
                 self._fields.setdefault(name.strip(), Field(value.strip(), at + 1))
 

@@ -19,7 +19,7 @@ MOST_SHOWN = 40
 
 _FORTRAN = re.compile(r"(?<!\d)(\d{1,3})[FE](\d{1,3})\.\d", re.IGNORECASE | re.ASCII)
 _OF_INTEGERS = frozenset("0123456789- \t")
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def read_text(path: Path) -> str:

@@ -22,7 +22,7 @@ from rbfrag.motions.text_file import free_numbers, sample_count
 
 FORMAT = "GeoNet text (.000/.090/.ver)"
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_NUMBER = r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"
 _HEAD = re.compile(
     r"[ \t]*(?P<station>\S+)[ \t]+(?P<component>[^\W_]{1,8})(?:[ \t][^\n]*)?\n"
     rf"[ \t]*(?P<npts>\d+)[ \t]+(?P<dt>{_NUMBER})(?:[ \t]+[+-]?\d+){{2}}"

@@ -174,6 +174,12 @@ def test_strange_json(tmp_path: Path, change: Callable[[str], str]) -> None:
     refusal(tmp_path, change(WRITTEN["SimCenter event JSON"]()), units="g")
 
 
+def test_csmip_v2_cut_within_its_velocities(tmp_path: Path) -> None:
+    text = WRITTEN["CSMIP/CDMG V2"]()
+    error = refusal(tmp_path, text[: text.rindex("2.0")])
+    assert "channel 1 does not end" in error.reason
+
+
 def test_cdmg_v1_of_zeros_alone(tmp_path: Path) -> None:
     text = written.cdmg_v1([("NS", ["0.000"] * 12)], 0.01)
     assert "zero" in refusal(tmp_path, text).reason
