@@ -14,6 +14,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.motion_store import add_motion
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError, MotionFileError
+from rbfrag.motions.dt_index import INDEX
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.metadata import MotionMetadata, TraceMetadata, read_metadata
 from rbfrag.motions.quality import quality_flags
@@ -124,7 +125,9 @@ def _files(
     for path in map(Path, paths):
         if path.is_dir():
             below = sorted(
-                file for file in path.rglob("*") if file.is_file() and not file.name.startswith(".")
+                file
+                for file in path.rglob("*")
+                if file.is_file() and not file.name.startswith(".") and file.name != INDEX
             )
         elif path.exists():
             below = [path]
