@@ -57,7 +57,7 @@ def plot_work_precision(
     wrong outcomes, which no error tells of.
 
     Args:
-        points: measured methods.
+        points: measured methods; those of a family in the order of their settings.
         path: .png, .pdf or .svg.
         title: written above.
 
@@ -77,10 +77,7 @@ def plot_work_precision(
             color = PEERS[peers % len(PEERS)]
             marker = MARKERS[peers % len(MARKERS)]
             peers += 1
-        line = sorted(
-            (p for p in points if p.family == family and p.error_median is not None),
-            key=lambda p: (p.time_s, p.setting),
-        )
+        line = [p for p in points if p.family == family and p.error_median is not None]
         error = [max(p.error_median or 0.0, ROUNDING) for p in line]
         worst = [max(p.error_worst or 0.0, ROUNDING) for p in line]
         time_s = [p.time_s for p in line]

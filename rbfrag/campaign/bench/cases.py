@@ -97,6 +97,9 @@ def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[Case,
         records: where the motions come from.
         number: how many cases.
         seed: the same seed draws the same cases.
+
+    Raises:
+        InputError: no block lifts off in any of many draws.
     """
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(records.motions))
@@ -112,6 +115,8 @@ def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[Case,
         kr = float(np.exp(rng.uniform(low, high))) * drive.pga_g
         if drive.max_q > kr:
             cases.append(Case(motion, polarity, drive, p2, kr))
+    if not cases:
+        raise InputError("no drawn block lifts off under these records: name other records")
     return tuple(cases)
 
 

@@ -28,7 +28,7 @@ class Size:
 
 
 QUICK = Size(10, 3, (1, 4), (1, 2), (24,))
-FULL = Size(60, 12, (1, 2, 4, 8, 16), (1, 2), (24, 48, 96))
+FULL = Size(24, 12, (1, 2, 4, 8, 16), (1, 2), (24, 48, 96))
 
 
 @dataclass(frozen=True)

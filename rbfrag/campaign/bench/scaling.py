@@ -64,6 +64,7 @@ def record_length(
     """Time one run, of a block that stays, under a record padded or repeated."""
     kr = 0.5 * motion.pga_g
     samples = motion.acceleration_g
+    taylor_run(Case(motion, "forward", excitation(motion), p2, kr))  # compiles
     rows = []
     for lengthened in ("rest", "shaking"):
         for n in times:

@@ -46,15 +46,18 @@ def _excursion(problem: Problem, start: float, solver: Solver, rtol: float) -> E
     acceleration = problem.acceleration
     absolute = ATOL_PARTS * rtol * problem.theta_c
     events = [_Event(problem, start, kind) for kind in ("re-seat", "toppled", "peak")]
-    solution = solve_ivp(
-        lambda t, y: (y[1], acceleration(t, y[0])),
-        (start, problem.end_s),
-        (0.0, 0.0),
-        method=solver,
-        rtol=rtol,
-        atol=[absolute, absolute * problem.p],
-        events=events,
-    )
+    try:
+        solution = solve_ivp(
+            lambda t, y: (y[1], acceleration(t, y[0])),
+            (start, problem.end_s),
+            (0.0, 0.0),
+            method=solver,
+            rtol=rtol,
+            atol=[absolute, absolute * problem.p],
+            events=events,
+        )
+    except ValueError:  # its interpolant and its step disagree about the sign of an event
+        return Excursion("failed", start, 0.0, 0.0, ())
     if solution.status < 0 or solution.t_events is None or solution.y_events is None:
         return Excursion("failed", start, 0.0, 0.0, ())
     ended = "record"

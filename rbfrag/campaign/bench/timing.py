@@ -18,17 +18,23 @@ T = TypeVar("T")
 SHORTEST_S = 4e-4
 """Least time measured in one piece: some thousand times the cost of reading the clock."""
 
+LONG_S = 0.02
+"""Work that takes longer is done once: its first call is no slower than the next."""
+
 
 def timed(work: Callable[[], T]) -> tuple[T, float]:
-    """Return what `work` returns, and the seconds of one call (the least of two readings)."""
+    """Return what `work` returns, and the seconds of one call.
+
+    Work under 20 ms is repeated: the least of three readings after a first call.
+    """
     started = time.thread_time()
     answer = work()
     once = time.thread_time() - started
-    if once >= SHORTEST_S:
+    if once >= LONG_S:
         return answer, once
     calls = int(SHORTEST_S / max(once, 1e-6)) + 1
     best = np.inf
-    for _ in range(2):
+    for _ in range(3):
         started = time.thread_time()
         for _ in range(calls):
             work()

@@ -1,0 +1,230 @@
+"""The benchmarks still run, and what they judge by is right."""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from benchmarks import critical_search, main_job, page, scaling, start_up, work_precision
+from rbfrag.campaign.bench import cvode_peer, run
+from rbfrag.campaign.bench.cases import (
+    RECORDS_VARIABLE,
+    Records,
+    choose_cases,
+    choose_combinations,
+    find_records,
+)
+from rbfrag.campaign.bench.critical_search import compare_searches, search_runs
+from rbfrag.campaign.bench.free_motion import Answer
+from rbfrag.campaign.bench.methods import Method, methods, missing_peers, taylor_run
+from rbfrag.campaign.bench.reference import reference
+from rbfrag.campaign.bench.tables import ratio, seconds
+from rbfrag.campaign.bench.work_precision import measure
+from rbfrag.cli.main import app
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.pulses import reversal_pulse
+from tests.solver.reference import integrate
+from tests.synthetic import shaking, write_at2
+
+FILES = 4
+
+
+def published() -> str:
+    return page.PAGE.read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def records() -> Records:
+    motions = tuple(GroundMotion(shaking(seed, npts=400), 0.02) for seed in range(3))
+    return Records((*motions, reversal_pulse(0.4, 0.65, 0.5, 0.02)), "made up")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    place = tmp_path / "records"
+    place.mkdir()
+    for seed in range(FILES):
+        event = f"PLACE {seed} 01/02/7{seed}"
+        write_at2(place / f"{seed}.AT2", shaking(seed, npts=400), event=event)
+    return place
+
+
+def test_reference_agrees_with_the_independent_integrator(records: Records) -> None:
+    seen = set()
+    for case in choose_cases(records, 10):
+        ours = reference(case)
+        other = integrate(case.drive.time_s, case.drive.k_h, None, p2=case.p2, kr=case.kr)
+        seen.add(other.outcome)
+        assert ours.outcome == other.outcome
+        if other.peak_rad is not None:
+            assert ours.peak_rad == pytest.approx(other.peak_rad, rel=2e-12)
+    assert seen == {"stable", "toppled"}
+
+
+def test_every_method_solves_the_same_problem(records: Records) -> None:
+    cases = choose_cases(records, 4)
+    rows = measure(cases, methods(quick=True))
+    assert [row.of_use for row in rows].count(True) == 1
+    for row in rows:
+        assert row.cases == len(cases)
+        assert row.wrong == 0, row
+        assert row.error_median is not None
+        assert row.error_worst is not None
+        if "Euler" not in row.family:
+            assert row.error_worst < 1e-2, row
+        if row.of_use:
+            assert row.error_worst < 1e-12
+            assert row.slower == row.slower_least == 1.0
+
+
+def test_a_wrong_outcome_and_an_error_are_seen(records: Records) -> None:
+    cases = choose_cases(records, 6)
+    truth = [reference(case) for case in cases]
+    stays = [answer.outcome == "stable" for answer in truth]
+    assert len(set(stays)) == 2
+
+    def off(case: object) -> Answer:
+        return Answer("stable", 1.25 * truth[[c is case for c in cases].index(True)].peak_rad)
+
+    base = Method("right", "", taylor_run, of_use=True)
+    right, wrong = measure(cases, (base, Method("wrong", "", off)))
+    assert right.wrong == 0
+    assert wrong.wrong == stays.count(False)
+    assert wrong.error_median == pytest.approx(0.25)
+
+
+def test_without_the_peer_it_is_named_and_left_out(
+    records: Records, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cvode_peer, "PACKAGE", "a_package_that_is_nowhere")
+    assert missing_peers() == ("scikit-sundae",)
+    assert not [m for m in methods() if "CVODE" in m.family]
+    rows = compare_searches(choose_combinations(records, 1))
+    assert [row.name for row in rows] == ["critical search", "23 runs, rbfrag"]
+    assert rows[0].over_search == rows[1].over_runs == 1.0
+
+
+def test_with_the_peer_it_runs_the_same_values(records: Records) -> None:
+    installed = cvode_peer.is_installed()
+    assert missing_peers() == (() if installed else ("scikit-sundae",))
+    motion, polarity, p2 = choose_combinations(records, 1)[0]
+    assert len(search_runs(motion, polarity, p2)) == 23
+    rows = compare_searches([(motion, polarity, p2)], tolerances=(1e-6,))
+    assert len(rows) == (3 if installed else 2)
+    for row in rows[2:]:
+        assert row.wrong is not None
+        assert row.wrong <= 3  # the last bisections lie closer to critical than its error
+
+
+def test_cases_are_drawn_alike_and_lift_off(records: Records) -> None:
+    first, again = choose_cases(records, 8, seed=3), choose_cases(records, 8, seed=3)
+    assert [(c.p2, c.kr, c.polarity) for c in first] == [(c.p2, c.kr, c.polarity) for c in again]
+    assert first[0].kr != choose_cases(records, 8, seed=4)[0].kr
+    assert all(c.drive.max_q > c.kr for c in first)
+
+
+def test_records_are_found_or_refused(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (folder / "notes.txt").write_text("no accelerogram\n")
+    assert len(find_records(folder).motions) == FILES
+    monkeypatch.setenv(RECORDS_VARIABLE, str(folder))
+    assert len(find_records().motions) == FILES
+    monkeypatch.delenv(RECORDS_VARIABLE)
+    monkeypatch.setattr("rbfrag.campaign.bench.cases.sample_folder", lambda: None)
+    assert "pulses" in find_records().source
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    for wrong in (empty, tmp_path / "nowhere"):
+        with pytest.raises(InputError, match=wrong.name):
+            find_records(wrong)
+
+
+def test_command_prints_tables_writes_files_and_json(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run, "QUICK", run.Size(2, 1, (1, 2), (1,), (12,)))
+    out = tmp_path / "out"
+    arguments = ["bench", "--quick", "--records", str(folder), "--out", str(out)]
+    refused = CliRunner().invoke(app, arguments)
+    assert refused.exit_code == 2
+    out.mkdir()
+    shown = CliRunner().invoke(app, arguments)
+    assert shown.exit_code == 0, shown.output
+    for word in ("order 8", "forward Euler", "critical search", "shaking"):
+        assert word in shown.stdout
+    assert {path.name for path in out.iterdir()} == {
+        "work-precision.csv", "critical-search.csv", "record-length.csv", "workers.csv",
+        "work-precision.svg",
+    }  # fmt: skip
+    with (out / "work-precision.csv").open() as file:
+        assert {row["cases"] for row in csv.DictReader(file)} == {"2"}
+    monkeypatch.setattr(cvode_peer, "PACKAGE", "a_package_that_is_nowhere")
+    answer = CliRunner().invoke(app, [*arguments[:4], "--json"])
+    document = json.loads(answer.stdout)
+    assert document["not_installed"] == ["scikit-sundae"]
+    assert {row["workers"] for row in document["workers"]} == {1}
+
+
+@pytest.mark.parametrize(
+    ("script", "arguments", "places"),
+    [
+        (work_precision.main, ["--cases", "2", "--quick"], ["work-precision"]),
+        (critical_search.main, ["--combinations", "1", "--rtol", "1e-5"], ["critical-search"]),
+        (
+            scaling.main,
+            ["--times", "1", "--workers", "1", "--combinations", "12"],
+            ["record-length", "workers"],
+        ),
+        (start_up.main, ["--repeat", "1", "--no-cold"], ["start-up"]),
+        (main_job.main, ["--jobs", "1", "--term", "pgv"], ["main-job"]),
+    ],
+    ids=lambda value: value.__module__ if callable(value) else "",
+)
+def test_scripts_run_and_fill_their_places_in_the_page(
+    script: Callable[[list[str]], None],
+    arguments: list[str],
+    places: list[str],
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    copy = tmp_path / "performance.md"
+    empty = re.sub(r" -->\n.*?<!-- end -->", " -->\n<!-- end -->", published(), flags=re.S)
+    copy.write_text(empty, encoding="utf-8")
+    module = importlib.import_module(script.__module__)
+    monkeypatch.setattr(page, "PAGE", copy)
+    if hasattr(module, "FIGURE"):
+        monkeypatch.setattr(module, "FIGURE", tmp_path / "figure.svg")
+    script([*arguments, "--records", str(folder), "--out", str(tmp_path), "--write"])
+    filled = re.findall(r"<!-- ([a-z-]+) -->\n\n\|", copy.read_text(encoding="utf-8"))
+    assert filled == places
+
+
+def test_every_place_in_the_page_holds_a_table() -> None:
+    text = published()
+    for name in (
+        "work-precision", "critical-search", "record-length", "workers", "main-job", "start-up",
+    ):  # fmt: skip
+        between = text.split(f"<!-- {name} -->")[1].split("<!-- end -->")[0]
+        assert between.count("\n|") >= 4, name
+    assert page.replaced("a\n<!-- x -->\nold\n<!-- end -->\nb", "x", "new") == (
+        "a\n<!-- x -->\n\nnew\n\n<!-- end -->\nb"
+    )
+    with pytest.raises(SystemExit):
+        page.replaced(text, "no such place", "")
+
+
+def test_numbers_are_short() -> None:
+    assert [seconds(t) for t in (2.0, 0.0123, 999.7e-6, 1.24e-5, 3e-8)] == [
+        "2 s", "12 ms", "1 ms", "12 µs", "30 ns",
+    ]  # fmt: skip
+    assert [ratio(r) for r in (0.351, 9.96, 1234.0)] == ["0.35×", "10×", "1,200×"]
