@@ -26,13 +26,21 @@ if TYPE_CHECKING:
     from rbfrag.fragility.prediction import predict as predict
     from rbfrag.motions.ground_motion import GroundMotion as GroundMotion
     from rbfrag.motions.recognise import read_motions as read_motions
+    from rbfrag.solver.block import Block as Block
+    from rbfrag.solver.block_arrays import BlockArray as BlockArray
     from rbfrag.solver.critical import critical as critical
     from rbfrag.solver.respond import respond as respond
     from rbfrag.solver.results import CriticalResult as CriticalResult
     from rbfrag.solver.results import Outcome as Outcome
     from rbfrag.solver.results import Response as Response
+    from rbfrag.solver.stability import Stability as Stability
+    from rbfrag.solver.stability import stability as stability
+    from rbfrag.solver.stability_arrays import StabilityArray as StabilityArray
+    from rbfrag.solver.stability_arrays import stability_arrays as stability_arrays
 
 _HOME = {
+    "Block": "rbfrag.solver.block",
+    "BlockArray": "rbfrag.solver.block_arrays",
     "CriticalResult": "rbfrag.solver.results",
     "DatabaseError": "rbfrag.errors",
     "FitError": "rbfrag.errors",
@@ -42,6 +50,8 @@ _HOME = {
     "Outcome": "rbfrag.solver.results",
     "RbfragError": "rbfrag.errors",
     "Response": "rbfrag.solver.results",
+    "Stability": "rbfrag.solver.stability",
+    "StabilityArray": "rbfrag.solver.stability_arrays",
     "UnknownModelError": "rbfrag.errors",
     "WorkFailedError": "rbfrag.errors",
     "add_motions": "rbfrag.campaign.add_motions",
@@ -51,6 +61,8 @@ _HOME = {
     "read_motions": "rbfrag.motions.recognise",
     "respond": "rbfrag.solver.respond",
     "simulate": "rbfrag.campaign.simulate",
+    "stability": "rbfrag.solver.stability",
+    "stability_arrays": "rbfrag.solver.stability_arrays",
 }
 
 __all__ = [*sorted(_HOME), "__version__"]

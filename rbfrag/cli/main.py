@@ -12,7 +12,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from rbfrag.cli import block as block_command
 from rbfrag.cli import critical, database, demo, fit, models, motions, plot, predict, respond
+from rbfrag.cli import rockmass as rockmass_command
 from rbfrag.cli import simulate as simulate_command
 from rbfrag.errors import RbfragError
 from rbfrag.version import __version__
@@ -61,6 +63,8 @@ def _options(
     pass
 
 
+app.command("block", epilog=block_command.EXAMPLE)(block_command.block)
+app.command("rockmass", epilog=rockmass_command.EXAMPLE)(rockmass_command.rockmass)
 app.add_typer(motions.app, name="motions")
 app.command("respond", epilog=respond.EXAMPLE)(respond.respond)
 app.command("critical", epilog=critical.EXAMPLE)(critical.critical)

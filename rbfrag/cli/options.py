@@ -59,6 +59,35 @@ Kr = Annotated[
     ),
 ]
 
+P2OrFile = Annotated[
+    float | None,
+    typer.Option(
+        "--p2",
+        help="Frequency parameter p² of the block [1/s²], with --kr.",
+        show_default=False,
+    ),
+]
+
+KrOrFile = Annotated[
+    float | None,
+    typer.Option(
+        "--kr",
+        help="Rocking acceleration coefficient k_r = tan(critical angle) [g], with --p2.",
+        show_default=False,
+    ),
+]
+
+BlockFile = Annotated[
+    str | None,
+    typer.Option(
+        "--block",
+        metavar="FILE",
+        help="Block file (.toml or .csv) with beta_deg and phi_deg, instead of --p2 and --kr; "
+        "refused unless the block topples.",
+        show_default=False,
+    ),
+]
+
 Linear = Annotated[
     bool,
     typer.Option(
@@ -90,3 +119,32 @@ Suite = Annotated[
     str | None,
     typer.Option("--suite", help="Only the motions of this suite.", show_default=False),
 ]
+
+Pgv = Annotated[
+    float | None,
+    typer.Option("--pgv", help="Peak ground velocity [m/s].", show_default=False),
+]
+
+Pga = Annotated[
+    float | None,
+    typer.Option("--pga", help="Peak ground acceleration [g].", show_default=False),
+]
+
+Tm = Annotated[float | None, typer.Option("--tm", help="Mean period [s].", show_default=False)]
+
+Pgd = Annotated[
+    float | None,
+    typer.Option("--pgd", help="Peak ground displacement [m].", show_default=False),
+]
+
+Model = Annotated[
+    str | None,
+    typer.Option(
+        "--model",
+        help="Name of a stored model. Default: the database's default if the given "
+        "measures suffice for it, else the best that they suffice for.",
+        show_default=False,
+    ),
+]
+
+Level = Annotated[float, typer.Option("--level", help="Confidence level of the interval.")]

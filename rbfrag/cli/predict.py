@@ -2,52 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
 from rbfrag.cli import options
+from rbfrag.cli.block_argument import toppling_block
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
 
 EXAMPLE = "Example:  rbfrag predict --p2 3 --kr 0.1 --pgv 0.6 --json"
 
 
 def predict(
-    p2: options.P2,
-    kr: options.Kr,
-    pgv: Annotated[
-        float | None,
-        typer.Option("--pgv", help="Peak ground velocity [m/s].", show_default=False),
-    ] = None,
-    pga: Annotated[
-        float | None,
-        typer.Option("--pga", help="Peak ground acceleration [g].", show_default=False),
-    ] = None,
-    tm: Annotated[
-        float | None, typer.Option("--tm", help="Mean period [s].", show_default=False)
-    ] = None,
-    pgd: Annotated[
-        float | None,
-        typer.Option("--pgd", help="Peak ground displacement [m].", show_default=False),
-    ] = None,
-    model: Annotated[
-        str | None,
-        typer.Option(
-            "--model",
-            help="Name of a stored model. Default: the database's default if the given "
-            "measures suffice for it, else the best that they suffice for.",
-            show_default=False,
-        ),
-    ] = None,
-    level: Annotated[
-        float, typer.Option("--level", help="Confidence level of the interval.")
-    ] = 0.95,
+    p2: options.P2OrFile = None,
+    kr: options.KrOrFile = None,
+    block: options.BlockFile = None,
+    pgv: options.Pgv = None,
+    pga: options.Pga = None,
+    tm: options.Tm = None,
+    pgd: options.Pgd = None,
+    model: options.Model = None,
+    level: options.Level = 0.95,
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
     """Print the probability that a block topples, with its confidence interval."""
     from rbfrag.fragility.prediction import predict as answer
 
+    p2, kr, remarks = toppling_block(p2, kr, block)
     prediction = answer(
         p2,
         kr,
@@ -60,9 +38,10 @@ def predict(
         db=db,
     )
     document = prediction.as_dict()
+    document["warnings"] = [*remarks, *prediction.warnings]
     if json:
         print_json(document)
         return
     document.pop("warnings")
     print_pairs(document)
-    print_warnings(prediction.warnings)
+    print_warnings([*remarks, *prediction.warnings])

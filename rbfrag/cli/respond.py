@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from rbfrag.cli import options
+from rbfrag.cli.block_argument import toppling_block
 from rbfrag.cli.motion_argument import find_motion
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
 
@@ -15,8 +16,9 @@ EXAMPLE = "Example:  rbfrag respond record.AT2 --p2 3 --kr 0.1 --plot response.p
 
 def respond(
     motion: options.Motion,
-    p2: options.P2,
-    kr: options.Kr,
+    p2: options.P2OrFile = None,
+    kr: options.KrOrFile = None,
+    block: options.BlockFile = None,
     vertical: options.Vertical = None,
     reverse: options.Reverse = False,
     linear: options.Linear = False,
@@ -42,6 +44,7 @@ def respond(
     from rbfrag.solver.respond import respond as run
     from rbfrag.solver.response_report import as_dict, write_history
 
+    p2, kr, remarks = toppling_block(p2, kr, block)
     ground = find_motion(motion, db=db, units=units, dt_s=dt)
     upward = find_motion(vertical, db=db, units=units, dt_s=dt) if vertical else None
     response = run(
@@ -62,10 +65,11 @@ def respond(
             response, plot, p2=p2, kr=kr, linear=linear, title=ground.label, reverse=reverse
         )
     answer = as_dict(response)
+    answer["warnings"] = [*remarks, *answer["warnings"]]
     if json:
         print_json(answer)
         return
     answer.pop("warnings")
     print_pairs(answer)
     print(response.outcome.advice)
-    print_warnings(response.warnings)
+    print_warnings([*remarks, *response.warnings])

@@ -29,8 +29,11 @@ FORMAT = "delimited text"
 
 COMMENT = "#"
 
+LONGEST_HEADER_LINE = 500
+"""Characters of a header line that are looked at."""
+
 _NUMBER_LIKE = re.compile(
-    r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE
+    r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[ed][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE
 )
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*[;\s]\s*[+-]?\d*,\d+\S*\s*")
 
@@ -42,7 +45,7 @@ def recognises(head: str) -> bool:
         del rows[0]
     if not rows:
         return False
-    if _DECIMAL_COMMA.fullmatch(rows[0]):
+    if _has_decimal_commas(rows[0]):
         return True
     width = len(_fields(rows[0]))
     if width > 2 and (len(rows) < 2 or len(_fields(rows[1])) != width):
@@ -65,7 +68,11 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
     """
     lines = text.split("\n")
     start = _first_data_line(lines)
-    header = [(number, line) for number, line in enumerate(lines[:start], 1) if line.strip()]
+    header = [
+        (number, line[:LONGEST_HEADER_LINE])
+        for number, line in enumerate(lines[:start], 1)
+        if line.strip()
+    ]
     rows = _rows(path, lines, start)
     unit = stated_unit(path, header, units)
     if len(rows[0][1]) == 1:
@@ -105,19 +112,28 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
     ]
 
 
+def _mark(row: str) -> str | None:
+    return next((mark for mark in (";", ",") if mark in row), None)
+
+
 def _fields(row: str) -> list[str]:
-    for mark in (";", ","):
-        if mark in row:
-            return row.split(mark)
-    return row.split()
+    return row.split(_mark(row))
+
+
+def _numeric(row: str) -> list[bool]:
+    # decimal commas are refused in words of their own, once it is clear that these are numbers
+    decimal = "," if _mark(row) == ";" else "."
+    return [
+        bool(_NUMBER_LIKE.fullmatch(field.strip().replace(decimal, "."))) for field in _fields(row)
+    ]
+
+
+def _has_decimal_commas(row: str) -> bool:
+    return len(row) < LONGEST_HEADER_LINE and bool(_DECIMAL_COMMA.fullmatch(row))
 
 
 def _is_numeric(row: str) -> bool:
-    return all(_NUMBER_LIKE.fullmatch(field.strip()) for field in _fields(row))
-
-
-def _holds_a_number(row: str) -> bool:
-    return any(_NUMBER_LIKE.fullmatch(field.strip()) for field in _fields(row))
+    return all(_numeric(row))
 
 
 def _first_data_line(lines: list[str]) -> int:
@@ -126,7 +142,7 @@ def _first_data_line(lines: list[str]) -> int:
     for at, line in enumerate(lines):
         if not line.strip() or line.startswith(COMMENT):
             continue
-        if named or _holds_a_number(line) or _DECIMAL_COMMA.fullmatch(line):
+        if named or any(_numeric(line)) or _has_decimal_commas(line):
             return at
         named = True
     return len(lines)
@@ -134,20 +150,19 @@ def _first_data_line(lines: list[str]) -> int:
 
 def _rows(path: Path, lines: list[str], start: int) -> list[tuple[int, list[str]]]:
     """Line number and fields of every row, all of one width."""
-    rows = [
-        (number, _fields(line))
-        for number, line in enumerate(lines[start:], start + 1)
-        if line.strip()
-    ]
-    if not rows:
+    numbered = [(n, line) for n, line in enumerate(lines[start:], start + 1) if line.strip()]
+    if not numbered:
         raise MotionFileError(path, "no values follow the header: export the record again")
-    first, fields = rows[0]
-    if _DECIMAL_COMMA.fullmatch(lines[first - 1]):
+    first, top = numbered[0]
+    mark = _mark(top)
+    if _has_decimal_commas(top) or (mark == ";" and "," in top):
         raise MotionFileError(
             path,
-            f"{lines[first - 1].strip()!r} has decimal commas: write decimal points, as in 0.005",
+            f"{top.strip()!r} has decimal commas: write decimal points, as in 0.005",
             line=first,
         )
+    rows = [(number, line.split(mark)) for number, line in numbered]
+    fields = rows[0][1]
     width = len(fields)
     if width > 2:
         raise MotionFileError(
@@ -160,8 +175,8 @@ def _rows(path: Path, lines: list[str], start: int) -> list[tuple[int, list[str]
         if len(fields) != width:
             raise MotionFileError(
                 path,
-                f"{lines[number - 1].strip()[:60]!r} has {len(fields)} columns where the rows "
-                f"above have {width}: repair the line or export the record again",
+                f"{lines[number - 1].strip()[:60]!r} has not {width} columns as the rows above: "
+                "repair the line or export the record again",
                 line=number,
             )
     return rows

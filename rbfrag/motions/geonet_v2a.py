@@ -13,7 +13,7 @@ from pathlib import Path
 from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text_file import finite_number, fixed_width_numbers
+from rbfrag.motions.text_file import finite_number, fixed_width_numbers, sample_count
 from rbfrag.motions.units import acceleration_unit, unit_in_g
 
 FORMAT = "GeoNet V2A"
@@ -79,9 +79,7 @@ def _component(
     station, _ = field(_SITE, "site")
     component, _ = field(_COMPONENT, "component")
     npts_text, npts_line = field(_NPTS, "number of points")
-    if not npts_text.isascii() or not npts_text.isdigit() or int(npts_text) < 1:
-        raise MotionFileError(path, f"number of points {npts_text!r} is no count", line=npts_line)
-    npts = int(npts_text)
+    npts = sample_count(path, npts_text, npts_line, "number of points")
     dt_text, dt_line = field(_DT, "sampling interval")
     dt = finite_number(path, dt_text, dt_line, "sampling interval")
     if dt <= 0.0:

@@ -17,7 +17,7 @@ from pathlib import Path
 from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text_file import finite_number, free_numbers
+from rbfrag.motions.text_file import finite_number, free_numbers, sample_count
 from rbfrag.motions.units import acceleration_unit, unit_in_g
 
 FORMAT = "PEER AT2"
@@ -55,7 +55,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
     lines = text.split("\n")
     at, npts_text, dt_text = _sampling(lines)
     number = at + 1
-    npts = _count(path, npts_text, number)
+    npts = sample_count(path, npts_text, number, "NPTS")
     dt = finite_number(path, dt_text, number, "DT")
     if dt <= 0.0:
         raise MotionFileError(path, f"DT = {dt_text} s must be positive", line=number)
@@ -94,13 +94,6 @@ def _sampling(lines: list[str]) -> tuple[int, str, str]:
         if found := _NAMED.search(line) or _TRAILING.match(line):
             return at, found[1], found[2]
     raise AssertionError("read() is called for recognised text only")
-
-
-def _count(path: Path, text: str, line: int) -> int:
-    digits = text.removesuffix(".")
-    if not digits.isascii() or not digits.isdigit() or int(digits) < 1:
-        raise MotionFileError(path, f"NPTS = {text!r} is not a count of samples", line=line)
-    return int(digits)
 
 
 def _unit(path: Path, header: list[str], stated: str | None) -> str:

@@ -84,7 +84,7 @@ def half_sine(amplitude_g: float, duration_s: float, dt_s: float) -> GroundMotio
     return GroundMotion(a * lobe, interval, event="half-sine pulse")
 
 
-def one_cycle_sine(amplitude_g: float, period_s: float, dt_s: float) -> GroundMotion:
+def sine_cycle(amplitude_g: float, period_s: float, dt_s: float) -> GroundMotion:
     """Return one full cycle of a sine, a(t) = A sin(2πt/T), sampled.
 
     Args:
@@ -95,7 +95,7 @@ def one_cycle_sine(amplitude_g: float, period_s: float, dt_s: float) -> GroundMo
     Raises:
         InputError: a value that is not finite, a period or dt that is not positive.
     """
-    return _two_lobes(amplitude_g, 1.0, period_s, dt_s, "one-cycle sine")
+    return _two_lobes(amplitude_g, 1.0, period_s, dt_s, "sine cycle")
 
 
 def reversal_pulse(amplitude_g: float, ratio: float, period_s: float, dt_s: float) -> GroundMotion:

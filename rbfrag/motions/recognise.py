@@ -68,7 +68,8 @@ def read_motion(
     name = os.fspath(text)
     index: int | None = None
     stem, mark, tail = name.rpartition("#")
-    if mark and tail.isascii() and tail.isdigit() and not Path(name).exists():
+    # int() refuses thousands of digits, and exists() names that are too long
+    if mark and tail.isascii() and tail.isdigit() and len(tail) < 10 and not _is_file(name):
         name, index = stem, int(tail)
     motions = read_motions(name, units=units, dt_s=dt_s)
     if index is None and len(motions) == 1:
@@ -80,3 +81,10 @@ def read_motion(
     raise MotionFileError(
         name, f"the file {trouble}: name one of  {listed}  as {name}#0, for example"
     )
+
+
+def _is_file(name: str) -> bool:
+    try:
+        return Path(name).exists()
+    except OSError:
+        return False

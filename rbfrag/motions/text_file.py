@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import math
 import re
 from collections.abc import Sequence
@@ -13,8 +14,10 @@ from numpy.typing import NDArray
 from rbfrag.errors import MotionFileError
 
 LARGEST_FILE_BYTES = 512 * 1024**2
+MOST_DIGITS = 12
+MOST_SHOWN = 40
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def read_text(path: Path) -> str:
@@ -23,9 +26,9 @@ def read_text(path: Path) -> str:
     Raises:
         MotionFileError: there is no such file, it is a folder, empty, binary or too large.
     """
-    if path.is_dir():
-        raise MotionFileError(path, "this is a folder, not a file: name a file in it")
     try:
+        if path.is_dir():
+            raise MotionFileError(path, "this is a folder, not a file: name a file in it")
         size = path.stat().st_size
         if size > LARGEST_FILE_BYTES:
             raise MotionFileError(
@@ -36,7 +39,12 @@ def read_text(path: Path) -> str:
         raise MotionFileError(path, "there is no such file: check the path") from None
     except OSError as error:
         raise MotionFileError(path, f"the file cannot be read: {error.strerror}") from None
-    if not raw.strip():
+    except MotionFileError:
+        raise
+    except ValueError as error:
+        # a name with a zero byte
+        raise MotionFileError(path, f"the file cannot be read: {error}") from None
+    if not raw.removeprefix(codecs.BOM_UTF8).strip():
         raise MotionFileError(path, "the file is empty: export the record again")
     if b"\0" in raw:
         raise MotionFileError(
@@ -95,6 +103,29 @@ def fixed_width_numbers(
     return np.array(numbers, dtype=np.float64)
 
 
+def sample_count(path: Path, text: str, line: int, what: str) -> int:
+    """Return a count of samples that a header states, or refuse it with its line.
+
+    Args:
+        path: for messages.
+        text: the count as the file has it.
+        line: 1-based line number.
+        what: the name of the count.
+
+    Raises:
+        MotionFileError: it is no whole number of at least 1.
+    """
+    digits = text.removesuffix(".")
+    # int() refuses thousands of digits in words of its own
+    if digits.isascii() and digits.isdigit() and len(digits) < MOST_DIGITS and int(digits) > 0:
+        return int(digits)
+    raise MotionFileError(path, f"{what} {_shown(text)} is not a count of samples", line=line)
+
+
+def _shown(text: str) -> str:
+    return repr(text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}…")
+
+
 def finite_number(path: Path, text: str, line: int, what: str) -> float:
     """Return one number of a file, or refuse it with its line.
 
@@ -111,9 +142,9 @@ def finite_number(path: Path, text: str, line: int, what: str) -> float:
         value = float(text)
         if math.isfinite(value):
             return value
-        raise MotionFileError(path, f"{what} {text!r} is too large", line=line)
+        raise MotionFileError(path, f"{what} {_shown(text)} is too large", line=line)
     raise MotionFileError(
         path,
-        f"{what} {text!r} is not a finite number: repair the line or export the record again",
+        f"{what} {_shown(text)} is not a finite number: repair the line or export the record again",
         line=line,
     )

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import MotionFileError
+
+FloatArray = NDArray[np.float64]
 
 ROUNDING = 1e-9
 """Times added up in a program drift in their last digits; relative to the largest time."""
@@ -20,6 +23,12 @@ SINGLE_PRECISION = 2.0**-23
 LARGEST_NOISE = 0.01
 """No more than this share of a step is put down to single precision."""
 
+FINE = 0.1
+"""Times rounded by less than this share of a step show each row, wherever they start."""
+
+RARE = 0.05
+"""Steps other than the usual one come from rounding only if more than this share of them do."""
+
 MOST_DIGITS = 17
 
 _EXPONENT = re.compile(r"[eE]")
@@ -28,7 +37,7 @@ _EXPONENT = re.compile(r"[eE]")
 def sampling_interval(
     path: Path,
     tokens: Sequence[str],
-    times_s: NDArray[np.float64],
+    times_s: FloatArray,
     line_numbers: Sequence[int],
     stated_dt_s: float | None,
 ) -> float:
@@ -58,18 +67,19 @@ def sampling_interval(
                 line=line_numbers[0],
             )
         return stated_dt_s
-    tolerance = _tolerance(tokens, times_s)
-    found = _shortest_decimal(times_s, tolerance)
+    column = _Column(times_s, _tolerance(tokens, times_s))
+    found = column.shortest_decimal()
     if found is None:
-        noise = SINGLE_PRECISION * float(np.max(np.abs(times_s)))
-        usual = abs(float(np.median(np.diff(times_s))))
-        tolerance = np.maximum(tolerance, min(noise, LARGEST_NOISE * usual))
-        found = _shortest_decimal(times_s, tolerance)
+        column = column.allowing_single_precision()
+        found = column.shortest_decimal()
+    if found is None and column.is_fine():
+        column.start_is_exact = False
+        found = column.shortest_decimal()
     if found is None:
-        raise _unequal(path, tokens, times_s, tolerance, line_numbers)
+        raise _unequal(path, tokens, times_s, column.tolerance_s, line_numbers)
     if stated_dt_s is None:
         return found
-    if not _reproduces(stated_dt_s, times_s, tolerance):
+    if not column.reproduced_by(stated_dt_s):
         raise MotionFileError(
             path,
             f"the time column has dt = {found:g} s, not {stated_dt_s:g}: leave --dt out",
@@ -78,24 +88,62 @@ def sampling_interval(
     return stated_dt_s
 
 
-def _shortest_decimal(times_s: NDArray[np.float64], tolerance: NDArray[np.float64]) -> float | None:
-    mean = float(times_s[-1] - times_s[0]) / (times_s.size - 1)
-    if not mean > 0.0:
+@dataclass
+class _Column:
+    times_s: FloatArray
+    tolerance_s: FloatArray
+    start_is_exact: bool = True
+
+    @property
+    def usual_step_s(self) -> float:
+        return float(np.median(np.diff(self.times_s)))
+
+    def allowing_single_precision(self) -> _Column:
+        noise = SINGLE_PRECISION * float(np.max(np.abs(self.times_s)))
+        allowed = min(noise, LARGEST_NOISE * abs(self.usual_step_s))
+        return _Column(self.times_s, np.maximum(self.tolerance_s, allowed))
+
+    def is_fine(self) -> bool:
+        """Whether the start may float by its rounding without hiding a missing row."""
+        return float(np.max(self.tolerance_s)) <= FINE * self.usual_step_s
+
+    def may_hide_a_gap(self, mean_s: float) -> bool:
+        """Whether a missing row could pass for the rounding of coarsely printed times."""
+        steps = np.diff(self.times_s)
+        finest = float(np.min(self.tolerance_s))
+        if np.min(steps) < 0.0 or (np.min(steps) == 0.0 and finest > FINE * mean_s):
+            return True
+        odd = np.abs(steps - self.usual_step_s) > 1.98 * self.tolerance_s[1:]
+        return bool(0.0 < np.mean(odd) < RARE)
+
+    def shortest_decimal(self) -> float | None:
+        mean = float(self.times_s[-1] - self.times_s[0]) / (self.times_s.size - 1)
+        if not mean > 0.0 or self.may_hide_a_gap(mean):
+            return None
+        lowest, highest = self.bounds_s()
+        for digits in range(MOST_DIGITS):
+            for near in (mean, 0.5 * (lowest + highest)):
+                candidate = float(f"{near:.{digits}e}")
+                if candidate > 0.0 and self.reproduced_by(candidate):
+                    return candidate
         return None
-    for digits in range(MOST_DIGITS):
-        candidate = float(f"{mean:.{digits}e}")
-        if _reproduces(candidate, times_s, tolerance):
-            return candidate
-    return None
+
+    def bounds_s(self) -> tuple[float, float]:
+        """Intervals outside these do not reproduce the times."""
+        slack = self.tolerance_s[1:]
+        if not self.start_is_exact:
+            slack = slack + self.tolerance_s[0]
+        since, number = self.times_s[1:] - self.times_s[0], np.arange(1, self.times_s.size)
+        return float(np.max((since - slack) / number)), float(np.min((since + slack) / number))
+
+    def reproduced_by(self, dt_s: float) -> bool:
+        start = self.times_s - dt_s * np.arange(self.times_s.size)
+        if self.start_is_exact:
+            return bool(np.all(np.abs(start - self.times_s[0]) <= self.tolerance_s))
+        return bool(np.max(start - self.tolerance_s) <= np.min(start + self.tolerance_s))
 
 
-def _reproduces(dt_s: float, times_s: NDArray[np.float64], tolerance: NDArray[np.float64]) -> bool:
-    # the first time is rounded too, so the start is any that suits all times
-    start = times_s - dt_s * np.arange(times_s.size)
-    return bool(np.max(start - tolerance) <= np.min(start + tolerance))
-
-
-def _tolerance(tokens: Sequence[str], times_s: NDArray[np.float64]) -> NDArray[np.float64]:
+def _tolerance(tokens: Sequence[str], times_s: FloatArray) -> FloatArray:
     unit = np.array([_last_digit(token) for token in tokens])
     if times_s[0] >= 0.0:
         # a later, larger time is not printed finer than an earlier one: "0.01" between 0.005
@@ -108,15 +156,16 @@ def _tolerance(tokens: Sequence[str], times_s: NDArray[np.float64]) -> NDArray[n
 def _last_digit(token: str) -> float:
     mantissa, *exponent = _EXPONENT.split(token)
     _, _, decimals = mantissa.partition(".")
-    power = (int(exponent[0]) if exponent else 0) - len(decimals)
-    return float(f"1e{max(min(power, 300), -300)}")
+    # float, as int() refuses exponents of thousands of digits
+    power = (float(exponent[0]) if exponent else 0.0) - len(decimals)
+    return float(f"1e{max(min(power, 300.0), -300.0):.0f}")
 
 
 def _unequal(
     path: Path,
     tokens: Sequence[str],
-    times_s: NDArray[np.float64],
-    tolerance: NDArray[np.float64],
+    times_s: FloatArray,
+    tolerance: FloatArray,
     line_numbers: Sequence[int],
 ) -> MotionFileError:
     steps = np.diff(times_s)
@@ -131,7 +180,7 @@ def _unequal(
     at = int(odd[0]) + 1 if odd.size else 1
     step = float(steps[at - 1])
     if step <= 0.0:
-        reason = f"time {tokens[at]} s follows {tokens[at - 1]} s: times must rise"
+        reason = f"time {tokens[at]} s follows {tokens[at - 1]} s: times must rise from row to row"
     else:
         reason = (
             f"time {tokens[at]} s follows {tokens[at - 1]} s, a step of {step:g} s where "

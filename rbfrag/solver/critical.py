@@ -28,7 +28,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.respond import OUTCOMES, positive, runner
+from rbfrag.solver.respond import OUTCOMES, positive, refuse_endless, runner
 from rbfrag.solver.results import (
     RESOLUTION,
     SEARCH_LIMIT,
@@ -78,6 +78,7 @@ def critical(
     p2 = positive(p2, "p2", "1/s²")
     search_limit = positive(search_limit, "search_limit", "the smallest k_r/PGA looked at")
     drive = excitation(motion, vertical, polarity)
+    refuse_endless(drive, p2)
     said = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion)), *drive.warnings]
     if vertical is not None:
         said += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]

@@ -91,7 +91,7 @@ def excitation(
             polarity ``forward``, its negative ones under ``reverse``.
         vertical: vertical motion (upward positive) of the same recording. It must have the
             same sampling interval (or, for node motions, the same node times). Where one
-            component is shorter, it is taken as zero after its end, with a warning.
+            component is shorter, it is taken as zero after its last sample, with a warning.
         polarity: ``forward`` or ``reverse``; the vertical is never reversed.
 
     Raises:
@@ -116,9 +116,14 @@ def excitation(
                 f"the {short} component has {min(k_h.size, k_v.size)} samples, the other "
                 f"{longer.npts}: it is taken as zero after its end"
             )
-            time_s, interval_s = longer.time_s, longer.interval_s
-            k_h = np.pad(k_h, (0, longer.npts - k_h.size))
-            k_v = np.pad(k_v, (0, longer.npts - k_v.size))
+            # the shorter one drops to zero at its last sample: a jump, two nodes at one time
+            n = min(k_h.size, k_v.size)
+            time_s = _twice(longer.time_s, n)
+            interval_s = np.insert(longer.interval_s, n - 1, 0.0)
+            k_h, k_v = (
+                np.pad(values, (0, longer.npts + 1 - n)) if values.size == n else _twice(values, n)
+                for values in (k_h, k_v)
+            )
         w = 1.0 + k_v
     return Excitation(
         time_s=np.array(time_s),
@@ -128,6 +133,11 @@ def excitation(
         pga_g=float(np.abs(motion.acceleration_g).max()),
         warnings=tuple(warnings),
     )
+
+
+def _twice(values: FloatArray, n: int) -> FloatArray:
+    """Repeat the value of sample n - 1."""
+    return np.concatenate([values[:n], values[n - 1 :]])
 
 
 def _refuse_different_sampling(motion: GroundMotion, vertical: GroundMotion) -> None:

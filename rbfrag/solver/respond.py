@@ -23,6 +23,9 @@ OUTCOMES = (Outcome.STABLE, Outcome.TOPPLED, Outcome.UNDETERMINED, Outcome.JUMP)
 
 _NO_HISTORY = np.empty((4, 0))
 
+MOST_STEPS = 1e8
+"""Steps of one run beyond which p² cannot be meant: a real record takes some thousands."""
+
 TAIL_PERIODS = 12.0
 """Length of the free motion shown after the record, in units of 1/p."""
 
@@ -62,6 +65,7 @@ def respond(
     p2 = positive(p2, "p2", "1/s²")
     kr = positive(kr, "kr", "the rocking acceleration coefficient")
     drive = excitation(motion, vertical, polarity)
+    refuse_endless(drive, p2)
     run = simulate(drive, p2=p2, kr=kr, linear=linear)
     outcome = OUTCOMES[run.outcome]
     theta_c = kr if linear else math.atan(kr)
@@ -77,7 +81,7 @@ def respond(
         error_estimate=run.error_rad,
         steps=run.steps,
         samples_moved=run.samples_moved,
-        samples_total=drive.interval_s.size,
+        samples_total=int(np.count_nonzero(drive.interval_s)),
         warnings=_warnings(motion, vertical, drive, outcome, run),
         history=_history(drive, p2=p2, kr=kr, linear=linear) if history else None,
     )
@@ -104,6 +108,16 @@ def runner(drive: Excitation, *, p2: float, linear: bool) -> Callable[[float], R
         return Run(*_kernel_call(drive, kr, p, linear, ORDER, PH_MAX, _NO_HISTORY))
 
     return run
+
+
+def refuse_endless(drive: Excitation, p2: float) -> None:
+    """Refuse a block so small that one run would not end in reasonable time."""
+    steps = math.sqrt(p2) * float(drive.time_s[-1] - drive.time_s[0]) / PH_MAX
+    if steps > MOST_STEPS:
+        raise InputError(
+            f"p2 = {p2:g} 1/s² would take {steps:.1g} steps over this record: a block of 1 mm "
+            "has p2 = 7000 1/s²; check its unit"
+        )
 
 
 def positive(number: float, name: str, what: str) -> float:

@@ -28,9 +28,9 @@ FloatArray = NDArray[np.float64]
 ORDER = 8
 """Degree of the rotation-rate polynomial; the method's order of convergence."""
 
-PH_MAX = 0.1
+PH_MAX = 0.03
 """Greatest p·h of one step; longer intervals are split evenly. At order 8 the truncation
-of a step is then below the rounding of its result."""
+of a step, and what is estimated for it, is then near the rounding of its result."""
 
 MACHINE_EPSILON = 2.220446049250313e-16
 

@@ -10,9 +10,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import rbfrag
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.quality import quality_flags
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGES = [
@@ -110,6 +113,14 @@ def test_local_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
         if "://" not in target:
             assert (page.parent / target).exists(), target
+
+
+def test_every_quality_flag_is_explained() -> None:
+    absurd = GroundMotion(np.full(50, 50.0), 0.5)
+    codes = {flag.code for motion in (absurd, absurd.scaled(0.0)) for flag in quality_flags(motion)}
+    assert len(codes) == 10
+    text = (ROOT / "docs" / "howto" / "add-motions.md").read_text(encoding="utf-8")
+    assert {code for code in codes if f"`{code}`" not in text} == set()
 
 
 def test_every_public_name_is_in_the_reference_with_a_docstring() -> None:

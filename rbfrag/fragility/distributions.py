@@ -1,0 +1,250 @@
+"""How the dip, the spacing or the friction of a rock mass scatters.
+
+Every law turns one uniform number into one value by its inverse distribution function. A
+truncation then only narrows the range of the uniform numbers, and a value depends on nothing
+but the law, the seed and its place in the sample.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+
+FloatArray = NDArray[np.float64]
+
+Law = Literal["constant", "normal", "lognormal", "uniform", "von_mises", "measured"]
+
+LAWS: dict[Law, tuple[str, ...]] = {
+    "constant": ("value",),
+    "normal": ("mean", "sd"),
+    "lognormal": ("median", "sd_ln"),
+    "uniform": ("low", "high"),
+    "von_mises": ("mean", "kappa"),
+    "measured": ("values",),
+}
+"""The laws and what each must be given."""
+
+TRUNCATED: tuple[Law, ...] = ("normal", "lognormal", "von_mises")
+"""Laws that may be cut off at ``low``, at ``high`` or at both."""
+
+SMALLEST_SHARE = 1e-6
+"""Least part of a law that a truncation may leave."""
+
+_SMALLEST_UNIFORM = 2.0**-54
+_NODES = 20001
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """The law of one variable of a rock mass; make one with :meth:`of`.
+
+    Args:
+        law: name of the law.
+        location: value of a constant, mean, median, or centre of the circular law.
+        scale: standard deviation, that of the logarithm, or the concentration kappa.
+        low: lower end; -inf for none.
+        high: upper end; +inf for none.
+        values: the measurements of the law ``measured``.
+    """
+
+    law: Law
+    location: float = math.nan
+    scale: float = math.nan
+    low: float = -math.inf
+    high: float = math.inf
+    values: tuple[float, ...] = ()
+
+    @classmethod
+    def of(cls, stated: object, *, angle: bool) -> Distribution:
+        """Return the law that a number or a table of keys describes.
+
+        Args:
+            stated: a number, or a mapping with ``distribution`` and the keys of that law:
+                ``normal`` mean, sd; ``lognormal`` median, sd_ln (standard deviation of the
+                natural logarithm); ``uniform`` low, high; ``von_mises`` mean, kappa;
+                ``measured`` values. The first two and von_mises may have low and high.
+            angle: whether the variable is an angle in degrees, which alone may be von_mises.
+
+        Raises:
+            InputError: what is stated is no such law; the message names the key.
+        """
+        if not isinstance(stated, dict):
+            return cls("constant", location=_number(stated, ""))
+        keys = dict(stated)
+        name = keys.pop("distribution", None)
+        if name not in LAWS:
+            known = ", ".join(LAWS)
+            if name is None:
+                raise InputError(f"the key distribution is missing: name one of {known}")
+            raise InputError(f"distribution = {name!r} is not known: use one of {known}")
+        law: Law = name
+        if law == "von_mises" and not angle:
+            raise InputError(
+                "distribution = 'von_mises' is for angles: use lognormal, normal, uniform or "
+                "measured for a length or an acceleration"
+            )
+        ends = ("low", "high") if law in TRUNCATED else ()
+        for key in LAWS[law]:
+            if key not in keys:
+                raise InputError(
+                    f"the key {key} is missing: a {law} distribution needs {_and(LAWS[law])}"
+                )
+        for key in keys:
+            if key not in (*LAWS[law], *ends):
+                raise InputError(
+                    f"unknown key {key!r}: a {law} distribution has {_and((*LAWS[law], *ends))}"
+                )
+        if law == "measured":
+            return cls(law, values=_values(keys["values"]))
+        numbers = {key: _number(value, key) for key, value in keys.items()}
+        made = cls(
+            law,
+            location=numbers.get("mean", numbers.get("median", numbers.get("value", math.nan))),
+            scale=numbers.get("sd", numbers.get("sd_ln", numbers.get("kappa", math.nan))),
+            low=numbers.get("low", -math.inf),
+            high=numbers.get("high", math.inf),
+        )
+        made._check()
+        return made
+
+    @property
+    def centres(self) -> tuple[float, ...]:
+        """Numbers that must lie in the permitted range of the variable: centre, ends or data."""
+        if self.law == "measured":
+            return self.values
+        if self.law == "uniform":
+            return (self.low, self.high)
+        return (self.location,)
+
+    def __str__(self) -> str:
+        """Return the law in words with its truncation."""
+        if self.law == "constant":
+            return f"{self.location:.10g}"
+        if self.law == "measured":
+            low, high = min(self.values), max(self.values)
+            return f"{len(self.values)} measurements from {low:.6g} to {high:.6g}"
+        if self.law == "uniform":
+            return f"uniform from {self.low:.10g} to {self.high:.10g}"
+        first, second = LAWS[self.law]
+        ends = ", truncated" if self.is_truncated else ", not truncated"
+        if self.low > -math.inf:
+            ends += f" below {self.low:.10g}"
+        if self.high < math.inf:
+            ends += f"{' and' if self.low > -math.inf else ''} above {self.high:.10g}"
+        name = self.law.replace("_", " ")
+        return f"{name}, {first} {self.location:.10g}, {second} {self.scale:.10g}{ends}"
+
+    @property
+    def is_truncated(self) -> bool:
+        """Whether a part of the law is cut off."""
+        return self.law in TRUNCATED and (self.low > -math.inf or self.high < math.inf)
+
+    def sample(self, n: int, random: np.random.Generator) -> FloatArray:
+        """Return n independent values.
+
+        Args:
+            n: how many.
+            random: generator of the uniform numbers; n are taken, whatever the law.
+        """
+        uniform = np.maximum(random.random(n), _SMALLEST_UNIFORM)
+        if self.law == "constant":
+            return np.full(n, self.location)
+        if self.law == "measured":
+            values = np.array(self.values)
+            return values[(uniform * values.size).astype(np.intp)]
+        if self.law == "uniform":
+            return self.low + (self.high - self.low) * uniform
+        start, end = self._share(self.low), self._share(self.high)
+        # Never quite 0 or 1, where the inverse is infinite.
+        inside = np.clip(start + (end - start) * uniform, _SMALLEST_UNIFORM, 1.0 - 2.0**-53)
+        values = self._inverse()(inside)
+        return np.clip(values, self.low, self.high)
+
+    def _check(self) -> None:
+        if self.law == "uniform" and not self.low < self.high:
+            raise InputError(f"low = {self.low:g} is not below high = {self.high:g}")
+        if self.law in TRUNCATED:
+            key = LAWS[self.law][1]
+            if not self.scale > 0.0:
+                raise InputError(
+                    f"{key} = {self.scale:g} is not above zero: for a variable that does not "
+                    "scatter give a plain number"
+                )
+            if self.law == "lognormal" and self.location <= 0.0:
+                raise InputError(f"median = {self.location:g} is not above zero")
+            if not self.low < self.high:
+                raise InputError(f"low = {self.low:g} is not below high = {self.high:g}")
+            left = self._share(self.high) - self._share(self.low)
+            if not left >= SMALLEST_SHARE:
+                raise InputError(
+                    f"low = {self.low:g} and high = {self.high:g} leave {left:.2g} of the "
+                    f"distribution, less than {SMALLEST_SHARE:g}: move them towards "
+                    f"{LAWS[self.law][0]} = {self.location:g}"
+                )
+
+    def _share(self, value: float) -> float:
+        """Return the probability of smaller values before truncation."""
+        if math.isinf(value):
+            return 0.0 if value < 0.0 else 1.0
+        if self.law == "von_mises":
+            angles, shares = self._von_mises_table()
+            return float(np.interp(value - self.location, angles, shares))
+        if self.law == "lognormal":
+            if value <= 0.0:
+                return 0.0
+            return _normal_share(math.log(value / self.location) / self.scale)
+        return _normal_share((value - self.location) / self.scale)
+
+    def _inverse(self) -> Callable[[FloatArray], FloatArray]:
+        if self.law == "von_mises":
+            angles, shares = self._von_mises_table()
+            return lambda share: self.location + np.interp(share, shares, angles)
+        from scipy.special import ndtri
+
+        if self.law == "lognormal":
+            return lambda share: self.location * np.exp(self.scale * ndtri(share))
+        return lambda share: np.asarray(self.location + self.scale * ndtri(share))
+
+    def _von_mises_table(self) -> tuple[FloatArray, FloatArray]:
+        """Return angles from the mean [deg] and the probability of smaller ones."""
+        # Beyond 12 standard deviations lies nothing that a sample could meet.
+        reach = min(math.pi, 12.0 / math.sqrt(self.scale))
+        angles = np.linspace(-reach, reach, _NODES)
+        density = np.exp(self.scale * (np.cos(angles) - 1.0))
+        shares = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
+        return np.degrees(angles), shares / shares[-1]
+
+
+def _normal_share(z: float) -> float:
+    return 0.5 * math.erfc(-z * math.sqrt(0.5))
+
+
+def _and(names: tuple[str, ...]) -> str:
+    return ", ".join(names[:-1]) + (" and " if len(names) > 1 else "") + names[-1]
+
+
+def _number(value: object, key: str) -> float:
+    given = f"{key} = {value!r}" if key else f"{value!r}"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        tables = "" if key else " or a table such as { distribution = 'normal', mean = 20, sd = 5 }"
+        raise InputError(f"{given} is not a number: give a number{tables}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(f"{given} is not finite: give a number")
+    return number
+
+
+def _values(stated: object) -> tuple[float, ...]:
+    if not isinstance(stated, list | tuple) or not stated:
+        raise InputError(f"values = {stated!r:.60}: give a list of measurements such as [18, 22.5]")
+    return tuple(_number(value, f"values[{i}]") for i, value in enumerate(stated))

@@ -1,0 +1,76 @@
+"""Single numbers as people give them: taken as floats, or refused with the permitted range."""
+
+from __future__ import annotations
+
+import math
+
+from rbfrag.errors import InputError
+
+
+def number(value: object, name: str, what: str) -> float:
+    """Return a finite number as a float.
+
+    Args:
+        value: what was given.
+        name: its name, for the message.
+        what: what it should be, for the message.
+
+    Raises:
+        InputError: it is no number, or not finite.
+    """
+    if isinstance(value, bool | str | bytes):
+        raise InputError(f"{name} = {value!r} is not a number: give {what}")
+    try:
+        result = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} = {value!r} is not a number: give {what}") from None
+    if not math.isfinite(result):
+        raise InputError(f"{name} = {result:g} is not finite: give {what}")
+    return result
+
+
+def positive(value: object, name: str, unit: str) -> float:
+    """Return a finite number above zero as a float, or refuse it."""
+    what = f"a number above 0 [{unit}]"
+    result = number(value, name, what)
+    if result <= 0.0:
+        raise InputError(f"{name} = {result:g} is not above zero: give {what}")
+    return result
+
+
+def not_negative(value: object, name: str, unit: str) -> float:
+    """Return a finite number of zero or more as a float, or refuse it."""
+    what = f"0 or more [{unit}]"
+    result = number(value, name, what)
+    if result < 0.0:
+        raise InputError(f"{name} = {result:g} is negative: give {what}")
+    return result
+
+
+def angle(value: object, name: str, above: float, below: float) -> float:
+    """Return an angle between two limits, both excluded, or refuse it [deg]."""
+    what = f"an angle between {above:g} and {below:g} degrees"
+    result = number(value, name, what)
+    if not above < result < below:
+        raise InputError(f"{name} = {result:.10g} is out of range: give {what}, both excluded")
+    return result
+
+
+def friction_angle(value: object, name: str) -> float:
+    """Return a friction angle, from 0 and below 90 degrees, or refuse it [deg]."""
+    what = "a friction angle from 0 to below 90 degrees"
+    result = number(value, name, what)
+    if not 0.0 <= result < 90.0:
+        raise InputError(f"{name} = {result:.10g} is out of range: give {what}")
+    return result
+
+
+def vertical_g(value: object) -> float:
+    """Return a vertical ground acceleration above -1 g, or refuse it [g]."""
+    result = number(value, "kv", "the vertical acceleration of the ground in g, up positive")
+    if result <= -1.0:
+        raise InputError(
+            f"kv = {result:g}: at -1 g or below the ground falls away under the block (a jump), "
+            "which the model of a block in contact does not cover: give a value above -1"
+        )
+    return result

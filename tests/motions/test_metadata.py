@@ -1,0 +1,149 @@
+"""Metadata tables: found by file and trace, bad rows refused with their line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rbfrag.errors import InputError, MotionFileError
+from rbfrag.motions.metadata import read_metadata
+
+
+def table(folder: Path, text: str, *, encoding: str = "utf-8") -> Path:
+    path = folder / "meta.csv"
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+def test_every_column(tmp_path: Path) -> None:
+    path = table(
+        tmp_path,
+        "notes,file,trace_index,event_id,units,is_vertical,companion_group,magnitude,processing,"
+        "earthquake,year,station,component,dt_s\n"
+        'ignored,"a/b, c.txt",2,loma-prieta,gal,1,pair 1,6.93,corrected,"Loma Prieta, CA",1989,'
+        "CLS,UP,0.005\n",
+    )
+    traced = read_metadata(path).trace(tmp_path / "a" / "b, c.txt", 2)
+    assert traced is not None
+    assert traced.event_id == "loma-prieta"
+    assert traced.units == "gal"
+    assert traced.is_vertical is True
+    assert traced.companion_group == "pair 1"
+    assert traced.magnitude == 6.93
+    assert traced.processing == "corrected"
+    assert traced.earthquake == "Loma Prieta, CA"
+    assert traced.year == "1989"
+    assert (traced.station, traced.component) == ("CLS", "UP")
+    assert traced.dt_s == 0.005
+    assert traced.line == 2
+
+
+def test_file_alone_states_nothing(tmp_path: Path) -> None:
+    metadata = read_metadata(table(tmp_path, "file\na.AT2\n\n"))
+    traced = metadata.trace(tmp_path / "a.AT2", 0)
+    assert traced is not None
+    assert traced.event_id == ""
+    assert traced.is_vertical is None
+    assert traced.magnitude is None
+    assert traced.units is None
+    assert traced.dt_s is None
+    assert metadata.trace(tmp_path / "a.AT2", 1) is None
+    assert metadata.trace(tmp_path / "b.AT2", 0) is None
+    assert metadata.file(tmp_path / "b.AT2") == []
+
+
+def test_traces_of_a_file_in_order(tmp_path: Path) -> None:
+    path = table(tmp_path, "file,trace_index,component\na.V2A,2,UP\na.V2A,0,N\na.V2A,1,E\n")
+    names = [traced.component for traced in read_metadata(path).file(tmp_path / "a.V2A")]
+    assert names == ["N", "E", "UP"]
+
+
+def test_byte_order_mark_and_windows_newlines(tmp_path: Path) -> None:
+    path = table(tmp_path, "file,event_id\r\na.AT2,quake\r\n", encoding="utf-8-sig")
+    traced = read_metadata(path).trace(tmp_path / "a.AT2", 0)
+    assert traced is not None
+    assert traced.event_id == "quake"
+
+
+def test_relative_absolute_and_roundabout_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    elsewhere = tmp_path / "other" / "b.AT2"
+    (tmp_path / "records").mkdir()
+    path = table(tmp_path / "records", f"file,event_id\nx/../a.AT2,one\n{elsewhere},two\n")
+    monkeypatch.chdir(tmp_path)
+    metadata = read_metadata(Path("records") / path.name)
+    for name in ("records/a.AT2", "./records/a.AT2", tmp_path / "records" / "a.AT2"):
+        traced = metadata.trace(name, 0)
+        assert traced is not None
+        assert traced.event_id == "one"
+    traced = metadata.trace("other/b.AT2", 0)
+    assert traced is not None
+    assert traced.event_id == "two"
+    assert metadata.trace("a.AT2", 0) is None
+
+
+def test_native_units_of_formats_are_kept_as_text(tmp_path: Path) -> None:
+    path = table(tmp_path, "file,file_units\na.V1,g/10\nb.UD,counts (scale factor in header)\n")
+    metadata = read_metadata(path)
+    assert [metadata.file(tmp_path / name)[0].units for name in ("a.V1", "b.UD")] == [
+        "g/10",
+        "counts (scale factor in header)",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("name,event_id\na,b\n", 1, ("'file'",)),
+        ("file,file\na,b\n", 1, ("'file'", "twice")),
+        ("file\na.AT2\nb.AT2\na.AT2\n", 4, ("a.AT2", "line 2")),
+        ("file,trace_index\na,0\na,1\n./a,1\n", 4, ("line 3",)),
+        ("file,event_id\n,quake\n", 2, ("file",)),
+        ("file,trace_index\na,-1\n", 2, ("trace_index", "'-1'")),
+        ("file,trace_index\na,1.5\n", 2, ("trace_index", "'1.5'")),
+        ("file,magnitude\na,6.7\nb,big\n", 3, ("magnitude", "'big'")),
+        ("file,magnitude\na,nan\n", 2, ("magnitude", "'nan'")),
+        ("file,is_vertical\na,perhaps\n", 2, ("is_vertical", "'perhaps'")),
+        ("file,units\na,furlongs\n", 2, ("furlongs", "m/s2")),
+        ("file,dt_s\na,0\n", 2, ("dt_s", "'0'")),
+        ("file,dt_s\na,inf\n", 2, ("dt_s", "'inf'")),
+        ("file,event_id\na,b,c\n", 2, ("3",)),
+        ('file,event_id\na,"b\n', 2, ("CSV",)),
+    ],
+)
+def test_bad_tables(tmp_path: Path, text: str, line: int, words: tuple[str, ...]) -> None:
+    path = table(tmp_path, text)
+    with pytest.raises(MotionFileError) as caught:
+        read_metadata(path)
+    assert caught.value.line == line
+    message = str(caught.value)
+    assert message.startswith(f"{path}, line {line}: ")
+    for word in words:
+        assert word in message
+
+
+def test_tables_that_cannot_be_opened(tmp_path: Path) -> None:
+    with pytest.raises(MotionFileError, match="no such file"):
+        read_metadata(tmp_path / "nowhere.csv")
+    with pytest.raises(MotionFileError, match="folder"):
+        read_metadata(tmp_path)
+    with pytest.raises(MotionFileError, match="empty"):
+        read_metadata(table(tmp_path, ""))
+
+
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.text(alphabet='file,trace_index\n\r"; 01.\x1c\u2028é/\\', max_size=80))
+def test_any_text_is_read_or_refused(tmp_path: Path, text: str) -> None:
+    path = table(tmp_path, "file,trace_index\n" + text)
+    try:
+        metadata = read_metadata(path)
+    except InputError as error:
+        refusal = str(error)
+    else:
+        refusal = ""
+        assert metadata.file(tmp_path / "not there") == []
+    assert not refusal or refusal.startswith(str(path))
