@@ -31,7 +31,7 @@ from rbfrag.solver.results import (
     no_intervals,
 )
 from rbfrag.solver.scan import BlockScan, scan_down
-from rbfrag.solver.toppling import TOPPLED, UNDETERMINED, Run
+from rbfrag.solver.toppling import TOPPLED, Run
 
 SLIVERS = 1e-9
 """Undecided length of k_r/PGA up to which an answer still counts as certified."""
@@ -200,12 +200,11 @@ class _Search:
         """
         pga = self.drive.pga_g
         self.lower, self.upper = bracket[0] / pga, bracket[1] / pga
-        for step in (0.0, 1e-10, 1e-9):
+        for step in (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8):
             ratio = max(self.lower - step * self.upper, self.limit)
-            if self._outcome(ratio) != UNDETERMINED:
+            if self._outcome(ratio) == TOPPLED:
+                self.lower = ratio
                 break
-        if self._tried[ratio].outcome == TOPPLED:
-            self.lower = ratio
         self._outcome(self.upper)
 
     def _by_scan(

@@ -16,7 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.solver.compiled import kernel
-from rbfrag.solver.flight import ORDER, IN_AIR, ORDER_LOST, RESEATED, STOPPED, TOPPLED, fly, rest_state
+from rbfrag.solver.flight import (
+    ORDER,
+    IN_AIR,
+    ORDER_LOST,
+    RESEATED,
+    STOPPED,
+    TOPPLED,
+    fly,
+    rest_state,
+)
 from rbfrag.solver.taylor import bracketed_root
 from rbfrag.solver.renewal import last_failing_end, last_rest
 from rbfrag.solver.rises import APART, TURNED_BACK, common_start, next_start, restart_floor

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.solver.compiled import kernel
-from rbfrag.solver.taylor import bracketed_root, fill_coefficients, rotation, step8, turn, value
+from rbfrag.solver.taylor import bracketed_root, fill_coefficients, rotation, lean_step, turn, value
 
 FloatArray = NDArray[np.float64]
 
@@ -32,9 +32,7 @@ def rest_state(kr: float, linear: bool) -> tuple[float, float]:
 
 
 @kernel
-def first_touch(
-    theta: float, u: FloatArray, theta_end: float, u_end: float, v_end: float
-) -> float:
+def first_touch(theta: float, u: FloatArray, theta_end: float, u_end: float, v_end: float) -> float:
     """Fraction of a step at which theta returns to 0, or -1."""
     v_start = u[1]
     u_start = u[0] if u[0] != 0.0 else v_start
@@ -89,7 +87,9 @@ def order_lost(
     """Return whether D may be negative between the states of one step and tan(phi) = tangent."""
     a1 = a0 + da
     w1 = w0 + dw
-    least = min(min(a0 * s0 + w0 * c0, a1 * s0 + w1 * c0), min(a0 * s1 + w0 * c1, a1 * s1 + w1 * c1))
+    least = min(
+        min(a0 * s0 + w0 * c0, a1 * s0 + w1 * c0), min(a0 * s1 + w0 * c1, a1 * s1 + w1 * c1)
+    )
     # phi leaves the range of its ends by less than it can turn in the step
     slack = (abs(a0) + abs(da) + abs(w0) + abs(dw)) * turned
     return least < slack or min(a0 * tangent + w0, a1 * tangent + w1) < 0.0 or min(c0, c1) <= 0.0
@@ -156,6 +156,9 @@ def fly(
     """
     last = k_h.size - 1
     steps = 0
+    ph_now = -1.0
+    per_ph = 0.0
+    u_now = 0.0
     while i < last and (i < stop_i or (i == stop_i and tau < stop_tau)):
         end = 1.0
         if i == stop_i and stop_tau < 1.0:
@@ -166,11 +169,14 @@ def fly(
         w1 = w[i + 1]
         if lifting and k1 - kr * w1 < 0.0:
             lifting = False
-        length = interval_s[i] * (end - tau)
-        if length > 0.0:
-            pieces = max(1, math.ceil(p * length / ph_max))
-            part = (end - tau) / pieces
-            ph = p * length / pieces
+        part = end - tau
+        ph = p * interval_s[i] * part
+        if ph > 0.0:
+            pieces = 1
+            if ph > ph_max:
+                pieces = math.ceil(ph / ph_max)
+                part /= pieces
+                ph /= pieces
             da = (k1 - k0) * part
             dw = (w1 - w0) * part
             for piece in range(pieces):
@@ -178,10 +184,14 @@ def fly(
                 a0 = k0 + (k1 - k0) * at
                 v0 = w0 + (w1 - w0) * at
                 steps += 1
+                if ph != ph_now:
+                    ph_now = ph
+                    per_ph = 1.0 / ph
+                    u_now = ph * rate
                 if linear:
                     us[0] = s
                     uc[0] = c
-                    u[0] = ph * rate
+                    u[0] = u_now
                     fill_coefficients(u, us, uc, ORDER, ph * ph, a0, da, v0, dw, True)
                     turned, u_end, v_end = 0.0, 0.0, 0.0
                     for k in range(ORDER, 0, -1):
@@ -191,7 +201,7 @@ def fly(
                     turned += u[0]
                     u_end += u[0]
                 else:
-                    turned, u_end, v_end = step8(u, ph, rate, s, c, a0, da, v0, dw)
+                    turned, u_end, v_end = lean_step(u, u_now, ph, s, c, a0, da, v0, dw)
                 theta_end = theta + turned
                 if lifting:
                     theta_end = max(theta_end, 0.0)
@@ -215,19 +225,23 @@ def fly(
                 theta = theta_end
                 if linear:
                     s -= turned
-                    rate = u_end / ph
+                    rate = u_end * per_ph
+                    u_now = u_end
                 else:
                     s_change, c_change = turn(s, c, turned)
                     if check > 0:
                         tangent = kr_other if check == 1 else tail_min_q[i]
                         if order_lost(
                             a0, da, v0, dw, s, c, s + s_change, c + c_change,
-                            ph * (abs(rate) + abs(u_end / ph)), tangent,
+                            ph * (abs(rate) + abs(u_end * per_ph)), tangent,
                         ):  # fmt: skip
                             return ORDER_LOST, i, at, theta, rate, s, c, steps
                     s += s_change
                     c += c_change
-                    rate = u_end / ph
+                    rate = u_end * per_ph
+                    u_now = u_end
+                    if c <= 0.0 and s < 0.0:  # more than 90 degrees past its balance point
+                        return TOPPLED, i, min(at + part, 1.0), theta, rate, s, c, steps
         if end < 1.0:
             return STOPPED, i, end, theta, rate, s, c, steps
         i += 1

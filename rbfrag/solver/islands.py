@@ -14,7 +14,7 @@ from rbfrag.solver.scan import BlockScan
 
 FloatArray = NDArray[np.float64]
 
-PROBES = 40
+PROBES = 160
 """Single blocks looked at below the critical one, equally spaced in ln k_r."""
 
 WORDS = {SAFE: "safe", TOPPLES: "topples"}
@@ -97,9 +97,7 @@ def islands_of_map(found: CertifiedMap, lower: float, resolution: float) -> Isla
     return Islands(width, resolved, reentrant)
 
 
-def islands_by_blocks(
-    scan: BlockScan, lower: float, bottom: float, resolution: float
-) -> Islands:
+def islands_by_blocks(scan: BlockScan, lower: float, bottom: float, resolution: float) -> Islands:
     """Look for islands below the critical value by single blocks: a finding, not a proof.
 
     Args:

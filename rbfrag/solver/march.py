@@ -18,6 +18,9 @@ IntArray = NDArray[np.int64]
 
 SAFE, TOPPLES, UNKNOWN, ORDERLESS = 0, 1, 2, 3
 
+BORDER = 1e-12
+"""Relative width to which a border between two single blocks is closed in on."""
+
 TO_BRACKET, TO_ISLANDS, TO_BOTTOM = 0, 1, 2
 
 
@@ -37,8 +40,7 @@ def border(
     lo: float,
     at_lo: float,
     hi: float,
-    depth: float,
-    margin: float,
+    width: float,
     rest: int,
     failing_end: int,
     u: FloatArray,
@@ -48,11 +50,10 @@ def border(
     """Close in on a border between two k_r of which one topples and the other does not.
 
     Returns:
-        A k_r on the side of `lo` and one on the side of `hi`, about `depth` apart; runs, steps.
+        A k_r on the side of `lo` and one on the side of `hi`, a relative `width` apart; runs,
+        steps.
     """
     low_topples = at_lo > 0.0
-    lowest = lo
-    highest = hi
     at_hi = math.inf if at_lo < 0.0 else -math.inf
     runs = 0
     steps = 0
@@ -60,8 +61,8 @@ def border(
     gauge = hi - lo
     slow = True
     side = 0
-    while hi - lo > 0.5 * depth * hi:
-        k = between(lo, hi, at_lo, at_hi, side, 0.12 * depth * hi, slow)
+    while hi - lo > width * hi:
+        k = between(lo, hi, at_lo, at_hi, side, 0.25 * width * hi, slow)
         far, made = follow(
             time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear, k,
             rest, failing_end, u, us, uc,
@@ -86,9 +87,7 @@ def border(
             tries = 0
             slow = slow or hi - lo > 0.125 * gauge
             gauge = hi - lo
-    # clear of the margins of the motions that enclose
-    spread = max(0.25 * depth, 2.0 * margin) * hi
-    return max(lo - spread, lowest), min(hi + spread, highest), runs, steps
+    return lo, hi, runs, steps
 
 
 @kernel
@@ -175,6 +174,8 @@ def march(
     patience = 2.0
     edge_high = top  # a border known by two blocks: one of `side` above, one of the other below
     edge_low = top
+    edge_point = top
+    clear = max(0.25 * depth, 2.0 * margin)  # of the margins of the enclosing motions
     far, made = follow(
         time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear,
         top * (1.0 - depth), 0, n, u, us, uc,
@@ -182,13 +183,19 @@ def march(
     runs += 1
     steps += made
     if far > 0.0:
-        edge_low = top * (1.0 - depth)
+        edge_point, _, made_runs, made = border(
+            time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear,
+            top * (1.0 - depth), far, top, BORDER, 0, n, u, us, uc,
+        )  # fmt: skip
+        runs += made_runs
+        steps += made
+        edge_low = edge_point - clear * top
     while hi > bottom and steps < max_steps and count < low.size - 1:
         if hi == edge_high and edge_low < hi:
             high[count] = hi
             low[count] = edge_low
             verdict[count] = UNKNOWN
-            point[count] = edge_low if side == SAFE else math.nan
+            point[count] = edge_point if side == SAFE else math.nan
             count += 1
             side = TOPPLES if side == SAFE else SAFE
             hi = edge_low
@@ -263,12 +270,14 @@ def march(
                 runs += 1
                 steps += made
                 if (far > 0.0) == (side == SAFE):
-                    edge_low, edge_high, made_runs, made = border(
+                    edge_point, edge_high, made_runs, made = border(
                         time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max,
-                        linear, lo, far, hi, depth, margin, window, window_end, u, us, uc,
+                        linear, lo, far, hi, BORDER, window, window_end, u, us, uc,
                     )  # fmt: skip
                     runs += made_runs
                     steps += made
+                    edge_low = max(edge_point - clear * hi, lo)
+                    edge_high = min(edge_high + clear * hi, hi)
                     width = hi - edge_high
                     share = 0.6
                     continue

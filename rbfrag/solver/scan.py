@@ -86,5 +86,3 @@ def scan_down(scan: BlockScan, top: float, bottom: float) -> tuple[float, float]
     if first == 0:
         return float(kr[0]), top
     return scan.border(float(kr[first]), float(kr[first - 1]))
-
-

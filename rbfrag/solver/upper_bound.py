@@ -21,7 +21,9 @@ NOTHING_FAILS, FOUND, AT_THE_TOP = 0, 1, 2
 
 
 @kernel
-def linear_drive(interval_s: FloatArray, k_h: FloatArray, p: float, still: FloatArray) -> tuple[float, int]:
+def linear_drive(
+    interval_s: FloatArray, k_h: FloatArray, p: float, still: FloatArray
+) -> tuple[float, int]:
     """Fill what of the drive is still to come; return its maximum and the node after it.
 
     `still` at a node is G(t) = p integral_t^inf k_h(s) exp(-p (s - t)) ds, by G' = p (G - k_h)
