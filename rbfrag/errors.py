@@ -22,8 +22,11 @@ what to do next. It is one paragraph meant for a person, without a traceback.
 
 from __future__ import annotations
 
+import re
 from os import PathLike, fspath
 from typing import ClassVar
+
+_LONG_WORD = re.compile(r"(\S{60})\S{140,}")
 
 
 class RbfragError(Exception):
@@ -47,10 +50,11 @@ class MotionFileError(InputError):
 
     def __init__(self, path: str | PathLike[str], reason: str, *, line: int | None = None) -> None:
         self.path = fspath(path)
-        self.reason = reason
+        # a damaged file may hold a word of any length, which no person wants to see whole
+        self.reason = _LONG_WORD.sub(r"\1…", reason)
         self.line = line
         where = self.path if line is None else f"{self.path}, line {line}"
-        super().__init__(f"{where}: {reason}")
+        super().__init__(f"{where}: {self.reason}")
 
     def __reduce__(self) -> tuple[object, ...]:
         # Exceptions with keyword arguments do not survive the trip between processes otherwise.

@@ -58,6 +58,15 @@ def block(
     no_back: Annotated[
         bool, typer.Option("--no-back", help="There is no fracture behind the block.")
     ] = False,
+    plot: Annotated[
+        str | None,
+        typer.Option(
+            "--plot",
+            help="Draw the block on its planes with its contacts and the resultant at yield "
+            "(.png, .pdf, .svg).",
+            show_default=False,
+        ),
+    ] = None,
     json: options.Json = False,
 ) -> None:
     """Print a block's failure mode, yield accelerations and size parameter.
@@ -87,6 +96,10 @@ def block(
         if name not in conditions:
             raise InputError(f"{option} is missing: the mode depends on dip and friction")
     found = stability(shape, **conditions)
+    if plot is not None:
+        from rbfrag.plots.block import plot_block
+
+        plot_block(shape, found, plot)
     answer = as_dict(shape, found)
     if json:
         print_json(answer)

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from rbfrag.cli import bench as bench_command
 from rbfrag.cli import block as block_command
 from rbfrag.cli import critical, database, demo, fit, models, motions, plot, predict, respond
 from rbfrag.cli import rockmass as rockmass_command
@@ -74,6 +75,7 @@ app.command("predict", epilog=predict.EXAMPLE)(predict.predict)
 app.add_typer(models.app, name="models")
 app.add_typer(plot.app, name="plot")
 app.add_typer(database.app, name="db")
+app.command("bench", epilog=bench_command.EXAMPLE)(bench_command.bench)
 app.command("demo", epilog=demo.EXAMPLE)(demo.demo)
 
 

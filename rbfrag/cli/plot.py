@@ -1,4 +1,4 @@
-"""`rbfrag plot`: pictures of fits and responses."""
+"""`rbfrag plot`: pictures of fits, responses and failure modes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rbfrag.cli.motion_argument import find_motion
 from rbfrag.cli.output import print_warnings
 
 app = typer.Typer(
-    help="Draw fits and responses (.png, .pdf, .svg).",
+    help="Draw fits, responses and failure modes (.png, .pdf, .svg).",
     no_args_is_help=True,
     rich_markup_mode=None,
     epilog="Example:  rbfrag plot fit --out fit.png",
@@ -84,3 +84,68 @@ def plot_response(
     )
     draw(response, out, p2=p2, kr=kr, linear=linear, reverse=reverse, title=ground.label)
     print(out)
+
+
+@app.command(
+    "modes",
+    epilog="Example:  rbfrag plot modes --phi 40 --beta 20 --rockmass mass.toml --out a.png",
+)
+def plot_modes(
+    phi: Annotated[
+        float,
+        typer.Option("--phi", help="Friction angle of the base [deg].", show_default=False),
+    ],
+    out: Out,
+    beta: Annotated[
+        float,
+        typer.Option("--beta", help="Dip of the base for the yield accelerations [deg]."),
+    ] = 0.0,
+    phi_back: Annotated[
+        float | None,
+        typer.Option(
+            "--phi-back",
+            help="Friction angle of the back plane [deg]. Default: that of the base.",
+            show_default=False,
+        ),
+    ] = None,
+    no_back: Annotated[
+        bool, typer.Option("--no-back", help="There is no fracture behind the blocks.")
+    ] = False,
+    blocks: Annotated[
+        str | None,
+        typer.Option(
+            "--blocks",
+            metavar="FILE",
+            help="Show the blocks of a table (.csv, .parquet) with alpha1_deg and alpha3_deg, "
+            "as  rbfrag rockmass --out  writes it.",
+            show_default=False,
+        ),
+    ] = None,
+    rockmass: Annotated[
+        str | None,
+        typer.Option(
+            "--rockmass",
+            metavar="FILE",
+            help="Show the blocks of a rock mass file (.toml, .csv).",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Draw failure modes and yield accelerations over the block angles alpha1 and alpha3."""
+    from rbfrag.cli.charted_blocks import charted_blocks
+    from rbfrag.plots.canvas import plot_path
+    from rbfrag.plots.modes import plot_modes as draw
+
+    plot_path(out)
+    shown = charted_blocks(blocks, rockmass, phi=phi, phi_back=phi_back, no_back=no_back)
+    draw(
+        out,
+        phi_deg=phi,
+        beta_deg=beta,
+        phi_back_deg=phi_back,
+        back_fracture=not no_back,
+        alpha1_deg=shown.alpha1_deg,
+        alpha3_deg=shown.alpha3_deg,
+    )
+    print(out)
+    print_warnings(shown.warnings)

@@ -40,7 +40,7 @@ def table_path(path: str | os.PathLike[str]) -> Path:
     if not os.access(target.parent, os.W_OK):
         raise InputError(f"table {target}: the folder cannot be written: choose another")
     if suffix == ".parquet":
-        _pyarrow()
+        pyarrow()
     return target
 
 
@@ -96,7 +96,7 @@ def _cells(column: NDArray[Any]) -> list[Any]:
 
 
 def _write_parquet(columns: Mapping[str, NDArray[Any]], place: Path) -> None:
-    arrow, parquet = _pyarrow()
+    arrow, parquet = pyarrow()
     arrays = {
         name: arrow.array(
             column,
@@ -108,10 +108,11 @@ def _write_parquet(columns: Mapping[str, NDArray[Any]], place: Path) -> None:
     parquet.write_table(arrow.table(arrays), place)
 
 
-def _pyarrow() -> tuple[Any, Any]:
+def pyarrow() -> tuple[Any, Any]:
+    """Return pyarrow and pyarrow.parquet, or say which extra brings them."""
     try:
-        import pyarrow
-        import pyarrow.parquet
+        import pyarrow as arrow
+        import pyarrow.parquet as parquet
     except ImportError:
         raise MissingExtraError("Parquet files need pyarrow", "parquet") from None
-    return pyarrow, pyarrow.parquet
+    return arrow, parquet

@@ -143,6 +143,13 @@ class RockMass:
             checked_seed(stated.get("seed", SEED), "seed"),
         )
 
+    def draw(self, n: int, seed: int) -> dict[str, FloatArray]:
+        """Return n values of every variable, each from its own stream of random numbers."""
+        return {
+            key: law.sample(n, _generator(seed, VARIABLES[key].stream))
+            for key, law in self.variables.items()
+        }
+
     def realise(self, n: int | None = None, seed: int | None = None) -> Realisations:
         """Return blocks drawn at random, with their modes and yield accelerations.
 
@@ -158,10 +165,7 @@ class RockMass:
         """
         n = self.realisations if n is None else checked_count(n, "n")
         seed = self.seed if seed is None else checked_seed(seed, "seed")
-        drawn = {
-            key: law.sample(n, _generator(seed, VARIABLES[key].stream))
-            for key, law in self.variables.items()
-        }
+        drawn = self.draw(n, seed)
         factor, phi = drawn["block.size_factor"], drawn["friction.phi_deg"]
         beta, back_dip = drawn["base.dip_deg"], drawn["back.dip_deg"]
         s1, s2 = drawn["base.spacing_m"] * factor, drawn["back.spacing_m"] * factor

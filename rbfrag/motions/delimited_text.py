@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import MotionFileError
 from rbfrag.motions.column_header import event_station_component, stated_unit
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
+from rbfrag.motions.dt_index import INDEX, indexed_interval
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text_file import finite_number
 from rbfrag.motions.time_column import sampling_interval
@@ -33,7 +34,7 @@ LONGEST_HEADER_LINE = 500
 """Characters of a header line that are looked at."""
 
 _NUMBER_LIKE = re.compile(
-    r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[ed][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE
+    r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[ed][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE
 )
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*[;\s]\s*[+-]?\d*,\d+\S*\s*")
 
@@ -60,8 +61,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         path: for labels and messages.
         text: the file's text.
         units: unit of acceleration that the caller states; refused when the file states another.
-        dt_s: sampling interval that the caller states [s]; needed where there is no time
-            column, refused where it contradicts one.
+        dt_s: sampling interval that the caller states [s]; needed where there is neither a time
+            column nor an index beside the file, refused where it contradicts one.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.
@@ -78,19 +79,16 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
     if len(rows[0][1]) == 1:
         samples = _numbers(path, rows, 0, "acceleration")
         _refuse_gaps(path, rows)
-        if dt_s is None:
-            raise MotionFileError(
-                path,
-                "the file holds one column and states no sampling interval: give it in seconds, "
-                "as in  --dt 0.005",
-            )
-        dt, first_s = dt_s, 0.0
+        dt, remark = _interval_of_list(path, dt_s)
     else:
         times = _numbers(path, rows, 0, "time")
         samples = _numbers(path, rows, 1, "acceleration")
         tokens = [fields[0].strip() for _, fields in rows]
         dt = sampling_interval(path, tokens, times, [number for number, _ in rows], dt_s)
         first_s = float(times[0])
+        remark = f"times in the file start at {first_s:g} s; here they start at 0"
+        if first_s == 0.0:
+            remark = ""
     event, station, component = event_station_component(header)
     factor = unit_in_g(unit)
     return [
@@ -105,9 +103,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             recording=f"{event} {station}".strip(),
             source_file=path.name,
             file_format=FORMAT,
-            remarks=(f"times in the file start at {first_s:g} s; here they start at 0",)
-            if first_s != 0.0
-            else (),
+            remarks=(remark,) if remark else (),
         )
     ]
 
@@ -197,6 +193,27 @@ def _numbers(
             [finite_number(path, fields[column].strip(), n, what) for n, fields in rows]
         )
     return numbers
+
+
+def _interval_of_list(path: Path, dt_s: float | None) -> tuple[float, str]:
+    """Sampling interval of a list of accelerations, and a sentence on where it comes from."""
+    indexed = indexed_interval(path)
+    if indexed is None and dt_s is None:
+        raise MotionFileError(
+            path,
+            "the file holds one column and states no sampling interval: give it in seconds, "
+            f"as in  --dt 0.005, or in a file {INDEX} beside it, as in  {path.name} 0.005",
+        )
+    if indexed is None:
+        assert dt_s is not None
+        return dt_s, f"the file states no dt; {dt_s:g} s is what was stated when it was read"
+    if dt_s is not None and dt_s != indexed.dt_s:
+        raise MotionFileError(
+            path,
+            f"{indexed.source} beside the file says dt = {indexed.dt_s:g} s, not {dt_s:g}: "
+            "leave --dt out, or correct one of them",
+        )
+    return indexed.dt_s, f"the file states no dt; {indexed.dt_s:g} s is from {indexed.source}"
 
 
 def _refuse_gaps(path: Path, rows: list[tuple[int, list[str]]]) -> None:

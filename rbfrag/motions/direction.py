@@ -15,10 +15,15 @@ _COMPASS = {
     "W": 270.0, "WEST": 270.0,
 }  # fmt: skip
 
+HORIZONTAL_NAMES = frozenset(
+    {"H1", "H2", "L", "T", "LONG", "TRAN", "TRANS", "LONGITUDINAL", "TRANSVERSE"}
+)
+"""Axes of an instrument, whose azimuth the name does not tell."""
+
 _BEARING = re.compile(r"([NS])\s*(\d{1,2}(?:\.\d+)?)\s*([EW])")
-# SEED channel names of seismometers and accelerometers: band, instrument, then Z for vertical
-_SEED_VERTICAL = re.compile(r"[A-Z][HLNG]Z")
-_AZIMUTH = re.compile(r"\d{1,3}(?:\.\d+)?")
+# SEED channel names of seismometers and accelerometers: band, instrument, orientation
+_SEED = re.compile(r"[A-Z][HLNG]([ZNE12])")
+_AZIMUTH = re.compile(r"(\d{1,3}(?:\.\d+)?)(?:\s*DEG\.?)?", re.ASCII)
 
 
 def is_vertical_name(component: str) -> bool | None:
@@ -29,18 +34,24 @@ def is_vertical_name(component: str) -> bool | None:
     """
     # file names join station and component by a dash, which some headers keep
     name = component.strip().upper().lstrip("-")
-    if name in VERTICAL_NAMES or _SEED_VERTICAL.fullmatch(name):
+    seed = _SEED.fullmatch(name)
+    if name in VERTICAL_NAMES or (seed and seed[1] == "Z"):
         return True
-    return False if azimuth_deg(component) is not None else None
+    if seed or name in HORIZONTAL_NAMES or azimuth_deg(component) is not None:
+        return False
+    return None
 
 
 def azimuth_deg(component: str) -> float | None:
     """Return the azimuth of a component [deg], clockwise from north; None if not stated.
 
     Args:
-        component: as the file names it: ``360``, ``N10E``, ``S62W``, ``EAST``.
+        component: as the file names it: ``360``, ``90 Deg``, ``N10E``, ``S62W``, ``EAST``, or a
+            SEED channel such as ``HNE``.
     """
     name = component.strip().upper()
+    if (seed := _SEED.fullmatch(name)) and seed[1] in "NE":
+        return _COMPASS[seed[1]]
     if name in _COMPASS:
         return _COMPASS[name]
     if bearing := _BEARING.fullmatch(name):
@@ -49,6 +60,6 @@ def azimuth_deg(component: str) -> float | None:
             return None
         turned = angle if bearing[3] == "E" else -angle
         return (turned if bearing[1] == "N" else 180.0 - turned) % 360.0
-    if _AZIMUTH.fullmatch(name) and float(name) <= 360.0:
-        return float(name) % 360.0
+    if (azimuth := _AZIMUTH.fullmatch(name)) and float(azimuth[1]) <= 360.0:
+        return float(azimuth[1]) % 360.0
     return None

@@ -10,11 +10,18 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from rbfrag.errors import InputError, MotionFileError
+from rbfrag.errors import MotionFileError
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text_file import finite_number, fixed_width_numbers, sample_count
-from rbfrag.motions.units import acceleration_unit, unit_in_g
+from rbfrag.motions.header_field import (
+    Field,
+    agreed_dt,
+    agreed_unit_in_g,
+    blocks,
+    find_field,
+    positive_number,
+)
+from rbfrag.motions.text_file import fixed_width_numbers, sample_count, without_blank_end
 
 FORMAT = "GeoNet V2A"
 
@@ -50,76 +57,49 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         MotionFileError: a header or value that cannot be used, with its line.
     """
     lines = text.split("\n")
-    starts = [i for i, line in enumerate(lines) if _BLOCK.match(line)]
-    ends = [*starts[1:], len(lines)]
     return [
-        _component(path, lines, start, end, index, units, dt_s)
-        for index, (start, end) in enumerate(zip(starts, ends, strict=True))
+        _component(path, lines, span, index, units, dt_s)
+        for index, span in enumerate(blocks(path, lines, _BLOCK))
     ]
 
 
 def _component(
-    path: Path,
-    lines: list[str],
-    start: int,
-    end: int,
-    index: int,
-    units: str | None,
-    dt_s: float | None,
+    path: Path, lines: list[str], span: range, index: int, units: str | None, dt_s: float | None
 ) -> GroundMotion:
-    def field(pattern: re.Pattern[str], what: str) -> tuple[str, int]:
-        for at in range(start, min(start + TEXT_LINES, end)):
-            if found := pattern.search(lines[at]):
-                return found[1], at + 1
-        raise MotionFileError(
-            path, f"component {index} has no line with its {what}", line=start + 1
-        )
+    header = range(span.start, min(span.start + TEXT_LINES, span.stop))
 
-    recording, _ = field(_BLOCK, "accelerogram name")
-    station, _ = field(_SITE, "site")
-    component, _ = field(_COMPONENT, "component")
-    npts_text, npts_line = field(_NPTS, "number of points")
-    npts = sample_count(path, npts_text, npts_line, "number of points")
-    dt_text, dt_line = field(_DT, "sampling interval")
-    dt = finite_number(path, dt_text, dt_line, "sampling interval")
-    if dt <= 0.0:
-        raise MotionFileError(path, f"sampling interval {dt_text} s must be positive", line=dt_line)
-    if dt_s is not None and dt_s != dt:
-        raise MotionFileError(
-            path, f"the header says {dt_text} s, not {dt_s:g}: leave --dt out", line=dt_line
-        )
-    unit_text, unit_line = field(_PEAK, "peak acceleration with its unit")
-    try:
-        unit = acceleration_unit(unit_text)
-    except InputError as error:
-        raise MotionFileError(path, str(error), line=unit_line) from None
-    if units is not None and acceleration_unit(units) != unit:
-        raise MotionFileError(
-            path, f"the header says {unit_text}, not {units}: leave --units out", line=unit_line
-        )
+    def field(pattern: re.Pattern[str], what: str) -> Field:
+        return find_field(path, lines, header, pattern, f"{what} of component {index}")
 
-    first = start + TEXT_LINES + NUMERIC_LINES
-    data = lines[first:end]
-    while data and not data[-1].strip():
-        data.pop()
+    recording = field(_BLOCK, "accelerogram name").text
+    station = field(_SITE, "site").text
+    component = field(_COMPONENT, "component").text
+    points = field(_NPTS, "number of points")
+    npts = sample_count(path, points.text, points.line, "number of points")
+    interval = field(_DT, "sampling interval")
+    dt = agreed_dt(path, positive_number(path, interval, "dt"), interval.line, dt_s)
+    factor = agreed_unit_in_g(path, field(_PEAK, "peak acceleration with its unit"), units)
+
+    first = span.start + TEXT_LINES + NUMERIC_LINES
+    data = without_blank_end(lines[first : span.stop])
     rows = -(-npts // PER_LINE)
     if len(data) != SERIES * rows:
         raise MotionFileError(
             path,
             f"the header of component {index} says {npts} points, which are {SERIES} x {rows} "
             f"lines of data, but {len(data)} follow: the file is truncated or its header wrong",
-            line=npts_line,
+            line=points.line,
         )
-    values = fixed_width_numbers(path, data[:rows], first + 1, WIDTH, "acceleration")
+    values = fixed_width_numbers(path, data[:rows], first + 1, WIDTH, PER_LINE, "acceleration")
     if values.size != npts:
         raise MotionFileError(
             path,
             f"the header of component {index} says {npts} points, but {values.size} "
             "accelerations follow",
-            line=npts_line,
+            line=points.line,
         )
     return GroundMotion(
-        values * unit_in_g(unit),
+        values * factor,
         dt,
         station=station,
         # the file names its own trigger, not the earthquake

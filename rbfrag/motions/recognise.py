@@ -7,12 +7,44 @@ from pathlib import Path
 from types import ModuleType
 
 from rbfrag.errors import InputError, MotionFileError, UnknownFormatError
-from rbfrag.motions import delimited_text, geonet_v2a, peer_at2
+from rbfrag.motions import (
+    bhrc_v1,
+    cdmg_v1,
+    cosmos,
+    csmip_v2,
+    cwb,
+    delimited_text,
+    esm_asc,
+    geonet_v2a,
+    knet,
+    nsmn,
+    peer_at2,
+    simcenter_event,
+    ucgmsim_text,
+    unam,
+    usgs_smc,
+)
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text_file import read_text
 from rbfrag.motions.units import acceleration_unit
 
-READERS: tuple[ModuleType, ...] = (peer_at2, geonet_v2a, delimited_text)
+READERS: tuple[ModuleType, ...] = (
+    peer_at2,
+    geonet_v2a,
+    csmip_v2,
+    cosmos,
+    cdmg_v1,
+    bhrc_v1,
+    knet,
+    esm_asc,
+    cwb,
+    unam,
+    nsmn,
+    usgs_smc,
+    simcenter_event,
+    ucgmsim_text,
+    delimited_text,
+)
 """One module a format, asked in this order; plain text, which has no mark of its own, last."""
 
 HEAD_CHARACTERS = 4096

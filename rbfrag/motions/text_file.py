@@ -17,7 +17,9 @@ LARGEST_FILE_BYTES = 512 * 1024**2
 MOST_DIGITS = 12
 MOST_SHOWN = 40
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_FORTRAN = re.compile(r"(?<!\d)(\d{1,3})[FE](\d{1,3})\.\d", re.IGNORECASE | re.ASCII)
+_OF_INTEGERS = frozenset("0123456789- \t")
+_NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def read_text(path: Path) -> str:
@@ -83,24 +85,103 @@ def free_numbers(
 
 
 def fixed_width_numbers(
-    path: Path, lines: Sequence[str], first_line: int, width: int, what: str
+    path: Path, lines: Sequence[str], first_line: int, width: int, per_line: int, what: str
 ) -> NDArray[np.float64]:
     """Return numbers in columns of a fixed width, which may touch.
 
     Args:
         path: for messages.
-        lines: the lines that hold the numbers.
+        lines: the lines that hold the numbers; only the last may hold fewer than the others.
         first_line: 1-based number of the first of them in the file.
-        width: characters a field.
+        width: characters a field, the number at its right end.
+        per_line: fields a line.
+        what: what the numbers are, for messages.
+
+    Raises:
+        MotionFileError: a line of another length, or a field that is no finite number.
+    """
+    rows = [line.rstrip() for line in lines]
+    whole = width * per_line
+    for at, row in enumerate(rows):
+        # a character too many or too few would shift every field after it
+        if len(row) != whole and (at < len(rows) - 1 or len(row) % width or len(row) > whole):
+            raise MotionFileError(
+                path,
+                f"the line has {len(row)} characters, which are not {per_line} fields of {width}: "
+                "repair the line or export the record again",
+                line=first_line + at,
+            )
+    text = "".join(rows)
+    if not text:
+        return np.empty(0)
+    try:
+        numbers = np.frombuffer(text.encode("ascii"), dtype=f"S{width}").astype(np.float64)
+    except ValueError:
+        numbers = np.array([np.nan])
+    if not np.isfinite(numbers).all() or "_" in text:
+        for at, row in enumerate(rows):
+            for start in range(0, len(row), width):
+                finite_number(path, row[start : start + width].strip(), first_line + at, what)
+    return numbers
+
+
+def table_numbers(
+    path: Path, lines: Sequence[str], first_line: int, columns: int, what: str
+) -> NDArray[np.float64]:
+    """Return blank-separated columns of numbers, shape (rows, columns).
+
+    Args:
+        path: for messages.
+        lines: the rows.
+        first_line: 1-based number of the first of them in the file.
+        columns: columns that each row must have.
         what: what the numbers are, for messages.
     """
-    numbers = []
     for number, line in enumerate(lines, first_line):
-        padded = line.rstrip()
-        for start in range(0, len(padded), width):
-            field = padded[start : start + width].strip()
-            numbers.append(finite_number(path, field, number, what))
-    return np.array(numbers, dtype=np.float64)
+        found = len(line.split())
+        if found != columns:
+            raise MotionFileError(
+                path,
+                f"the line has {found} values, not {columns} as the header says: repair the line "
+                "or export the record again",
+                line=number,
+            )
+    return free_numbers(path, lines, first_line, what).reshape(-1, columns)
+
+
+def holds_integers(line: str) -> bool:
+    """Return whether a line holds integers and nothing else.
+
+    Args:
+        line: a line of a file.
+    """
+    return set(line) <= _OF_INTEGERS and any(character.isdigit() for character in line)
+
+
+def without_blank_end(lines: Sequence[str]) -> Sequence[str]:
+    """Return lines without the blank ones after the last that is not.
+
+    Args:
+        lines: some lines of a file.
+    """
+    end = len(lines)
+    while end and not lines[end - 1].strip():
+        end -= 1
+    return lines[:end]
+
+
+def field_layout(text: str, default: tuple[int, int] | None = None) -> tuple[int, int] | None:
+    """Return fields a line and characters a field of a Fortran format such as ``(8F10.6)``.
+
+    Args:
+        text: a line that may have a format in it.
+        default: what to return if it has none.
+    """
+    found = _FORTRAN.search(text)
+    if not found:
+        return default
+    per_line, width = int(found[1]), int(found[2])
+    return (per_line, width) if per_line and width else default
 
 
 def sample_count(path: Path, text: str, line: int, what: str) -> int:

@@ -88,6 +88,40 @@ def sampling_interval(
     return stated_dt_s
 
 
+def refuse_other_times(
+    path: Path,
+    times_s: FloatArray,
+    dt_s: float,
+    decimals: int,
+    first_line: int,
+    per_line: int,
+) -> None:
+    """Refuse printed times that the header's sampling interval does not reproduce.
+
+    Args:
+        path: for messages.
+        times_s: times as printed [s], shape (n,).
+        dt_s: sampling interval by the header [s].
+        decimals: decimals printed.
+        first_line: 1-based line of the first time.
+        per_line: times a line.
+
+    Raises:
+        MotionFileError: a time off by more than its rounding; a missing or doubled row shows so.
+    """
+    expected = times_s[0] + dt_s * np.arange(times_s.size)
+    # the first time is rounded as well
+    odd = np.flatnonzero(np.abs(times_s - expected) > (1.0 + 1e-6) * 10.0**-decimals)
+    if odd.size:
+        at = int(odd[0])
+        raise MotionFileError(
+            path,
+            f"time {times_s[at]:g} s stands where {expected[at]:g} s was expected with the "
+            f"header's dt of {dt_s:g} s: repair the line or export the record again",
+            line=first_line + at // per_line,
+        )
+
+
 @dataclass
 class _Column:
     times_s: FloatArray

@@ -19,6 +19,7 @@ from rbfrag.plots.mode_style import COLOURS, LINES, words
 
 _POINTS = 600
 _SHOWN = 0.997
+_HIGHEST_PGA_G = 2.0
 
 
 def plot_rockmass(made: Realisations, path: str | PathLike[str], *, title: str = "") -> Path:
@@ -37,17 +38,19 @@ def plot_rockmass(made: Realisations, path: str | PathLike[str], *, title: str =
         MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
-    figure = new_figure(7.4, 4.6)
     counts = mode_counts(made)
     present = [mode for mode, found in counts.items() if found.count]
+    # Every bar takes the room that the name of its mode needs.
+    width_in = 0.45 + 0.62 * len(present)
+    figure = new_figure(5.7 + width_in, 4.6)
     yields = {mode: sorted_yields(made, mode) for mode in present}
     finite = np.concatenate(list(yields.values()))
-    # A few blocks of extreme shape would otherwise squeeze all the others to the left.
+    # A few blocks that hardly any earthquake moves would squeeze all the others to the left.
     right = float(np.quantile(finite, _SHOWN)) if finite.size else 1.0
-    right = max(1.02 * right, 0.01)
+    right = min(max(1.02 * right, 0.01), _HIGHEST_PGA_G)
     pga_g = np.linspace(0.0, right, _POINTS)
 
-    axes, bars = figure.subplots(1, 2, width_ratios=[4.6, 1.0])
+    axes, bars = figure.subplots(1, 2, width_ratios=[5.7, width_in])
     for mode in present:
         axes.plot(
             pga_g,
@@ -74,7 +77,10 @@ def plot_rockmass(made: Realisations, path: str | PathLike[str], *, title: str =
     axes.set_xlabel("peak ground acceleration, PGA [g]")
     axes.set_ylabel("blocks with a yield acceleration below PGA")
     axes.grid(visible=True, lw=0.3, alpha=0.6)
-    axes.legend(loc="upper left", fontsize=9, framealpha=0.9)
+    # Above the axes, because the curves may run anywhere.
+    axes.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(present), fontsize=9, frameon=False
+    )
 
     at = range(len(present))
     shares = [100.0 * counts[mode].share for mode in present]
@@ -87,7 +93,7 @@ def plot_rockmass(made: Realisations, path: str | PathLike[str], *, title: str =
             textcoords="offset points",
             ha="center",
             va="bottom",
-            fontsize=8.5 if len(present) < 3 else 7,
+            fontsize=8.5,
         )
     bars.set_xticks(list(at), [words(mode).replace(" ", "\n") for mode in present], fontsize=9)
     bars.set_xlim(-0.6, len(present) - 0.4)

@@ -189,3 +189,15 @@ def test_stated_dt(tmp_path: Path, dt_s: float) -> None:
 def test_stated_unit(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"'furlongs'.*m/s2"):
         read_motions(written(tmp_path, "0.1\n0.2\n"), units="furlongs", dt_s=0.01)
+
+
+def test_words_of_any_length_are_cut(tmp_path: Path) -> None:
+    long = "9" * 2000
+    for text in (
+        f"0.0,1.0\n0.01,2.0\n0.02{long},3.0\n0.03,1.0\n",
+        at2(SAMPLES, 0.01).replace("UNITS OF G", f"UNITS OF {long}"),
+        V2A.replace("mm/s/s", long),
+    ):
+        error = refusal(written(tmp_path, text), units="g")
+        assert len(error.reason) < 500
+        assert "999…" in error.reason

@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 
 from rbfrag.errors import MotionFileError, UnknownFormatError
+from rbfrag.motions import delimited_text
 from rbfrag.motions.metadata import read_metadata
-from rbfrag.motions.recognise import read_motion, read_motions
+from rbfrag.motions.recognise import HEAD_CHARACTERS, READERS, read_motion, read_motions
+from rbfrag.motions.text_file import read_text
 
 COUNTS = {
     "peer_at2_opensees": 52,
@@ -18,11 +20,23 @@ COUNTS = {
     "geonet_v2a": 9,
     "geer_chihshang_2022_acc": 57,
     "fema_p695_far_field": 32,
+    "geonet_ucgmsim_text": 9,
+    "csmip_v2": 15,
+    "cosmos_v1c_v2c": 9,
+    "knet_ascii": 21,
+    "kiknet_ascii": 3,
+    "renadic_v1": 36,
+    "bhrc_v1": 9,
+    "cwb_dat": 36,
+    "esm_asc": 3,
+    "unam_smis": 6,
+    "nsmn_txt": 3,
+    "usgs_smc": 6,
 }
 """Traces by set."""
 
-STATES_NO_UNIT = {"geer_chihshang_2022_acc", "fema_p695_far_field"}
-STATES_NO_DT = {"fema_p695_far_field"}
+STATES_NO_UNIT = {"geer_chihshang_2022_acc", "fema_p695_far_field", "geonet_ucgmsim_text"}
+NAMES_NO_COMPONENT = {"geer_chihshang_2022_acc", "fema_p695_far_field"}
 
 
 def manifest(records_dir: Path) -> list[dict[str, str]]:
@@ -37,8 +51,7 @@ def test_npts_dt_and_pga(records_dir: Path, name: str) -> None:
     for row in rows:
         units = row["file_units"] if name in STATES_NO_UNIT else None
         path = records_dir / row["file"]
-        dt_s = float(row["dt_s"]) if name in STATES_NO_DT else None
-        motions = read_motions(path, units=units, dt_s=dt_s)
+        motions = read_motions(path, units=units)
         assert len(motions) == sum(other["file"] == row["file"] for other in rows)
         motion = motions[int(row["trace_index"])]
         assert motion.trace_index == int(row["trace_index"])
@@ -46,8 +59,10 @@ def test_npts_dt_and_pga(records_dir: Path, name: str) -> None:
         assert motion.npts == int(row["npts"]), path
         assert motion.dt_s == float(row["dt_s"]), path
         assert f"{motion.pga_g:.5f}" == f"{float(row['pga_g']):.5f}", path
-        if motion.is_vertical is not None:
-            assert motion.is_vertical == (row["is_vertical"] == "1"), path
+        if name in NAMES_NO_COMPONENT:
+            assert motion.is_vertical is None
+        else:
+            assert motion.is_vertical is (row["is_vertical"] == "1"), path
 
 
 @pytest.mark.parametrize(
@@ -91,13 +106,83 @@ def test_three_components_of_one_recording(records_dir: Path) -> None:
         read_motion(f"{path}#3")
 
 
-def test_other_formats_are_refused_and_never_misread(records_dir: Path) -> None:
-    rows = [row for row in manifest(records_dir) if row["set"] not in COUNTS]
-    others = {row["set"]: row["file"] for row in rows}
-    assert others
-    for file in others.values():
-        with pytest.raises(MotionFileError):
-            read_motions(records_dir / file)
+def test_every_trace_is_of_one_set(records_dir: Path) -> None:
+    assert sum(COUNTS.values()) == len(manifest(records_dir)) == 341
+
+
+def test_one_reader_recognises_each_file(records_dir: Path) -> None:
+    plain = {"slammer_csv", "geer_chihshang_2022_acc", "fema_p695_far_field"}
+    readers: dict[str, set[str]] = {}
+    for row in manifest(records_dir):
+        head = read_text(records_dir / row["file"])[:HEAD_CHARACTERS]
+        found = [r.FORMAT for r in READERS if r is not delimited_text and r.recognises(head)]
+        assert len(found) == (0 if row["set"] in plain else 1), row["file"]
+        readers.setdefault(row["set"], set()).update(found)
+    assert all(len(formats) <= 1 for formats in readers.values())
+
+
+@pytest.mark.parametrize(
+    ("file", "index", "station", "component", "orientation_deg"),
+    [
+        ("csmip_v2/CIWLT.V2", 1, "WLT Hacienda Heights", "360 Deg", 0.0),
+        ("csmip_v2/CE58667.V2", 2, "58667 Concord - Clayton & Ellis", "H2", None),
+        ("cosmos_v1c_v2c/NCMLI--n.00725272.HNE.--.V1c", 0, "NC-MLI", "HNE", 90.0),
+        ("knet_ascii/AOM0031801241951.EW", 0, "AOM003", "E-W", 90.0),
+        ("kiknet_ascii/AICH040010061330.NS2", 0, "AICH04", "NS2", 0.0),
+        ("renadic_v1/curico1002271parte1.v1", 2, "CURICO S/N 499", "EW", 90.0),
+        ("bhrc_v1/5523-1.V1", 2, "Amand", "T3", 267.0),
+        ("cwb_dat/3-EHY.dat", 1, "EHY", "N", 0.0),
+        ("esm_asc/20230206011732_0131_ap_Acc_N.asc", 0, "TK.0131", "HNN", 0.0),
+        ("unam_smis/PZPU1709.191", 2, "PZPU", "N90E", 90.0),
+        ("nsmn_txt/20170720223109_0921.txt", 1, "0921", "E-W", 90.0),
+        ("usgs_smc/np01002p_4225a_a.smc", 0, "APEEL Array #2 - Redwood City", "133", 133.0),
+    ],
+)
+def test_names_of_networks(
+    records_dir: Path,
+    file: str,
+    index: int,
+    station: str,
+    component: str,
+    orientation_deg: float | None,
+) -> None:
+    motion = read_motions(records_dir / file)[index]
+    assert (motion.station, motion.component) == (station, component)
+    assert motion.orientation_deg == orientation_deg
+
+
+def test_components_share_a_recording(records_dir: Path) -> None:
+    for name in COUNTS:
+        if name in NAMES_NO_COMPONENT:
+            continue
+        groups: dict[str, set[str]] = {}
+        for row in manifest(records_dir):
+            if row["set"] == name:
+                units = row["file_units"] if name in STATES_NO_UNIT else None
+                motion = read_motions(records_dir / row["file"], units=units)[
+                    int(row["trace_index"])
+                ]
+                groups.setdefault(motion.recording, set()).add(row["companion_group"])
+        assert all(len(group) == 1 for group in groups.values()), name
+        if name not in {"peer_at2_opensees", "nga_at2_misc", "slammer_csv"}:
+            assert len(groups) == len(set.union(*groups.values())), name
+
+
+def test_channel_of_zeros_is_left_out(records_dir: Path) -> None:
+    motions = read_motions(records_dir / "renadic_v1" / "curico1002271parte1.v1")
+    assert [motion.component for motion in motions] == ["NS", "V", "EW"]
+    assert all("INTC" in motion.remarks[0] for motion in motions)
+
+
+def test_interval_of_a_list_comes_from_its_index(records_dir: Path) -> None:
+    (motion,) = read_motions(records_dir / "fema_p695_far_field" / "120921.th", units="g")
+    assert motion.dt_s == 0.0025
+    assert "dt_index.txt, line" in motion.remarks[0]
+
+
+def test_event_whose_counts_disagree(formats_dir: Path) -> None:
+    with pytest.raises(MotionFileError, match=r"line 5: numSteps says 1992, .* 1991 values"):
+        read_motions(formats_dir / "simcenter_event_rinaldi.json", units="g")
 
 
 def test_tables_are_no_accelerograms(records_dir: Path) -> None:

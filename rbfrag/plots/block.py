@@ -1,0 +1,197 @@
+"""Figure of one block on its planes, with what moves it first."""
+
+from __future__ import annotations
+
+import math
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.mode_style import COLOURS, words
+from rbfrag.solver.block import Block
+from rbfrag.solver.polygon import Point
+from rbfrag.solver.stability import Stability
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_GROUND = "#8a8378"
+_INK = "#222222"
+
+
+def plot_block(
+    block: Block, found: Stability, path: str | PathLike[str], *, title: str = ""
+) -> Path:
+    """Draw a block to scale on its base and back planes, out of the slope to the right.
+
+    The contacts are 1 heel, 2 back and 3 toe, C is the centroid. The arrow is the direction of
+    the resultant of weight and inertia at the yield acceleration; a block that no acceleration
+    moves, or that none holds, has the direction of its weight.
+
+    Args:
+        block: the block.
+        found: its stability.
+        path: file to write: .png, .pdf or .svg.
+        title: title of the figure; mode and yield if empty.
+
+    Raises:
+        InputError: a path that cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    plot_path(path)
+    figure = new_figure(7.4, 4.8)
+    axes, panel = figure.subplots(1, 2, width_ratios=[2.6, 1.0])
+    place = _Frame(block, found.beta_deg)
+    _draw_planes(axes, place, found.back_fracture)
+    outline = [place.of(point) for point in block.outline]
+    axes.fill(*zip(*outline, strict=True), color=COLOURS[found.mode], alpha=0.28, lw=0, zorder=2)
+    axes.plot(
+        *zip(*[*outline, outline[0]], strict=True), color=COLOURS[found.mode], lw=1.6, zorder=3
+    )
+    contacts = [("1", block.heel), ("3", block.toe)]
+    if found.back_fracture:
+        contacts.insert(1, ("2", block.back))
+    for name, arm in contacts:
+        x, y = place.of(arm)
+        axes.plot([0.0, x], [0.0, y], color=_INK, lw=0.6, ls=":", zorder=4)
+        axes.plot(x, y, "o", ms=5, mfc="white", mec=_INK, zorder=6)
+        length = math.hypot(x, y)
+        axes.annotate(
+            name,
+            (x, y),
+            xytext=(13.0 * x / length, 13.0 * y / length),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            fontsize=9,
+            bbox={"boxstyle": "circle,pad=0.1", "facecolor": "white", "linewidth": 0.0},
+            zorder=7,
+        )
+    _draw_resultant(axes, place, found)
+    axes.plot(0.0, 0.0, "o", ms=5, color=_INK, zorder=6)
+    axes.annotate(
+        "C", (0.0, 0.0), xytext=(-5, 5), textcoords="offset points", ha="right", fontsize=10
+    )
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.04)
+    axes.set_xlabel("horizontal distance from the centroid, out of the slope [m]")
+    axes.set_ylabel("height above the centroid [m]")
+    axes.grid(visible=True, lw=0.3, alpha=0.5)
+    _write_panel(panel, block, found)
+    figure.suptitle(title or _title(found), fontsize=11)
+    return save_figure(figure, path)
+
+
+class _Frame:
+    """The base frame of the block turned into the slope, centroid at the origin."""
+
+    def __init__(self, block: Block, beta_deg: float) -> None:
+        beta = math.radians(beta_deg)
+        self._cosine, self._sine = math.cos(beta), math.sin(beta)
+        gamma = math.radians(block.gamma_deg)
+        self.up_the_back = (-math.cos(gamma), math.sin(gamma))
+        self.behind = (-math.sin(gamma), -math.cos(gamma))
+        base_y = block.heel[1]
+        # Where the planes meet; of a block without its heel's corner that is not the heel.
+        self.corner = (block.back[0] + block.cot_gamma * (block.back[1] - base_y), base_y)
+        self.size = max(math.dist(a, b) for a in block.outline for b in block.outline)
+        self.toe, self.heel = block.toe, block.heel
+        self.back_length = math.dist(self.corner, block.back)
+
+    def of(self, point: Point) -> Point:
+        """Return a point of the base frame in the frame of the slope."""
+        x, y = point
+        return x * self._cosine + y * self._sine, -x * self._sine + y * self._cosine
+
+
+def _draw_planes(axes: Axes, place: _Frame, back_fracture: bool) -> None:
+    """Draw the rock below and behind as a band along the planes."""
+    band, reach = 0.09 * place.size, 0.30 * place.size
+    end = (place.toe[0] + reach, place.toe[1])
+    below = (end[0], end[1] - band)
+    if back_fracture:
+        corner, up = place.corner, place.up_the_back
+        along = place.back_length + 0.6 * reach
+        top = (corner[0] + up[0] * along, corner[1] + up[1] * along)
+        behind = (top[0] + place.behind[0] * band, top[1] + place.behind[1] * band)
+        gamma = math.atan2(up[1], -up[0])
+        shift = band * min(math.tan(0.5 * gamma), 4.0)
+        line = [end, corner, top]
+        rock = [*line, behind, (corner[0] - shift, corner[1] - band), below]
+    else:
+        start = (place.heel[0] - reach, place.heel[1])
+        line = [end, start]
+        rock = [*line, (start[0], start[1] - band), below]
+    points = [place.of(point) for point in rock]
+    axes.fill(
+        *zip(*points, strict=True), facecolor="#e9e5de", edgecolor=_GROUND, hatch="////", lw=0.0
+    )
+    axes.plot(*zip(*[place.of(p) for p in line], strict=True), color=_GROUND, lw=1.4, zorder=1)
+
+
+def _draw_resultant(axes: Axes, place: _Frame, found: Stability) -> None:
+    k = found.yield_acceleration
+    moves = math.isfinite(k)
+    right, down = (k, 1.0 + found.kv) if moves else (0.0, 1.0)
+    length = 0.45 * place.size / math.hypot(right, down)
+    tip = (right * length, -down * length)
+    axes.plot([0.0, 1.5 * tip[0]], [0.0, 1.5 * tip[1]], color="#b2182b", lw=0.7, ls="--", zorder=4)
+    axes.annotate(
+        "",
+        xy=tip,
+        xytext=(0.0, 0.0),
+        arrowprops={"arrowstyle": "-|>", "color": "#b2182b", "lw": 1.8, "shrinkA": 0, "shrinkB": 0},
+        zorder=5,
+    )
+
+
+def _title(found: Stability) -> str:
+    k = found.yield_acceleration
+    name = words(found.mode)
+    if found.state == "locked":
+        return f"{name}: locked, no horizontal acceleration moves the block in this mode"
+    if found.state == "unstable":
+        held = f" (k = {k:.3f} g)" if math.isfinite(k) else ""
+        return f"{name}: fails at rest{held}"
+    return f"{name} from k = {k:.3f} g"
+
+
+def _write_panel(panel: Axes, block: Block, found: Stability) -> None:
+    panel.set_axis_off()
+    k = found.yield_acceleration
+    rows = [
+        ("mode", words(found.mode)),
+        ("state", found.state),
+        ("yield $k$", f"{k:.4f} g" if math.isfinite(k) else "none"),
+        ("sliding $k_y$", f"{found.ky:.4f} g" if math.isfinite(found.ky) else "none"),
+        ("", ""),
+        (r"$\alpha_1$", f"{block.alpha1_deg:.2f}°"),
+        (r"$\alpha_3$", f"{block.alpha3_deg:.2f}°"),
+        (r"$\gamma$", f"{block.gamma_deg:.2f}°" if found.back_fracture else "no back plane"),
+        (r"dip $\beta$", f"{found.beta_deg:.2f}°"),
+        (r"friction $\phi$", _friction(found)),
+        ("", ""),
+        ("$S_1$", f"{block.s1_m:.3g} m"),
+        ("$S_2$", f"{block.s2_m:.3g} m"),
+        ("base 1–3", f"{block.base_m:.3g} m"),
+        ("$r_3$", f"{block.r3_m:.3g} m"),
+        ("area", f"{block.area_m2:.3g} m²"),
+        ("$p^2$", f"{block.p2:.3g} s$^{{-2}}$"),
+    ]
+    if found.kv:
+        rows.insert(4, ("vertical $k_v$", f"{found.kv:.3g} g"))
+    for i, (name, value) in enumerate(rows):
+        height = 0.97 - i * 0.92 / len(rows)
+        panel.text(0.0, height, name, transform=panel.transAxes, fontsize=9, va="top")
+        panel.text(0.47, height, value, transform=panel.transAxes, fontsize=9, va="top")
+    panel.plot([0.0, 0.14], [0.01, 0.01], color="#b2182b", lw=1.8, transform=panel.transAxes)
+    text = "resultant at yield" if math.isfinite(k) else "weight"
+    panel.text(0.19, 0.01, text, transform=panel.transAxes, fontsize=9, va="center")
+
+
+def _friction(found: Stability) -> str:
+    text = f"{found.phi_deg:.4g}°"
+    if found.back_fracture and found.phi_back_deg != found.phi_deg:
+        text += f", back {found.phi_back_deg:.4g}°"
+    return text

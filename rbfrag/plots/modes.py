@@ -1,0 +1,278 @@
+"""Chart of failure modes over the block angles, with yield accelerations and blocks."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.mode_style import COLOURS, words
+from rbfrag.solver.block_arrays import BlockArray
+from rbfrag.solver.mechanism import LOCKED, MODES, STABLE, UNSTABLE
+from rbfrag.solver.stability_arrays import StabilityArray, stability_arrays
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FloatArray = NDArray[np.float64]
+
+MOST_POINTS = 300
+"""More blocks than these are drawn as a histogram."""
+
+CELL_DEG = 2.0
+"""Cell of the histogram [deg]."""
+
+_STEP_DEG = 0.5
+_HATCHED = (
+    (UNSTABLE, "////", "unstable at rest"),
+    (LOCKED, "xxx", "locked: no acceleration\nmoves it in this mode"),
+)
+_LEVELS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0)
+_NARROW_G = 0.4
+# An image keeps vector files small.
+_WHOLE_CHART: dict[str, Any] = {
+    "extent": (-90.0, 90.0, -90.0, 90.0),
+    "origin": "lower",
+    "interpolation": "none",
+    "aspect": "equal",
+}
+_FINE_LEVELS = tuple(0.05 * i for i in range(1, 60))
+
+
+def plot_modes(
+    path: str | PathLike[str],
+    *,
+    phi_deg: float,
+    beta_deg: float = 0.0,
+    phi_back_deg: float | None = None,
+    back_fracture: bool = True,
+    alpha1_deg: ArrayLike | None = None,
+    alpha3_deg: ArrayLike | None = None,
+    title: str = "",
+) -> Path:
+    """Draw which mode governs a block of given angles, and its yield acceleration.
+
+    The modes do not depend on the dip of the base if there is a back fracture; the yield
+    accelerations, and what is unstable or locked, do.
+
+    Args:
+        path: file to write: .png, .pdf or .svg.
+        phi_deg: friction angle of the base [deg].
+        beta_deg: dip of the base for the yield accelerations [deg].
+        phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
+        back_fracture: False for blocks that no plane supports from behind.
+        alpha1_deg: angles of the heel of blocks to be shown [deg], shape (m,).
+        alpha3_deg: angles of the toe of these blocks [deg], shape (m,).
+        title: title of the figure; friction and dip if empty.
+
+    Raises:
+        InputError: an angle outside its range, or a path that cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    plot_path(path)
+    nodes = np.arange(-90.0 + 0.5 * _STEP_DEG, 90.0, _STEP_DEG)
+    a1, a3 = np.meshgrid(nodes, nodes)
+    is_block = a1 < a3
+    found = stability_arrays(
+        # Other angles than a block's are not asked for; their place is taken by one that is.
+        BlockArray.from_angles(np.where(is_block, a1, -1.0), np.where(is_block, a3, 1.0), 1.0),
+        beta_deg=beta_deg,
+        phi_deg=phi_deg,
+        phi_back_deg=phi_back_deg,
+        back_fracture=back_fracture,
+        nan="raise",
+    )
+    shown = _pairs(alpha1_deg, alpha3_deg)
+    figure = new_figure(6.4 if len(shown[0]) > MOST_POINTS else 5.6, 5.5)
+    axes = figure.add_subplot()
+    _draw_regions(axes, nodes, is_block, found)
+    _draw_yields(axes, nodes, is_block, found)
+    covered = _draw_blocks(axes, nodes, *shown)
+    _name_regions(axes, nodes, is_block, found, back_fracture, covered)
+    _explain_hatches(axes, is_block, found)
+    axes.fill([-90, 90, 90], [-90, -90, 90], color="white", zorder=4, lw=0)
+    axes.plot([-90, 90], [-90, 90], color="black", lw=1.0, zorder=5)
+    axes.text(38, -38, r"no block: $\alpha_1 \geq \alpha_3$", ha="center", fontsize=9, zorder=5)
+    axes.set_xlim(-90, 90)
+    axes.set_ylim(-90, 90)
+    axes.set_aspect("equal")
+    axes.set_xticks(range(-90, 91, 30))
+    axes.set_yticks(range(-90, 91, 30))
+    axes.set_xlabel(r"angle of the heel, $\alpha_1$ [°]")
+    axes.set_ylabel(r"angle of the toe, $\alpha_3$ [°]")
+    figure.suptitle(title or _title(phi_deg, phi_back_deg, beta_deg, back_fracture), fontsize=10)
+    return save_figure(figure, path)
+
+
+def _title(phi_deg: float, phi_back_deg: float | None, beta_deg: float, back_fracture: bool) -> str:
+    friction = rf"$\phi$ = {phi_deg:g}°"
+    if back_fracture and phi_back_deg is not None and phi_back_deg != phi_deg:
+        friction += f" (back {phi_back_deg:g}°)"
+    back = "with" if back_fracture else "without"
+    return (
+        f"failure modes {back} back fracture, {friction}\n"
+        rf"contours: yield acceleration [g] on a base that dips by $\beta$ = {beta_deg:g}°"
+    )
+
+
+def _pairs(
+    alpha1_deg: ArrayLike | None, alpha3_deg: ArrayLike | None
+) -> tuple[FloatArray, FloatArray]:
+    if alpha1_deg is None or alpha3_deg is None:
+        return np.empty(0), np.empty(0)
+    a1, a3 = np.asarray(alpha1_deg, dtype=np.float64), np.asarray(alpha3_deg, dtype=np.float64)
+    if a1.shape != a3.shape or a1.ndim != 1:
+        raise InputError(
+            f"alpha1_deg {a1.shape} and alpha3_deg {a3.shape} must be two lists of equal length"
+        )
+    return a1, a3
+
+
+def _draw_regions(
+    axes: Axes, nodes: FloatArray, is_block: NDArray[np.bool_], found: StabilityArray
+) -> None:
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    axes.imshow(
+        np.ma.masked_where(~is_block, found.mode_code),
+        cmap=ListedColormap([COLOURS[mode] for mode in MODES]),
+        norm=BoundaryNorm(np.arange(-0.5, len(MODES)), len(MODES)),
+        alpha=0.30,
+        zorder=1,
+        **_WHOLE_CHART,
+    )
+    for code, hatch, _ in _HATCHED:
+        here = is_block & (found.state_code == code)
+        if here.any():
+            axes.contourf(
+                nodes,
+                nodes,
+                here.astype(float),
+                levels=[0.5, 1.5],
+                colors="none",
+                hatches=[hatch],
+                zorder=2,
+            ).set_edgecolor("#777777")
+    for code in range(len(MODES)):
+        here = is_block & (found.mode_code == code)
+        if here.any():
+            axes.contour(
+                nodes, nodes, here.astype(float), levels=[0.5], colors="black", linewidths=1.2,
+                zorder=3,
+            )  # fmt: skip
+
+
+def _draw_yields(
+    axes: Axes, nodes: FloatArray, is_block: NDArray[np.bool_], found: StabilityArray
+) -> None:
+    # Mode by mode: between topple and confined topple the yield jumps.
+    for code, mode in enumerate(MODES):
+        here = is_block & (found.mode_code == code) & (found.state_code == STABLE)
+        values = found.yield_acceleration
+        if not here.any() or np.ptp(values[here]) < 1e-9:
+            continue
+        lines = axes.contour(
+            nodes,
+            nodes,
+            np.ma.masked_where(~here, values),
+            levels=_LEVELS if np.ptp(values[here]) > _NARROW_G else _FINE_LEVELS,
+            colors=COLOURS[mode],
+            linewidths=1.0,
+            zorder=3,
+        )
+        axes.clabel(lines, fontsize=7.5, fmt="%g", inline_spacing=3)
+
+
+def _name_regions(
+    axes: Axes,
+    nodes: FloatArray,
+    is_block: NDArray[np.bool_],
+    found: StabilityArray,
+    back_fracture: bool,
+    covered: NDArray[np.bool_],
+) -> None:
+    for code, mode in enumerate(MODES):
+        region = is_block & (found.mode_code == code)
+        stable = region & (found.state_code == STABLE)
+        # Where no block is drawn, or at least where blocks are stable.
+        for here in (stable & ~covered, stable, region):
+            place = _roomiest(here)
+            if place is not None:
+                break
+        else:
+            continue
+        text = words(mode)
+        if mode == "slump" and not back_fracture:
+            text = "turns back\nabout the heel"
+        values = found.yield_acceleration[stable]
+        if values.size and np.ptp(values) < 1e-9:
+            text += f"\n{values[0]:.3f} g"
+        axes.text(
+            nodes[place[1]],
+            nodes[place[0]],
+            text,
+            ha="center",
+            va="center",
+            fontsize=10,
+            bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "alpha": 0.75, "lw": 0},
+            zorder=6,
+        )
+
+
+def _explain_hatches(axes: Axes, is_block: NDArray[np.bool_], found: StabilityArray) -> None:
+    from matplotlib.patches import Patch
+
+    patches = [
+        Patch(facecolor="white", edgecolor="#777777", hatch=hatch, label=text)
+        for code, hatch, text in _HATCHED
+        if np.any(is_block & (found.state_code == code))
+    ]
+    if patches:
+        axes.legend(
+            handles=patches,
+            loc="lower right",
+            fontsize=9,
+            frameon=False,
+            handlelength=2.2,
+            handleheight=1.4,
+        ).set_zorder(8)
+
+
+def _roomiest(here: NDArray[np.bool_]) -> tuple[int, int] | None:
+    """Return the place of a region that is furthest from its rim; None if it is too small."""
+    if np.count_nonzero(here) * _STEP_DEG**2 < 60.0:
+        return None
+    from scipy.ndimage import distance_transform_edt
+
+    distance: Any = distance_transform_edt(np.pad(here, 1))
+    row, column = np.unravel_index(int(np.argmax(distance)), distance.shape)
+    return int(row) - 1, int(column) - 1
+
+
+def _draw_blocks(
+    axes: Axes, nodes: FloatArray, a1: FloatArray, a3: FloatArray
+) -> NDArray[np.bool_]:
+    """Draw the blocks; return where they cover the chart."""
+    edges = np.arange(-90.0, 90.0 + CELL_DEG, CELL_DEG)
+    counts = np.histogram2d(a3, a1, bins=(edges, edges))[0]
+    per_cell = np.searchsorted(edges, nodes) - 1
+    covered: NDArray[np.bool_] = (counts > 0.0)[np.ix_(per_cell, per_cell)]
+    if a1.size <= MOST_POINTS:
+        axes.plot(a1, a3, "o", ms=4, mfc="white", mec="black", mew=0.8, zorder=7)
+        return covered
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    greys = ListedColormap(colormaps["Greys"](np.linspace(0.25, 0.95, 256)))
+    cells = axes.imshow(
+        np.ma.masked_equal(counts, 0.0), cmap=greys, zorder=2.5, alpha=0.85, **_WHOLE_CHART
+    )
+    axes.figure.colorbar(
+        cells, ax=axes, label=f"blocks per cell of {CELL_DEG:g}° x {CELL_DEG:g}°", shrink=0.8
+    )
+    return covered

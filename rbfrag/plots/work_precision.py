@@ -1,0 +1,113 @@
+"""The work-precision plot: time of a run against its error, both logarithmic."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Protocol
+
+from rbfrag.plots.canvas import new_figure, save_figure
+
+ROUNDING = 1e-16
+"""Errors below are drawn here: nothing smaller can be told apart."""
+
+OURS = ("#08306b", "#2171b5", "#6baed6")
+PEERS = ("#7f7f7f", "#e08214", "#b35806", "#8c6d31", "#c44e52", "#7b3294")
+MARKERS = ("s", "D", "^", "v", "P", "X")
+
+
+class Point(Protocol):
+    """What the figure needs to know of one method at one setting."""
+
+    @property
+    def family(self) -> str:
+        """Method; its settings are joined by a line."""
+
+    @property
+    def setting(self) -> str:
+        """Setting, written beside the point."""
+
+    @property
+    def of_use(self) -> bool:
+        """The setting that users get."""
+
+    @property
+    def wrong(self) -> int:
+        """Wrong outcomes."""
+
+    @property
+    def error_median(self) -> float | None:
+        """Median relative error."""
+
+    @property
+    def error_worst(self) -> float | None:
+        """Greatest relative error."""
+
+    @property
+    def time_s(self) -> float:
+        """Median time [s]."""
+
+
+def plot_work_precision(
+    points: Sequence[Point], path: str | os.PathLike[str], *, title: str = ""
+) -> None:
+    """Draw time against error, a marker per method and setting, and write it to `path`.
+
+    The marker is at the median error, a thin bar reaches to the worst. Open markers had
+    wrong outcomes, which no error tells of.
+
+    Args:
+        points: measured methods.
+        path: .png, .pdf or .svg.
+        title: written above.
+
+    Raises:
+        InputError: an unknown suffix, a folder that cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    figure = new_figure(width_in=8.0, height_in=5.4)
+    axes = figure.subplots()
+    families = list(dict.fromkeys(point.family for point in points))
+    ours = peers = 0
+    for family in families:
+        if family.startswith("rbfrag"):
+            color, marker = OURS[ours % len(OURS)], "o"
+            ours += 1
+        else:
+            color = PEERS[peers % len(PEERS)]
+            marker = MARKERS[peers % len(MARKERS)]
+            peers += 1
+        line = sorted(
+            (p for p in points if p.family == family and p.error_median is not None),
+            key=lambda p: (p.time_s, p.setting),
+        )
+        error = [max(p.error_median or 0.0, ROUNDING) for p in line]
+        worst = [max(p.error_worst or 0.0, ROUNDING) for p in line]
+        time_s = [p.time_s for p in line]
+        axes.plot(error, time_s, color=color, lw=1.0, zorder=2)
+        axes.hlines(time_s, error, worst, color=color, lw=0.8, alpha=0.4, zorder=1)
+        axes.scatter(
+            error, time_s, marker=marker, s=30, edgecolors=color, zorder=3, label=family,
+            c=["white" if p.wrong else color for p in line],
+        )  # fmt: skip
+        for p, x, y in zip(line, error, time_s, strict=True):
+            label = p.setting.removeprefix("order ").removeprefix("rtol ")
+            axes.annotate(
+                label, (x, y), xytext=(4, 4), textcoords="offset points", fontsize=6.5, color=color
+            )
+            if p.of_use:
+                axes.scatter([x], [y], s=150, facecolors="none", edgecolors="black", zorder=4)
+                axes.annotate(
+                    "as used", (x, y), xytext=(0, -15), textcoords="offset points", ha="center",
+                    fontsize=8,
+                )  # fmt: skip
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.invert_xaxis()
+    axes.set_xlabel("relative error of the peak rotation: median (marker) to worst (bar)")
+    axes.set_ylabel("median time of one run [s]")
+    axes.grid(visible=True, which="major", lw=0.3, alpha=0.6)
+    axes.legend(fontsize=7.5, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
+    if title:
+        axes.set_title(title, fontsize=10)
+    save_figure(figure, path)

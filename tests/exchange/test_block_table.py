@@ -1,0 +1,149 @@
+"""Tables go to disk and come back to the bit, whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rbfrag.errors import InputError
+from rbfrag.exchange import block_table
+from rbfrag.exchange.block_columns import read_columns
+from rbfrag.exchange.block_table import write_block_table
+
+TABLE = {
+    "block_id": np.arange(1, 4),
+    "kr": np.array([0.1, math.nan, -math.inf]),
+    "mode": np.array(["topple", "", "slide"], dtype=object),
+    "in_domain": np.array([True, False, False]),
+    "reason": np.array(["", 'a, "b"', "no block; too thin"], dtype=object),
+}
+KINDS = (".csv", ".parquet")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+# The first call loads pyarrow, which takes as long as it takes.
+@settings(deadline=None)
+@given(values=st.lists(st.floats(width=64), min_size=1, max_size=30))
+def test_numbers_come_back_to_the_bit(
+    kind: str, values: list[float], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    path = tmp_path_factory.mktemp("table") / f"a{kind}"
+    column = np.array(values)
+    write_block_table({"kr": column, "other": np.zeros(column.size)}, path)
+    found = read_columns(path, ("kr",))["kr"]
+    assert np.array_equal(found, column, equal_nan=True)
+    fine = ~np.isnan(column)
+    assert np.array_equal(np.signbit(found[fine]), np.signbit(column[fine]))
+
+
+def test_cells_of_a_csv(tmp_path: Path) -> None:
+    path = write_block_table(TABLE, tmp_path / "a.csv")
+    with path.open(newline="") as file:
+        rows = list(csv.reader(file))
+    assert rows == [
+        list(TABLE),
+        ["1", "0.1", "topple", "true", ""],
+        ["2", "", "", "false", 'a, "b"'],
+        ["3", "-inf", "slide", "false", "no block; too thin"],
+    ]
+
+
+def test_columns_of_a_parquet_file(tmp_path: Path) -> None:
+    from pyarrow import parquet
+
+    path = write_block_table(TABLE, tmp_path / "a.parquet")
+    table = parquet.read_table(path)
+    assert [str(kind) for kind in table.schema.types] == [
+        "int64", "double", "string", "bool", "string",
+    ]  # fmt: skip
+    assert table.to_pydict()["kr"] == [0.1, None, -math.inf]
+    assert table.to_pydict()["reason"] == TABLE["reason"].tolist()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_failure_keeps_the_older_file(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / f"a{kind}"
+    path.write_text("older")
+
+    def fail(columns: object, place: Path) -> None:
+        place.write_text("half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(block_table, "_write_csv", fail)
+    monkeypatch.setattr(block_table, "_write_parquet", fail)
+    with pytest.raises(InputError, match="No space left"):
+        write_block_table(TABLE, path)
+    assert path.read_text() == "older"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("name", ["a", "a.xlsx", "none/a.csv"])
+def test_places_that_cannot_be_written(tmp_path: Path, name: str) -> None:
+    with pytest.raises(InputError, match="table "):
+        write_block_table(TABLE, tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("a.csv", b"kr,p2\n0.1,3\n0.1\n", "line 3: 1 cells under 2 columns"),
+        ("a.csv", b"kr,p2\n0.1,3\nx,3\n", "line 3: kr = 'x' is not a number"),
+        ("a.csv", b"p2\n3\n", "no column kr; the columns are p2"),
+        ("a.csv", b"", "no column kr; the columns are none"),
+        ("a.csv", b"kr\n\xff\n", "not a text file"),
+        ("a.parquet", b"kr\n0.1\n", "not a Parquet file"),
+        ("a.txt", b"kr\n0.1\n", "ends in .csv or .parquet"),
+    ],
+)
+def test_tables_that_cannot_be_read(tmp_path: Path, name: str, content: bytes, words: str) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError, match=words):
+        read_columns(tmp_path / name, ("kr",))
+
+
+def test_missing_tables_and_columns(tmp_path: Path) -> None:
+    for kind in KINDS:
+        with pytest.raises(InputError, match="no such file"):
+            read_columns(tmp_path / f"none{kind}", ("kr",))
+    path = write_block_table(TABLE, tmp_path / "a.parquet")
+    with pytest.raises(InputError, match="no column p2; the columns are block_id, kr"):
+        read_columns(path, ("p2",))
+    with pytest.raises(InputError, match="not a Parquet file of numbers"):
+        read_columns(path, ("mode",))
+
+
+def test_without_pyarrow_the_extra_is_named(tmp_path: Path) -> None:
+    program = """
+import sys
+sys.modules["pyarrow"] = None
+from rbfrag.errors import MissingExtraError
+from rbfrag.exchange.block_columns import read_columns
+from rbfrag.exchange.block_table import table_path
+table_path("a.csv")
+for act in (lambda: table_path("a.parquet"), lambda: read_columns("a.parquet", ("kr",))):
+    try:
+        act()
+    except MissingExtraError as error:
+        print(error)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent.parent.parent)},
+    )
+    assert done.stdout.count("pip install 'rbfrag[parquet]'") == 2, done.stderr

@@ -1,0 +1,99 @@
+"""The chart of modes shows what the solver says, and the blocks where they belong."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rbfrag.errors import InputError
+from rbfrag.plots import modes as module
+from rbfrag.plots.modes import MOST_POINTS, plot_modes
+from rbfrag.solver.block import Block
+from rbfrag.solver.mechanism import MODES
+from rbfrag.solver.stability import stability
+
+
+def images(figure):
+    return list(figure.axes[0].images)
+
+
+def names(figure):
+    return [t for t in figure.axes[0].texts if t.get_bbox_patch() is not None]
+
+
+@pytest.mark.parametrize("back", [True, False])
+@pytest.mark.parametrize(("phi", "beta"), [(35.0, 0.0), (20.0, 10.0), (50.0, -15.0)])
+def test_the_regions_are_the_modes_of_the_solver(phi, beta, back, tmp_path, caught, overlapping):
+    figures = caught(module)
+    plot_modes(tmp_path / "a.png", phi_deg=phi, beta_deg=beta, back_fracture=back)
+    (figure,) = figures
+    (image,) = images(figure)
+    shown = image.get_array()
+    size = shown.shape[0]
+    random = np.random.default_rng(1)
+    for _ in range(300):
+        i1, i3 = random.integers(0, size, 2)
+        a1, a3 = (-90.0 + 180.0 * (i + 0.5) / size for i in (i1, i3))
+        if a1 >= a3:
+            assert shown.mask[i3, i1]
+            continue
+        found = stability(
+            Block.from_angles(a1, a3, 1.0), beta_deg=beta, phi_deg=phi, back_fracture=back
+        )
+        assert MODES[shown[i3, i1]] == found.mode
+    texts = [t.get_text() for t in names(figure)]
+    assert {"topple"} < set(texts)
+    assert any(t.startswith("slide\n") and t.endswith(" g") for t in texts)
+    assert ("confined topple" in texts) == back
+    assert ("slump" in texts) == back
+    assert f"{phi:g}°" in figure.get_suptitle()
+    axes = figure.axes[0]
+    assert "°" in axes.get_xlabel()
+    assert "°" in axes.get_ylabel()
+    assert overlapping(figure, [*names(figure), *axes.get_legend().get_texts()]) == []
+
+
+def test_a_name_stands_in_its_region(tmp_path, caught):
+    figures = caught(module)
+    plot_modes(tmp_path / "a.png", phi_deg=35.0, beta_deg=20.0)
+    for text in names(figures[0]):
+        a1, a3 = text.get_position()
+        found = stability(Block.from_angles(a1, a3, 1.0), beta_deg=20.0, phi_deg=35.0)
+        assert text.get_text().split("\n")[0] == found.mode.replace("_", " ")
+        assert found.state == "stable"
+
+
+def test_a_few_blocks_are_points_and_many_a_histogram(tmp_path, caught):
+    figures = caught(module)
+    a1 = np.random.default_rng(1).uniform(-30.0, 10.0, MOST_POINTS + 1)
+    a3 = a1 + 25.0
+    for count in (3, MOST_POINTS, MOST_POINTS + 1):
+        plot_modes(tmp_path / "a.png", phi_deg=35.0, alpha1_deg=a1[:count], alpha3_deg=a3[:count])
+    few, most, many = figures
+    for figure, count in ((few, 3), (most, MOST_POINTS)):
+        points = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
+        assert [line.get_xdata().size for line in points] == [count]
+        assert len(images(figure)) == 1
+    _, counts = images(many)
+    assert counts.get_array().sum() == MOST_POINTS + 1
+    row, column = np.argwhere(~np.ma.getmaskarray(counts.get_array()))[0]
+    low1, low3 = -90.0 + 2.0 * column, -90.0 + 2.0 * row
+    inside = (a1 >= low1) & (a1 < low1 + 2.0) & (a3 >= low3) & (a3 < low3 + 2.0)
+    assert counts.get_array()[row, column] == inside.sum() > 0
+    assert "blocks per cell" in many.axes[1].get_ylabel()
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"phi_deg": 90.0}, "phi_deg"),
+        ({"phi_deg": float("nan")}, "phi_deg"),
+        ({"phi_deg": 35.0, "beta_deg": 95.0}, "beta_deg"),
+        ({"phi_deg": 35.0, "phi_back_deg": -1.0}, "phi_back_deg"),
+        ({"phi_deg": 35.0, "alpha1_deg": [1.0, 2.0], "alpha3_deg": [3.0]}, "equal length"),
+    ],
+)
+def test_refusals_leave_no_file(changes, words, tmp_path):
+    with pytest.raises(InputError, match=words):
+        plot_modes(tmp_path / "a.png", **changes)
+    assert list(tmp_path.iterdir()) == []
