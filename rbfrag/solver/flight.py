@@ -240,8 +240,9 @@ def fly(
                     c += c_change
                     rate = u_end * per_ph
                     u_now = u_end
-                    if c <= 0.0 and s < 0.0:  # more than 90 degrees past its balance point
-                        return TOPPLED, i, min(at + part, 1.0), theta, rate, s, c, steps
+                if s < 0.0 and rate > 0.0 and piece < pieces - 1 and s < c * tail_min_q[i]:
+                    # in a long interval the block could swing right round before its end
+                    return TOPPLED, i, at + part, theta, rate, s, c, steps
         if end < 1.0:
             return STOPPED, i, end, theta, rate, s, c, steps
         i += 1

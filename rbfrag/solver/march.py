@@ -250,7 +250,7 @@ def march(
             patience = patience * 8.0 if before == n_fine + n * n_failing else 2.0
             continue
         topples_at = math.nan
-        if what == ALL_SAFE or what == ALL_TOPPLE:
+        if what in (ALL_SAFE, ALL_TOPPLE):
             answer = SAFE if what == ALL_SAFE else TOPPLES
             width = min(2.0 * (hi - lo), 0.2 * lo)
             share = min(1.3 * share, 0.9)
