@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import typer
+
 from rbfrag.cli import options
 from rbfrag.cli.motion_argument import find_motion
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
@@ -22,6 +26,10 @@ def critical(
     vertical: options.Vertical = None,
     reverse: options.Reverse = False,
     linear: options.Linear = False,
+    full_map: Annotated[
+        bool,
+        typer.Option("--map", help="Map every toppling and safe interval of k_r/PGA down to 0.01."),
+    ] = False,
     units: options.Units = None,
     dt: options.Dt = None,
     db: options.Db = None,
@@ -29,7 +37,7 @@ def critical(
 ) -> None:
     """Find the largest k_r/PGA that one accelerogram topples, with its bracket."""
     from rbfrag.solver.critical import critical as search
-    from rbfrag.solver.critical_report import as_dict
+    from rbfrag.solver.critical_report import as_dict, map_rows
 
     ground = find_motion(motion, db=db, units=units, dt_s=dt)
     upward = find_motion(vertical, db=db, units=units, dt_s=dt) if vertical else None
@@ -39,12 +47,18 @@ def critical(
         vertical=upward,
         polarity="reverse" if reverse else "forward",
         linear=linear,
+        full_map=full_map,
     )
     answer = as_dict(result)
+    if full_map:
+        answer["map"] = map_rows(result)
     if json:
         print_json(answer)
         return
     answer.pop("warnings")
+    rows = answer.pop("map", [])
     print_pairs(answer)
     print(f"{result.status}: {STATUS[result.status]}")
+    for row in rows:
+        print(f"{row['k_lo']:.12f}  {row['k_hi']:.12f}  {row['outcome']}")
     print_warnings(result.warnings)

@@ -29,3 +29,14 @@ def as_dict(result: CriticalResult) -> dict[str, Any]:
         "pga_g": result.pga_g,
         "warnings": list(result.warnings),
     }
+
+
+def map_rows(result: CriticalResult) -> list[dict[str, Any]]:
+    """Return the map of outcomes, one row per interval of k_r/PGA, rising."""
+    found = result.intervals
+    return [
+        {"k_lo": low, "k_hi": high, "outcome": outcome}
+        for low, high, outcome in zip(
+            found.k_lo.tolist(), found.k_hi.tolist(), found.outcome, strict=True
+        )
+    ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Literal
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-NUMERICS_VERSION = "1"
+NUMERICS_VERSION = "2"
 """Changes whenever a run of the same input may give other bits; part of every stored key."""
 
 Polarity = Literal["forward", "reverse"]
@@ -110,7 +110,7 @@ class Response:
 
 @dataclass(frozen=True, eq=False)
 class SearchPoints:
-    """Every simulation of one critical search, by falling k_r/PGA.
+    """Blocks simulated for themselves in one critical search, by falling k_r/PGA.
 
     Args:
         kr_over_pga: block strength over PGA, shape (n,).
@@ -121,6 +121,30 @@ class SearchPoints:
     kr_over_pga: FloatArray
     theta_n: FloatArray
     outcome: tuple[str, ...]
+
+
+IntervalOutcome = Literal["topples", "safe", "undecided"]
+
+
+@dataclass(frozen=True, eq=False)
+class OutcomeIntervals:
+    """What becomes of every block of a range of k_r: a partition, by rising k_r/PGA.
+
+    Args:
+        k_lo: lower ends, k_r/PGA, shape (n,); `k_lo[i + 1] == k_hi[i]`.
+        k_hi: upper ends, k_r/PGA, shape (n,). Nothing above the last one ever lifts.
+        outcome: ``topples`` (every block of the interval), ``safe`` (none) or ``undecided``,
+            length n. The border between two of them is an undecided interval too.
+    """
+
+    k_lo: FloatArray
+    k_hi: FloatArray
+    outcome: tuple[IntervalOutcome, ...]
+
+
+def no_intervals() -> OutcomeIntervals:
+    """Return the map of a search that made none."""
+    return OutcomeIntervals(np.empty(0), np.empty(0), ())
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,15 +164,20 @@ class CriticalResult:
         upper: upper end of the bracket (safe), k_r/PGA.
         kr: the critical k_r itself.
         y_m_s: critical toppling velocity k_r g/p [m/s].
-        certified: True when every k_r above the bracket is proven not to topple.
+        certified: True when every k_r above the bracket is proven not to topple, slivers of
+            the total length `undecided` (at most 1e-9) excepted.
         k_up_over_pga: proven upper bound over fresh starts: nothing above it topples.
         undecided: length of k_r/PGA above `upper` for which safety is not proven.
-        island_width: width in k_r/PGA of the toppling interval that the bracket caps.
+        island_width: width in k_r/PGA of the toppling interval that the bracket caps. Without
+            a full map its lower end is looked for by single blocks.
         kr_over_pga_resolved: the same search with islands narrower than 1e-6 ignored.
-        reentrant: True when a safe island wider than 1e-6 lies below the critical value.
+        reentrant: True when a safe island wider than 1e-6 lies below the critical value. With
+            a full map False is proven; otherwise it means that none was met.
         n_runs: number of simulations made.
         warnings: sentences about suspicious input or an uncertain answer.
-        points: every simulated point.
+        points: the blocks that were simulated for themselves.
+        intervals: what the search proved: the whole range from the search limit upwards if a
+            full map was asked for, otherwise the part from the bracket upwards.
     """
 
     p2: float
@@ -171,3 +200,4 @@ class CriticalResult:
     n_runs: int
     warnings: tuple[str, ...]
     points: SearchPoints
+    intervals: OutcomeIntervals = field(default_factory=no_intervals)

@@ -210,7 +210,7 @@ def run_toppling(
                 w0 = w[i] + (w[i + 1] - w[i]) * at
                 steps += 1
                 if order == 8 and not linear:
-                    turned, u_end, v_end = step8(u, ph, rate, s[0], c[0], a0, da, w0, dw)
+                    turned, u_end, v_end = step8(u, ph * rate, ph, s[0], c[0], a0, da, w0, dw)
                 else:
                     u[0] = ph * rate
                     fill_coefficients(u, s, c, order, ph * ph, a0, da, w0, dw, linear)

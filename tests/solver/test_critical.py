@@ -75,18 +75,13 @@ def test_nothing_topples_above_a_certified_bracket(
     assert result.upper <= result.k_up_over_pga
 
 
-def test_an_uncertified_answer_says_how_much_is_not_proven() -> None:
-    uncertified = 0
+def test_every_answer_within_reach_of_the_proof_is_certified() -> None:
     for seed in range(40):
         result = critical(shaking(seed), p2=10.0)
-        if result.status != "found" or result.certified:
-            continue
-        uncertified += 1
-        assert result.k_up_over_pga is not None
-        assert result.upper is not None
-        assert result.undecided == pytest.approx(result.k_up_over_pga - result.upper)
-        assert any("not certified" in sentence for sentence in result.warnings)
-    assert uncertified > 0
+        assert result.certified
+        assert result.undecided is not None
+        assert result.undecided <= 1e-9
+        assert not any("not certified" in sentence for sentence in result.warnings)
 
 
 def test_safe_island_below_the_critical_value_is_reported() -> None:
@@ -100,12 +95,15 @@ def test_safe_island_below_the_critical_value_is_reported() -> None:
     floor = result.lower - result.island_width
     assert outcome(motion, floor + 1e-9, 10.0) is Outcome.TOPPLED
     assert outcome(motion, floor - 1e-9, 10.0) is Outcome.STABLE
+    mapped = critical(motion, p2=10.0, full_map=True)
     weaker = [
-        o
-        for ratio, o in zip(result.points.kr_over_pga, result.points.outcome, strict=True)
-        if ratio < floor
+        what
+        for high, what in zip(mapped.intervals.k_hi, mapped.intervals.outcome, strict=True)
+        if high <= floor
     ]
-    assert {"toppled", "stable"} <= set(weaker)
+    assert {"topples", "safe"} <= set(weaker)
+    assert mapped.reentrant
+    assert mapped.island_width == pytest.approx(result.island_width, abs=1e-8)
 
 
 def test_one_pulse_has_no_safe_island() -> None:

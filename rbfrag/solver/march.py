@@ -1,0 +1,321 @@
+"""Marching down through k_r: verdict after verdict, each for all blocks of an interval."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.solver.compiled import kernel
+from rbfrag.solver.envelopes import ALL_SAFE, ALL_TOPPLE, NO_ORDER, SPLIT, decide
+from rbfrag.solver.follow import follow
+from rbfrag.solver.renewal import fresh_starts, last_failing_end, last_rest
+from rbfrag.solver.upper_bound import between
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SAFE, TOPPLES, UNKNOWN, ORDERLESS = 0, 1, 2, 3
+
+BORDER = 1e-12
+"""Relative width to which a border between two single blocks is closed in on."""
+
+TO_BRACKET, TO_ISLANDS, TO_BOTTOM = 0, 1, 2
+
+
+@kernel
+def border(
+    time_s: FloatArray,
+    interval_s: FloatArray,
+    k_h: FloatArray,
+    w: FloatArray,
+    q: FloatArray,
+    tail_min_q: FloatArray,
+    block_max_q: FloatArray,
+    still: FloatArray,
+    p: float,
+    ph_max: float,
+    linear: bool,
+    lo: float,
+    at_lo: float,
+    hi: float,
+    width: float,
+    rest: int,
+    failing_end: int,
+    u: FloatArray,
+    us: FloatArray,
+    uc: FloatArray,
+) -> tuple[float, float, int, int]:
+    """Close in on a border between two k_r of which one topples and the other does not.
+
+    Returns:
+        A k_r on the side of `lo` and one on the side of `hi`, a relative `width` apart; runs,
+        steps.
+    """
+    low_topples = at_lo > 0.0
+    at_hi = math.inf if at_lo < 0.0 else -math.inf
+    runs = 0
+    steps = 0
+    tries = 0
+    gauge = hi - lo
+    slow = True
+    side = 0
+    while hi - lo > width * hi:
+        k = between(lo, hi, at_lo, at_hi, side, 0.25 * width * hi, slow)
+        far, made = follow(
+            time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear, k,
+            rest, failing_end, u, us, uc,
+        )  # fmt: skip
+        runs += 1
+        steps += made
+        if (far > 0.0) == low_topples:
+            lo = k
+            at_lo = far
+            if side > 0:
+                at_hi *= 0.5
+            side = 1
+        else:
+            hi = k
+            at_hi = far
+            if side < 0:
+                at_lo *= 0.5
+            side = -1
+        slow = math.isinf(at_hi)
+        tries += 1
+        if tries == 3:
+            tries = 0
+            slow = slow or hi - lo > 0.125 * gauge
+            gauge = hi - lo
+    return lo, hi, runs, steps
+
+
+@kernel
+def march(
+    time_s: FloatArray,
+    interval_s: FloatArray,
+    k_h: FloatArray,
+    w: FloatArray,
+    q: FloatArray,
+    tail_min_q: FloatArray,
+    block_max_q: FloatArray,
+    p: float,
+    ph_max: float,
+    linear: bool,
+    top: float,
+    bottom: float,
+    margin: float,
+    depth: float,
+    order_depth: float,
+    still: FloatArray,
+    first_step: float,
+    check: bool,
+    goal: int,
+    resolution: float,
+    max_steps: int,
+    low: FloatArray,
+    high: FloatArray,
+    verdict: IntArray,
+    point: FloatArray,
+) -> tuple[int, float, int, int]:
+    """Give verdicts from `top` downwards until the goal or `bottom` is reached.
+
+    Args:
+        time_s: node times [s], shape (n,).
+        interval_s: as in :func:`rbfrag.solver.flight.fly`; likewise up to `linear`.
+        top: k_r to start from.
+        bottom: k_r to stop at.
+        margin: relative margin on k_r of the enclosing motions.
+        depth: relative width below which an interval is left undecided.
+        order_depth: the same where the order of motions is lost.
+        still: of :func:`rbfrag.solver.upper_bound.linear_drive`.
+        first_step: relative width of the first interval.
+        check: check D >= 0 on the way.
+        goal: TO_BRACKET, TO_ISLANDS or TO_BOTTOM.
+        resolution: width of k_r of the islands that count for TO_ISLANDS.
+        max_steps: integration steps after which the march is given up.
+        low: filled with the lower ends of the intervals, falling.
+        high: filled with their upper ends.
+        verdict: filled with SAFE, TOPPLES, UNKNOWN or ORDERLESS.
+        point: filled with a k_r of an UNKNOWN interval whose block topples, or NaN.
+
+    Returns:
+        Number of intervals, k_r reached, runs, steps.
+    """
+    n = q.size
+    u = np.empty(9)
+    us = np.empty(9)
+    uc = np.empty(9)
+    # fresh starts over the whole record at one k_r, and over the part of it that they leave
+    # open at a greater one
+    coarse = np.empty((4, n), dtype=np.int64)
+    n_coarse = 0
+    coarse_k = math.inf
+    coarse_other = 0.0
+    fine = np.empty((4, n), dtype=np.int64)
+    n_fine = 0
+    fine_k = math.inf
+    n_failing = 0
+    window = 0
+    window_end = 0
+    runs = 0
+    steps = 0
+    count = 0
+    found = False
+    island = 0.0  # width of the toppling interval being passed
+    wide_island = False
+    gap = 0.0  # width of the safe interval being passed below a toppling one
+    wide_gap = False
+    hi = top
+    width = first_step * top
+    steady = width  # width of the last interval that got a verdict
+    side = SAFE
+    share = 0.6
+    patience = 2.0
+    edge_high = top  # a border known by two blocks: one of `side` above, one of the other below
+    edge_low = top
+    edge_point = top
+    clear = max(0.25 * depth, 2.0 * margin)  # of the margins of the enclosing motions
+    far, made = follow(
+        time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear,
+        top * (1.0 - depth), 0, n, u, us, uc,
+    )  # fmt: skip
+    runs += 1
+    steps += made
+    if far > 0.0:
+        edge_point, _, made_runs, made = border(
+            time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear,
+            top * (1.0 - depth), far, top, BORDER, 0, n, u, us, uc,
+        )  # fmt: skip
+        runs += made_runs
+        steps += made
+        edge_low = edge_point - clear * top
+    while hi > bottom and steps < max_steps and count < low.size - 1:
+        if hi == edge_high and edge_low < hi:
+            high[count] = hi
+            low[count] = edge_low
+            verdict[count] = UNKNOWN
+            point[count] = edge_point if side == SAFE else math.nan
+            count += 1
+            side = TOPPLES if side == SAFE else SAFE
+            hi = edge_low
+            width = min(steady, 0.2 * hi)
+            if side == TOPPLES:
+                found = True
+                if goal == TO_BRACKET:
+                    break
+            continue
+        lo = max(hi - width, bottom)
+        if lo < bottom * (1.0 + 0.1 * depth):
+            lo = bottom
+        if lo < edge_high < hi:
+            # towards a border the distance left is shared out: all of it at once seldom works
+            lo = edge_high
+            if hi - lo > 3.0 * depth * hi:
+                lo = hi - share * (hi - lo)
+        if lo < coarse_k or (check and hi > coarse_other):
+            coarse_k = max(bottom, lo - 0.5 * (hi - lo) - 0.1 * hi)
+            coarse_other = hi * (1.0 + margin)
+            n_coarse, _, made = fresh_starts(
+                interval_s, k_h, w, q, tail_min_q, block_max_q, p, ph_max, linear, coarse_k,
+                coarse_k * (1.0 - margin), coarse_other, check, 0, n, coarse, u, us, uc,
+            )  # fmt: skip
+            runs += n_coarse
+            steps += made
+            fine_k = math.inf
+            window, _ = last_rest(coarse, n_coarse, 0, 0, 0)
+            window_end = last_failing_end(coarse, n_coarse)
+        if lo >= fine_k:
+            what, peak, made_runs, made = decide(
+                interval_s, k_h, w, q, tail_min_q, block_max_q, p, ph_max, linear, lo, hi, margin,
+                check, fine, n_fine, window, u, us, uc,
+            )  # fmt: skip
+        else:
+            what, peak, made_runs, made = decide(
+                interval_s, k_h, w, q, tail_min_q, block_max_q, p, ph_max, linear, lo, hi, margin,
+                check, coarse, n_coarse, 0, u, us, uc,
+            )  # fmt: skip
+        runs += made_runs
+        steps += made
+        scanned = fine_k if lo >= fine_k else coarse_k
+        if what == SPLIT and not (lo < peak < hi) and lo - scanned > patience * (hi - lo):
+            before = n_fine + n * n_failing
+            fine_k = max(lo - 0.5 * (hi - lo), coarse_k)
+            n_fine, n_failing, made = fresh_starts(
+                interval_s, k_h, w, q, tail_min_q, block_max_q, p, ph_max, linear, fine_k,
+                fine_k * (1.0 - margin), coarse_other, check, window, window_end, fine, u, us, uc,
+            )  # fmt: skip
+            runs += n_fine
+            steps += made
+            patience = patience * 8.0 if before == n_fine + n * n_failing else 2.0
+            continue
+        topples_at = math.nan
+        if what in (ALL_SAFE, ALL_TOPPLE):
+            answer = SAFE if what == ALL_SAFE else TOPPLES
+            width = min(2.0 * (hi - lo), 0.2 * lo)
+            share = min(1.3 * share, 0.9)
+            if not (edge_high < hi):
+                steady = width
+            side = answer
+        elif lo < peak < hi:
+            width = hi - peak
+            continue
+        elif hi - lo > (order_depth if what == NO_ORDER else depth) * hi:
+            if what == SPLIT and not (lo <= edge_high < hi):
+                # is a border the reason? then verdicts can go as far as that
+                far, made = follow(
+                    time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max,
+                    linear, lo, window, window_end, u, us, uc,
+                )  # fmt: skip
+                runs += 1
+                steps += made
+                if (far > 0.0) == (side == SAFE):
+                    edge_point, edge_high, made_runs, made = border(
+                        time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max,
+                        linear, lo, far, hi, BORDER, window, window_end, u, us, uc,
+                    )  # fmt: skip
+                    runs += made_runs
+                    steps += made
+                    edge_low = max(edge_point - clear * hi, lo)
+                    edge_high = min(edge_high + clear * hi, hi)
+                    width = hi - edge_high
+                    share = 0.6
+                    continue
+            width = 0.5 * (hi - lo)
+            share *= 0.5
+            continue
+        else:
+            answer = ORDERLESS if what == NO_ORDER else UNKNOWN
+            width = hi - lo
+            if not found:
+                far, made = follow(
+                    time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max,
+                    linear, lo, window, window_end, u, us, uc,
+                )  # fmt: skip
+                runs += 1
+                steps += made
+                if far > 0.0:
+                    topples_at = lo
+        if count > 0 and verdict[count - 1] == answer and answer != UNKNOWN:
+            low[count - 1] = lo
+        else:
+            high[count] = hi
+            low[count] = lo
+            verdict[count] = answer
+            point[count] = topples_at
+            count += 1
+        if answer == TOPPLES:
+            found = True
+            island = island + hi - lo
+            wide_island = wide_island or island > resolution
+            gap = 0.0
+        elif answer == SAFE:
+            island = 0.0
+            if found:
+                gap = gap + hi - lo
+                wide_gap = wide_gap or gap > resolution
+        found = found or topples_at == lo
+        hi = lo
+        if found and (goal == TO_BRACKET or (goal == TO_ISLANDS and wide_island and wide_gap)):
+            break
+    return count, hi, runs, steps

@@ -1,0 +1,322 @@
+"""K_up: no block with a larger k_r topples, because no fresh excursion of one does."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.solver.compiled import kernel
+from rbfrag.solver.flight import TOPPLED, fly, rest_state
+from rbfrag.solver.follow import linear_distance
+from rbfrag.solver.renewal import END, FAILS, FIRST, fresh_starts
+from rbfrag.solver.rises import next_start
+from rbfrag.solver.toppling import next_lifting_node
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+NOTHING_FAILS, FOUND, AT_THE_TOP = 0, 1, 2
+
+
+@kernel
+def linear_drive(
+    interval_s: FloatArray, k_h: FloatArray, p: float, still: FloatArray
+) -> tuple[float, int]:
+    """Fill what of the drive is still to come; return its maximum and the node after it.
+
+    `still` at a node is G(t) = p integral_t^inf k_h(s) exp(-p (s - t)) ds, by G' = p (G - k_h)
+    from the end backwards. In the linear model without vertical motion a block topples from
+    (theta, theta') if theta'/p + G > theta_c - theta; the maximum of G, which may lie inside
+    an interval where G = k_h, is the largest critical angle over all fresh starts.
+    """
+    g = 0.0
+    greatest = 0.0
+    where = 0
+    h = -1.0
+    decay = 0.0
+    still[k_h.size - 1] = 0.0
+    for i in range(interval_s.size - 1, -1, -1):
+        if interval_s[i] != h:
+            h = interval_s[i]
+            decay = math.exp(-p * h)
+        if h > 0.0:
+            slope = (k_h[i + 1] - k_h[i]) / h
+            rest = g - k_h[i + 1] - slope / p  # times exp(-p (t_end - t))
+            # G turns where slope + p rest exp(-p (t_end - t)) = 0
+            if slope > 0.0 and rest < 0.0:
+                faded = -slope / (p * rest)
+                if decay < faded <= 1.0:
+                    turn = k_h[i + 1] + slope * math.log(faded) / p
+                    if turn > greatest:
+                        greatest = turn
+                        where = i + 1
+            g = k_h[i] + slope / p + rest * decay
+        still[i] = g
+        if g > greatest:
+            greatest = g
+            where = i
+    return greatest, where
+
+
+@kernel
+def fresh_margin(
+    time_s: FloatArray,
+    interval_s: FloatArray,
+    k_h: FloatArray,
+    w: FloatArray,
+    q: FloatArray,
+    tail_min_q: FloatArray,
+    still: FloatArray,
+    p: float,
+    ph_max: float,
+    linear: bool,
+    kr: float,
+    k_ahead: float,
+    first: int,
+    stop: int,
+    block_max_q: FloatArray,
+    u: FloatArray,
+    us: FloatArray,
+    uc: FloatArray,
+) -> tuple[float, int, int]:
+    """How far the fresh excursions that begin in [first, stop) are from toppling.
+
+    Positive if one topples. The size is the linear model's estimate of the distance in k_r:
+    good for a secant, and nothing is concluded from it.
+    """
+    n = q.size
+    s0, c0 = rest_state(k_ahead, linear)
+    best = -math.inf
+    steps = 0
+    flights = 0
+    node = next_lifting_node(q, block_max_q, first, stop, kr)
+    while node > 0 and node < stop and q[node - 1] > kr:
+        node -= 1
+    while node < stop:
+        i, tau = next_start(k_h, w, q, block_max_q, kr, max(node - 1, 0), 0.0)
+        if i >= n:
+            break
+        event, at, fraction, _, rate, s, c, made = fly(
+            interval_s, k_h, w, tail_min_q, p, ph_max, linear, k_ahead, i, tau,
+            0.0, 0.0, s0, c0, True, n - 1, 0.0, True, 0, 0.0, u, us, uc,
+        )  # fmt: skip
+        steps += made
+        flights += 1
+        distance = linear_distance(
+            time_s, interval_s, still, p, linear, i, tau, at, fraction, rate, s, c,
+            event == TOPPLED,
+        )  # fmt: skip
+        best = max(best, distance)
+        while node < n and q[node] > kr:
+            node += 1
+        node = next_lifting_node(q, block_max_q, node, stop, kr)
+    if flights == 0:
+        best = -kr
+    return best, flights, steps
+
+
+@kernel
+def between(
+    low: float, high: float, at_low: float, at_high: float, side: int, edge: float, halve: bool
+) -> float:
+    """Next k_r to try between one that topples and one that does not, by false position.
+
+    A little beyond the root as seen from the side of the last one, so that the bracket closes
+    from both sides.
+    """
+    if halve:
+        return 0.5 * (low + high)
+    k = (low * at_high - high * at_low) / (at_high - at_low)
+    return min(max(k + (edge if side > 0 else -edge), low + edge), high - edge)
+
+
+@kernel
+def border_of(
+    time_s: FloatArray,
+    interval_s: FloatArray,
+    k_h: FloatArray,
+    w: FloatArray,
+    q: FloatArray,
+    tail_min_q: FloatArray,
+    block_max_q: FloatArray,
+    still: FloatArray,
+    p: float,
+    ph_max: float,
+    linear: bool,
+    bottom: float,
+    guess: float,
+    top: float,
+    first: int,
+    stop: int,
+    margin: float,
+    width: float,
+    u: FloatArray,
+    us: FloatArray,
+    uc: FloatArray,
+) -> tuple[float, float, bool, int, int]:
+    """Bracket the k_r below which a fresh excursion that begins in [first, stop) topples.
+
+    Returns:
+        A k_r that fails, one that does not (or `top`), whether any fails at all, flights, steps.
+    """
+    low = bottom
+    high = top
+    at_low = math.inf
+    at_high = -math.inf
+    known = False
+    flights = 0
+    steps = 0
+    side = 0
+    tries = 0
+    gauge = top - bottom
+    slow = False
+    reach = 0.004
+    k = guess
+    while high - low > width * high:
+        distance, made_flights, made = fresh_margin(
+            time_s, interval_s, k_h, w, q, tail_min_q, still, p, ph_max, linear, k,
+            k * (1.0 - margin), first, stop, block_max_q, u, us, uc,
+        )  # fmt: skip
+        flights += made_flights
+        steps += made
+        if distance > 0.0:
+            known = True
+            low = k
+            at_low = distance
+            if side > 0:
+                at_high *= 0.5
+            side = 1
+        else:
+            if k <= bottom:
+                return bottom, bottom, known, flights, steps
+            high = k
+            at_high = distance
+            if side < 0:
+                at_low *= 0.5
+            side = -1
+        edge = 0.25 * width * high
+        if at_high == -math.inf or at_low == math.inf:
+            # one side only so far: go on to the other, further each time
+            reach *= 4.0
+            k = low * (1.0 + reach) if at_high == -math.inf else high * (1.0 - reach)
+            if k >= top:
+                k = 0.5 * (low + top)
+            if k <= bottom:
+                k = bottom
+        else:
+            # false position, its ends halved in turn (Illinois); a little beyond the root, so
+            # that the bracket closes from both sides; bisection where that gains too little
+            tries += 1
+            if tries == 3:
+                tries = 0
+                slow = high - low > 0.125 * gauge
+                gauge = high - low
+            k = between(low, high, at_low, at_high, side, edge, slow)
+            slow = False
+    return low, high, known, flights, steps
+
+
+@kernel
+def upper_bound(
+    time_s: FloatArray,
+    interval_s: FloatArray,
+    k_h: FloatArray,
+    w: FloatArray,
+    q: FloatArray,
+    tail_min_q: FloatArray,
+    block_max_q: FloatArray,
+    p: float,
+    ph_max: float,
+    linear: bool,
+    bottom: float,
+    top: float,
+    margin: float,
+    width: float,
+    check: bool,
+    stretches: IntArray,
+    u: FloatArray,
+    us: FloatArray,
+    uc: FloatArray,
+) -> tuple[int, float, float, int, int]:
+    """Find K_up between two k_r.
+
+    Args:
+        time_s: node times [s], shape (n,).
+        interval_s: as in :func:`rbfrag.solver.flight.fly`; likewise up to `linear`.
+        bottom: least k_r of interest.
+        top: greatest q of the record.
+        margin: the excursions are flown with k_r (1 - margin).
+        width: relative width to which K_up is bisected.
+        check: check D >= 0; where it fails the answer is `top`.
+        stretches: work, shape (4, n).
+        u: work of `fly`.
+        us: work of `fly`.
+        uc: work of `fly`.
+
+    Returns:
+        NOTHING_FAILS (no fresh excursion at `bottom` topples), FOUND or AT_THE_TOP;
+        a k_r with a failing fresh excursion and K_up; flights; steps.
+    """
+    n = q.size
+    still = np.empty(n)
+    guess, node = linear_drive(interval_s, k_h, p, still)
+    flights = 0
+    steps = 0
+    count, failing, made = fresh_starts(
+        interval_s, k_h, w, q, tail_min_q, block_max_q, p, ph_max, linear, top,
+        top * (1.0 - margin), top, check, 0, n, stretches, u, us, uc,
+    )  # fmt: skip
+    steps += made
+    flights += count
+    if failing > 0:
+        return AT_THE_TOP, top, top, flights, steps
+    high = top
+    first = 0
+    stop = n
+    low = min(max(guess, bottom), top)
+    known = False
+    if guess > bottom and q[node] > bottom:
+        # the stretch that decides in the linear model is the one to begin with
+        first = node
+        stop = node + 1
+        while stop < n and q[stop] > bottom:
+            stop += 1
+        low, high, known, made_flights, made = border_of(
+            time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear,
+            bottom, min(guess, top), top, first, stop, margin, width, u, us, uc,
+        )  # fmt: skip
+        flights += made_flights
+        steps += made
+    if not known:
+        low = bottom
+        high = bottom
+    while True:
+        # no other stretch may fail at `high`
+        count, failing, made = fresh_starts(
+            interval_s, k_h, w, q, tail_min_q, block_max_q, p, ph_max, linear, high,
+            high * (1.0 - margin), top, check, 0, n, stretches, u, us, uc,
+        )  # fmt: skip
+        flights += count
+        steps += made
+        if failing == 0:
+            return FOUND if known else NOTHING_FAILS, low, high, flights, steps
+        if high >= top:
+            return AT_THE_TOP, top, top, flights, steps
+        known = True
+        first = n
+        stop = 0
+        for m in range(count):
+            if stretches[FAILS, m] == 1:
+                first = min(first, stretches[FIRST, m])
+                stop = max(stop, stretches[END, m])
+        before = high
+        low, high, _, made_flights, made = border_of(
+            time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear,
+            high, high * 1.001, top, first, stop, margin, width, u, us, uc,
+        )  # fmt: skip
+        flights += made_flights
+        steps += made
+        if high <= before:  # it is the order of motions that is lost
+            return AT_THE_TOP, top, top, flights, steps
