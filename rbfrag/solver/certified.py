@@ -28,8 +28,8 @@ ORDERLESS_DEPTH = 1e-3
 FIRST_STEP = 1e-3
 """Relative width of the first interval below K_up."""
 
-STEP_BUDGET = 400_000_000
-"""Integration steps after which a search is given up: about half a minute."""
+STEP_BUDGET = 40_000_000
+"""Integration steps after which a search is given up: about three seconds."""
 
 MAX_INTERVALS = 20_000
 
@@ -68,7 +68,8 @@ class CertifiedMap:
     @property
     def undecided(self) -> NDArray[np.bool_]:
         """Which intervals have no verdict."""
-        return (self.verdict != SAFE) & (self.verdict != TOPPLES)
+        without: NDArray[np.bool_] = (self.verdict != SAFE) & (self.verdict != TOPPLES)
+        return without
 
 
 def keeps_order(drive: Excitation, linear: bool) -> bool:

@@ -11,15 +11,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.certified import CertifiedMap, bracket_of, certified_map
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.islands import islands_by_blocks, islands_of_map, outcome_intervals
-from rbfrag.solver.respond import OUTCOMES, positive, refuse_endless, runner
+from rbfrag.solver.respond import positive, refuse_endless
 from rbfrag.solver.results import (
     RESOLUTION,
     SEARCH_LIMIT,
@@ -31,7 +29,6 @@ from rbfrag.solver.results import (
     no_intervals,
 )
 from rbfrag.solver.scan import BlockScan, scan_down
-from rbfrag.solver.toppling import TOPPLED, Run
 
 SLIVERS = 1e-9
 """Undecided length of k_r/PGA up to which an answer still counts as certified."""
@@ -74,6 +71,7 @@ def critical(
         said += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
     search = _Search(drive, p2, linear, search_limit)
     search.run(full_map)
+    points = search.points()
     found = search.status == "found"
     kr = search.lower * drive.pga_g if found else None
     return CriticalResult(
@@ -94,9 +92,9 @@ def critical(
         island_width=search.island_width,
         kr_over_pga_resolved=search.resolved,
         reentrant=search.reentrant,
-        n_runs=search.n_runs,
+        n_runs=search.n_runs + len(points.outcome),
         warnings=(*said, *search.warnings),
-        points=search.points(),
+        points=points,
         intervals=search.intervals,
     )
 
@@ -121,7 +119,7 @@ class _Search:
         self.intervals: OutcomeIntervals = no_intervals()
         self.warnings: list[str] = []
         self.n_runs = 0
-        self._tried: dict[float, Run] = {}
+        self._scan = BlockScan(drive, p2=p2, linear=linear)
 
     def run(self, full_map: bool) -> None:
         """Make the search; the answer is left in the attributes."""
@@ -143,7 +141,7 @@ class _Search:
         self.n_runs += found.runs
         self.intervals = outcome_intervals(found, pga, drive.max_q)
         bracket = bracket_of(found)
-        scan = BlockScan(drive, p2=self.p2, linear=self.linear)
+        scan = self._scan
         if found.k_up > bottom:
             self.k_up = found.k_up / pga
         if bracket is None:
@@ -152,7 +150,7 @@ class _Search:
         else:
             undecided = bracket[2]
         self.undecided = undecided / pga
-        self.certified = self.undecided <= SLIVERS
+        self.certified = bool(self.undecided <= SLIVERS)
         if not self.certified:
             self._say_why(found)
             bracket = self._by_scan(scan, found, bottom, bracket)
@@ -166,31 +164,13 @@ class _Search:
             islands = islands_of_map(found, lower, resolution)
         else:
             islands = islands_by_blocks(scan, lower, bottom, resolution)
-        self.n_runs += scan.runs
         self.island_width = islands.width / pga
         self.resolved = None if islands.resolved is None else islands.resolved / pga
         self.reentrant = islands.reentrant
 
     def points(self) -> SearchPoints:
-        """Return every simulated point by falling k_r/PGA."""
-        ratios = np.array(sorted(self._tried, reverse=True))
-        runs = [self._tried[float(ratio)] for ratio in ratios]
-        theta_c = ratios * self.drive.pga_g
-        if not self.linear:
-            theta_c = np.arctan(theta_c)
-        return SearchPoints(
-            kr_over_pga=ratios,
-            theta_n=np.array([run.peak_rad for run in runs]) / theta_c,
-            outcome=tuple(OUTCOMES[run.outcome].value for run in runs),
-        )
-
-    def _outcome(self, ratio: float) -> int:
-        run = self._tried.get(ratio)
-        if run is None:
-            simulate = runner(self.drive, p2=self.p2, linear=self.linear)
-            run = self._tried[ratio] = simulate(ratio * self.drive.pga_g)
-            self.n_runs += 1
-        return run.outcome
+        """Return every block that was run itself, by falling k_r/PGA."""
+        return self._scan.points()
 
     def _take_bracket(self, bracket: tuple[float, float, float]) -> None:
         """Run the critical block itself, clear of the error of its run where need be.
@@ -202,10 +182,10 @@ class _Search:
         self.lower, self.upper = bracket[0] / pga, bracket[1] / pga
         for step in (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8):
             ratio = max(self.lower - step * self.upper, self.limit)
-            if self._outcome(ratio) == TOPPLED:
+            if self._scan.topples(ratio * pga):
                 self.lower = ratio
                 break
-        self._outcome(self.upper)
+        self._scan.outcome(self.upper * pga)
 
     def _by_scan(
         self,

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from rbfrag.solver.compiled import kernel
 from rbfrag.solver.flight import (
-    ORDER,
     IN_AIR,
+    ORDER,
     ORDER_LOST,
     RESEATED,
     STOPPED,
@@ -26,9 +26,9 @@ from rbfrag.solver.flight import (
     fly,
     rest_state,
 )
-from rbfrag.solver.taylor import bracketed_root
 from rbfrag.solver.renewal import last_failing_end, last_rest
 from rbfrag.solver.rises import APART, TURNED_BACK, common_start, next_start, restart_floor
+from rbfrag.solver.taylor import bracketed_root
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.solver.compiled import kernel
-from rbfrag.solver.taylor import bracketed_root, fill_coefficients, rotation, lean_step, turn, value
+from rbfrag.solver.taylor import bracketed_root, fill_coefficients, lean_step, rotation, turn, value
 
 FloatArray = NDArray[np.float64]
 
@@ -251,10 +251,7 @@ def fly(
             return TOPPLED, i, tau, theta, rate, s, c, steps
     if i < last or stop_i < last:
         return STOPPED, i, tau, theta, rate, s, c, steps
-    if linear:
-        half = s
-    else:
-        half = 2.0 * math.sin(0.5 * math.atan2(s, c))
+    half = s if linear else 2.0 * math.sin(0.5 * math.atan2(s, c))
     if rate > half:
         return TOPPLED, i, tau, theta, rate, s, c, steps
     return IN_AIR, i, tau, theta, rate, s, c, steps

@@ -45,7 +45,7 @@ def linear_distance(
     start_s = time_s[start_i]
     if start_tau > 0.0:
         start_s += start_tau * interval_s[start_i]
-    distance = (rate + to_come - x) * math.exp(-p * (end_s - start_s))
+    distance: float = (rate + to_come - x) * math.exp(-p * (end_s - start_s))
     if toppled:
         return max(distance, 1e-300)
     return min(distance, -1e-300)
@@ -111,33 +111,3 @@ def follow(
         i = at
         tau = fraction
     return best, steps
-
-
-@kernel
-def first_block(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    still: FloatArray,
-    p: float,
-    ph_max: float,
-    linear: bool,
-    kr: FloatArray,
-    wanted: bool,
-) -> int:
-    """First of the blocks `kr`, shape (m,), that topples (or stays, unless `wanted`); or m."""
-    u = np.empty(9)
-    us = np.empty(9)
-    uc = np.empty(9)
-    for k in range(kr.size):
-        far, _ = follow(
-            time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear,
-            kr[k], 0, q.size, u, us, uc,
-        )  # fmt: skip
-        if (far > 0.0) == wanted:
-            return k
-    return kr.size

@@ -1,16 +1,14 @@
-"""Looking at single blocks: what a search does where nothing can be proven."""
+"""Single blocks, each kept with what it did: where nothing can be proven, and what lies below."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.follow import first_block
-from rbfrag.solver.taylor import PH_MAX
-from rbfrag.solver.upper_bound import linear_drive
+from rbfrag.solver.respond import OUTCOMES, runner
+from rbfrag.solver.results import SearchPoints
+from rbfrag.solver.toppling import TOPPLED, Run
 
 FloatArray = NDArray[np.float64]
 
@@ -31,33 +29,45 @@ class BlockScan:
     """
 
     def __init__(self, drive: Excitation, *, p2: float, linear: bool) -> None:
-        p = math.sqrt(p2)
-        still = np.empty(drive.q.size)
-        linear_drive(drive.interval_s, drive.k_h, p, still)
-        self._record = (
-            drive.time_s,
-            drive.interval_s,
-            drive.k_h,
-            drive.w,
-            drive.q,
-            drive.tail_min_q,
-            drive.block_max_q,
-            still,
-            p,
-            PH_MAX,
-            linear,
-        )
-        self.runs = 0
+        self._drive = drive
+        self._linear = linear
+        self._run = runner(drive, p2=p2, linear=linear)
+        self._tried: dict[float, Run] = {}
+
+    @property
+    def runs(self) -> int:
+        """Number of blocks that were run."""
+        return len(self._tried)
+
+    def outcome(self, kr: float) -> int:
+        """Return the kernel's outcome code of one block, run once and kept."""
+        run = self._tried.get(kr)
+        if run is None:
+            run = self._tried[kr] = self._run(kr)
+        return run.outcome
 
     def first(self, kr: FloatArray, *, topples: bool) -> int | None:
         """Return the number of the first of these blocks that topples (or that stays)."""
-        at: int = first_block(*self._record, kr, topples)
-        self.runs += min(at + 1, kr.size)
-        return None if at == kr.size else at
+        for number, strength in enumerate(kr.tolist()):
+            if self.topples(strength) == topples:
+                return number
+        return None
 
     def topples(self, kr: float) -> bool:
         """Return whether one block topples."""
-        return self.first(np.array([kr]), topples=True) is not None
+        return self.outcome(kr) == TOPPLED
+
+    def points(self) -> SearchPoints:
+        """Return every block that was run, by falling k_r/PGA."""
+        strengths = sorted(self._tried, reverse=True)
+        runs = [self._tried[kr] for kr in strengths]
+        kr = np.array(strengths)
+        theta_c = kr if self._linear else np.arctan(kr)
+        return SearchPoints(
+            kr_over_pga=kr / self._drive.pga_g if strengths else kr,
+            theta_n=np.array([run.peak_rad for run in runs]) / theta_c,
+            outcome=tuple(OUTCOMES[run.outcome].value for run in runs),
+        )
 
     def border(self, one: float, other: float) -> tuple[float, float]:
         """Bisect between a block that topples and one that stays; first the kind of `one`."""
