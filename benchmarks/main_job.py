@@ -42,36 +42,43 @@ def main(arguments: Sequence[str] | None = None) -> None:
         fits = [run("fit", "--term", term, *db) for term in chosen.term]
         _, again_s = run("simulate", *jobs, *db)
     cells = [
-        ["`rbfrag motions add`", f"{len(added['added'])} traces", seconds(add_s)],
+        ["`rbfrag motions add`", f"{len(added['added'])} traces", *add_s],
         [
             "`rbfrag simulate`",
             f"{done['combinations']} combinations, {done['found']} found, "
             f"{done['below_limit']} below the limit, {done['runs']:,} runs",
-            seconds(simulate_s),
+            *simulate_s,
         ],
         *(
-            [f"`rbfrag fit --term {term}`", fit_words(fitted), seconds(fit_s)]
+            [f"`rbfrag fit --term {term}`", fit_words(fitted), *fit_s]
             for term, (fitted, fit_s) in zip(chosen.term, fits, strict=True)
         ),
-        ["`rbfrag simulate` again", "everything is stored", seconds(again_s)],
+        ["`rbfrag simulate` again", "everything is stored", *again_s],
     ]
-    report("main-job", markdown((["command", "result", "wall time"], cells)), write=chosen.write)
+    headers = ["command", "result", "wall time", "processor time"]
+    report("main-job", markdown((headers, cells)), write=chosen.write)
 
 
-def run(*arguments: str) -> tuple[dict, float]:
-    """Run one rbfrag command in a process of its own: (its JSON, wall time)."""
+def run(*arguments: str) -> tuple[dict, list[str]]:
+    """Run one rbfrag command in a process of its own: (its JSON, wall and processor time)."""
     code = "from rbfrag.cli.main import run; run()"
-    before = time.perf_counter()
+    before, used = time.perf_counter(), processor_time()
     done = subprocess.run(
         [sys.executable, "-c", code, *arguments, "--json"],
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
     )
-    passed = time.perf_counter() - before
+    passed = [seconds(time.perf_counter() - before), seconds(processor_time() - used)]
     if not done.stdout.strip():
         raise SystemExit(f"rbfrag {' '.join(arguments)}: {done.stderr}")
     return json.loads(done.stdout), passed
+
+
+def processor_time() -> float:
+    """Processor time of all processes started so far that have ended, workers included [s]."""
+    times = os.times()
+    return times.children_user + times.children_system
 
 
 def fit_words(fitted: dict) -> str:

@@ -56,7 +56,10 @@ def stored_model(tmp_path: Path) -> None:
         domain={"p2": (0.1, 30.0), "intensity_m_s": (0.02, 1.5)},
         data_fingerprint="0" * 64,
     )
-    with opened_database(tmp_path / "rbfrag.db", create=True) as engine, engine.begin() as connection:
+    with (
+        opened_database(tmp_path / "rbfrag.db", create=True) as engine,
+        engine.begin() as connection,
+    ):
         save_model(connection, row)
 
 
