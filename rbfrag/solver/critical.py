@@ -29,6 +29,7 @@ from rbfrag.solver.results import (
     no_intervals,
 )
 from rbfrag.solver.scan import BlockScan, scan_down
+from rbfrag.solver.toppling import TOPPLED
 
 SLIVERS = 1e-9
 """Undecided length of k_r/PGA up to which an answer still counts as certified."""
@@ -182,10 +183,10 @@ class _Search:
         self.lower, self.upper = bracket[0] / pga, bracket[1] / pga
         for step in (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8):
             ratio = max(self.lower - step * self.upper, self.limit)
-            if self._scan.topples(ratio * pga):
+            if self._scan.outcome_at(ratio) == TOPPLED:
                 self.lower = ratio
                 break
-        self._scan.outcome(self.upper * pga)
+        self._scan.outcome_at(self.upper)
 
     def _by_scan(
         self,

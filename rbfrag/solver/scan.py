@@ -33,6 +33,7 @@ class BlockScan:
         self._linear = linear
         self._run = runner(drive, p2=p2, linear=linear)
         self._tried: dict[float, Run] = {}
+        self._ratio: dict[float, float] = {}
 
     @property
     def runs(self) -> int:
@@ -45,6 +46,12 @@ class BlockScan:
         if run is None:
             run = self._tried[kr] = self._run(kr)
         return run.outcome
+
+    def outcome_at(self, ratio: float) -> int:
+        """Return the outcome code at a k_r/PGA, which :meth:`points` repeats exactly."""
+        kr = ratio * self._drive.pga_g
+        self._ratio[kr] = ratio
+        return self.outcome(kr)
 
     def first(self, kr: FloatArray, *, topples: bool) -> int | None:
         """Return the number of the first of these blocks that topples (or that stays)."""
@@ -64,7 +71,7 @@ class BlockScan:
         kr = np.array(strengths)
         theta_c = kr if self._linear else np.arctan(kr)
         return SearchPoints(
-            kr_over_pga=kr / self._drive.pga_g if strengths else kr,
+            kr_over_pga=np.array([self._ratio.get(k, k / self._drive.pga_g) for k in strengths]),
             theta_n=np.array([run.peak_rad for run in runs]) / theta_c,
             outcome=tuple(OUTCOMES[run.outcome].value for run in runs),
         )
