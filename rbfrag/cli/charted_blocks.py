@@ -60,9 +60,12 @@ def charted_blocks(
     else:
         return ChartedBlocks(None, None, warnings)
     alpha1, alpha3 = (columns[name] for name in names)
-    known = (alpha1 == alpha1) & (alpha3 == alpha3)
+    known = (alpha1 > -90.0) & (alpha1 < alpha3) & (alpha3 < 90.0)
     if not known.any():
-        raise InputError(f"{blocks or rockmass}: there is no block with both angles to show")
+        raise InputError(
+            f"{blocks or rockmass}: there is no block to show: alpha1_deg and alpha3_deg lie "
+            "between -90 and 90 degrees, and the first is below the second"
+        )
     if not known.all():
         warnings.append(f"{(~known).sum()} of {known.size} rows are no block and not shown")
     return ChartedBlocks(alpha1[known], alpha3[known], warnings)

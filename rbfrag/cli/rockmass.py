@@ -128,7 +128,7 @@ def _print(document: dict[str, Any]) -> None:
     )
     for crossing in document["crossings"]:
         print(
-            f"counts cross at {crossing['pga_g']:.4g} +- {crossing['standard_error_g']:.2g} g "
+            f"counts cross at {crossing['pga_g']:.4g} +- {_short(crossing['standard_error_g'])} g "
             f"({cell(crossing['count'])} blocks each): more {_words(crossing['below'])} below, "
             f"more {_words(crossing['above'])} above"
         )
@@ -152,6 +152,10 @@ def _print_scenario(found: dict[str, Any]) -> None:
 
 def _probability(answer: dict[str, Any]) -> list[Any]:
     return [answer[key] for key in ("probability", "standard_error", "ci_low", "ci_high")]
+
+
+def _short(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2g}"
 
 
 def _words(mode: str) -> str:

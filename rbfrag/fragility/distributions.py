@@ -79,7 +79,7 @@ class Distribution:
             return cls("constant", location=_number(stated, ""))
         keys = dict(stated)
         name = keys.pop("distribution", None)
-        if name not in LAWS:
+        if not isinstance(name, str) or name not in LAWS:
             known = ", ".join(LAWS)
             if name is None:
                 raise InputError(f"the key distribution is missing: name one of {known}")

@@ -65,6 +65,8 @@ def read_rock_mass(path: str | os.PathLike[str]) -> RockMass:
         return RockMass.of(_from_toml(text) if suffix == ".toml" else _from_csv(text))
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
+    except csv.Error as error:
+        raise InputError(f"{source}: not a CSV file: {error}") from None
 
 
 def _text(source: Path) -> str:
@@ -85,7 +87,8 @@ def _text(source: Path) -> str:
 def _from_toml(text: str) -> dict[str, object]:
     try:
         document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    # Beside its own error, the parser passes on those of absurd numbers and nesting.
+    except (ValueError, RecursionError) as error:
         raise InputError(f"not valid TOML: {error}") from None
     stated: dict[str, object] = {}
     for name, content in document.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -51,7 +52,9 @@ def as_dict(
                 "below": crossing.below,
                 "above": crossing.above,
                 "pga_g": crossing.pga_g,
-                "standard_error_g": crossing.standard_error_g,
+                "standard_error_g": crossing.standard_error_g
+                if math.isfinite(crossing.standard_error_g)
+                else None,
                 "count": crossing.count,
             }
             for crossing in crossings

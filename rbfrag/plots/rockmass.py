@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from os import PathLike
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from rbfrag.fragility.rockmass import Realisations
 from rbfrag.fragility.rockmass_counts import (
+    Crossing,
     crossings,
     cumulative_counts,
     mode_counts,
@@ -65,7 +67,7 @@ def plot_rockmass(made: Realisations, path: str | PathLike[str], *, title: str =
         axes.plot(crossing.pga_g, crossing.count, "o", ms=6, mfc="white", mec="black", zorder=5)
         axes.plot([crossing.pga_g] * 2, [0.0, crossing.count], color="black", lw=0.7, ls=":")
         axes.annotate(
-            f"{crossing.pga_g:.3f} ± {crossing.standard_error_g:.3f} g",
+            _with_error(crossing),
             (crossing.pga_g, crossing.count),
             xytext=(9, -12),
             textcoords="offset points",
@@ -103,6 +105,11 @@ def plot_rockmass(made: Realisations, path: str | PathLike[str], *, title: str =
         bars.spines[side].set_visible(False)
     figure.suptitle(title or _title(made), fontsize=10)
     return save_figure(figure, path)
+
+
+def _with_error(crossing: Crossing) -> str:
+    error = crossing.standard_error_g
+    return f"{crossing.pga_g:.3f}{f' ± {error:.3f}' if math.isfinite(error) else ''} g"
 
 
 def _title(made: Realisations) -> str:

@@ -205,12 +205,12 @@ def test_files_are_refused_with_file_and_key(
         (("--phi", "90"), "phi_deg"),
         (("--phi", "35", "--blocks", "a.csv", "--rockmass", "mass.toml"), "does not go with"),
         (("--phi", "35", "--blocks", "a.csv"), "a.csv: no such file"),
-        (("--phi", "35", "--blocks", "empty.csv"), "no block with both angles"),
+        (("--phi", "35", "--blocks", "empty.csv"), "no block to show"),
     ],
 )
 def test_charts_are_refused(
     refuses: Refuses, mass: Path, tmp_path: Path, arguments: tuple[str, ...], words: str
 ) -> None:
-    (tmp_path / "empty.csv").write_text("alpha1_deg,alpha3_deg\n,\n")
+    (tmp_path / "empty.csv").write_text("alpha1_deg,alpha3_deg\n,\n20,120\n30,10\n")
     assert words in refuses("plot", "modes", *arguments, "--out", "a.png")
     assert not (tmp_path / "a.png").exists()

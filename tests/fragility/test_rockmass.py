@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.distributions import LAWS
 from rbfrag.fragility.rockmass import IMPOSSIBLE, VARIABLES, RockMass
 from rbfrag.fragility.rockmass_counts import (
     crossings,
@@ -258,6 +262,26 @@ class TestRefusals:
     def test_values(self, key: str, value: object, words: str) -> None:
         with pytest.raises(InputError, match=words):
             RockMass.of({**TABLE_3_4, key: value})
+
+    @given(
+        key=st.sampled_from([*VARIABLES, "block.back_fracture", "realisations", "seed"]),
+        value=st.recursive(
+            st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+            lambda inner: (
+                st.lists(inner, max_size=3)
+                | st.dictionaries(
+                    st.sampled_from(["distribution", *(k for keys in LAWS.values() for k in keys)]),
+                    inner | st.sampled_from(sorted(LAWS)),
+                    max_size=4,
+                )
+            ),
+            max_leaves=6,
+        ),
+    )
+    def test_anything_else_is_refused_in_words(self, key: str, value: object) -> None:
+        with contextlib.suppress(InputError):
+            mass = RockMass.of({**TABLE_3_4, key: value})
+            assert mass.realise(20).n == 20
 
     @pytest.mark.parametrize("key", TABLE_3_4)
     def test_missing_keys_are_named(self, key: str) -> None:

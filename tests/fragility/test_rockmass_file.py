@@ -78,6 +78,8 @@ def test_the_example_files_are_the_same_rock_mass() -> None:
         ("high = 45", "high = 90", "friction.phi_deg: 90 is out of range"),
         ("realisations = 500", "realisations = 0", "realisations = 0"),
         ("[block]", "[block", "not valid TOML"),
+        ("seed = 7", "seed = " + "7" * 5000, "not valid TOML"),
+        ("seed = 7", "seed = " + "[" * 5000, "not valid TOML"),
         ("[friction]", "[[friction]]", "friction = .* is not a table"),
     ],
 )
@@ -98,6 +100,7 @@ def test_toml_refusals(tmp_path: Path, old: str, new: str, words: str) -> None:
         ("seed,,7", "seed,,7,8", "line 4: seed: without a distribution only a value counts"),
         ("seed,,7", "realisations,,7", "line 4: realisations is stated twice"),
         ("seed,,7", "seed,,,,,,,,,,,7", "line 4: 12 cells under 10 columns"),
+        ("41 44.5", "4" * 200_000, "not a CSV file"),
         ("41 44.5", "41 x", "line 8: back.dip_deg: values = 'x' is not a number"),
         ("back.dip_deg,", "back.dip,", "unknown key back.dip"),
         ("block.back_fracture,,false", "block.back_fracture,,0", "block.back_fracture = 0"),

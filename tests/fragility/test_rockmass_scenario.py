@@ -13,7 +13,7 @@ from rbfrag.errors import DatabaseNotFoundError, InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import predict
 from rbfrag.fragility.rockmass import Realisations, RockMass
-from rbfrag.fragility.rockmass_counts import crossings, mode_counts
+from rbfrag.fragility.rockmass_counts import Crossing, crossings, mode_counts
 from rbfrag.fragility.rockmass_report import as_dict
 from rbfrag.fragility.rockmass_scenario import LOCKED, UNCOVERED, scenario
 from rbfrag.fragility.rockmass_table import block_columns
@@ -183,3 +183,10 @@ def test_the_report_is_plain_and_doubts_many_impossible_blocks(
     assert set(document["modes"]["topple"]["yield_g"]) == {"q05", "q16", "q50", "q84", "q95"}
     assert "realisations are no block and are left out" in document["warnings"][0]
     assert document["scenario"]["covered_only"]["covered"] < document["blocks"]
+
+
+def test_an_error_that_cannot_be_told_is_null_in_the_report(made: Realisations) -> None:
+    crossing = Crossing("slump", "slide", 0.3, math.inf, 10.0)
+    (told,) = as_dict(made, mode_counts(made), [crossing])["crossings"]
+    assert told["standard_error_g"] is None
+    assert told["pga_g"] == 0.3
