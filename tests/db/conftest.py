@@ -18,7 +18,7 @@ from rbfrag.db.campaign_store import combination_key, insert_combination
 from rbfrag.db.engine import open_database
 from rbfrag.db.rows import ModelRow
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.results import CriticalResult, SearchPoints
+from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, SearchPoints
 
 NOBODY = 65534
 
@@ -135,7 +135,7 @@ def store_result() -> Callable[..., str]:
         **changes: Any,
     ) -> str:
         settings = changes.pop("settings", {"search_limit": result.search_limit})
-        version = changes.pop("numerics_version", "1")
+        version = changes.pop("numerics_version", NUMERICS_VERSION)
         vertical = changes.pop("vertical", None)
         key = combination_key(
             motion_sha256=motion.sha256,

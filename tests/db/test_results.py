@@ -255,7 +255,7 @@ class TestTables:
         assert info.rows["combination"] == 6
         assert info.rows["motion"] == 3
         assert info.combinations_by_status == {"below_limit": 3, "found": 3}
-        assert info.numerics_versions == ("1",)
+        assert info.numerics_versions == (NUMERICS_VERSION,)
         assert info.default_model is None
         assert info.dialect == filled.dialect.name
 
