@@ -26,6 +26,7 @@ from rbfrag.db.motion_store import add_motion
 from rbfrag.db.queries import combination_table, database_info, simulation_points
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError
+from rbfrag.solver.results import NUMERICS_VERSION
 
 QUAKE = EarthquakeInfo("chi-chi-1999", magnitude=7.62, guessed=False)
 
