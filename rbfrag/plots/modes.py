@@ -18,6 +18,7 @@ from rbfrag.solver.stability_arrays import StabilityArray, stability_arrays
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.text import Text
 
 FloatArray = NDArray[np.float64]
 
@@ -91,9 +92,9 @@ def plot_modes(
     figure = new_figure(6.4 if len(shown[0]) > MOST_POINTS else 5.6, 5.5)
     axes = figure.add_subplot()
     _draw_regions(axes, nodes, is_block, found)
-    _draw_yields(axes, nodes, is_block, found)
+    values = _draw_yields(axes, nodes, is_block, found)
     covered = _draw_blocks(axes, nodes, *shown)
-    _name_regions(axes, nodes, is_block, found, back_fracture, covered)
+    names = _name_regions(axes, nodes, is_block, found, back_fracture, covered)
     _explain_hatches(axes, is_block, found)
     axes.fill([-90, 90, 90], [-90, -90, 90], color="white", zorder=4, lw=0)
     axes.plot([-90, 90], [-90, 90], color="black", lw=1.0, zorder=5)
@@ -106,6 +107,8 @@ def plot_modes(
     axes.set_xlabel(r"angle of the heel, $\alpha_1$ [°]")
     axes.set_ylabel(r"angle of the toe, $\alpha_3$ [°]")
     figure.suptitle(title or _title(phi_deg, phi_back_deg, beta_deg, back_fracture), fontsize=10)
+    figure.draw_without_rendering()  # the extents of texts are known once the layout is
+    _hide_illegible(axes, values, names)
     return save_figure(figure, path)
 
 
@@ -169,7 +172,9 @@ def _draw_regions(
 
 def _draw_yields(
     axes: Axes, nodes: FloatArray, is_block: NDArray[np.bool_], found: StabilityArray
-) -> None:
+) -> list[Text]:
+    """Draw the contours; return their values."""
+    written: list[Text] = []
     # Mode by mode: between topple and confined topple the yield jumps.
     for code, mode in enumerate(MODES):
         here = is_block & (found.mode_code == code) & (found.state_code == STABLE)
@@ -185,7 +190,8 @@ def _draw_yields(
             linewidths=1.0,
             zorder=3,
         )
-        axes.clabel(lines, fontsize=7.5, fmt="%g", inline_spacing=3)
+        written += axes.clabel(lines, fontsize=7.5, fmt="%g", inline_spacing=3)
+    return written
 
 
 def _name_regions(
@@ -195,7 +201,8 @@ def _name_regions(
     found: StabilityArray,
     back_fracture: bool,
     covered: NDArray[np.bool_],
-) -> None:
+) -> list[Text]:
+    names = []
     for code, mode in enumerate(MODES):
         region = is_block & (found.mode_code == code)
         stable = region & (found.state_code == STABLE)
@@ -212,7 +219,7 @@ def _name_regions(
         values = found.yield_acceleration[stable]
         if values.size and np.ptp(values) < 1e-9:
             text += f"\n{values[0]:.3f} g"
-        axes.text(
+        name = axes.text(
             nodes[place[1]],
             nodes[place[0]],
             text,
@@ -222,6 +229,19 @@ def _name_regions(
             bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "alpha": 0.75, "lw": 0},
             zorder=6,
         )
+        names.append(name)
+    return names
+
+
+def _hide_illegible(axes: Axes, values: list[Text], names: list[Text]) -> None:
+    """Hide the contour values that a region's name or the chart's edge covers."""
+    frame = axes.get_window_extent()
+    boxes = [name.get_window_extent() for name in names]
+    for value in values:
+        box = value.get_window_extent()
+        inside = frame.contains(*box.min) and frame.contains(*box.max)
+        if not inside or any(box.overlaps(other) for other in boxes):
+            value.set_visible(False)
 
 
 def _explain_hatches(axes: Axes, is_block: NDArray[np.bool_], found: StabilityArray) -> None:
