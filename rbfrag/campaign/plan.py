@@ -17,8 +17,9 @@ from rbfrag.solver.results import NUMERICS_VERSION, POLARITIES, SEARCH_LIMIT, Po
 DEFAULT_P2 = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1)
 """The dissertation's block sizes, as p² [1/s²]: 0.25 m to 74 m from centroid to toe."""
 
-SETTINGS = {"search_limit": SEARCH_LIMIT}
-"""What else decides an answer, as it goes into the natural key."""
+SETTINGS = {"search_limit": SEARCH_LIMIT, "map": "full"}
+"""What else decides an answer, as it goes into the natural key: how far down the search goes,
+and that it maps every toppling and safe interval on the way."""
 
 
 @dataclass(frozen=True)

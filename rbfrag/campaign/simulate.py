@@ -16,8 +16,9 @@ from sqlalchemy import Engine
 from rbfrag.campaign.plan import DEFAULT_P2, SETTINGS, MotionPlan, plan_campaign
 from rbfrag.campaign.worker import MotionResults, MotionWork, prepare_worker, run_work
 from rbfrag.db.campaign_store import (
+    CombinationRecord,
     finish_campaign,
-    insert_combination,
+    insert_combinations,
     known_statuses,
     start_campaign,
 )
@@ -190,15 +191,16 @@ def _answers(work: Iterator[MotionWork], workers: int) -> Iterator[MotionResults
 
 
 def _store(engine: Engine, campaign_id: int, done: MotionResults) -> None:
-    for case, result in zip(done.cases, done.results, strict=True):
-        with engine.begin() as connection:
-            insert_combination(
-                connection,
-                campaign_id=campaign_id,
-                natural_key=case.natural_key,
-                motion_id=done.motion_id,
-                vertical_motion_id=None,
-                result=result,
-                settings=SETTINGS,
-                numerics_version=NUMERICS_VERSION,
-            )
+    records = [
+        CombinationRecord(
+            natural_key=case.natural_key,
+            motion_id=done.motion_id,
+            vertical_motion_id=None,
+            result=result,
+            settings=SETTINGS,
+            numerics_version=NUMERICS_VERSION,
+        )
+        for case, result in zip(done.cases, done.results, strict=True)
+    ]
+    with engine.begin() as connection:
+        insert_combinations(connection, campaign_id, records)

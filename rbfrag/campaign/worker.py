@@ -36,7 +36,8 @@ class MotionResults:
 def run_work(work: MotionWork) -> MotionResults:
     """Make every search of one motion."""
     results = tuple(
-        critical(work.motion, p2=case.p2, polarity=case.polarity) for case in work.cases
+        critical(work.motion, p2=case.p2, polarity=case.polarity, full_map=True)
+        for case in work.cases
     )
     return MotionResults(motion_id=work.motion_id, cases=work.cases, results=results)
 

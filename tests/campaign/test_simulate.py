@@ -9,14 +9,18 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rbfrag.campaign.add_motions import add_motions
 from rbfrag.campaign.simulate import CampaignProgress, simulate
 from rbfrag.db.content import content_digest
 from rbfrag.db.engine import opened_database
-from rbfrag.db.queries import database_info
+from rbfrag.db.motion_store import load_motion
+from rbfrag.db.outcome_maps import outcome_maps
+from rbfrag.db.queries import combination_table, database_info
 from rbfrag.errors import InputError
+from rbfrag.solver.respond import respond
 from tests.synthetic import write_suite
 
 P2 = (10.0, 1.0)
@@ -52,6 +56,24 @@ def test_one_and_two_workers_give_equal_databases(database: Path) -> None:
     assert (one.combinations, one.found, one.runs) == (two.combinations, two.found, two.runs)
     assert one.found > 0
     assert _digest(database) == _digest(other)
+
+
+def test_the_stored_maps_tell_what_every_block_does(database: Path) -> None:
+    simulate(database, p2=P2, jobs=1)
+    k = np.geomspace(0.012, 1.1, 40)
+    with opened_database(database, read_only=True) as engine, engine.connect() as connection:
+        table = combination_table(connection)
+        told = outcome_maps(connection, table.combination_id).outcomes(k)
+        motions = {int(i): load_motion(connection, int(i)) for i in set(table.motion_id)}
+    assert np.isfinite(told).all()
+    assert told.any(axis=1).tolist() == (table.status == "found").tolist()
+    for i in range(0, table.p2.size, 3):
+        motion = motions[int(table.motion_id[i])]
+        for value, topples in zip(k, told[i], strict=True):
+            run = respond(
+                motion, p2=table.p2[i], kr=value * motion.pga_g, polarity=table.polarity[i]
+            )
+            assert (run.outcome == "toppled") == bool(topples)
 
 
 def test_progress_is_told_after_each_motion(database: Path) -> None:
