@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 
 from sqlalchemy import Engine
 
+from rbfrag.campaign.made_on import made_on
 from rbfrag.campaign.plan import DEFAULT_P2, SETTINGS, MotionPlan, plan_campaign
 from rbfrag.campaign.worker import MotionResults, MotionWork, prepare_worker, run_work
 from rbfrag.db.campaign_store import (
@@ -114,8 +115,8 @@ def simulate(
             plans = plan_campaign(connection, suite=suite, p2=p2)
             keys = [case.natural_key for plan in plans for case in plan.cases]
             statuses = known_statuses(connection, keys)
-            settings = {"suite": suite, "p2": list(map(float, p2)), **SETTINGS}
-            campaign_id = start_campaign(connection, settings)
+            asked = {"suite": suite, "p2": list(map(float, p2)), **SETTINGS}
+            campaign_id = start_campaign(connection, {**asked, "made_on": made_on()})
         resumed, runs = len(statuses), 0
         todo = [_without_known(plan, statuses) for plan in plans]
         todo = [plan for plan in todo if plan.cases]

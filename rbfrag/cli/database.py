@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from typing import Annotated
 
 import typer
 
@@ -57,19 +58,57 @@ def info(db: options.Db = None, json: options.Json = False) -> None:
         print_table(("combinations", "number"), found.combinations_by_status.items())
 
 
-@app.command("check", epilog="Example:  rbfrag db check")
-def check(db: options.Db = None, json: options.Json = False) -> None:
-    """Look for damage: references, sha256 of samples, brackets, keys. Exit 1 if any is found."""
+@app.command("check", epilog="Example:  rbfrag db check --sample 100 --seed 7")
+def check(
+    db: options.Db = None,
+    sample: Annotated[
+        int,
+        typer.Option(
+            "--sample",
+            min=0,
+            help="Combinations to compute again, chosen at random; 0 leaves this out.",
+        ),
+    ] = 20,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the random choice.")] = 0,
+    json: options.Json = False,
+) -> None:
+    """Look for damage: the file, references, samples, keys, brackets, maps, and a random sample
+    computed again. Exit 1 if any is found."""
     from rbfrag.db.check import check_database
     from rbfrag.db.engine import opened_database
 
+    again = None
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         findings = check_database(connection)
+        if sample:
+            from rbfrag.campaign.resimulate import resimulate
+
+            again = resimulate(connection, sample=sample, seed=seed)
+            findings += again.findings
     if json:
-        print_json({"sound": not findings, "findings": [asdict(found) for found in findings]})
-    elif findings:
-        print_table(("table", "row", "problem"), [(f.table, f.row, f.problem) for f in findings])
+        computed = None if again is None else asdict(again)
+        if computed is not None:
+            del computed["findings"]
+        print_json(
+            {
+                "sound": not findings,
+                "findings": [asdict(found) for found in findings],
+                "resimulated": computed,
+            }
+        )
     else:
-        print("sound: nothing is wrong with this database")
+        if again is not None:
+            print(
+                f"computed again: {again.sampled} of {again.eligible} combinations, "
+                f"{again.exact} exact, {again.within_error} within the solver's error"
+            )
+        if findings:
+            print_table(
+                ("table", "row", "problem"), [(f.table, f.row, f.problem) for f in findings]
+            )
+            for advice in dict.fromkeys(found.advice for found in findings):
+                print(f"to do: {advice}")
+        else:
+            print("sound: nothing is wrong with this database")
     if findings:
         raise typer.Exit(1)

@@ -14,9 +14,15 @@ import numpy as np
 import pytest
 from sqlalchemy import Engine
 
-from rbfrag.db.campaign_store import combination_key, insert_combination
+from rbfrag.db.campaign_store import (
+    combination_key,
+    finish_campaign,
+    insert_combination,
+    start_campaign,
+)
 from rbfrag.db.engine import open_database
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.motion_store import add_motion
+from rbfrag.db.rows import EarthquakeInfo, ModelRow
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, SearchPoints
 
@@ -161,6 +167,41 @@ def store_result() -> Callable[..., str]:
         return key
 
     return store
+
+
+@pytest.fixture
+def fill(make_motion: Any, make_result: Any, store_result: Any) -> Callable[..., None]:
+    """Store three motions, two of a stated event, with a found and a censored search each."""
+    quake = EarthquakeInfo("chi-chi-1999", magnitude=7.62, guessed=False)
+
+    def store(connection: Any, order: list[int]) -> None:
+        motions = {seed: make_motion(seed) for seed in (1, 2, 3)}
+        ids = {}
+        for seed in order:
+            ids[seed], _ = add_motion(
+                connection,
+                motions[seed],
+                earthquake=quake if seed < 3 else EarthquakeInfo("guess"),
+                is_vertical=False,
+                suite="s" if seed < 3 else None,
+            )
+        campaign = start_campaign(connection, {"order": order})
+        for seed in order:
+            pga = motions[seed].pga_g
+            for p2, status in ((3.0, "found"), (0.1, "below_limit")):
+                result = make_result(pga, p2=p2, k=0.1 * seed, status=status)
+                store_result(connection, campaign, motions[seed], ids[seed], result)
+        finish_campaign(connection, campaign)
+
+    return store
+
+
+@pytest.fixture
+def filled(engine: Engine, fill: Callable[..., None]) -> Engine:
+    """A database that holds what `fill` stores."""
+    with engine.begin() as connection:
+        fill(connection, [1, 2, 3])
+    return engine
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sqlalchemy import Engine, delete, exc, func, insert, select, update
+from sqlalchemy import Engine, delete, exc, func, select, update
 
 from rbfrag.db import schema
 from rbfrag.db.campaign_store import (
@@ -19,7 +19,6 @@ from rbfrag.db.campaign_store import (
     known_statuses,
     start_campaign,
 )
-from rbfrag.db.check import check_database
 from rbfrag.db.content import CONTENT_TABLES, content_digest, table_rows_by_natural_key
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motion_store import add_motion
@@ -156,35 +155,6 @@ def test_the_schema_refuses_nonsense(
         assert _count(connection, schema.combination) == 0
 
 
-def _fill(
-    connection: Any, make_motion: Any, make_result: Any, store_result: Any, order: list[int]
-) -> None:
-    motions = {seed: make_motion(seed) for seed in (1, 2, 3)}
-    ids = {}
-    for seed in order:
-        ids[seed], _ = add_motion(
-            connection,
-            motions[seed],
-            earthquake=QUAKE if seed < 3 else EarthquakeInfo("guess"),
-            is_vertical=False,
-            suite="s" if seed < 3 else None,
-        )
-    campaign = start_campaign(connection, {"order": order})
-    for seed in order:
-        pga = motions[seed].pga_g
-        for p2, status in ((3.0, "found"), (0.1, "below_limit")):
-            result = make_result(pga, p2=p2, k=0.1 * seed, status=status)
-            store_result(connection, campaign, motions[seed], ids[seed], result)
-    finish_campaign(connection, campaign)
-
-
-@pytest.fixture
-def filled(engine: Engine, make_motion: Any, make_result: Any, store_result: Any) -> Engine:
-    with engine.begin() as connection:
-        _fill(connection, make_motion, make_result, store_result, [1, 2, 3])
-    return engine
-
-
 class TestTables:
     def test_columns(self, filled: Engine) -> None:
         with filled.connect() as connection:
@@ -263,13 +233,13 @@ class TestTables:
 
 class TestEqualDatabases:
     def test_order_times_and_campaigns_do_not_count(
-        self, filled: Engine, tmp_path: Any, make_motion: Any, make_result: Any, store_result: Any
+        self, filled: Engine, fill: Any, tmp_path: Any
     ) -> None:
         # Against a file, so that SQLite and the server are also compared with each other.
         with opened_database(tmp_path / "other.db", create=True) as other:
             for order in ([3, 1], [2], [1, 2, 3]):
                 with other.begin() as connection:
-                    _fill(connection, make_motion, make_result, store_result, order)
+                    fill(connection, order)
             with filled.connect() as a, other.connect() as b:
                 for table in CONTENT_TABLES:
                     mine = list(table_rows_by_natural_key(a, table))
@@ -302,71 +272,3 @@ class TestEqualDatabases:
 
     def test_every_table_is_compared(self) -> None:
         assert {*CONTENT_TABLES, "campaign"} == set(schema.metadata.tables)
-
-
-class TestCheck:
-    def test_a_sound_database(self, filled: Engine) -> None:
-        with filled.connect() as connection:
-            assert check_database(connection) == []
-
-    @pytest.mark.parametrize(
-        ("table", "values", "problem"),
-        [
-            ("motion", {"samples": b"\x00" * 512}, "do not match their sha256"),
-            ("motion", {"samples": b"\x00" * 511}, "holds 511 bytes"),
-            ("combination", {"natural_key": "0" * 64}, "natural key is not the hash"),
-            ("combination", {"p2": 2.0}, "is not kr g/p"),
-            ("combination", {"kr": 0.7}, "times the motion's PGA"),
-            ("combination", {"lower": 0.95}, "lies below its bracket"),
-            ("combination", {"upper": 0.05}, "lies above its bracket"),
-            ("combination", {"settings": "{"}, "settings cannot be read"),
-            ("simulation", {"outcome": "stable"}, "no simulation topples at its critical"),
-            ("simulation", {"outcome": "toppled"}, "topples above its critical"),
-            ("simulation", {"outcome": "toppled"}, "status below_limit, yet"),
-        ],
-    )
-    def test_damage_is_found(self, filled: Engine, table: str, values: Any, problem: str) -> None:
-        changed = schema.metadata.tables[table]
-        query = update(changed).values(**values)
-        if table == "combination":
-            first = select(func.min(changed.c.id)).where(changed.c.status == "found")
-            query = query.where(changed.c.id == first.scalar_subquery())
-        with filled.begin() as connection:
-            connection.execute(query)
-            findings = check_database(connection)
-        assert {finding.table for finding in findings} <= {table, "combination"}
-        assert any(problem in finding.problem for finding in findings)
-
-    def test_rows_that_nothing_refers_to(self, filled: Engine) -> None:
-        with filled.begin() as connection:
-            values = {"event_id": "lost", "guessed": True, "name": ""}
-            connection.execute(insert(schema.earthquake).values(**values))
-            (finding,) = check_database(connection)
-        assert (finding.table, finding.row) == ("earthquake", "lost")
-
-    def test_a_damaged_file(self, tmp_path: Any) -> None:
-        path = tmp_path / "x.db"
-        with opened_database(path, create=True) as engine:
-            with engine.connect() as connection:
-                connection.exec_driver_sql("PRAGMA ignore_check_constraints = ON")
-                values = {"event_id": "", "guessed": True, "name": ""}
-                connection.execute(insert(schema.earthquake).values(**values))
-                connection.commit()
-                connection.exec_driver_sql("PRAGMA ignore_check_constraints = OFF")
-            with engine.connect() as connection:
-                problems = [finding.problem for finding in check_database(connection)]
-        assert any("CHECK constraint failed in earthquake" in problem for problem in problems)
-
-    def test_broken_references(self, sqlite_file: Any) -> None:
-        import sqlite3
-
-        raw = sqlite3.connect(sqlite_file)
-        raw.execute("INSERT INTO suite_motion VALUES (7, 8)")
-        raw.commit()
-        raw.close()
-        with opened_database(sqlite_file, read_only=True) as engine, engine.connect() as c:
-            problems = {finding.problem for finding in check_database(c)}
-        assert problems == {
-            "points to a row of motion that is not there",
-            "points to a row of suite that is not there",
-        }

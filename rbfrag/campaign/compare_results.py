@@ -1,0 +1,149 @@
+"""A stored combination against the same one computed again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+from rbfrag.db.stored_combination import StoredCombination
+from rbfrag.solver.results import CriticalResult, OutcomeIntervals, Response
+
+_VALUES = (
+    "status",
+    "kr_over_pga",
+    "lower",
+    "upper",
+    "kr",
+    "y_m_s",
+    "certified",
+    "k_up_over_pga",
+    "undecided",
+    "island_width",
+    "kr_over_pga_resolved",
+    "reentrant",
+    "n_runs",
+)
+
+# Relative error of a border, and of a rotation: what another processor's last bits can do.
+BORDER_ERROR = 1e-7
+ROTATION_ERROR = 1e-6
+
+
+def differences(
+    stored: StoredCombination, again: CriticalResult, runs: Mapping[float, Response]
+) -> Iterator[str]:
+    """Yield every value that is not the same bit for bit.
+
+    Args:
+        stored: what the database says.
+        again: the search made again.
+        runs: single blocks that are stored but not part of the search, run again, by k_r/PGA.
+    """
+    for name in _VALUES:
+        then, now = stored.values[name], getattr(again, name)
+        if then != now:
+            yield f"{name} is {then!r}, computed again {now!r}"
+    # earlier databases hold no maps; the search then still proves a part of one
+    if stored.intervals.k_lo.size and not _same_intervals(stored.intervals, again.intervals):
+        yield "its map of intervals is another when computed again"
+    points = stored.points
+    then_at = dict(zip(points.kr_over_pga.tolist(), _ends(stored), strict=True))
+    now_at = {k: _end(run.peak_theta_n, run.outcome.value) for k, run in runs.items()}
+    for k, theta, outcome in zip(
+        again.points.kr_over_pga.tolist(),
+        again.points.theta_n.tolist(),
+        again.points.outcome,
+        strict=True,
+    ):
+        now_at[k] = _end(theta, outcome)
+    for k in sorted(then_at.keys() | now_at.keys(), reverse=True):
+        if k not in then_at:
+            yield f"the simulation at kr/PGA {k!r} is missing"
+        elif then_at[k] != now_at[k]:
+            yield f"the simulation at kr/PGA {k!r} is {then_at[k]}, computed again {now_at[k]}"
+
+
+def deviations(
+    stored: StoredCombination, again: CriticalResult, runs: Mapping[float, Response]
+) -> Iterator[str]:
+    """Yield what differs by more than the error of the solver.
+
+    Args:
+        stored: what the database says.
+        again: the search made again.
+        runs: single blocks that are stored but not part of the search, run again, by k_r/PGA.
+    """
+    values = stored.values
+    if values["status"] != again.status:
+        yield f"status is {values['status']!r}, computed again {again.status!r}"
+        return
+    if again.status == "found":
+        low = max(values["lower"], again.lower or 0.0)
+        high = min(values["upper"], again.upper or math.inf)
+        if low > high * (1.0 + BORDER_ERROR):
+            yield (
+                f"its bracket {values['lower']!r} to {values['upper']!r} does not meet the one "
+                f"computed again, {again.lower!r} to {again.upper!r}"
+            )
+    yield from _contradictions(stored.intervals, again.intervals)
+    then_at = dict(zip(stored.points.kr_over_pga.tolist(), _ends(stored), strict=True))
+    borders = _borders(again)
+    for k, run in runs.items():
+        outcome, theta = then_at[k]
+        if outcome != run.outcome.value:
+            if not any(math.isclose(k, at, rel_tol=BORDER_ERROR) for at in borders):
+                yield (
+                    f"the simulation at kr/PGA {k!r} is {outcome}, computed again "
+                    f"{run.outcome.value}"
+                )
+        elif theta is not None and run.peak_theta_n is not None:
+            error = run.error_estimate / math.radians(run.critical_angle_deg)
+            if abs(theta - run.peak_theta_n) > error + ROTATION_ERROR * run.peak_theta_n:
+                yield (
+                    f"the simulation at kr/PGA {k!r} reaches {theta!r} of the critical angle, "
+                    f"computed again {run.peak_theta_n!r}"
+                )
+
+
+def _ends(stored: StoredCombination) -> list[tuple[str, float | None]]:
+    points = stored.points
+    return [
+        _end(theta, outcome)
+        for theta, outcome in zip(points.theta_n.tolist(), points.outcome, strict=True)
+    ]
+
+
+def _end(theta_n: float | None, outcome: str) -> tuple[str, float | None]:
+    return str(outcome), None if theta_n is None or math.isnan(theta_n) else theta_n
+
+
+def _same_intervals(one: OutcomeIntervals, other: OutcomeIntervals) -> bool:
+    return (
+        one.outcome == other.outcome
+        and one.k_lo.tolist() == other.k_lo.tolist()
+        and one.k_hi.tolist() == other.k_hi.tolist()
+    )
+
+
+def _borders(result: CriticalResult) -> list[float]:
+    return [
+        *result.intervals.k_lo.tolist(),
+        *result.intervals.k_hi.tolist(),
+        *(edge for edge in (result.lower, result.upper) if edge is not None),
+    ]
+
+
+def _contradictions(one: OutcomeIntervals, other: OutcomeIntervals) -> Iterator[str]:
+    """Yield stretches that one map has toppling and the other safe."""
+    for low, high, word in zip(one.k_lo.tolist(), one.k_hi.tolist(), one.outcome, strict=True):
+        for low_2, high_2, word_2 in zip(
+            other.k_lo.tolist(), other.k_hi.tolist(), other.outcome, strict=True
+        ):
+            if {word, word_2} != {"topples", "safe"}:
+                continue
+            shared = min(high, high_2) - max(low, low_2)
+            if shared > BORDER_ERROR * min(high, high_2):
+                yield (
+                    f"its map says {word} from kr/PGA {max(low, low_2)!r} to "
+                    f"{min(high, high_2)!r}, computed again {word_2}"
+                )

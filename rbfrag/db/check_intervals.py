@@ -1,0 +1,102 @@
+"""The map of one combination against its bracket and its simulations."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from sqlalchemy import Row, RowMapping
+
+# k_r is divided by PGA and the limit was multiplied by it before.
+_ROUNDING = 1e-12
+
+# The critical block is taken up to this share of its k_r clear of the border.
+_CLEARANCE = 1.01e-8
+
+
+def interval_problems(
+    row: RowMapping,
+    intervals: Sequence[Row[Any]],
+    toppled: Sequence[float],
+    stable: Sequence[float],
+) -> Iterator[str]:
+    """Yield what is wrong with a map; one that is absent is not wrong.
+
+    Databases of earlier numerics hold none, nor do motions outside the model or that never
+    lift a block.
+
+    Args:
+        row: the combination.
+        intervals: its rows of `outcome_interval`, by rising k_lo.
+        toppled: kr/PGA of its simulations that toppled.
+        stable: kr/PGA of those that did not.
+    """
+    if not intervals:
+        return
+    yield from _cover_problems(row, intervals)
+    yield from _bracket_problems(row, intervals)
+    for points, word, other in ((toppled, "topples", "safe"), (stable, "stays", "topples")):
+        for k in points:
+            inside = _holding(intervals, k)
+            if inside is not None and inside.outcome == other:
+                yield (
+                    f"a simulation {word} at kr/PGA {k!r}, inside the interval "
+                    f"{inside.k_lo!r} to {inside.k_hi!r} that is {_said(other)}"
+                )
+
+
+def _said(outcome: str) -> str:
+    return "safe" if outcome == "safe" else "said to topple"
+
+
+def _cover_problems(row: RowMapping, intervals: Sequence[Row[Any]]) -> Iterator[str]:
+    limit, bottom = row["search_limit"], intervals[0].k_lo
+    if not math.isclose(bottom, limit, rel_tol=_ROUNDING):
+        yield f"its map begins at kr/PGA {bottom!r}, not at the search limit {limit!r}"
+    for below, above in itertools.pairwise(intervals):
+        if below.k_hi < above.k_lo:
+            yield f"its map has a gap from kr/PGA {below.k_hi!r} to {above.k_lo!r}"
+        elif below.k_hi > above.k_lo:
+            yield f"two of its intervals overlap from kr/PGA {above.k_lo!r} to {below.k_hi!r}"
+    top, k_up = intervals[-1].k_hi, row["k_up_over_pga"]
+    if k_up is not None and top < k_up * (1.0 - _ROUNDING):
+        yield f"its map ends at kr/PGA {top!r}, below K_up {k_up!r}"
+
+
+def _bracket_problems(row: RowMapping, intervals: Sequence[Row[Any]]) -> Iterator[str]:
+    topples = [interval for interval in intervals if interval.outcome == "topples"]
+    highest = topples[-1].k_hi if topples else None
+    if row["status"] != "found":
+        if highest is not None:
+            yield f"status {row['status']}, yet its map topples up to kr/PGA {highest!r}"
+        return
+    k, upper = row["kr_over_pga"], row["upper"]
+    bound = k if upper is None else upper
+    if highest is not None and highest > bound * (1.0 + _ROUNDING):
+        yield f"its map topples up to kr/PGA {highest!r}, above its bracket that ends at {bound!r}"
+    inside = _holding(intervals, k)
+    if inside is not None and inside.outcome == "safe":
+        depth = min(k - inside.k_lo, inside.k_hi - k)
+        if depth > _CLEARANCE * k:
+            yield f"its critical kr/PGA {k!r} lies in an interval that is safe"
+    if row["certified"] and row["undecided"] is not None:
+        measured = sum(
+            interval.k_hi - interval.k_lo
+            for interval in intervals
+            if interval.outcome == "undecided" and interval.k_lo >= bound
+        )
+        if measured > row["undecided"] * (1.0 + 1e-6) + _CLEARANCE * bound:
+            yield (
+                f"its map is undecided over {measured!r} above the bracket, more than the "
+                f"{row['undecided']!r} it states"
+            )
+
+
+def _holding(intervals: Sequence[Row[Any]], k: float) -> Row[Any] | None:
+    """Return the interval with `k` strictly inside, if there is one."""
+    for interval in intervals:
+        if interval.k_lo * (1.0 + _ROUNDING) < k < interval.k_hi * (1.0 - _ROUNDING):
+            return interval
+    return None

@@ -1,0 +1,29 @@
+"""One thing that is wrong with a database, and what to do about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+RESTORE = "restore the database from a copy"
+COMPUTE_AGAIN = (
+    "restore the database from a copy, or add the motions to a new database and run  "
+    "rbfrag simulate  there"
+)
+FIT_AGAIN = "fit it again:  rbfrag fit --name NAME --replace"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong.
+
+    Args:
+        table: where it is.
+        row: the row, as the database numbers or names it.
+        problem: what is wrong, in words.
+        advice: what to do next.
+    """
+
+    table: str
+    row: str
+    problem: str
+    advice: str = RESTORE

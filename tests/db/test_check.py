@@ -1,0 +1,230 @@
+"""Damage of every kind is found, named by its row, and told with what to do."""
+
+from __future__ import annotations
+
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy import Engine, delete, func, insert, select, update
+
+from rbfrag.db import schema
+from rbfrag.db.check import check_database
+from rbfrag.db.engine import opened_database
+
+# The map of the first found combination of `filled`, whose critical kr/PGA is 0.1.
+MAP = (
+    (0.01, 0.05, "topples"),
+    (0.05, 0.05 + 1e-9, "undecided"),
+    (0.05 + 1e-9, 0.08, "safe"),
+    (0.08, 0.08 + 1e-9, "undecided"),
+    (0.08 + 1e-9, 0.1 - 1e-9, "topples"),
+    (0.1 - 1e-9, 0.1 + 1e-12, "undecided"),
+    (0.1 + 1e-12, 1.0, "safe"),
+)
+
+
+class TestCheck:
+    def test_a_sound_database(self, filled: Engine) -> None:
+        with filled.connect() as connection:
+            assert check_database(connection) == []
+
+    @pytest.mark.parametrize(
+        ("table", "values", "problem"),
+        [
+            ("motion", {"samples": b"\x00" * 512}, "do not match their sha256"),
+            ("motion", {"samples": b"\x00" * 511}, "holds 511 bytes"),
+            ("combination", {"natural_key": "0" * 64}, "natural key is not the hash"),
+            ("combination", {"p2": 2.0}, "is not kr g/p"),
+            ("combination", {"kr": 0.7}, "times the motion's PGA"),
+            ("combination", {"lower": 0.95}, "lies below its bracket"),
+            ("combination", {"upper": 0.05}, "lies above its bracket"),
+            ("combination", {"settings": "{"}, "settings cannot be read"),
+            ("simulation", {"outcome": "stable"}, "no simulation topples at its critical"),
+            ("simulation", {"outcome": "toppled"}, "topples above its critical"),
+            ("simulation", {"outcome": "toppled"}, "status below_limit, yet"),
+        ],
+    )
+    def test_damage_is_found(self, filled: Engine, table: str, values: Any, problem: str) -> None:
+        changed = schema.metadata.tables[table]
+        query = update(changed).values(**values)
+        if table == "combination":
+            first = select(func.min(changed.c.id)).where(changed.c.status == "found")
+            query = query.where(changed.c.id == first.scalar_subquery())
+        with filled.begin() as connection:
+            connection.execute(query)
+            findings = check_database(connection)
+        assert {finding.table for finding in findings} <= {table, "combination"}
+        assert any(problem in finding.problem for finding in findings)
+        assert all(finding.advice for finding in findings)
+
+    def test_rows_that_nothing_refers_to(self, filled: Engine) -> None:
+        with filled.begin() as connection:
+            values = {"event_id": "lost", "guessed": True, "name": ""}
+            connection.execute(insert(schema.earthquake).values(**values))
+            (finding,) = check_database(connection)
+        assert (finding.table, finding.row) == ("earthquake", "lost")
+
+    def test_a_damaged_file(self, tmp_path: Path) -> None:
+        path = tmp_path / "x.db"
+        with opened_database(path, create=True) as engine:
+            with engine.connect() as connection:
+                connection.exec_driver_sql("PRAGMA ignore_check_constraints = ON")
+                values = {"event_id": "", "guessed": True, "name": ""}
+                connection.execute(insert(schema.earthquake).values(**values))
+                connection.commit()
+                connection.exec_driver_sql("PRAGMA ignore_check_constraints = OFF")
+            with engine.connect() as connection:
+                problems = [finding.problem for finding in check_database(connection)]
+        assert any("CHECK constraint failed in earthquake" in problem for problem in problems)
+
+    def test_broken_references(self, sqlite_file: Path) -> None:
+        raw = sqlite3.connect(sqlite_file)
+        raw.execute("INSERT INTO suite_motion VALUES (7, 8)")
+        raw.commit()
+        raw.close()
+        with opened_database(sqlite_file, read_only=True) as engine, engine.connect() as c:
+            problems = {finding.problem for finding in check_database(c)}
+        assert problems == {
+            "points to a row of motion that is not there",
+            "points to a row of suite that is not there",
+        }
+
+
+def _store_map(connection: Any, intervals: Any, *, status: str = "found") -> None:
+    combination = schema.combination
+    first = select(func.min(combination.c.id)).where(combination.c.status == status)
+    row_id = connection.scalar(first)
+    rows = [
+        {"combination_id": row_id, "k_lo": low, "k_hi": high, "outcome": outcome}
+        for low, high, outcome in intervals
+    ]
+    connection.execute(insert(schema.outcome_interval), rows)
+
+
+class TestMaps:
+    def test_a_sound_map(self, filled: Engine) -> None:
+        with filled.begin() as connection:
+            _store_map(connection, MAP)
+            assert check_database(connection) == []
+
+    @pytest.mark.parametrize(
+        ("intervals", "problem"),
+        [
+            (MAP[1:], "begins at kr/PGA 0.05, not at the search limit 0.01"),
+            (MAP[:2] + MAP[3:], "a gap from kr/PGA"),
+            ((*MAP[:-1], (0.099, 1.0, "safe")), "overlap from kr/PGA 0.099"),
+            (MAP[:-1], "below K_up 1.0"),
+            ((*MAP[:-1], (MAP[-1][0], 1.0, "topples")), "topples up to kr/PGA 1.0, above its"),
+            ((*MAP[:-1], (MAP[-1][0], 1.0, "undecided")), "more than the 0.0 it states"),
+            (((0.01, 1.0, "safe"),), "its critical kr/PGA 0.1 lies in an interval that is safe"),
+            (((0.01, 1.0, "safe"),), "topples at kr/PGA 0.1, inside the interval 0.01 to 1.0"),
+            (((0.01, 0.95, "topples"), (0.95, 1.0, "safe")), "a simulation stays at kr/PGA 0.9"),
+        ],
+    )
+    def test_a_wrong_map(self, filled: Engine, intervals: Any, problem: str) -> None:
+        with filled.begin() as connection:
+            _store_map(connection, intervals)
+            findings = check_database(connection)
+        assert {finding.table for finding in findings} == {"combination"}
+        assert any(problem in finding.problem for finding in findings), findings
+        assert all("rbfrag simulate" in finding.advice for finding in findings)
+
+    def test_a_censored_combination_has_no_toppling_interval(self, filled: Engine) -> None:
+        with filled.begin() as connection:
+            _store_map(connection, MAP, status="below_limit")
+            problems = [finding.problem for finding in check_database(connection)]
+        assert any("status below_limit, yet its map topples" in text for text in problems)
+
+
+@pytest.mark.parametrize(
+    ("values", "problem"),
+    [
+        ({"pga_g": 0.123}, "pga_g is 0.123, the samples give"),
+        ({"pgv_m_s": 0.123}, "pgv_m_s is 0.123"),
+        ({"pgd_m": 0.123}, "pgd_m is 0.123"),
+        ({"tm_s": 0.123}, "tm_s is 0.123"),
+        ({"tm_s": None}, "tm_s is None"),
+        ({"final_velocity_m_s": 0.123}, "final_velocity_m_s is 0.123"),
+        ({"final_displacement_m": 0.123}, "final_displacement_m is 0.123"),
+        ({"npts": 63}, "not 8 x 63"),
+        ({"flags": "{}"}, "its flags are no JSON list"),
+        ({"remarks": "["}, "its remarks cannot be read"),
+    ],
+)
+def test_measures_are_calculated_anew(filled: Engine, values: Any, problem: str) -> None:
+    motion = schema.motion
+    with filled.begin() as connection:
+        first = connection.scalar(select(func.min(motion.c.id)))
+        connection.execute(update(motion).where(motion.c.id == first).values(**values))
+        findings = [found for found in check_database(connection) if found.table == "motion"]
+    assert [finding.row for finding in findings] == [str(first)]
+    assert problem in findings[0].problem
+    assert "1.txt" in findings[0].advice  # the file to add again
+
+
+def test_measures_within_rounding_are_the_same(filled: Engine) -> None:
+    motion = schema.motion
+    with filled.begin() as connection:
+        connection.execute(update(motion).values(pgv_m_s=motion.c.pgv_m_s * (1.0 + 1e-12)))
+        assert check_database(connection) == []
+
+
+def test_a_database_without_samples_is_sound(filled: Engine) -> None:
+    with filled.begin() as connection:
+        connection.execute(update(schema.motion).values(samples=None))
+        assert check_database(connection) == []
+
+
+@pytest.mark.parametrize("value", [float("inf"), float("-inf"), float("nan")])
+def test_numbers_must_be_finite(filled: Engine, value: float) -> None:
+    if filled.dialect.name == "sqlite" and value != value:
+        pytest.skip("SQLite holds NaN as NULL")
+    with filled.begin() as connection:
+        connection.execute(update(schema.combination).values(island_width=value))
+        findings = check_database(connection)
+    wrong = [finding for finding in findings if "island_width: not a finite" in finding.problem]
+    assert len(wrong) == 6
+
+
+def test_a_history_has_the_length_it_states(filled: Engine) -> None:
+    with filled.begin() as connection:
+        motion_id = connection.scalar(select(func.min(schema.motion.c.id)))
+        series = dict.fromkeys(("time_s", "theta_rad", "theta_dot_rad_s", "k_h", "k_v"), b"0" * 16)
+        values = {
+            "natural_key": "0" * 64,
+            "motion_id": motion_id,
+            "polarity": "forward",
+            "kind": "toppling",
+            "linear": False,
+            "p2": 3.0,
+            "kr": 0.1,
+            "numerics_version": "2",
+            "outcome": "stable",
+            "npts": 2,
+        }
+        connection.execute(insert(schema.response).values(**values, **series))
+        assert check_database(connection) == []
+        connection.execute(update(schema.response).values(theta_rad=b"0" * 8))
+        (finding,) = check_database(connection)
+    assert finding.problem == "theta_rad holds 8 bytes, not 8 x 2"
+
+
+def test_numerics_of_the_campaign_agree(filled: Engine) -> None:
+    with filled.begin() as connection:
+        connection.execute(update(schema.campaign).values(numerics_version="0"))
+        findings = check_database(connection)
+    assert len(findings) == 6
+    assert "its campaign says 0" in findings[0].problem
+
+
+def test_rows_are_looked_at_in_any_number(filled: Engine, monkeypatch: Any) -> None:
+    import rbfrag.db.check_combinations
+
+    monkeypatch.setattr(rbfrag.db.check_combinations, "_ROWS_AT_ONCE", 2)
+    with filled.begin() as connection:
+        connection.execute(update(schema.combination).values(settings="{"))
+        connection.execute(delete(schema.simulation))
+        findings = check_database(connection)
+    assert len({finding.row for finding in findings}) == 6
