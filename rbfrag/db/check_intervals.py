@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -22,9 +23,9 @@ def interval_problems(
     toppled: Sequence[float],
     stable: Sequence[float],
 ) -> Iterator[str]:
-    """Yield what is wrong with a map; one that is absent is not wrong.
+    """Yield what is wrong with a map.
 
-    Databases of earlier numerics hold none, nor do motions outside the model or that never
+    Searches that did not ask for one hold none, nor do motions outside the model or that never
     lift a block.
 
     Args:
@@ -34,6 +35,8 @@ def interval_problems(
         stable: kr/PGA of those that did not.
     """
     if not intervals:
+        if row["status"] in ("found", "below_limit") and _maps_all(row["settings"]):
+            yield "its map of intervals is missing"
         return
     yield from _cover_problems(row, intervals)
     yield from _bracket_problems(row, intervals)
@@ -45,6 +48,13 @@ def interval_problems(
                     f"a simulation {word} at kr/PGA {k!r}, inside the interval "
                     f"{inside.k_lo!r} to {inside.k_hi!r} that is {_said(other)}"
                 )
+
+
+def _maps_all(settings: str) -> bool:
+    try:
+        return bool(json.loads(settings).get("map") == "full")
+    except (ValueError, AttributeError):
+        return False
 
 
 def _said(outcome: str) -> str:

@@ -131,6 +131,13 @@ class TestMaps:
         assert any(problem in finding.problem for finding in findings), findings
         assert all("rbfrag simulate" in finding.advice for finding in findings)
 
+    def test_a_map_that_was_asked_for_is_there(self, filled: Engine) -> None:
+        settings = '{"map":"full","search_limit":0.01}'
+        with filled.begin() as connection:
+            connection.execute(update(schema.combination).values(settings=settings))
+            problems = [finding.problem for finding in check_database(connection)]
+        assert problems.count("its map of intervals is missing") == 6
+
     def test_a_censored_combination_has_no_toppling_interval(self, filled: Engine) -> None:
         with filled.begin() as connection:
             _store_map(connection, MAP, status="below_limit")
