@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rbfrag.fragility.prediction import predict as predict
     from rbfrag.motions.ground_motion import GroundMotion as GroundMotion
     from rbfrag.motions.recognise import read_motions as read_motions
+    from rbfrag.motions.toppling_spectrum import toppling_spectrum as toppling_spectrum
     from rbfrag.solver.block import Block as Block
     from rbfrag.solver.block_arrays import BlockArray as BlockArray
     from rbfrag.solver.critical import critical as critical
@@ -63,6 +64,7 @@ _HOME = {
     "simulate": "rbfrag.campaign.simulate",
     "stability": "rbfrag.solver.stability",
     "stability_arrays": "rbfrag.solver.stability_arrays",
+    "toppling_spectrum": "rbfrag.motions.toppling_spectrum",
 }
 
 __all__ = [*sorted(_HOME), "__version__"]

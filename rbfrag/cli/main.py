@@ -17,6 +17,7 @@ from rbfrag.cli import block as block_command
 from rbfrag.cli import critical, database, demo, fit, models, motions, plot, predict, respond
 from rbfrag.cli import rockmass as rockmass_command
 from rbfrag.cli import simulate as simulate_command
+from rbfrag.cli import spectrum as spectrum_command
 from rbfrag.errors import RbfragError
 from rbfrag.version import __version__
 
@@ -69,6 +70,7 @@ app.command("rockmass", epilog=rockmass_command.EXAMPLE)(rockmass_command.rockma
 app.add_typer(motions.app, name="motions")
 app.command("respond", epilog=respond.EXAMPLE)(respond.respond)
 app.command("critical", epilog=critical.EXAMPLE)(critical.critical)
+app.command("spectrum", epilog=spectrum_command.EXAMPLE)(spectrum_command.spectrum)
 app.command("simulate", epilog=simulate_command.EXAMPLE)(simulate_command.simulate)
 app.command("fit", epilog=fit.EXAMPLE)(fit.fit)
 app.command("predict", epilog=predict.EXAMPLE)(predict.predict)

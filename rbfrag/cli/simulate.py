@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rbfrag.cli import options
+from rbfrag.cli.number_list import number_list
 from rbfrag.cli.output import print_json, print_pairs
-from rbfrag.errors import InputError
 
 if TYPE_CHECKING:
     from rbfrag.campaign.simulate import CampaignProgress
@@ -44,23 +44,13 @@ def simulate(
     from rbfrag.campaign.simulate import simulate as run
 
     with _Progress() as progress:
-        summary = run(db, suite=suite, p2=_numbers(p2), jobs=jobs, on_progress=progress.show)
+        summary = run(
+            db, suite=suite, p2=number_list(p2, "--p2"), jobs=jobs, on_progress=progress.show
+        )
     if json:
         print_json(summary.as_dict())
     else:
         print_pairs(summary.as_dict())
-
-
-def _numbers(text: str) -> list[float]:
-    values = []
-    for part in text.split(","):
-        try:
-            values.append(float(part))
-        except ValueError:
-            raise InputError(
-                f"--p2: {part.strip()!r} is no number: write a list such as 30,10,3,1"
-            ) from None
-    return values
 
 
 class _Progress:

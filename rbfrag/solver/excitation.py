@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.results import POLARITIES, Polarity
+from rbfrag.motions.polarity import Polarity, driving_acceleration_g
 
 FloatArray = NDArray[np.float64]
 
@@ -97,11 +97,7 @@ def excitation(
     Raises:
         InputError: unknown polarity, or components that cannot be brought together.
     """
-    if polarity not in POLARITIES:
-        raise InputError(f"polarity must be 'forward' or 'reverse', not {polarity!r}")
-    sign = 1.0 if polarity == "forward" else -1.0
-    # + 0.0 turns the -0.0 of a reversed zero sample into 0.0
-    k_h = sign * motion.acceleration_g + 0.0
+    k_h = driving_acceleration_g(motion.acceleration_g, polarity)
     time_s, interval_s = motion.time_s, motion.interval_s
     warnings: list[str] = []
     if vertical is None:

@@ -9,13 +9,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.motions.polarity import POLARITIES as POLARITIES
+from rbfrag.motions.polarity import Polarity as Polarity
+
 FloatArray = NDArray[np.float64]
 
 NUMERICS_VERSION = "2"
 """Changes whenever a run of the same input may give other bits; part of every stored key."""
-
-Polarity = Literal["forward", "reverse"]
-POLARITIES: tuple[Polarity, Polarity] = ("forward", "reverse")
 
 Status = Literal["found", "below_limit", "no_motion", "outside_model"]
 

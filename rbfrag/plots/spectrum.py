@@ -1,0 +1,123 @@
+"""Figure of toppling spectra: what motions can topple, over the size of the block."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.polarity import POLARITIES, Polarity
+from rbfrag.motions.toppling_spectrum import toppling_spectrum
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+
+# Told apart by people who do not see red and green alike.
+COLOURS = ("#1f4e79", "#d98c1f", "#4c9a6a", "#8c2d4f", "#7f7f7f", "#56b4e9", "#c44e52", "#5e3c99")
+LINES: dict[Polarity, str] = {"forward": "-", "reverse": "--"}
+
+MOST_MOTIONS = len(COLOURS)
+_POINTS = 161
+_LOWEST_SHARE = 0.02
+"""Share of the highest value shown below which a curve may leave the sheet."""
+
+
+def block_size_m(p2: ArrayLike) -> NDArray[np.float64]:
+    """Distance r3 from centroid to toe of a rectangular block of the given p² [m]."""
+    # the axis also asks for its two ends at zero and infinity
+    with np.errstate(divide="ignore"):
+        size: NDArray[np.float64] = 0.75 * STANDARD_GRAVITY_M_S2 / np.asarray(p2, dtype=np.float64)
+    return size
+
+
+def plot_spectrum(
+    motions: Sequence[GroundMotion],
+    path: str | PathLike[str],
+    *,
+    polarities: Sequence[Polarity] = POLARITIES,
+    p2: Sequence[float] = (0.1, 30.0),
+    names: Sequence[str] = (),
+) -> Path:
+    """Draw the toppling spectra of several motions with the PGV of each.
+
+    Args:
+        motions: at most eight.
+        path: file to write: .png, .pdf or .svg.
+        polarities: the polarities to draw, forward solid, reverse dashed.
+        p2: the figure spans at least these frequency parameters [1/s²].
+        names: names of the motions in the legend; their labels if empty.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: no motion or too many, nothing to draw, a path that cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    plot_path(path)
+    if not 1 <= len(motions) <= MOST_MOTIONS:
+        raise InputError(
+            f"{len(motions)} motions: a figure of spectra shows 1 to {MOST_MOTIONS} of them"
+        )
+    named = names or [motion.label for motion in motions]
+    low, high = min(p2), max(p2)
+    if high < 4.0 * low:
+        low, high = 0.5 * low, 2.0 * high
+    sizes = np.geomspace(low, high, _POINTS)
+    figure = new_figure(7.2, 5.0)
+    axes = figure.add_subplot()
+    highest = 0.0
+    for motion, name, colour in zip(motions, named, COLOURS, strict=False):
+        for polarity in polarities:
+            x = toppling_spectrum(motion, sizes, polarity)
+            highest = max(highest, float(np.max(x)))
+            label = name if len(polarities) == 1 or polarity == "forward" else None
+            axes.plot(sizes, x, LINES[polarity], color=colour, lw=1.7, label=label)
+        axes.axhline(motion.pgv_m_s, color=colour, lw=0.9, ls=":")
+        highest = max(highest, motion.pgv_m_s)
+    if highest <= 0.0:
+        raise InputError("these motions topple no block of any size: there is nothing to draw")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlim(low, high)
+    bottom = max(_LOWEST_SHARE * highest, 0.8 * _lowest(axes))
+    axes.set_ylim(bottom, 1.25 * highest)
+    axes.set_xlabel("frequency parameter of the block, $p^2$ [1/s$^2$]")
+    axes.set_ylabel("toppling spectrum $X(p)$ and PGV [m/s]")
+    axes.grid(visible=True, which="both", lw=0.3, alpha=0.5)
+    _plain_numbers(axes.xaxis, 1.0, 3.0)
+    _plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    above = axes.secondary_xaxis("top", functions=(block_size_m, block_size_m))
+    above.set_xlabel("size of a rectangular block, $r_3 = 3g/(4p^2)$ [m]", labelpad=7)
+    _plain_numbers(above.xaxis, 1.0, 2.0, 5.0)
+    for words, style in _key(polarities):
+        axes.plot([], [], style, color="black", lw=1.2, label=words)
+    figure.legend(loc="outside lower center", ncols=2, fontsize=8.5, frameon=False)
+    return save_figure(figure, path)
+
+
+def _key(polarities: Sequence[Polarity]) -> list[tuple[str, str]]:
+    lines = [(f"$X(p)$, {each}", LINES[each]) for each in polarities]
+    return [*lines, ("PGV, either polarity", ":")]
+
+
+def _lowest(axes: Axes) -> float:
+    values = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in axes.lines])
+    return float(values[values > 0.0].min())
+
+
+def _plain_numbers(axis: Axis, *digits: float) -> None:
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=digits))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
