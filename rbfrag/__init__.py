@@ -22,7 +22,11 @@ if TYPE_CHECKING:
     from rbfrag.errors import RbfragError as RbfragError
     from rbfrag.errors import UnknownModelError as UnknownModelError
     from rbfrag.errors import WorkFailedError as WorkFailedError
+    from rbfrag.exchange.hazard_file import read_hazard_curves as read_hazard_curves
     from rbfrag.fragility.fitting import fit as fit
+    from rbfrag.fragility.hazard_answer import HazardAnswer as HazardAnswer
+    from rbfrag.fragility.hazard_answer import hazard as hazard
+    from rbfrag.fragility.hazard_curve import HazardCurve as HazardCurve
     from rbfrag.fragility.prediction import predict as predict
     from rbfrag.motions.ground_motion import GroundMotion as GroundMotion
     from rbfrag.motions.recognise import read_motions as read_motions
@@ -46,6 +50,8 @@ _HOME = {
     "DatabaseError": "rbfrag.errors",
     "FitError": "rbfrag.errors",
     "GroundMotion": "rbfrag.motions.ground_motion",
+    "HazardAnswer": "rbfrag.fragility.hazard_answer",
+    "HazardCurve": "rbfrag.fragility.hazard_curve",
     "InputError": "rbfrag.errors",
     "MotionFileError": "rbfrag.errors",
     "Outcome": "rbfrag.solver.results",
@@ -58,7 +64,9 @@ _HOME = {
     "add_motions": "rbfrag.campaign.add_motions",
     "critical": "rbfrag.solver.critical",
     "fit": "rbfrag.fragility.fitting",
+    "hazard": "rbfrag.fragility.hazard_answer",
     "predict": "rbfrag.fragility.prediction",
+    "read_hazard_curves": "rbfrag.exchange.hazard_file",
     "read_motions": "rbfrag.motions.recognise",
     "respond": "rbfrag.solver.respond",
     "simulate": "rbfrag.campaign.simulate",

@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 from rbfrag.cli import bench as bench_command
 from rbfrag.cli import block as block_command
 from rbfrag.cli import critical, database, demo, fit, models, motions, plot, predict, respond
+from rbfrag.cli import hazard as hazard_command
 from rbfrag.cli import rockmass as rockmass_command
 from rbfrag.cli import simulate as simulate_command
 from rbfrag.cli import spectrum as spectrum_command
@@ -74,6 +75,7 @@ app.command("spectrum", epilog=spectrum_command.EXAMPLE)(spectrum_command.spectr
 app.command("simulate", epilog=simulate_command.EXAMPLE)(simulate_command.simulate)
 app.command("fit", epilog=fit.EXAMPLE)(fit.fit)
 app.command("predict", epilog=predict.EXAMPLE)(predict.predict)
+app.command("hazard", epilog=hazard_command.EXAMPLE)(hazard_command.hazard)
 app.add_typer(models.app, name="models")
 app.add_typer(plot.app, name="plot")
 app.add_typer(database.app, name="db")

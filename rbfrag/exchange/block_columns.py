@@ -4,15 +4,37 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_table import SUFFIXES, pyarrow
+
+T = TypeVar("T")
+
+
+def read_names(path: str | os.PathLike[str]) -> list[str]:
+    """Return the names of the columns of a block table.
+
+    Raises:
+        InputError: the file cannot be read.
+        MissingExtraError: a Parquet file without pyarrow.
+    """
+    return _opened(path, _names_of)
+
+
+def read_texts(path: str | os.PathLike[str], name: str) -> NDArray[np.object_]:
+    """Return one column of a block table as texts.
+
+    Raises:
+        InputError: the file cannot be read or lacks the column.
+        MissingExtraError: a Parquet file without pyarrow.
+    """
+    return _opened(path, lambda source: _texts(source, name))
 
 
 def read_columns(
@@ -29,16 +51,26 @@ def read_columns(
             message names the line.
         MissingExtraError: a Parquet file without pyarrow.
     """
+    return _opened(
+        path,
+        lambda source: (_from_csv if _is_csv(source) else _from_parquet)(source, names),
+    )
+
+
+def _is_csv(source: Path) -> bool:
+    return source.suffix.lower() == ".csv"
+
+
+def _opened(path: str | os.PathLike[str], read: Callable[[Path], T]) -> T:
     source = Path(path)
-    suffix = source.suffix.lower()
-    if suffix not in SUFFIXES:
+    if source.suffix.lower() not in SUFFIXES:
         raise InputError(
             f"{source}: a block table ends in {' or '.join(SUFFIXES)}, not {source.suffix!r}"
         )
     try:
         if source.is_dir():
             raise InputError(f"{source} is a folder: name a block table in it")
-        return (_from_csv if suffix == ".csv" else _from_parquet)(source, names)
+        return read(source)
     except FileNotFoundError:
         raise InputError(f"{source}: no such file; name a .csv or .parquet block table") from None
     except UnicodeDecodeError:
@@ -47,6 +79,35 @@ def read_columns(
         raise InputError(f"{source}: not a CSV file: {error}") from None
     except OSError as error:
         raise InputError(f"{source}: cannot be read: {error.strerror or error}") from None
+
+
+def _names_of(source: Path) -> list[str]:
+    if _is_csv(source):
+        with source.open(newline="", encoding="utf-8-sig") as file:
+            return [cell.strip() for cell in next(csv.reader(file), [])]
+    arrow, parquet = pyarrow()
+    try:
+        return list(parquet.ParquetFile(source).schema_arrow.names)
+    except arrow.ArrowException as error:
+        raise InputError(f"{source}: not a Parquet file: {error}") from None
+
+
+def _texts(source: Path, name: str) -> NDArray[np.object_]:
+    names = _names_of(source)
+    _missing(source, names, [name])
+    if _is_csv(source):
+        with source.open(newline="", encoding="utf-8-sig") as file:
+            rows = csv.reader(file)
+            next(rows, None)
+            place = names.index(name)
+            cells = [row[place].strip() if place < len(row) else "" for row in rows if row]
+    else:
+        _, parquet = pyarrow()
+        column = parquet.ParquetFile(source).read(columns=[name])[name]
+        cells = ["" if cell is None else str(cell) for cell in column.to_pylist()]
+    found = np.empty(len(cells), dtype=object)
+    found[:] = cells
+    return found
 
 
 def _missing(source: Path, have: Sequence[str], names: Sequence[str]) -> None:

@@ -1,0 +1,205 @@
+"""`rbfrag hazard`: how often per year blocks topple."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+import typer
+
+from rbfrag.cli import options
+from rbfrag.cli.block_argument import toppling_block
+from rbfrag.cli.output import print_json, print_pairs, print_table, print_warnings
+from rbfrag.errors import InputError
+
+EXAMPLE = "Example:  rbfrag hazard pgv-curve.csv --p2 3 --kr 0.1 --component rotd50 --years 50"
+
+
+def hazard(
+    curve: Annotated[
+        str,
+        typer.Argument(
+            metavar="CURVE",
+            help="Hazard curve: OpenQuake CSV, USGS NSHM JSON, or CSV of two columns whose header "
+            "names their units (pgv_m_s,annual_rate).",
+            show_default=False,
+        ),
+    ],
+    p2: options.P2OrFile = None,
+    kr: options.KrOrFile = None,
+    block: options.BlockFile = None,
+    blocks: Annotated[
+        str | None,
+        typer.Option(
+            "--blocks",
+            metavar="FILE",
+            help="Block table (.csv, .parquet) with p2_1_s2 [1/s²] and kr, one answer a row.",
+            show_default=False,
+        ),
+    ] = None,
+    imt: Annotated[
+        str | None,
+        typer.Option("--imt", help="Intensity measure of the curve: PGV, PGA, 'SA(1.0)'."),
+    ] = None,
+    site: Annotated[
+        str | None,
+        typer.Option("--site", help="Site of the file: its number from 1 on, or its name."),
+    ] = None,
+    years: Annotated[
+        float, typer.Option("--years", help="Period of the probability [years].")
+    ] = 50.0,
+    tm: options.Tm = None,
+    convert: Annotated[
+        str | None,
+        typer.Option(
+            "--convert",
+            help="Published conversion of a spectral acceleration to PGV: newmark_hall_1982 "
+            "(SA(1)) or bommer_alarcon_2006 (SA(0.5)).",
+        ),
+    ] = None,
+    component: Annotated[
+        str | None,
+        typer.Option(
+            "--component",
+            help="What the curve's horizontal component means: single, geometric_mean, rotd50 or "
+            "larger.",
+        ),
+    ] = None,
+    model: options.Model = None,
+    level: options.Level = 0.95,
+    out: Annotated[
+        str | None,
+        typer.Option("--out", help="Write one row a block and site (.csv, .parquet)."),
+    ] = None,
+    plot: Annotated[
+        str | None,
+        typer.Option(
+            "--plot", help="Draw which shaking the rate of one block comes from (.png, .pdf, .svg)."
+        ),
+    ] = None,
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Print the annual rate at which a block topples, and the probability in a period of years.
+
+    The fragility is integrated over the hazard curve. A PGA curve needs --tm, a spectral
+    acceleration --convert.
+    """
+    from rbfrag.exchange.block_table import table_path, write_block_table
+    from rbfrag.exchange.hazard_file import read_hazard_curves, suited_curves
+    from rbfrag.fragility.hazard_answer import hazard as answer
+    from rbfrag.fragility.velocity_conversion import velocity_conversion
+
+    if out is not None:
+        table_path(out)
+    if plot is not None:
+        from rbfrag.plots.canvas import plot_path
+
+        plot_path(plot)
+    table, remarks = _blocks(p2, kr, block, blocks)
+    curves = suited_curves(
+        read_hazard_curves(curve, imt=imt, site=site),
+        with_mean_period=tm is not None,
+        converted_period_s=None if convert is None else velocity_conversion(convert).period_s,
+    )
+    if plot is not None and (len(curves) > 1 or len(table["kr"]) > 1):
+        raise InputError(
+            "--plot draws one block at one site: choose them with --site, --p2 and --kr"
+        )
+    found = [
+        answer(
+            one, table["p2_1_s2"], table["kr"], tm_s=tm, convert=convert, component=component,
+            years=years, model=model, level=level, db=db,
+        )
+        for one in curves
+    ]  # fmt: skip
+    warnings = [*remarks, *dict.fromkeys(w for one in found for w in one.warnings)]
+    if out is not None:
+        from rbfrag.exchange.rate_table import rate_columns
+
+        write_block_table(rate_columns(curves, table, found), out)
+    if plot is not None:
+        from rbfrag.plots.hazard import plot_contribution
+
+        plot_contribution(curves[0], found[0], plot)
+    rows = [
+        {
+            "site": one.place or None,
+            "block_id": name,
+            "annual_rate": rate.annual_rate[i],
+            "ci_low": rate.ci_low[i],
+            "ci_high": rate.ci_high[i],
+            "probability": rate.probability[i],
+        }
+        for one, rate in zip(curves, found, strict=True)
+        for i, name in enumerate(table["block_id"])
+    ]
+    shared = {
+        "years": years,
+        "level": level,
+        "model": found[0].model,
+        "term": found[0].term,
+        "method": found[0].method,
+        "imt": curves[0].imt,
+    }
+    if len(rows) == 1:
+        document: dict[str, Any] = {**rows[0], **shared}
+        document.pop("block_id")
+        if json:
+            print_json({**document, "contributions": _parts(found[0]), "warnings": warnings})
+            return
+        print_pairs(document)
+        if document["annual_rate"] > 0.0:
+            print(f"once in {1.0 / document['annual_rate']:.4g} years on average")
+    else:
+        if json:
+            print_json({**shared, "answers": [_plain(row) for row in rows], "warnings": warnings})
+            return
+        print_pairs(shared)
+        print()
+        print_table(list(rows[0]), [list(row.values()) for row in rows])
+    print_warnings(warnings)
+
+
+def _blocks(
+    p2: float | None, kr: float | None, block: str | None, blocks: str | None
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    if blocks is None:
+        p2, kr, remarks = toppling_block(p2, kr, block)
+        return {"block_id": [None], "p2_1_s2": [p2], "kr": [kr]}, remarks
+    if p2 is not None or kr is not None or block is not None:
+        raise InputError("--blocks does not go with --p2, --kr or --block: the table has them")
+    from rbfrag.exchange.block_columns import read_columns, read_names, read_texts
+
+    columns = read_columns(blocks, ["p2_1_s2", "kr"])
+    size = len(columns["kr"])
+    if size == 0:
+        raise InputError(f"{blocks}: there is no block in the table")
+    names = [str(i + 1) for i in range(size)]
+    if "block_id" in read_names(blocks):
+        names = read_texts(blocks, "block_id").tolist()
+    for name, a, b in zip(names, columns["p2_1_s2"].tolist(), columns["kr"].tolist(), strict=True):
+        if not (a > 0.0 and b > 0.0 and math.isfinite(a) and math.isfinite(b)):
+            raise InputError(
+                f"{blocks}: block {name} has p2_1_s2 = {a:g} and kr = {b:g}: a block that waits "
+                "for an earthquake has both above zero (an unstable one has already failed)"
+            )
+    return {"block_id": names, **columns}, ()
+
+
+def _parts(found: Any) -> list[dict[str, float]]:
+    """Return the contributions by intensity in the intervals of the table."""
+    return [
+        {"from": low, "to": high, "annual_rate": part}
+        for low, high, part in zip(
+            found.edges[:-1].tolist(),
+            found.edges[1:].tolist(),
+            found.contribution[0].tolist(),
+            strict=True,
+        )
+    ]
+
+
+def _plain(row: dict[str, Any]) -> dict[str, Any]:
+    return {key: value if isinstance(value, str) or value is None else float(value)
+            for key, value in row.items()}  # fmt: skip

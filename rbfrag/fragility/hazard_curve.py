@@ -1,0 +1,177 @@
+"""A seismic hazard curve: how often per year each level of shaking is exceeded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbfrag.errors import InputError
+
+FloatArray = NDArray[np.float64]
+
+MEASURES = ("pga_g", "pgv_m_s", "sa_g")
+"""What the levels of a curve may be, with the unit."""
+
+CERTAIN = 1.0 - 1e-9
+"""A probability of exceedance above this says nothing of the rate."""
+
+
+@dataclass(frozen=True, eq=False)
+class HazardCurve:
+    """Annual rates of exceedance at rising levels of one measure of shaking.
+
+    Args:
+        measure: one of `MEASURES`.
+        levels: levels of the measure in the unit it names, rising, shape (n,).
+        annual_rate: mean number of exceedances a year [1/a], never rising, all above zero,
+            shape (n,).
+        end_level: the level from which on nothing is exceeded, if the curve states one.
+        period_s: oscillator period of a spectral acceleration [s].
+        site: name of the site, or empty.
+        lon: longitude of the site [deg], or None.
+        lat: latitude of the site [deg], or None.
+        source: where the curve comes from, for messages.
+        warnings: what was noticed on reading it.
+    """
+
+    measure: str
+    levels: FloatArray
+    annual_rate: FloatArray
+    end_level: float | None = None
+    period_s: float | None = None
+    site: str = ""
+    lon: float | None = None
+    lat: float | None = None
+    source: str = "hazard curve"
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def imt(self) -> str:
+        """Intensity measure type as OpenQuake names it: PGA, PGV, SA(0.5)."""
+        if self.measure == "sa_g":
+            return f"SA({self.period_s:g})"
+        return self.measure.split("_")[0].upper()
+
+    @property
+    def place(self) -> str:
+        """The site in words."""
+        if self.site:
+            return self.site
+        if self.lon is None or self.lat is None:
+            return ""
+        return f"lon {self.lon:g}, lat {self.lat:g}"
+
+    def rate_at(self, level: ArrayLike) -> FloatArray:
+        """Return annual rates of exceedance [1/a] by interpolation in log-log.
+
+        NaN outside the levels of the curve: nothing is invented there.
+        """
+        x = np.asarray(level, dtype=np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = np.exp(np.interp(np.log(x), np.log(self.levels), np.log(self.annual_rate)))
+        inside = (x >= self.levels[0]) & (x <= self.levels[-1])
+        return np.where(inside, found, np.nan)
+
+
+def rates_from_probabilities(probability: FloatArray, years: float) -> FloatArray:
+    """Return annual rates -ln(1 - P)/T of probabilities of exceedance in T years (Poisson)."""
+    return -np.log1p(-probability) / years
+
+
+def hazard_curve(
+    measure: str,
+    levels: ArrayLike,
+    annual_rate: ArrayLike,
+    *,
+    source: str = "hazard curve",
+    period_s: float | None = None,
+    site: str = "",
+    lon: float | None = None,
+    lat: float | None = None,
+) -> HazardCurve:
+    """Return a checked hazard curve; levels that say nothing are left out with a warning.
+
+    Levels whose rate is infinite (a probability of 1) are left out. From the first level of
+    rate zero on nothing is exceeded: that level becomes `end_level`.
+
+    Args:
+        measure: ``pga_g``, ``pgv_m_s`` or ``sa_g`` (with `period_s`).
+        levels: levels in that unit, above zero, rising, shape (n,).
+        annual_rate: rates of exceedance [1/a], not below zero, never rising, shape (n,).
+        source: file and place, for messages.
+        period_s: oscillator period [s].
+        site: name of the site.
+        lon: longitude [deg].
+        lat: latitude [deg].
+
+    Raises:
+        InputError: levels or rates that make no hazard curve, with the offending value.
+    """
+    if measure not in MEASURES:
+        raise InputError(f"{source}: measure {measure!r} is none of {', '.join(MEASURES)}")
+    if measure == "sa_g" and (period_s is None or not period_s > 0.0):
+        raise InputError(f"{source}: a spectral acceleration needs its period above 0 s")
+    x = np.asarray(levels, dtype=np.float64)
+    rate = np.asarray(annual_rate, dtype=np.float64)
+    if x.ndim != 1 or x.shape != rate.shape:
+        raise InputError(
+            f"{source}: {x.size} levels and {rate.size} rates: give one rate for each level"
+        )
+    _refuse_disorder(x, rate, measure, source)
+    warnings = []
+    endless = np.isinf(rate)
+    if endless.any():
+        warnings.append(
+            f"{source}: {int(endless.sum())} lowest levels are exceeded with probability 1, which "
+            "gives no rate: they are left out"
+        )
+        x, rate = x[~endless], rate[~endless]
+    end_level = None
+    nothing = rate == 0.0
+    if nothing.any():
+        end_level = float(x[nothing][0])
+        x, rate = x[~nothing], rate[~nothing]
+    if x.size < 2:
+        raise InputError(
+            f"{source}: {x.size} levels have a rate between zero and infinity: a curve needs at "
+            "least two"
+        )
+    return HazardCurve(
+        measure=measure,
+        levels=x,
+        annual_rate=rate,
+        end_level=end_level,
+        period_s=period_s,
+        site=site,
+        lon=lon,
+        lat=lat,
+        source=source,
+        warnings=tuple(warnings),
+    )
+
+
+def _refuse_disorder(x: FloatArray, rate: FloatArray, measure: str, source: str) -> None:
+    for i, (level, value) in enumerate(zip(x.tolist(), rate.tolist(), strict=True), start=1):
+        if not np.isfinite(level) or level <= 0.0:
+            raise InputError(
+                f"{source}: level {i} is {level:g}: {measure} levels are finite and above zero"
+            )
+        if np.isnan(value) or value < 0.0:
+            raise InputError(
+                f"{source}: the rate at level {i} ({measure} = {level:g}) is {value:g}: "
+                "rates are numbers, not below zero"
+            )
+    for i in range(1, x.size):
+        if x[i] <= x[i - 1]:
+            what = "repeats" if x[i] == x[i - 1] else "falls"
+            raise InputError(
+                f"{source}: level {i + 1} ({measure} = {x[i]:g}) {what} after {x[i - 1]:g}: "
+                "levels must rise"
+            )
+        if rate[i] > rate[i - 1]:
+            raise InputError(
+                f"{source}: the rate rises from {rate[i - 1]:g} to {rate[i]:g} 1/a at level "
+                f"{i + 1} ({measure} = {x[i]:g}): a higher level cannot be exceeded more often"
+            )

@@ -1,0 +1,97 @@
+"""`rbfrag hazard` as people and scripts call it."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rbfrag.db.engine import opened_database
+from rbfrag.db.model_store import save_model
+from tests.cli.conftest import Shell
+from tests.fragility.conftest import model_row
+
+
+@pytest.fixture
+def curve(shell: Shell) -> Path:
+    """A power law of PGV in the current folder, with a database of one model beside it."""
+    x = np.geomspace(0.01, 10.0, 20)
+    lines = [f"{a!r},{b!r}" for a, b in zip(x.tolist(), (1e-3 * x**-2).tolist(), strict=True)]
+    path = Path("curve.csv")
+    path.write_text("\n".join(["pgv_m_s,annual_rate", *lines]))
+    with opened_database("rbfrag.db", create=True) as engine, engine.begin() as connection:
+        save_model(connection, model_row())
+    return path
+
+
+def test_one_block(shell: Shell, curve: Path) -> None:
+    found = shell.json("hazard", curve, "--p2", "3", "--kr", "0.1", "--component", "single")
+    assert found["ci_low"] < found["annual_rate"] < found["ci_high"]
+    assert found["probability"] == pytest.approx(1 - np.exp(-50 * found["annual_rate"]))
+    assert (found["years"], found["imt"], found["term"]) == (50.0, "PGV", "pgv")
+    parts = sum(part["annual_rate"] for part in found["contributions"])
+    assert parts == pytest.approx(found["annual_rate"], rel=0.05)
+    # a steep fragility fails about as often as its median is exceeded: y = 0.566 = 0.72 PGV
+    assert found["annual_rate"] == pytest.approx(1e-3 * (0.566 / 0.72) ** -2, rel=0.05)
+
+
+def test_what_the_component_means(shell: Shell, curve: Path) -> None:
+    block = ("--p2", "3", "--kr", "0.1")
+    unsaid = shell.json("hazard", curve, *block)
+    assert any("say which" in text for text in unsaid["warnings"])
+    single = shell.json("hazard", curve, *block, "--component", "single")
+    assert unsaid["annual_rate"] == single["annual_rate"]
+    larger = shell.json("hazard", curve, *block, "--component", "larger")
+    mean = shell.json("hazard", curve, *block, "--component", "geometric_mean")
+    # one component scatters about the mean, which adds to the rate, and lies below the larger one
+    assert larger["annual_rate"] < single["annual_rate"] < mean["annual_rate"]
+
+
+def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
+    Path("blocks.csv").write_text("block_id,p2_1_s2,kr\nA7,3,0.1\nB2,10,0.3\n")
+    shell("hazard", curve, "--blocks", "blocks.csv", "--out", "rates.csv")
+    with Path("rates.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["block_id"] for row in rows] == ["A7", "B2"]
+    alone = shell.json("hazard", curve, "--p2", "3", "--kr", "0.1")
+    assert float(rows[0]["annual_rate"]) == pytest.approx(alone["annual_rate"], rel=1e-8)
+    answers = shell.json("hazard", curve, "--blocks", "blocks.csv")["answers"]
+    assert answers[1]["block_id"] == "B2"
+
+
+def test_plot(shell: Shell, curve: Path) -> None:
+    shell("hazard", curve, "--p2", "3", "--kr", "0.1", "--plot", "rate.svg")
+    assert "share of the rate" in Path("rate.svg").read_text()
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "words"),
+    [
+        ("pga_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (), "give the mean period with --tm"),
+        ("sa(1)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (), "published conversion"),
+        ("sa(2)_g,annual_rate\n0.1,0.01\n0.5,0.001\n",
+         ("--convert", "newmark_hall_1982"), "is for SA(1), not for SA(2)"),
+        ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n",
+         ("--convert", "newmark_hall_1982"), "the curve is of PGV"),
+        ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--convert", "x"), "'x' is not known"),
+        ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--component", "x"), "'x' is not known"),
+        ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--years", "0"), "years = 0"),
+        ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--site", "4"), "no site '4'"),
+        ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.02\n", (), "the rate rises"),
+    ],
+)  # fmt: skip
+def test_refusals(
+    refuses: Callable[..., str], curve: Path, text: str, options: tuple[str, ...], words: str
+) -> None:
+    Path("other.csv").write_text(text)
+    message = refuses("hazard", "other.csv", "--p2", "3", "--kr", "0.1", *options)
+    assert words in message
+
+
+def test_blocks_that_do_not_wait_are_refused(refuses: Callable[..., str], curve: Path) -> None:
+    Path("blocks.csv").write_text("block_id,p2_1_s2,kr\nA7,3,-0.1\n")
+    assert "block A7" in refuses("hazard", curve, "--blocks", "blocks.csv")
+    assert "does not go with" in refuses("hazard", curve, "--blocks", "blocks.csv", "--p2", "3")

@@ -1,0 +1,121 @@
+"""Hazard curves of other tools: the samples, and files that are not whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rbfrag.errors import InputError
+from rbfrag.exchange.hazard_file import read_hazard_curves, suited_curves
+
+OPENQUAKE = (
+    "#,,,,,\"generated_by='OpenQuake engine 3.16', kind='mean', "
+    "investigation_time=50.0, imt='PGV'\"\n"
+    "lon,lat,depth,poe-10.0,poe-20.0,poe-40.0\n"
+    "10.5,45.0,0.0,0.5,0.1,0.01\n"
+)
+
+
+def test_openquake_mean_pga(formats_dir: Path) -> None:
+    curves = read_hazard_curves(formats_dir / "openquake_hazard_curve_mean_PGA.csv")
+    assert [curve.place for curve in curves] == [
+        "lon -65, lat 0", "lon -65.25, lat 0", "lon -65.5, lat 0"
+    ]  # fmt: skip
+    first = curves[0]
+    assert (first.imt, first.measure, first.levels.size) == ("PGA", "pga_g", 10)
+    # line 3 of the file: poe 6.921140E-03 at 0.1 g in one year
+    assert first.annual_rate[6] == pytest.approx(-np.log1p(-6.921140e-03), rel=1e-12)
+
+
+def test_openquake_single_site_ends_at_zero(formats_dir: Path) -> None:
+    (curve,) = read_hazard_curves(formats_dir / "openquake_hazard_curve_single_site.csv")
+    assert curve.levels.tolist() == [0.1, 0.4, 0.6]
+    assert curve.end_level == 1.0
+
+
+def test_usgs_nshm(formats_dir: Path) -> None:
+    path = formats_dir / "usgs_nshm_hazard_curves_los_angeles_2018.json"
+    curves = read_hazard_curves(path)
+    assert len(curves) == 12
+    pga = curves[0]
+    assert pga.levels[0] == pytest.approx(0.0025, rel=1e-12)
+    assert pga.annual_rate[0] == 0.7542958319493401
+    (one,) = read_hazard_curves(path, imt="SA(1.0)".replace(".0", ""))
+    assert one.period_s == 1.0
+    with pytest.raises(InputError, match="no curve of PGV; there are PGA, SA"):
+        read_hazard_curves(path, imt="PGV")
+    with pytest.raises(InputError, match="choose one with --imt"):
+        suited_curves(curves, with_mean_period=False, converted_period_s=None)
+    assert suited_curves(curves, with_mean_period=True, converted_period_s=None) == [pga]
+    assert suited_curves(curves, with_mean_period=False, converted_period_s=1.0)[0].imt == "SA(1)"
+
+
+def test_units_and_investigation_time(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(OPENQUAKE)
+    (curve,) = read_hazard_curves(path)
+    assert curve.levels.tolist() == pytest.approx([0.1, 0.2, 0.4])  # cm/s in the file
+    assert curve.annual_rate[0] == pytest.approx(np.log(2.0) / 50.0)
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "level", "rate"),
+    [
+        ("pgv_m_s,annual_rate", "0.3,0.002", 0.3, 0.002),
+        ("pgv_cm_s,annual_rate", "30,0.002", 0.3, 0.002),
+        ("pga_m_s2,annual_rate", "4.903325,0.002", 0.5, 0.002),
+        ("pga_g,poe_50_years", "0.5,0.1", 0.5, -np.log(0.9) / 50.0),
+        ("sa(0.5)_g,poe_1_year", "0.5,0.1", 0.5, -np.log(0.9)),
+    ],
+)
+def test_two_columns(tmp_path: Path, header: str, row: str, level: float, rate: float) -> None:
+    path = tmp_path / "curve.csv"
+    path.write_text(f"# a note\n{header}\n{row}\n100,1e-9\n")
+    (curve,) = read_hazard_curves(path)
+    assert curve.levels[0] == pytest.approx(level, rel=1e-12)
+    assert curve.annual_rate[0] == pytest.approx(rate, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty"),
+        ("0.1,0.01\n0.2,0.001\n", "line 1: column '0.1' is not known"),
+        ("pgv_m_s,probability\n0.1,0.01\n", "line 1: column 'probability' does not say"),
+        ("pgv_m_s,annual_rate\n0.1,0.01\n0.2\n", "line 3: 1 cells, not two"),
+        ("pgv_m_s,annual_rate\n0.1,0.01\n0.2,x\n", "line 3: '0.2,x' are not two numbers"),
+        ("pgv_m_s,poe_50_years\n0.1,1.5\n", "line 2: 1.5 is no probability"),
+        ("pgv_m_s,annual_rate,x\n", "line 1: 3 columns, not two"),
+        (OPENQUAKE.replace("imt='PGV'", "imt='CAV'"), "line 1: intensity measure 'CAV'"),
+        (OPENQUAKE.replace("50.0", "x"), "line 1: 'x' is not a number"),
+        (OPENQUAKE.replace("kind='mean', investigation_time=50.0", "investigation_time=-1"),
+         "investigation_time = -1"),
+        (OPENQUAKE.replace("0.5,0.1,0.01", "0.5,0.1"), "line 3: 5 cells under 6 columns"),
+        (OPENQUAKE.replace("0.5,0.1,0.01", "0.5,1.1,0.01"), "line 3: 1.1 is no probability"),
+        (OPENQUAKE.replace("0.5,0.1,0.01", "0.1,0.5,0.01"), "line 3: the rate rises"),
+        (OPENQUAKE.replace("10.5,", "210.5,"), "line 3: lon = 210.5 lies off the map"),
+        (OPENQUAKE.split("\n")[0], "ends after line 1"),
+        ("{", "not JSON"),
+        ("{}", "one member a measure"),
+        ('{"Peak Ground Acceleration": {"xs": [0.0, "a"], "ys": [1, 2]}}', r"xs\[1\] = 'a'"),
+        ('{"Peak Ground Acceleration": {"xs": [0.0, 1.0], "ys": [1]}}', "2 levels and 1 rates"),
+        ('{"Arias": {"xs": [0.0, 1.0], "ys": [1, 0]}}', "the measure is not known"),
+    ],
+)  # fmt: skip
+def test_bad_curves_are_refused(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "curve.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words):
+        read_hazard_curves(path)
+
+
+def test_no_such_file_and_no_text(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        read_hazard_curves(tmp_path / "none.csv")
+    (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="byte 0 is not UTF-8"):
+        read_hazard_curves(tmp_path / "b.csv")
+    with pytest.raises(InputError, match="folder"):
+        read_hazard_curves(tmp_path)
