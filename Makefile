@@ -30,6 +30,7 @@ types: $(VENV)/.installed-dev  ## static types
 # -E: an unchanged page whose warning stopped the last build would pass this one.
 docs: $(VENV)/.installed-dev  ## the documentation, into docs/_build/html
 	$(BIN)/python docs/generate_cli_reference.py --check
+	$(BIN)/python docs/generate_data_dictionary.py --check
 	$(RUN) sphinx -E -W --keep-going -q -b html docs docs/_build/html
 
 # The folder of matplotlib's settings is given because HOME may not be writable.
@@ -40,8 +41,9 @@ format: $(VENV)/.installed-dev  ## put the source in the style that lint asks fo
 	$(RUN) ruff check --fix .
 	$(RUN) ruff format .
 
-cli-reference: $(VENV)/.installed-dev  ## write docs/reference/cli.md anew from --help
+cli-reference: $(VENV)/.installed-dev  ## write the generated reference pages anew: commands, data dictionary
 	$(BIN)/python docs/generate_cli_reference.py
+	$(BIN)/python docs/generate_data_dictionary.py
 
 wheel: $(VENV)/.installed-dev  ## the wheel, into dist/
 	$(RUN) pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from rbfrag.errors import UnknownModelError as UnknownModelError
     from rbfrag.errors import WorkFailedError as WorkFailedError
     from rbfrag.exchange.hazard_file import read_hazard_curves as read_hazard_curves
+    from rbfrag.exchange.read_table import read_table as read_table
     from rbfrag.fragility.fitting import fit as fit
     from rbfrag.fragility.hazard_answer import HazardAnswer as HazardAnswer
     from rbfrag.fragility.hazard_answer import hazard as hazard
@@ -68,6 +69,7 @@ _HOME = {
     "predict": "rbfrag.fragility.prediction",
     "read_hazard_curves": "rbfrag.exchange.hazard_file",
     "read_motions": "rbfrag.motions.recognise",
+    "read_table": "rbfrag.exchange.read_table",
     "respond": "rbfrag.solver.respond",
     "simulate": "rbfrag.campaign.simulate",
     "stability": "rbfrag.solver.stability",

@@ -11,7 +11,7 @@ from rbfrag.cli import options
 from rbfrag.cli.output import print_json, print_pairs, print_table
 
 app = typer.Typer(
-    help="Upgrade, describe and check a database.",
+    help="Upgrade, describe, check, export and merge databases.",
     no_args_is_help=True,
     rich_markup_mode=None,
     epilog="Example:  rbfrag db info",
@@ -112,3 +112,38 @@ def check(
             print("sound: nothing is wrong with this database")
     if findings:
         raise typer.Exit(1)
+
+
+@app.command("export", epilog="Example:  rbfrag db export --out tables --tables motion,combination")
+def export(
+    out: Annotated[
+        str,
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="Folder to make: a file for each table, and the data dictionary.",
+            show_default=False,
+        ),
+    ],
+    db: options.Db = None,
+    format: Annotated[str, typer.Option("--format", help="parquet or csv.")] = "parquet",
+    tables: Annotated[
+        str | None,
+        typer.Option("--tables", help="Only these, with commas between.", show_default=False),
+    ] = None,
+    arrays: Annotated[
+        bool,
+        typer.Option("--arrays", help="Include samples [g] and histories (Parquet only)."),
+    ] = False,
+    json: options.Json = False,
+) -> None:
+    """Write the tables as Parquet or CSV, with a data dictionary of every column and unit."""
+    from rbfrag.exchange.database_export import export_database
+
+    names = None if tables is None else [name.strip() for name in tables.split(",") if name.strip()]
+    report = export_database(out, db=db, format=format, tables=names, arrays=arrays)
+    if json:
+        print_json(report.as_dict())
+    else:
+        print_table(("table", "rows"), report.rows.items())
+        print(f"written to {report.folder}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import json
-import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -63,8 +62,12 @@ def _said(outcome: str) -> str:
 
 def _cover_problems(row: RowMapping, intervals: Sequence[Row[Any]]) -> Iterator[str]:
     limit, bottom = row["search_limit"], intervals[0].k_lo
-    if not math.isclose(bottom, limit, rel_tol=_ROUNDING):
-        yield f"its map begins at kr/PGA {bottom!r}, not at the search limit {limit!r}"
+    # below the bracket a search may be given up, after its budget: nothing is said there then
+    needed = row["lower"] if row["status"] == "found" and row["lower"] is not None else limit
+    if bottom < limit * (1.0 - _ROUNDING):
+        yield f"its map begins at kr/PGA {bottom!r}, below the search limit {limit!r}"
+    elif row["certified"] and bottom > needed * (1.0 + _CLEARANCE):
+        yield f"its map begins at kr/PGA {bottom!r}, above {needed!r}"
     for below, above in itertools.pairwise(intervals):
         if below.k_hi < above.k_lo:
             yield f"its map has a gap from kr/PGA {below.k_hi!r} to {above.k_lo!r}"

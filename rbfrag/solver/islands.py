@@ -56,7 +56,13 @@ def outcome_intervals(found: CertifiedMap, pga_g: float, max_q: float) -> Outcom
             kept_words.append(word)
             kept_edges.append(edge)
     ratio = np.array(kept_edges) / pga_g
-    return OutcomeIntervals(k_lo=ratio[:-1], k_hi=ratio[1:], outcome=tuple(kept_words))  # type: ignore[arg-type]
+    # ends one rounding apart may fall together in the quotient, and such an interval is none
+    wide = ratio[1:] > ratio[:-1]
+    return OutcomeIntervals(
+        k_lo=ratio[:-1][wide],
+        k_hi=ratio[1:][wide],
+        outcome=tuple(word for word, kept in zip(kept_words, wide, strict=True) if kept),  # type: ignore[misc]
+    )
 
 
 def islands_of_map(found: CertifiedMap, lower: float, resolution: float) -> Islands:

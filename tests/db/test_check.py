@@ -106,13 +106,14 @@ def _store_map(connection: Any, intervals: Any, *, status: str = "found") -> Non
 class TestMaps:
     def test_a_sound_map(self, filled: Engine) -> None:
         with filled.begin() as connection:
-            _store_map(connection, MAP)
+            _store_map(connection, MAP[2:])  # given up on the way down
             assert check_database(connection) == []
 
     @pytest.mark.parametrize(
         ("intervals", "problem"),
         [
-            (MAP[1:], "begins at kr/PGA 0.05, not at the search limit 0.01"),
+            (((0.2, 1.0, "safe"),), "begins at kr/PGA 0.2, above 0.1"),
+            (((0.001, 0.01, "safe"), *MAP), "begins at kr/PGA 0.001, below the search limit 0.01"),
             (MAP[:2] + MAP[3:], "a gap from kr/PGA"),
             ((*MAP[:-1], (0.099, 1.0, "safe")), "overlap from kr/PGA 0.099"),
             (MAP[:-1], "below K_up 1.0"),

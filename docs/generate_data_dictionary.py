@@ -1,0 +1,42 @@
+"""Write the data dictionary page from the schema and its meanings; --check only compares."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from rbfrag.db.data_dictionary import dictionary_as_markdown
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs" / "reference" / "data-dictionary.md"
+
+HEAD = """\
+# Data dictionary
+
+Every table and column of the database. `rbfrag db export` writes the same beside the tables, as
+JSON and as Markdown. Units are in the column names; `k_r/PGA` is a $k_r$ over the motion's PGA in g. A
+missing value is NULL in the database, null in Parquet, an empty cell in CSV and NaN in arrays and
+data frames. Row numbers hold in one database only: between databases, compare `natural_key`, or
+`samples_sha256` with `dt_s`.
+
+"""
+
+
+def page() -> str:
+    """Return the page."""
+    return HEAD + dictionary_as_markdown()
+
+
+def main(arguments: list[str]) -> int:
+    """Write the page, or say whether it is up to date."""
+    if "--check" in arguments:
+        if PAGE.exists() and PAGE.read_text(encoding="utf-8") == page():
+            return 0
+        print(f"{PAGE} is out of date: run python docs/generate_data_dictionary.py")
+        return 1
+    PAGE.write_text(page(), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

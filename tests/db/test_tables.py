@@ -1,0 +1,142 @@
+"""Tables as columns, and the dictionary of what they mean."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sqlalchemy import Engine, func, select, update
+
+import rbfrag.db.table_columns
+from rbfrag.db import schema
+from rbfrag.db.data_dictionary import (
+    data_dictionary,
+    dictionary_as_json,
+    dictionary_as_markdown,
+)
+from rbfrag.db.table_columns import TABLES, chosen_columns, column_batches, read_columns
+from rbfrag.errors import InputError
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "data-dictionary.md"
+
+UNIT_OF_SUFFIX = {
+    "_m_s": "m/s", "_rad_s": "rad/s", "_rad": "rad", "_deg": "deg", "_g": "g", "_m": "m", "_s": "s",
+}  # fmt: skip
+
+
+class TestDictionary:
+    def test_every_column_of_the_schema_has_an_entry_in_its_order(self) -> None:
+        said = {table.name: [c.name for c in table.columns] for table in data_dictionary()}
+        assert said == {
+            name: [column.name for column in table.c]
+            for name, table in schema.metadata.tables.items()
+        }
+
+    def test_every_entry_says_something(self) -> None:
+        for table in data_dictionary():
+            assert table.meaning.endswith("."), table.name
+            for column in table.columns:
+                assert len(column.meaning) > 5, (table.name, column.name)
+
+    def test_units_are_those_in_the_names(self) -> None:
+        for table in data_dictionary():
+            for column in table.columns:
+                suffix = next((s for s in UNIT_OF_SUFFIX if column.name.endswith(s)), None)
+                if suffix is not None:
+                    assert column.unit == UNIT_OF_SUFFIX[suffix], (table.name, column.name)
+
+    def test_types_and_references_come_from_the_schema(self) -> None:
+        column = {c.name: c for c in TABLES["combination"].columns}
+        assert column["motion_id"].type == "integer"
+        assert column["motion_id"].refers_to == "motion.id"
+        assert column["vertical_motion_id"].may_be_missing
+        assert column["certified"].type == "true/false"
+        assert column["kr"].type == "number"
+        assert TABLES["motion"].columns[-2].type == "array"
+
+    def test_json_and_markdown_name_every_column(self) -> None:
+        document, text = dictionary_as_json(), dictionary_as_markdown()
+        names = [(t["name"], c["name"]) for t in document["tables"] for c in t["columns"]]
+        assert len(names) == sum(len(table.c) for table in schema.metadata.tables.values())
+        for line in text.splitlines():
+            if line.startswith("|"):
+                assert len(re.findall(r"(?<!\\)\|", line)) == 5, line
+        for table, column in names:
+            section = text.split(f"## {table}\n")[1].split("## ")[0]
+            assert f"| {column} |" in section
+
+    def test_the_page_is_up_to_date(self) -> None:
+        assert PAGE.read_text(encoding="utf-8").endswith(dictionary_as_markdown())
+
+
+class TestColumns:
+    def test_numbers_texts_and_truths(self, filled: Engine) -> None:
+        with filled.connect() as connection:
+            found = read_columns(connection, "combination")
+            motions = read_columns(connection, "motion")
+        assert list(found) == [column.name for column in schema.combination.c]
+        assert {name: values.dtype.kind for name, values in found.items()} | {} == {
+            **dict.fromkeys(found, "O"),
+            **dict.fromkeys(("id", "campaign_id", "motion_id", "n_runs"), "i"),
+            **dict.fromkeys(("linear", "certified", "reentrant"), "b"),
+            **dict.fromkeys(
+                ("vertical_motion_id", "p2", "search_limit", "kr_over_pga", "lower", "upper", "kr",
+                 "y_m_s", "k_up_over_pga", "undecided", "island_width", "kr_over_pga_resolved"),
+                "f",
+            ),
+        }  # fmt: skip
+        censored = found["status"] == "below_limit"
+        np.testing.assert_array_equal(np.isnan(found["kr"]), censored)
+        np.testing.assert_array_equal(found["id"], np.sort(found["id"]))
+        assert np.isnan(found["vertical_motion_id"]).all()
+        assert "samples" not in motions
+
+    def test_values_are_those_of_the_rows(self, filled: Engine) -> None:
+        with filled.connect() as connection:
+            columns = read_columns(connection, "simulation")
+            rows = connection.execute(
+                select(schema.simulation).order_by(*schema.simulation.primary_key.columns)
+            ).all()
+        assert [row.kr_over_pga for row in rows] == columns["kr_over_pga"].tolist()
+        assert [row.outcome for row in rows] == columns["outcome"].tolist()
+        theta = [np.nan if row.theta_n is None else row.theta_n for row in rows]
+        np.testing.assert_array_equal(columns["theta_n"], theta)
+
+    def test_samples_are_arrays(self, filled: Engine, make_motion: Any) -> None:
+        with filled.begin() as connection:
+            last = connection.scalar(select(func.max(schema.motion.c.id)))
+            gone = update(schema.motion).where(schema.motion.c.id == last).values(samples=None)
+            connection.execute(gone)
+            samples = read_columns(connection, "motion", arrays=True)["samples"]
+        np.testing.assert_array_equal(samples[0], make_motion(1).acceleration_g)
+        assert samples[2] is None
+
+    def test_batches_make_one_table(self, filled: Engine, monkeypatch: Any) -> None:
+        with filled.connect() as connection:
+            whole = read_columns(connection, "simulation")
+            monkeypatch.setattr(rbfrag.db.table_columns, "_ROWS", 4)
+            columns = chosen_columns("simulation")
+            sizes = [
+                len(batch.values[0]) for batch in column_batches(connection, "simulation", columns)
+            ]
+            parts = read_columns(connection, "simulation")
+        assert sizes == [4, 4, 4, 4, 2]
+        for name, values in whole.items():
+            np.testing.assert_array_equal(values, parts[name])
+
+    def test_chosen_columns_and_empty_tables(self, filled: Engine) -> None:
+        with filled.connect() as connection:
+            some = read_columns(connection, "motion", ["pga_g", "id", "pga_g"])
+            none = read_columns(connection, "response")
+        assert list(some) == ["pga_g", "id"]
+        assert none["kr"].shape == (0,)
+        assert none["kr"].dtype == np.float64
+
+    def test_unknown_names_are_refused_with_those_there_are(self) -> None:
+        with pytest.raises(InputError, match="no table 'motions'; there are: earthquake"):
+            chosen_columns("motions")
+        with pytest.raises(InputError, match="no column 'pga'; it has: id, recording_id"):
+            chosen_columns("motion", ["pga"])
