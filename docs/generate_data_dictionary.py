@@ -14,10 +14,10 @@ HEAD = """\
 # Data dictionary
 
 Every table and column of the database. `rbfrag db export` writes the same beside the tables, as
-JSON and as Markdown. Units are in the column names; `k_r/PGA` is a $k_r$ over the motion's PGA in g. A
-missing value is NULL in the database, null in Parquet, an empty cell in CSV and NaN in arrays and
-data frames. Row numbers hold in one database only: between databases, compare `natural_key`, or
-`samples_sha256` with `dt_s`.
+JSON and as Markdown. Units are in the column names; `k_r/PGA` is a $k_r$ over the motion's PGA in
+g. A missing value is NULL in the database, null in Parquet, an empty cell in CSV and NaN in arrays
+and data frames. Row numbers hold in one database only: between databases, compare `natural_key`,
+or `samples_sha256` with `dt_s`.
 
 """
 

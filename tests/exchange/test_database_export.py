@@ -170,9 +170,8 @@ def test_refusals(database: Path, tmp_path: Path) -> None:
 
 
 def test_the_command_line(database: Path, shell: Shell, refuses: Refuses) -> None:
-    answer = shell.json(
-        "db", "export", "--db", database, "--out", "out", "--tables", "motion, suite"
-    )
+    words = ("db", "export", "--db", database, "--out", "out")
+    answer = shell.json(*words, "--tables", "motion, suite")
     assert answer == {"folder": "out", "format": "parquet", "rows": {"motion": 2, "suite": 1}}
     assert "it holds something already" in refuses(*words)
     assert "there is no database" in refuses("db", "export", "--out", "out2")
