@@ -5,21 +5,27 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from sqlalchemy import Connection, Engine
 
+from rbfrag.campaign.traced_file import Trace, missing_files, read_traces
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import add_motion
+from rbfrag.db.motion_store import add_motion, motion_row, same_source
 from rbfrag.db.rows import EarthquakeInfo
+from rbfrag.db.vertical_pairs import recordings_of_mixed_dt
 from rbfrag.errors import InputError, MotionFileError
+from rbfrag.motions.companions import upward
 from rbfrag.motions.dt_index import INDEX
-from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.metadata import MotionMetadata, TraceMetadata, read_metadata
+from rbfrag.motions.metadata import read_metadata
+from rbfrag.motions.processing import (
+    DEFAULT_HIGH_PASS,
+    HighPass,
+    counts_as_uncorrected,
+    processed,
+)
 from rbfrag.motions.quality import quality_flags
-from rbfrag.motions.recognise import read_motions
-from rbfrag.motions.units import acceleration_unit
 
 AS_SUPPLIED = "as supplied"
 
@@ -43,21 +49,53 @@ class AddReport:
 
     Args:
         added: ids of the motions that are new.
-        known: ids of those whose samples were stored before.
+        known: ids of those that were stored before.
+        processed: ids of the new ones that were uncorrected and have been processed.
         failed: files that were left out, each with its reason.
+        warnings: sentences about what was added: the same samples in two files, one trace
+            stored with two kinds of processing, a recording with several sampling intervals.
     """
 
     added: tuple[int, ...]
     known: tuple[int, ...]
+    processed: tuple[int, ...]
     failed: tuple[FailedFile, ...]
+    warnings: tuple[str, ...]
 
     def as_dict(self) -> dict[str, object]:
         """Return the report under the keys of the JSON contract."""
         return {
             "added": list(self.added),
             "known": list(self.known),
+            "processed": list(self.processed),
             "failed": [{"file": bad.path, "reason": bad.reason} for bad in self.failed],
+            "warnings": list(self.warnings),
         }
+
+
+@dataclass
+class _Run:
+    """What has been found so far."""
+
+    suite: str | None
+    high_pass: HighPass | None
+    added: list[int] = field(default_factory=list)
+    known: list[int] = field(default_factory=list)
+    processed: list[int] = field(default_factory=list)
+    failed: list[FailedFile] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    place: dict[int, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class _Stored:
+    """One trace that is in the database."""
+
+    motion_id: int
+    new: bool
+    processed: bool
+    place: str
+    doubt: str
 
 
 def add_motions(
@@ -68,9 +106,11 @@ def add_motions(
     metadata: str | os.PathLike[str] | None = None,
     units: str | None = None,
     dt_s: float | None = None,
+    raw: bool = False,
+    high_pass: HighPass = DEFAULT_HIGH_PASS,
     on_file: Callable[[int, int], None] | None = None,
 ) -> AddReport:
-    """Read accelerogram files and store their motions as supplied.
+    """Read accelerogram files and store their motions, uncorrected ones processed.
 
     Each file is stored whole or not at all. A file that cannot be read does not stop the
     others; it is reported with its reason. The database is made when the first file has
@@ -83,6 +123,8 @@ def add_motions(
         metadata: CSV that states, by file and trace, earthquake, units and direction.
         units: unit of text files that do not state it.
         dt_s: sampling interval [s] of text files that hold accelerations only.
+        raw: store every record as its file has it; uncorrected ones are flagged.
+        high_pass: what is applied to uncorrected records.
         on_file: called after each file with (files done, files in all).
 
     Raises:
@@ -93,28 +135,66 @@ def add_motions(
         raise InputError("--suite: the name is empty; give one or leave it out")
     stated = None if metadata is None else read_metadata(metadata)
     files = list(_files(paths, leave_out=metadata))
-    added: list[int] = []
-    known: list[int] = []
-    failed: list[FailedFile] = []
+    run = _Run(suite, None if raw else high_pass)
+    if stated is not None:
+        run.failed += [
+            FailedFile(
+                name,
+                f"line {row.line} of the metadata names this file, but it is not there: correct "
+                "the metadata or bring the file",
+            )
+            for name, row in missing_files(stated, list(map(Path, paths)))
+        ]
     with ExitStack() as stack:
         engine: Engine | None = None
         for number, file in enumerate(files, 1):
             try:
-                motions = _read(file, stated, units, dt_s)
+                traces = read_traces(file, stated, units, dt_s)
                 if engine is None:
                     engine = stack.enter_context(opened_database(db, create=True))
                 with engine.begin() as connection:
-                    stored = [
-                        _store(connection, motion, traced, suite) for motion, traced in motions
-                    ]
+                    stored = [_store(connection, file, trace, run) for trace in traces]
             except InputError as error:
-                failed.append(FailedFile(str(file), _reason(error)))
+                run.failed.append(FailedFile(str(file), _reason(error)))
             else:
-                for motion_id, new in stored:
-                    (added if new else known).append(motion_id)
+                _take_note(run, stored)
             if on_file is not None:
                 on_file(number, len(files))
-    return AddReport(tuple(added), tuple(known), tuple(failed))
+        if engine is not None:
+            with engine.connect() as connection:
+                run.warnings += _mixed_intervals(connection, run.place)
+    return AddReport(
+        tuple(run.added),
+        tuple(run.known),
+        tuple(run.processed),
+        tuple(run.failed),
+        tuple(run.warnings),
+    )
+
+
+def _take_note(run: _Run, stored: list[_Stored]) -> None:
+    for one in stored:
+        (run.added if one.new else run.known).append(one.motion_id)
+        if one.new and one.processed:
+            run.processed.append(one.motion_id)
+        first = run.place.setdefault(one.motion_id, one.place)
+        if first != one.place:
+            run.warnings.append(
+                f"{one.place} holds the same samples as {first}: stored once, as motion "
+                f"{one.motion_id}"
+            )
+        elif one.doubt:
+            run.warnings.append(one.doubt)
+
+
+def _mixed_intervals(connection: Connection, touched: dict[int, str]) -> list[str]:
+    return [
+        f"recording {found.name!r} has components of dt = "
+        f"{' and '.join(f'{dt:g}' for dt in found.dt_s)} s: those that differ are not used "
+        "together"
+        for found in recordings_of_mixed_dt(connection)
+        if not touched.keys().isdisjoint(found.motion_ids)
+    ]
 
 
 def _files(
@@ -141,79 +221,65 @@ def _files(
         raise InputError(f"there is no file in {', '.join(map(str, paths))}")
 
 
-def _read(
-    file: Path, stated: MotionMetadata | None, units: str | None, dt_s: float | None
-) -> list[tuple[GroundMotion, TraceMetadata | None]]:
-    of_file = [] if stated is None else stated.file(file)
-    if of_file:
-        units = units or _known_unit(of_file[0].units)
-        dt_s = dt_s or of_file[0].dt_s
-    motions = read_motions(file, units=units, dt_s=dt_s)
-    by_index = [
-        None if stated is None else stated.trace(file, motion.trace_index) for motion in motions
-    ]
-    for motion, traced in zip(motions, by_index, strict=True):
-        if (
-            traced is not None
-            and traced.is_vertical is not None
-            and motion.is_vertical is not None
-            and traced.is_vertical != motion.is_vertical
-        ):
-            says = {True: "vertical", False: "horizontal"}
-            raise MotionFileError(
-                file,
-                f"trace {motion.trace_index} ({motion.component}) is "
-                f"{says[motion.is_vertical]}, but line {traced.line} of the metadata says "
-                f"{says[traced.is_vertical]}: correct the metadata",
-            )
-    return list(zip(motions, by_index, strict=True))
-
-
-def _known_unit(text: str | None) -> str | None:
-    """Metadata may name the native unit of a format (counts, g/10) that its reader converts."""
-    if text is None:
-        return None
-    try:
-        return acceleration_unit(text)
-    except InputError:
-        return None
-
-
-def _store(
-    connection: Connection,
-    motion: GroundMotion,
-    traced: TraceMetadata | None,
-    suite: str | None,
-) -> tuple[int, bool]:
-    flags = [flag.code for flag in quality_flags(motion)]
-    if traced is not None and traced.event_id:
+def _store(connection: Connection, file: Path, trace: Trace, run: _Run) -> _Stored:
+    motion, stated = trace.motion, trace.stated
+    flags: list[str] = []
+    uncorrected = counts_as_uncorrected(motion, stated.processing)
+    filtered = uncorrected and run.high_pass is not None
+    if uncorrected and run.high_pass is not None:
+        motion = processed(motion, run.high_pass)
+    elif uncorrected:
+        flags.append("uncorrected")
+    component = stated.component
+    if trace.is_vertical and run.high_pass is not None:
+        turned = upward(replace(motion, component=component or motion.component))
+        # a component that was turned is no longer called as the metadata have it
+        motion, component = turned, turned.component
+    flags = [flag.code for flag in quality_flags(motion)] + flags
+    if stated.event_id:
         earthquake = EarthquakeInfo(
-            event_id=traced.event_id,
-            name=traced.earthquake,
-            magnitude=traced.magnitude,
-            time=traced.year,
+            event_id=stated.event_id,
+            name=stated.earthquake,
+            magnitude=stated.magnitude,
+            time=stated.year,
             guessed=False,
         )
     else:
         earthquake = EarthquakeInfo(event_id=motion.event, name=motion.event)
         flags.append("event_guessed")
-    is_vertical = motion.is_vertical
-    if traced is not None and traced.is_vertical is not None:
-        is_vertical = traced.is_vertical
-    if is_vertical is None:
+    if trace.is_vertical is None:
         flags.append("direction_guessed")
-    return add_motion(
+    words = (
+        stated.processing
+        or {None: AS_SUPPLIED, True: "corrected", False: "uncorrected"}[trace.motion.is_corrected]
+    )
+    motion_id, new = add_motion(
         connection,
         motion,
         earthquake=earthquake,
-        is_vertical=bool(is_vertical),
-        recording=traced.companion_group if traced is not None else "",
-        station=traced.station if traced is not None else "",
-        component=traced.component if traced is not None else "",
-        processing=(traced.processing if traced is not None else "") or AS_SUPPLIED,
+        is_vertical=bool(trace.is_vertical),
+        recording=stated.companion_group,
+        station=stated.station,
+        component=component,
+        processing=words,
         flags=flags,
-        suite=suite,
+        suite=run.suite,
     )
+    name = f"{file}#{motion.trace_index}"
+    if not new and motion_id not in run.place:
+        row = motion_row(connection, motion_id)
+        run.place[motion_id] = name
+        if (row.source_file, row.trace_index) != (motion.source_file, motion.trace_index):
+            run.place[motion_id] = f"{row.source_file}#{row.trace_index}"
+    doubt = ""
+    others = same_source(connection, motion_id)
+    if new and others:
+        doubt = (
+            f"{name} is stored as motion {motion_id}, and the same samples with other processing "
+            f"as motion {', '.join(map(str, others))}: a campaign would count the trace twice; "
+            "use one suite for each kind of processing"
+        )
+    return _Stored(motion_id, new, filtered, name, doubt)
 
 
 def _reason(error: InputError) -> str:

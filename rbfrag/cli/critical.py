@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from rbfrag.cli import options
-from rbfrag.cli.motion_argument import find_motion
+from rbfrag.cli.motion_argument import find_motion, find_vertical
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
 
 EXAMPLE = "Example:  rbfrag critical record.AT2 --p2 3 --json"
@@ -40,7 +40,7 @@ def critical(
     from rbfrag.solver.critical_report import as_dict, map_rows
 
     ground = find_motion(motion, db=db, units=units, dt_s=dt)
-    upward = find_motion(vertical, db=db, units=units, dt_s=dt) if vertical else None
+    upward, remarks = find_vertical(vertical, ground, db=db, units=units, dt_s=dt)
     result = search(
         ground,
         p2=p2,
@@ -50,15 +50,16 @@ def critical(
         full_map=full_map,
     )
     answer = as_dict(result)
+    answer["warnings"] = [*remarks, *answer["warnings"]]
     if full_map:
         answer["map"] = map_rows(result)
     if json:
         print_json(answer)
         return
-    answer.pop("warnings")
+    warnings = answer.pop("warnings")
     rows = answer.pop("map", [])
     print_pairs(answer)
     print(f"{result.status}: {STATUS[result.status]}")
     for row in rows:
         print(f"{row['k_lo']:.12f}  {row['k_hi']:.12f}  {row['outcome']}")
-    print_warnings(result.warnings)
+    print_warnings(warnings)

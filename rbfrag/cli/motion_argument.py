@@ -33,3 +33,37 @@ def find_motion(
     from rbfrag.motions.recognise import read_motion
 
     return read_motion(text, units=units, dt_s=dt_s)
+
+
+def find_vertical(
+    text: str | None,
+    horizontal: GroundMotion,
+    *,
+    db: str | None,
+    units: str | None = None,
+    dt_s: float | None = None,
+) -> tuple[GroundMotion | None, list[str]]:
+    """Return the vertical motion that `--vertical` means, upward, and what to warn of.
+
+    Args:
+        text: as for :func:`find_motion`, or None.
+        horizontal: the motion it is to go with.
+        db: as for :func:`find_motion`.
+        units: likewise.
+        dt_s: likewise.
+
+    Raises:
+        InputError: no such motion, or it does not fit to the horizontal one.
+    """
+    if text is None:
+        return None, []
+    from rbfrag.motions.companions import companion
+
+    found = find_motion(text, db=db, units=units, dt_s=dt_s)
+    warnings = []
+    if found.is_vertical is False:
+        warnings.append(f"{text} is the horizontal component {found.component} by its own header")
+    vertical = companion(horizontal, found)
+    if vertical is not found:
+        warnings.append(vertical.remarks[-1])
+    return vertical, warnings

@@ -44,12 +44,22 @@ def add(
             show_default=False,
         ),
     ] = None,
+    raw: Annotated[
+        bool,
+        typer.Option(
+            "--raw", help="Store every record as its file has it; uncorrected ones are flagged."
+        ),
+    ] = False,
     units: options.Units = None,
     dt: options.Dt = None,
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Read accelerogram files and store them as they are.
+    """Read accelerogram files and store them; uncorrected records are processed first.
+
+    Uncorrected, by metadata, header or format: mean removed, 20 s of zeros on each side,
+    Butterworth high-pass of order 2 at 0.1 Hz forward and backward. Corrected records are
+    stored as they are. Vertical components called DOWN are turned upward.
 
     Formats are recognised by content. A file that cannot be read is listed with its reason,
     the others are added, and the exit status is 1. Without --metadata an earthquake is only a
@@ -63,7 +73,14 @@ def add(
             print(f"\r\x1b[Kmotions add: {done}/{total} files", end=end, file=sys.stderr)
 
     report = add_motions(
-        paths, db=db, suite=suite, metadata=metadata, units=units, dt_s=dt, on_file=show
+        paths,
+        db=db,
+        suite=suite,
+        metadata=metadata,
+        units=units,
+        dt_s=dt,
+        raw=raw,
+        on_file=show,
     )
     if json:
         print_json(report.as_dict())
@@ -71,10 +88,12 @@ def add(
         print_pairs(
             {
                 "added": len(report.added),
+                "of these processed": len(report.processed),
                 "stored before": len(report.known),
                 "left out": len(report.failed),
             }
         )
+    print_warnings(report.warnings)
     for bad in report.failed:
         print(f"left out: {bad.path}: {bad.reason}", file=sys.stderr)
     if report.failed:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from rbfrag.cli import options
-from rbfrag.cli.motion_argument import find_motion
+from rbfrag.cli.motion_argument import find_motion, find_vertical
 from rbfrag.cli.output import print_warnings
 
 app = typer.Typer(
@@ -72,7 +72,7 @@ def plot_response(
     from rbfrag.solver.respond import respond
 
     ground = find_motion(motion, db=db, units=units, dt_s=dt)
-    upward = find_motion(vertical, db=db, units=units, dt_s=dt) if vertical else None
+    upward, remarks = find_vertical(vertical, ground, db=db, units=units, dt_s=dt)
     response = respond(
         ground,
         p2=p2,
@@ -83,6 +83,7 @@ def plot_response(
         history=True,
     )
     draw(response, out, p2=p2, kr=kr, linear=linear, reverse=reverse, title=ground.label)
+    print_warnings(remarks)
     print(out)
 
 

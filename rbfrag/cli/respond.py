@@ -8,7 +8,7 @@ import typer
 
 from rbfrag.cli import options
 from rbfrag.cli.block_argument import toppling_block
-from rbfrag.cli.motion_argument import find_motion
+from rbfrag.cli.motion_argument import find_motion, find_vertical
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
 
 EXAMPLE = "Example:  rbfrag respond record.AT2 --p2 3 --kr 0.1 --plot response.png"
@@ -46,7 +46,8 @@ def respond(
 
     p2, kr, remarks = toppling_block(p2, kr, block)
     ground = find_motion(motion, db=db, units=units, dt_s=dt)
-    upward = find_motion(vertical, db=db, units=units, dt_s=dt) if vertical else None
+    upward, about = find_vertical(vertical, ground, db=db, units=units, dt_s=dt)
+    remarks = (*remarks, *about)
     response = run(
         ground,
         p2=p2,

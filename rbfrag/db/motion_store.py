@@ -6,22 +6,42 @@ import hashlib
 import json
 import math
 from collections.abc import Sequence
+from datetime import datetime
 from typing import Any
 
 import numpy as np
-from sqlalchemy import Connection, RowMapping, Select, and_, delete, exists, select, update
+from sqlalchemy import (
+    Connection,
+    RowMapping,
+    Select,
+    and_,
+    case,
+    delete,
+    exists,
+    or_,
+    select,
+    update,
+)
 
 from rbfrag.db import schema
 from rbfrag.db.clock import utc_now
 from rbfrag.db.earthquake_store import earthquake_id_for
 from rbfrag.db.insert import insert_if_new
+from rbfrag.db.natural_key import canonical_json
 from rbfrag.db.rows import EarthquakeInfo, MotionRow
 from rbfrag.db.stored_text import storable
 from rbfrag.db.suite_store import add_to_suite, require_suite, suite_names
 from rbfrag.errors import DatabaseError, InputError
 from rbfrag.motions.ground_motion import GroundMotion
 
-__all__ = ["add_motion", "load_motion", "motion_row", "motion_rows", "suite_names"]
+__all__ = [
+    "add_motion",
+    "load_motion",
+    "motion_row",
+    "motion_rows",
+    "same_source",
+    "suite_names",
+]
 
 _ID_LIMIT = 2**31  # drivers refuse larger integers in words of their own
 
@@ -41,9 +61,12 @@ def add_motion(
 ) -> tuple[int, bool]:
     """Store a motion, or find it when the same samples are there already.
 
-    A motion is its samples and their interval; labels do not make another one. Where it is
-    there already, a stated earthquake replaces a guessed one together with all labels
-    (recording, station, component, vertical or not, processing, flags); a guess replaces
+    A motion is its samples and their interval; labels do not make another one. Nor does a
+    filter that rounds otherwise: the same samples of a file, processed alike, are one motion
+    even where another machine's arithmetic differs in the last bits.
+
+    Where it is there already, a stated earthquake replaces a guessed one together with all
+    labels (recording, station, component, vertical or not, processing, flags); a guess replaces
     nothing; what was stated before stays, and stating another earthquake or direction is
     refused.
 
@@ -173,10 +196,44 @@ def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
         trace_index=row["trace_index"],
         file_format=row["file_format"],
         remarks=tuple(json.loads(row["remarks"])),
+        is_partial="partial" in json.loads(row["flags"]),
+        start_time=_time(row["start_time"]),
+        processing_applied=_parameters(row["processing_applied"]),
+        source_sha256="" if row["processing_applied"] is None else row["source_sha256"],
     )
 
 
+def same_source(connection: Connection, motion_id: int) -> list[int]:
+    """Return the other motions that were made from the same samples of a file, by id.
+
+    Args:
+        connection: the database.
+        motion_id: a stored motion.
+    """
+    own = select(schema.motion.c.source_sha256).where(schema.motion.c.id == motion_id)
+    interval = select(schema.motion.c.dt_s).where(schema.motion.c.id == motion_id)
+    query = (
+        select(schema.motion.c.id)
+        .where(
+            schema.motion.c.source_sha256 == own.scalar_subquery(),
+            schema.motion.c.dt_s == interval.scalar_subquery(),
+            schema.motion.c.id != motion_id,
+        )
+        .order_by(schema.motion.c.id)
+    )
+    return list(connection.scalars(query))
+
+
+def _applied(motion: GroundMotion) -> str | None:
+    return None if motion.processing_applied is None else canonical_json(motion.processing_applied)
+
+
 def _find(connection: Connection, motion: GroundMotion) -> RowMapping | None:
+    same_samples = schema.motion.c.samples_sha256 == motion.sha256
+    same_origin = and_(
+        schema.motion.c.source_sha256 == motion.source_sha256,
+        schema.motion.c.processing_applied == _applied(motion),
+    )
     return (
         connection.execute(
             select(
@@ -188,12 +245,11 @@ def _find(connection: Connection, motion: GroundMotion) -> RowMapping | None:
                 schema.earthquake.c.guessed,
             )
             .select_from(schema.motion.join(schema.recording).join(schema.earthquake))
-            .where(
-                schema.motion.c.samples_sha256 == motion.sha256, schema.motion.c.dt_s == motion.dt_s
-            )
+            .where(schema.motion.c.dt_s == motion.dt_s, or_(same_samples, same_origin))
+            .order_by(case((same_samples, 0), else_=1), schema.motion.c.id)
         )
         .mappings()
-        .one_or_none()
+        .first()
     )
 
 
@@ -218,9 +274,20 @@ def _measured(motion: GroundMotion) -> dict[str, Any]:
             )
     return {
         **values,
+        "processing_applied": _applied(motion),
+        "source_sha256": motion.source_sha256 or motion.sha256,
+        "start_time": None if motion.start_time is None else motion.start_time.isoformat(),
         "samples_sha256": motion.sha256,
         "samples": motion.acceleration_g.astype("<f8").tobytes(),
     }
+
+
+def _time(text: str | None) -> datetime | None:
+    return None if text is None else datetime.fromisoformat(text)
+
+
+def _parameters(text: str | None) -> dict[str, object] | None:
+    return None if text is None else json.loads(text)
 
 
 def _own_name(motion: GroundMotion) -> str:
@@ -294,6 +361,9 @@ def _row_query() -> Select[Any]:
         schema.motion.c.trace_index,
         schema.motion.c.file_format,
         schema.motion.c.processing,
+        schema.motion.c.processing_applied,
+        schema.motion.c.source_sha256,
+        schema.motion.c.start_time,
         schema.motion.c.samples_sha256,
         schema.motion.c.flags,
     ).select_from(schema.motion.join(schema.recording).join(schema.earthquake))
@@ -324,6 +394,9 @@ def _motion_row(row: RowMapping) -> MotionRow:
         trace_index=row["trace_index"],
         file_format=row["file_format"],
         processing=row["processing"],
+        processing_applied=_parameters(row["processing_applied"]),
+        source_sha256=row["source_sha256"],
+        start_time=row["start_time"],
         sha256=row["samples_sha256"],
         flags=tuple(json.loads(row["flags"])),
     )

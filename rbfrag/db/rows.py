@@ -59,6 +59,9 @@ class MotionRow:
     trace_index: int
     file_format: str
     processing: str
+    processing_applied: Mapping[str, object] | None
+    source_sha256: str
+    start_time: str | None
     sha256: str
     flags: tuple[str, ...]
 

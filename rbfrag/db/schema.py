@@ -85,7 +85,10 @@ motion = Table(
     Column("source_file", Text, nullable=False),
     Column("trace_index", Integer, nullable=False),
     Column("file_format", Text, nullable=False),
-    Column("processing", Text, nullable=False),
+    Column("processing", Text, nullable=False),  # what the source says was done
+    Column("processing_applied", Text),  # JSON object; NULL where the samples are the file's
+    Column("source_sha256", Text, nullable=False),  # of the samples as the file has them
+    Column("start_time", Text),  # of the first sample, as the file's clock has it
     Column("flags", Text, nullable=False),  # JSON list
     Column("remarks", Text, nullable=False),  # JSON list
     Column("samples_sha256", Text, nullable=False),
@@ -97,7 +100,9 @@ motion = Table(
     CheckConstraint("trace_index >= 0", name="trace_index"),
     CheckConstraint("pga_g >= 0 AND pgv_m_s >= 0 AND pgd_m >= 0 AND tm_s > 0", name="measures"),
     CheckConstraint("length(samples_sha256) = 64", name="samples_sha256"),
+    CheckConstraint("length(source_sha256) = 64", name="source_sha256"),
     Index(None, "recording_id"),
+    Index(None, "source_sha256"),
 )
 
 suite = Table(

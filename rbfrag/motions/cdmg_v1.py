@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rbfrag.errors import MotionFileError
+from rbfrag.motions.clock import first_sample_time
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.header_field import (
@@ -38,6 +39,7 @@ _CHANNEL = re.compile(r"^\s*chan\s*\d+\s*:\s*(\S+)", re.IGNORECASE)
 _STATION = re.compile(r"^(station\s+no\..*)", re.IGNORECASE)
 _POINTS = re.compile(r"no\.\s*of points\s*=\s*(\S+)", re.IGNORECASE)
 _DURATION = re.compile(r"record length\s*=\s*(\S+)\s*sec", re.IGNORECASE)
+_TRIGGER = re.compile(r"trigger time\s*:\s*(\S.*)", re.IGNORECASE)
 _UNIT = re.compile(r"units of uncor accel are sec and\s+(g\s*/\s*10|\S*\w)", re.IGNORECASE)
 
 
@@ -96,6 +98,7 @@ def _channel(
     refuse_other_times(path, times, dt, TIME_DECIMALS, first + 1, PER_LINE // 2)
     channel = find_field(path, lines, span, _CHANNEL, "line 'CHAN'")
     station = optional_field(lines, span, _STATION)
+    trigger = optional_field(lines, span, _TRIGGER)
     event = lines[span.start + 1].strip() if len(span) > 1 else ""
     name = " ".join(lines[station.line].split()) if station else ""
     return GroundMotion(
@@ -109,4 +112,6 @@ def _channel(
         recording=f"{event} {name}".strip(),
         source_file=path.name,
         file_format=FORMAT,
+        is_corrected=False,
+        start_time=first_sample_time(trigger.text) if trigger else None,
     )

@@ -15,6 +15,7 @@ import re
 from pathlib import Path
 
 from rbfrag.errors import MotionFileError
+from rbfrag.motions.clock import first_sample_time
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.header_field import (
@@ -51,6 +52,7 @@ _SECONDS = re.compile(r"approx\s+(\S+)\s+secs?", re.IGNORECASE)
 _UNIT = re.compile(r"units\s*=\s*([^\s,(]+)", re.IGNORECASE)
 _END = re.compile(r"\s*End-of-data", re.IGNORECASE)
 _EVENT = re.compile(r"^\s*Record of\s+(\S.*)", re.IGNORECASE)
+_START = re.compile(r"^\s*Rcrd start time:\s*(\S.*)", re.IGNORECASE)
 _STATION = re.compile(r"^\s*Statn No:.*\bCode:\s*(\S+)", re.IGNORECASE)
 _CHANNEL = re.compile(r"^\s*Sta Chan\s+[^:]*:\s*([^(]*)", re.IGNORECASE)
 _SCNL = re.compile(r"<SCNL>\s*[^.\s]+\.([^.\s]+)\.")
@@ -120,6 +122,7 @@ def _trace(
     seed = optional_field(lines, header, _SCNL)
     component = seed.text if seed else direction
     station = optional_field(lines, header, _STATION)
+    start = optional_field(lines, header, _START)
     event = optional_field(lines, header, _EVENT)
     name = station.text if station else ""
     azimuth, vertical = azimuth_deg(direction), is_vertical_name(direction)
@@ -138,6 +141,8 @@ def _trace(
         source_file=path.name,
         trace_index=index,
         file_format=FORMAT,
+        is_corrected=not lines[span.start].strip().lower().startswith("uncorrected"),
+        start_time=first_sample_time(start.text) if start else None,
     )
 
 

@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rbfrag.errors import MotionFileError
+from rbfrag.motions.clock import first_sample_time
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.header_field import (
@@ -50,6 +51,7 @@ _KIND = re.compile(r"^(?:\s*chan\s*\d|\s*\S+\s+points of instrument)", re.IGNORE
 _RECORD = re.compile(r"^corrected accelerogram\s+(\S+)", re.IGNORECASE)
 _CHANNEL = re.compile(r"^\s*chan\s*\d+\s*:\s*(\S.*)", re.IGNORECASE)
 _STATION = re.compile(r"^station\s+(?:no|id)\.?\s*(\S+)", re.IGNORECASE)
+_START = re.compile(r"\b(?:start|trigger) time\s*:\s*(\S.*)", re.IGNORECASE)
 _POINTS = re.compile(r"^\s*(\S+)\s+points of accel\w*\s+data", re.IGNORECASE)
 _INTERVAL = re.compile(r"equally spaced at\s*(\S+)\s*sec", re.IGNORECASE)
 _UNIT = re.compile(r"sec[.,\s]+(?:in\s+|\(\s*units:\s*)([a-z/0-9^*]+)", re.IGNORECASE)
@@ -112,6 +114,7 @@ def _channel(
     header = range(span.start, points.line - 1)
     channel = find_field(path, lines, header, _CHANNEL, f"line 'Chan' in channel {index}")
     station = optional_field(lines, header, _STATION)
+    start = optional_field(lines, header, _START)
     return GroundMotion(
         values * factor,
         dt,
@@ -124,6 +127,8 @@ def _channel(
         source_file=path.name,
         trace_index=index,
         file_format=FORMAT,
+        is_corrected=True,
+        start_time=first_sample_time(start.text) if start else None,
     )
 
 

@@ -100,7 +100,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             component=component,
             orientation_deg=azimuth_deg(component),
             is_vertical=is_vertical_name(component),
-            recording=f"{event} {station}".strip(),
+            recording=f"{event} {station}" if event and station else "",
             source_file=path.name,
             file_format=FORMAT,
             remarks=(remark,) if remark else (),

@@ -8,6 +8,8 @@ VERTICAL_NAMES = frozenset(
     {"UP", "DOWN", "DWN", "DN", "VER", "VRT", "VERT", "VERTICAL", "V", "Z", "U", "UD", "U-D"}
 )
 
+_DOWNWARD_NAMES = frozenset({"DOWN", "DWN", "DN"})
+
 _COMPASS = {
     "N": 0.0, "NORTH": 0.0, "NS": 0.0, "N-S": 0.0,
     "E": 90.0, "EAST": 90.0, "EW": 90.0, "E-W": 90.0,
@@ -40,6 +42,15 @@ def is_vertical_name(component: str) -> bool | None:
     if seed or name in HORIZONTAL_NAMES or azimuth_deg(component) is not None:
         return False
     return None
+
+
+def is_downward_name(component: str) -> bool:
+    """Return whether a component's name says that its positive samples are downward.
+
+    Args:
+        component: as the file names it: ``DOWN``, ``DWN``, ``DN``.
+    """
+    return component.strip().upper().lstrip("-") in _DOWNWARD_NAMES
 
 
 def azimuth_deg(component: str) -> float | None:

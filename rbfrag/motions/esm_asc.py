@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from rbfrag.errors import MotionFileError
+from rbfrag.motions.clock import first_sample_time
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.header_field import (
@@ -74,5 +75,13 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             recording=f"{event} {station}".strip(),
             source_file=path.name,
             file_format=FORMAT,
+            is_corrected=_is_corrected(fields.text("BASELINE_CORRECTION")),
+            start_time=first_sample_time(fields.text("DATE_TIME_FIRST_SAMPLE_YYYYMMDD")),
         )
     ]
+
+
+def _is_corrected(baseline: str) -> bool | None:
+    """`BASELINE REMOVED` or `BASELINE NOT REMOVED`; None where the header does not say."""
+    words = baseline.upper().split()
+    return None if "REMOVED" not in words else "NOT" not in words

@@ -111,4 +111,5 @@ def _component(
         source_file=path.name,
         trace_index=index,
         file_format=FORMAT,
+        is_corrected=True,
     )

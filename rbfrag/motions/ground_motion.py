@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from functools import cached_property
 from typing import Self
 
@@ -36,6 +37,13 @@ class GroundMotion:
         remarks: sentences about the reading that a user should see.
         node_time_s: node times [s] of a general motion, shape (npts,), non-decreasing.
             A time given twice is a jump. None when the samples are equally spaced.
+        is_corrected: whether the baseline was corrected, as file or format say; None when
+            they do not.
+        is_partial: True when the file holds another number of samples than its header says.
+        start_time: time of the first sample by the clock and zone of the file, if it says.
+        processing_applied: every parameter of what rbfrag did to the samples; None where they
+            are those of the file.
+        source_sha256: hash of the samples as the file has them; empty where these are they.
 
     Raises:
         InputError: no samples, a sample that is not finite, dt_s not positive, times that fall.
@@ -54,6 +62,11 @@ class GroundMotion:
     file_format: str = ""
     remarks: tuple[str, ...] = ()
     node_time_s: FloatArray | None = None
+    is_corrected: bool | None = None
+    is_partial: bool = False
+    start_time: datetime | None = None
+    processing_applied: Mapping[str, object] | None = None
+    source_sha256: str = ""
 
     def __post_init__(self) -> None:
         samples = _finite_vector(self.acceleration_g, "acceleration sample", "g")

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import MotionFileError
+from rbfrag.motions.clock import first_sample_time
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.header_field import (
@@ -108,6 +109,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             recording=f"{station} {recorded}{' borehole' if direction in _BOREHOLE else ''}",
             source_file=path.name,
             file_format=FORMAT,
+            is_corrected=False,
+            start_time=first_sample_time(recorded),
             remarks=tuple(remarks),
         )
     ]

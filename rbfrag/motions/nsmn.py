@@ -82,6 +82,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             source_file=path.name,
             trace_index=index,
             file_format=FORMAT,
+            is_corrected=False,
         )
         for index, component in enumerate(components)
     ]

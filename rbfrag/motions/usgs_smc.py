@@ -120,8 +120,15 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             recording=f"{earthquake} {name}".strip(),
             source_file=path.name,
             file_format=FORMAT,
+            is_corrected=_is_corrected(lines[0]),
         )
     ]
+
+
+def _is_corrected(kind: str) -> bool | None:
+    if "UNCORRECTED" in kind:
+        return False
+    return True if "CORRECTED" in kind else None
 
 
 def _value(path: Path, lines: list[str], top: int, place: int, per_line: int, width: int) -> Field:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,12 @@ from sqlalchemy import Connection, Engine, create_engine, inspect, text
 import rbfrag.db.upgrade
 import rbfrag.migrations
 from rbfrag.db.engine import open_database, unchecked_engine
+from rbfrag.db.motion_store import add_motion, load_motion, motion_rows
 from rbfrag.db.revision import REVISIONS, SCHEMA_REVISION, VERSION_TABLE
+from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.schema import metadata
 from rbfrag.db.upgrade import migrate, upgrade_database
+from rbfrag.motions.ground_motion import GroundMotion
 
 
 def _config() -> Config:
@@ -145,3 +149,28 @@ def test_upgrade_from_before_the_first_schema(place: str) -> None:
         found = connection.scalar(text(f"SELECT version_num FROM {VERSION_TABLE}"))
     again.dispose()
     assert found == SCHEMA_REVISION
+
+
+def test_motions_of_the_first_schema_keep_their_samples(
+    place: str, make_motion: Callable[..., GroundMotion]
+) -> None:
+    open_database(place, create=True).dispose()
+    engine = unchecked_engine(Path(place) if "://" not in place else place, foreign_keys=False)
+    given = make_motion(component="090")
+    with engine.begin() as connection:
+        quake = EarthquakeInfo("E")
+        motion_id, _ = add_motion(connection, given, earthquake=quake, is_vertical=False, suite="S")
+        config = _config()
+        config.attributes["connection"] = connection
+        command.downgrade(config, "0001")
+        names = {column["name"] for column in inspect(connection).get_columns("motion")}
+        assert not names & {"source_sha256", "processing_applied", "start_time"}
+    engine.dispose()
+    assert upgrade_database(place) == ("0001", SCHEMA_REVISION)
+    again = open_database(place)
+    with again.connect() as connection:
+        back = load_motion(connection, motion_id)
+        (row,) = motion_rows(connection, suite="S")
+    again.dispose()
+    assert back.sha256 == given.sha256 == row.source_sha256
+    assert (back.processing_applied, back.start_time) == (None, None)

@@ -1,0 +1,156 @@
+"""Baseline correction and high-pass filter of uncorrected records: a named step, never silent.
+
+An instrument's offset and its slow drift are accelerations of micro-g that integrate to metres.
+The default procedure removes the mean, puts 20 s of zeros on each side, and runs a Butterworth
+high-pass of order 2 at 0.1 Hz forward and backward, which shifts no phase. The padding stays in
+the record: without it the filter's transients are cut off, and velocity and displacement do not
+return to zero (Boore 2005, Bull. Seismol. Soc. Am. 95(2), 745-750).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import asdict, dataclass, replace
+from datetime import timedelta
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+
+LARGEST_ORDER = 8
+
+MOST_SAMPLES = 20_000_000
+"""A padded record beyond this has a wrong dt."""
+
+_UNCORRECTED = re.compile(r"\b(?:uncorrected|unfiltered|unprocessed|raw)\b", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class HighPass:
+    """What is applied to an uncorrected record, in this order.
+
+    Args:
+        taper_s: length of a cosine taper at each end [s], after the mean was removed.
+        padding_s: zeros put on each side [s]; they stay in the record.
+        corner_hz: corner of the Butterworth high-pass [Hz].
+        order: its order; run forward and backward, it falls off twice as steeply.
+
+    Raises:
+        InputError: a value that is negative, not finite or beyond use.
+    """
+
+    taper_s: float = 0.0
+    padding_s: float = 20.0
+    corner_hz: float = 0.1
+    order: int = 2
+
+    def __post_init__(self) -> None:
+        for name in ("taper_s", "padding_s"):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise InputError(f"{name} must be 0 s or more, not {getattr(self, name)}")
+        if not 0.0 < self.corner_hz < math.inf:
+            raise InputError(f"corner_hz must be positive, not {self.corner_hz}")
+        if not 1 <= self.order <= LARGEST_ORDER:
+            raise InputError(f"order must be 1 to {LARGEST_ORDER}, not {self.order}")
+
+
+DEFAULT_HIGH_PASS = HighPass()
+"""The procedure that `rbfrag motions add` applies to uncorrected records."""
+
+
+def counts_as_uncorrected(motion: GroundMotion, stated: str = "") -> bool:
+    """Return whether a record is to be processed before it is integrated.
+
+    What a metadata table states outranks the file: words with `uncorrected`, `unfiltered`,
+    `unprocessed` or `raw` mean yes, any other words no. Where it states nothing, the file
+    decides: its header, or its format where that holds uncorrected records only (volume 1,
+    K-NET, KiK-net, CWB, UNAM, NSMN). A file that does not say is taken as corrected.
+
+    Args:
+        motion: as its file has it.
+        stated: what a metadata table says of its processing.
+    """
+    if stated.strip():
+        return bool(_UNCORRECTED.search(stated))
+    return motion.is_corrected is False
+
+
+def processed(motion: GroundMotion, high_pass: HighPass = DEFAULT_HIGH_PASS) -> GroundMotion:
+    """Return a record with its mean removed, padded with zeros and high-pass filtered.
+
+    Args:
+        motion: equally spaced samples, as the file has them.
+        high_pass: corner, order, padding and taper.
+
+    Returns:
+        A longer motion (by twice the padding); `processing_applied` holds every parameter,
+        `source_sha256` the hash of the samples before.
+
+    Raises:
+        InputError: a motion from nodes or one that was processed before; a corner above the
+            Nyquist frequency; a taper longer than half the record; a record too long to pad.
+    """
+    # heavy, and most commands never process anything
+    from scipy.signal import butter, sosfiltfilt
+
+    if motion.dt_s is None:
+        raise InputError(f"{motion.label}: only equally spaced samples can be filtered")
+    if motion.processing_applied:
+        raise InputError(f"{motion.label}: the record was processed before; read its file again")
+    nyquist_hz = 0.5 / motion.dt_s
+    if high_pass.corner_hz >= nyquist_hz:
+        raise InputError(
+            f"{motion.label}: a corner of {high_pass.corner_hz:g} Hz is not below the "
+            f"{nyquist_hz:g} Hz that dt = {motion.dt_s:g} s resolves: check dt, or add the record "
+            "as it is (--raw)"
+        )
+    padding = math.ceil(high_pass.padding_s / motion.dt_s)
+    if motion.npts + 2 * padding > MOST_SAMPLES:
+        raise InputError(
+            f"{motion.label}: {high_pass.padding_s:g} s of zeros are {padding} samples at dt = "
+            f"{motion.dt_s:g} s: check dt, or add the record as it is (--raw)"
+        )
+    samples = motion.acceleration_g - motion.acceleration_g.mean()
+    samples = np.pad(samples * _taper(motion, high_pass.taper_s), padding)
+    sections = butter(high_pass.order, high_pass.corner_hz, "highpass", fs=1.0 / motion.dt_s,
+                      output="sos")  # fmt: skip
+    try:
+        filtered = sosfiltfilt(sections, samples)
+    except ValueError:
+        raise InputError(
+            f"{motion.label}: {samples.size} samples are too few to filter: add the record as it "
+            "is (--raw)"
+        ) from None
+    start = motion.start_time
+    return replace(
+        motion,
+        acceleration_g=filtered,
+        is_corrected=True,
+        start_time=None if start is None else start - timedelta(seconds=padding * motion.dt_s),
+        source_sha256=motion.source_sha256 or motion.sha256,
+        processing_applied={
+            "mean_removed": True,
+            "filter": "butterworth high-pass",
+            "passes": "forward and backward",
+            **asdict(high_pass),
+            "padding_samples": padding,
+        },
+    )
+
+
+def _taper(motion: GroundMotion, taper_s: float) -> NDArray[np.float64]:
+    assert motion.dt_s is not None
+    count = round(taper_s / motion.dt_s)
+    if 2 * count > motion.npts:
+        raise InputError(
+            f"{motion.label}: a taper of {taper_s:g} s at each end is longer than the record of "
+            f"{motion.duration_s:g} s"
+        )
+    weights = np.ones(motion.npts)
+    if count:
+        rise = 0.5 * (1.0 - np.cos(np.pi * np.arange(count) / count))
+        weights[:count], weights[-count:] = rise, rise[::-1]
+    return weights
