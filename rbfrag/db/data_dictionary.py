@@ -70,7 +70,14 @@ _MEANINGS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "source_file": ("", "name of the file it was read from"),
             "trace_index": ("", "number of the trace in that file, from 0"),
             "file_format": ("", "format of that file"),
-            "processing": ("", "what was done to the samples"),
+            "processing": ("", "what metadata or file say was done to the record before"),
+            "processing_applied": (
+                "",
+                "JSON object: every parameter of what rbfrag did to the samples; missing where "
+                "they are those of the file",
+            ),
+            "source_sha256": ("", "SHA-256 of the samples as the file has them"),
+            "start_time": ("", "time of the first sample by the file's clock, where it says"),
             "flags": ("", "JSON list of quality signs"),
             "remarks": ("", "JSON list of sentences about the file"),
             "samples_sha256": ("", "SHA-256 of the samples as little-endian float64"),
