@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 from rbfrag.cli import bench as bench_command
 from rbfrag.cli import block as block_command
 from rbfrag.cli import critical, database, demo, fit, models, motions, plot, predict, respond
+from rbfrag.cli import export as export_command
 from rbfrag.cli import hazard as hazard_command
 from rbfrag.cli import rockmass as rockmass_command
 from rbfrag.cli import simulate as simulate_command
@@ -76,6 +77,7 @@ app.command("simulate", epilog=simulate_command.EXAMPLE)(simulate_command.simula
 app.command("fit", epilog=fit.EXAMPLE)(fit.fit)
 app.command("predict", epilog=predict.EXAMPLE)(predict.predict)
 app.command("hazard", epilog=hazard_command.EXAMPLE)(hazard_command.hazard)
+app.add_typer(export_command.app, name="export")
 app.add_typer(models.app, name="models")
 app.add_typer(plot.app, name="plot")
 app.add_typer(database.app, name="db")

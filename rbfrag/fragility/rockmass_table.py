@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rbfrag.fragility.rockmass import Realisations
 from rbfrag.fragility.rockmass_scenario import Scenario
-from rbfrag.solver.mechanism import MODES, STATES
+from rbfrag.solver.mechanism import MODES, STABLE, STATES, TOPPLE
 
 
 def block_columns(made: Realisations, answer: Scenario | None = None) -> dict[str, NDArray[Any]]:
@@ -62,6 +62,17 @@ def block_columns(made: Realisations, answer: Scenario | None = None) -> dict[st
         "in_domain": answer.in_domain,
         "reason": answer.reason,
     }
+
+
+def toppling_blocks(
+    made: Realisations,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Return p² [1/s²] and k_r of the stable toppling blocks, and their share of all blocks."""
+    found = made.stability
+    chosen = made.is_block & (found.mode_code == TOPPLE) & (found.state_code == STABLE)
+    chosen &= made.kr_at_rest > 0.0
+    share = float(chosen.sum()) / max(made.n_blocks, 1)
+    return found.p2[chosen], made.kr_at_rest[chosen], share
 
 
 def _names(

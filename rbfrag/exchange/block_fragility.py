@@ -1,0 +1,179 @@
+"""The fragility of blocks as a function of one measure of shaking, for other tools."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from rbfrag.errors import InputError
+from rbfrag.exchange.fragility_function import FragilityFunction
+from rbfrag.exchange.intensity_type import IntensityType
+from rbfrag.fragility.answers import PredictionArray
+from rbfrag.fragility.model_lookup import find_model
+from rbfrag.fragility.prediction import Model, predict
+
+FloatArray = NDArray[np.float64]
+
+LIMIT_STATE = "toppled"
+"""The limit state of a block."""
+
+SMALLEST = 1e-7
+"""Probabilities from this to one minus this are covered by a discrete function."""
+
+_LOWEST, _HIGHEST, _SCANNED = 1e-5, 1e3, 4001
+_STRAIGHT = 1e-9
+_CHUNK = 256
+
+
+def block_functions(
+    names: list[str],
+    p2: FloatArray,
+    kr: FloatArray,
+    measure: str,
+    *,
+    tm_s: float | None = None,
+    levels: int = 80,
+    model: Model | None = None,
+    db: str | PathLike[str] | None = None,
+) -> tuple[list[FragilityFunction], tuple[str, ...]]:
+    """Return the fragility of each block over one measure, and the model that answered.
+
+    A fragility that is lognormal to 1e-9 in its normal score is returned as such, every other
+    on a grid of levels with equal ratios between `SMALLEST` and one minus it, together with the
+    largest error of linear interpolation on that grid.
+
+    Args:
+        names: identifiers of the blocks.
+        p2: frequency parameters [1/s²], shape (m,).
+        kr: toppling yield acceleration coefficients, shape (m,).
+        measure: ``pgv_m_s``, or ``pga_g`` with `tm_s`.
+        tm_s: mean period [s], for PGA.
+        levels: number of levels of a discrete function.
+        model: as in :func:`rbfrag.predict`.
+        db: as in :func:`rbfrag.predict`.
+
+    Returns:
+        The functions, and name, term and method of the model.
+
+    Raises:
+        InputError: a block or a measure that no model can work with, or too few levels.
+        UnknownModelError: no model of that name.
+        DatabaseError: the database cannot be read.
+    """
+    x = np.geomspace(_LOWEST, _HIGHEST, _SCANNED)
+    kind, about, rows = _probabilities(x, p2, kr, measure, tm_s, levels, model, db)
+    functions = [
+        _function(name, kind, x, row, levels)
+        for name, row in zip(names, (row for some in rows for row in some), strict=True)
+    ]
+    return functions, about
+
+
+def class_function(
+    name: str,
+    p2: FloatArray,
+    kr: FloatArray,
+    measure: str,
+    *,
+    tm_s: float | None = None,
+    levels: int = 80,
+    model: Model | None = None,
+    db: str | PathLike[str] | None = None,
+) -> tuple[FragilityFunction, tuple[str, ...]]:
+    """Return the mean fragility of the blocks of one class, and the model that answered.
+
+    Args:
+        name: identifier of the class.
+        p2: frequency parameters of its blocks [1/s²], shape (m,).
+        kr: their toppling yield acceleration coefficients, shape (m,).
+        measure: as in :func:`block_functions`, as are the others.
+        tm_s: mean period [s].
+        levels: number of levels of a discrete function.
+        model: as in :func:`rbfrag.predict`.
+        db: as in :func:`rbfrag.predict`.
+
+    Raises:
+        InputError: no block, or as for :func:`block_functions`.
+    """
+    if p2.size == 0:
+        raise InputError(f"class {name!r} has no stable toppling block: it has no fragility")
+    x = np.geomspace(_LOWEST, _HIGHEST, _SCANNED)
+    kind, about, rows = _probabilities(x, p2, kr, measure, tm_s, levels, model, db)
+    total = np.zeros_like(x)
+    for some in rows:
+        total += some.sum(axis=0)
+    return _function(name, kind, x, total / p2.size, levels), about
+
+
+def _probabilities(
+    x: FloatArray,
+    p2: FloatArray,
+    kr: FloatArray,
+    measure: str,
+    tm_s: float | None,
+    levels: int,
+    model: Model | None,
+    db: str | PathLike[str] | None,
+) -> tuple[IntensityType, tuple[str, ...], Iterator[FloatArray]]:
+    """Return the meaning of the levels, the model, and probabilities, some blocks at a time."""
+    if levels < 10:
+        raise InputError(f"levels = {levels}: a discrete fragility needs at least 10")
+    if measure not in ("pgv_m_s", "pga_g"):
+        raise InputError(f"measure = {measure!r}: use pgv_m_s or pga_g")
+    if measure == "pga_g" and tm_s is None:
+        raise InputError(
+            "PGA alone does not say whether a block topples: give the mean period with --tm, or "
+            "export PGV"
+        )
+    fixed = {} if tm_s is None or measure != "pga_g" else {"tm_s": tm_s}
+    chosen = find_model(model, ("p2", "kr", measure, *fixed), db)
+
+    def rows() -> Iterator[FloatArray]:
+        for start in range(0, p2.size, _CHUNK):
+            some = slice(start, start + _CHUNK)
+            shaking: dict[str, Any] = {measure: x[None, :], **fixed}
+            found = predict(p2[some, None], kr[some, None], **shaking, model=chosen)
+            assert isinstance(found, PredictionArray)
+            yield found.probability
+
+    kind = IntensityType(measure, 0.01 if measure == "pgv_m_s" else 1.0)
+    return kind, (chosen.name, chosen.term.name, chosen.row.method), rows()
+
+
+def _function(
+    name: str, kind: IntensityType, x: FloatArray, p: FloatArray, levels: int
+) -> FragilityFunction:
+    if np.isnan(p).any():
+        raise InputError(
+            f"block {name!r} has no fragility: p2 and kr must be above zero and finite"
+        )
+    # A normal score straight in ln x is a lognormal function.
+    middle = (p > 1e-9) & (p < 1.0 - 1e-9)
+    if middle.sum() > 2:
+        z, u = ndtri(p[middle]), np.log(x[middle])
+        slope, intercept = np.polyfit(u, z, 1)
+        if slope > 0.0 and np.abs(intercept + slope * u - z).max() < _STRAIGHT * max(slope, 1.0):
+            return FragilityFunction(
+                name, LIMIT_STATE, kind,
+                median=float(np.exp(-intercept / slope)), beta=float(1.0 / slope),
+            )  # fmt: skip
+    rising = np.maximum.accumulate(p)
+    inside = np.flatnonzero((rising > SMALLEST) & (rising < 1.0 - SMALLEST))
+    if inside.size < 2:
+        raise InputError(
+            f"block {name!r}: the probability jumps from 0 to 1 between {x[0]:g} and {x[-1]:g}, "
+            "which a fragility function cannot show"
+        )
+    low, high = max(inside[0] - 1, 0), min(inside[-1] + 1, x.size - 1)
+    grid = np.geomspace(x[low], x[high], levels)
+    on_grid = np.interp(grid, x, rising)
+    error = np.abs(np.interp(x[low : high + 1], grid, on_grid) - rising[low : high + 1]).max()
+    return FragilityFunction(
+        name, LIMIT_STATE, kind, levels=grid, probability=np.clip(on_grid, 0.0, 1.0),
+        grid_error=float(error),
+    )  # fmt: skip

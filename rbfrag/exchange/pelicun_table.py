@@ -1,0 +1,202 @@
+"""Fragility tables of pelicun and SimCenter's damage and loss library."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.exchange.fragility_function import (
+    FragilityFunction,
+    discrete_function,
+    lognormal_function,
+)
+from rbfrag.exchange.intensity_type import IntensityType
+from rbfrag.exchange.source_text import source_text
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+_DEMANDS = {"pga_g": ("Peak Ground Acceleration", "g"), "pgv_m_s": ("Peak Ground Velocity", "mps")}
+
+_UNITS = {
+    ("Peak Ground Acceleration", "g"): IntensityType("pga_g", 1.0),
+    ("Peak Ground Acceleration", "mps2"): IntensityType("pga_g", 1.0 / STANDARD_GRAVITY_M_S2),
+    ("Peak Ground Velocity", "mps"): IntensityType("pgv_m_s", 1.0),
+    ("Peak Ground Velocity", "cmps"): IntensityType("pgv_m_s", 0.01),
+    ("Peak Ground Velocity", "inps"): IntensityType("pgv_m_s", 0.0254),
+}
+
+_HEAD = ("ID", "Incomplete", "Demand-Type", "Demand-Unit", "Demand-Offset", "Demand-Directional")
+_APART = 1.5e-8
+_LIMIT = ("Family", "Theta_0", "Theta_1", "DamageStateWeights")
+
+
+@dataclass(frozen=True)
+class PelicunTable:
+    """What a table says of ground shaking, and what it says of other demands.
+
+    Args:
+        functions: functions of peak ground acceleration and velocity.
+        skipped: number of limit states of other demands (floor acceleration, drift …).
+        incomplete: names of the rows that are marked incomplete or hold no parameters.
+    """
+
+    functions: tuple[FragilityFunction, ...]
+    skipped: int
+    incomplete: tuple[str, ...]
+
+
+def pelicun_text(functions: Sequence[FragilityFunction]) -> str:
+    """Return the table as CSV: PGA in g, PGV in mps, one limit state a function.
+
+    A lognormal function keeps median and standard deviation of the logarithm; any other is a
+    ``multilinear_CDF`` through its levels, completed to run from 0 to 1 and rounded to the six
+    digits that pelicun keeps.
+
+    Args:
+        functions: functions of PGA or PGV, one limit state for each asset.
+
+    Raises:
+        InputError: nothing to write, a name twice, or another measure.
+    """
+    if not functions:
+        raise InputError("there is no fragility function to write")
+    names = [function.name for function in functions]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"block {name!r} is there twice: give every block its own block_id")
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow([*_HEAD, *(f"LS1-{name}" for name in _LIMIT)])
+    for function in functions:
+        if function.kind.measure not in _DEMANDS:
+            raise InputError(
+                f"{function.name}: pelicun has no demand for {function.kind.imt}: export PGV or PGA"
+            )
+        demand, unit = _DEMANDS[function.kind.measure]
+        row: list[object] = [function.name, 0, demand, unit, 0, 0]
+        if function.is_lognormal:
+            row += ["lognormal", _text(function.median), _text(function.beta), ""]
+        else:
+            levels, probability = _whole(function)
+            theta = f"{_list(levels)}|{_list(probability)}"
+            row += ["multilinear_CDF", theta, "", ""]
+        table.writerow(row)
+    return out.getvalue()
+
+
+def read_pelicun(path: str | os.PathLike[str]) -> PelicunTable:
+    """Return the functions of peak ground acceleration and velocity of a table.
+
+    Args:
+        path: CSV file.
+
+    Raises:
+        InputError: not such a table, or a row whose numbers make no function, with its line.
+    """
+    text = source_text(path, "a pelicun fragility table")
+    reader = csv.reader(io.StringIO(text))
+    header = [name.strip() for name in next(reader, [])]
+    for name in ("ID", "Demand-Type", "Demand-Unit", "LS1-Family", "LS1-Theta_0"):
+        if name not in header:
+            raise InputError(f"{path}, line 1: there is no column {name}: not a pelicun table")
+    functions: list[FragilityFunction] = []
+    skipped, incomplete = 0, []
+    for cells in reader:
+        if not cells:
+            continue
+        line = reader.line_num
+        if len(cells) != len(header):
+            raise InputError(f"{path}, line {line}: {len(cells)} cells under {len(header)} columns")
+        row = {name: cell.strip() for name, cell in zip(header, cells, strict=True)}
+        states = [
+            name.removesuffix("-Family")
+            for name in header
+            if name.endswith("-Family") and row[name]
+        ]
+        kind = _UNITS.get((row["Demand-Type"], row["Demand-Unit"]))
+        if row.get("Incomplete", "0") not in ("", "0") or not states:
+            incomplete.append(row["ID"])
+            continue
+        of_ground = row["Demand-Type"] in ("Peak Ground Acceleration", "Peak Ground Velocity")
+        if of_ground and kind is None:
+            raise InputError(
+                f"{path}, line {line}: {row['Demand-Type']} in {row['Demand-Unit']!r} is not "
+                "known: g, mps2; mps, cmps, inps"
+            )
+        if kind is None:
+            skipped += len(states)
+            continue
+        functions += [
+            _function(row, state, kind, f"{path}, line {line}, {state}") for state in states
+        ]
+    return PelicunTable(tuple(functions), skipped, tuple(incomplete))
+
+
+def _function(
+    row: dict[str, str], state: str, kind: IntensityType, where: str
+) -> FragilityFunction:
+    family = row[f"{state}-Family"]
+    if family == "lognormal":
+        median, beta = (
+            _number(row.get(f"{state}-{key}", ""), f"{where}, {key}")
+            for key in ("Theta_0", "Theta_1")
+        )
+        return lognormal_function(row["ID"], state, kind, kind.factor * median, beta, where)
+    if family == "multilinear_CDF":
+        parts = row[f"{state}-Theta_0"].split("|")
+        if len(parts) != 2:
+            raise InputError(f"{where}: Theta_0 is not 'levels|probabilities'")
+        x, p = (np.array([_number(w, where) for w in part.split(",")]) for part in parts)
+        return discrete_function(row["ID"], state, kind, kind.factor * x, p, where)
+    raise InputError(f"{where}: family {family!r} is not known: lognormal and multilinear_CDF are")
+
+
+def _number(text: str, where: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(f"{where}: {text!r} is not a finite number")
+    return value
+
+
+def _whole(function: FragilityFunction) -> tuple[list[float], list[float]]:
+    """Return levels and probabilities from 0 to 1, strictly rising as pelicun wants them."""
+    assert function.levels is not None
+    assert function.probability is not None
+    x: NDArray[np.float64] = function.levels
+    p: NDArray[np.float64] = function.probability
+    if p[0] > 0.0:
+        x, p = np.concatenate([[0.0], x]), np.concatenate([[0.0], p])
+    if p[-1] < 1.0:
+        last = (1.0 - p[-1]) / max((p[-1] - p[-2]) / (x[-1] - x[-2]), 1e-3)
+        x, p = np.append(x, x[-1] + min(last, x[-1])), np.append(p, 1.0)
+    # pelicun keeps six digits and refuses neighbours that are then equal
+    x, p = _rounded(x), _rounded(p)
+    keep = [0]
+    for i in range(1, x.size - 1):
+        before = p[i] - p[keep[-1]] > _APART and x[i] - x[keep[-1]] > _APART
+        if before and p[-1] - p[i] > _APART and x[-1] - x[i] > _APART:
+            keep.append(i)
+    keep.append(x.size - 1)
+    return x[keep].tolist(), p[keep].tolist()
+
+
+def _rounded(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.array([float(f"{value:.6g}") for value in values.tolist()])
+
+
+def _text(value: float | None) -> str:
+    return "" if value is None else repr(float(value))
+
+
+def _list(values: list[float]) -> str:
+    return ",".join(map(repr, values))

@@ -1,0 +1,96 @@
+"""`rbfrag export`: what other tools get is what `predict` answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rbfrag
+from rbfrag.db.engine import opened_database
+from rbfrag.db.model_store import save_model
+from rbfrag.exchange.nrml_read import read_nrml
+from rbfrag.exchange.pelicun_table import read_pelicun
+from tests.cli.conftest import Shell
+from tests.fragility.conftest import model_row
+
+BLOCKS = "block_id,p2_1_s2,kr\nA7,3,0.1\nB2,10,0.3\n"
+
+
+@pytest.fixture
+def database(shell: Shell) -> None:
+    with opened_database("rbfrag.db", create=True) as engine, engine.begin() as connection:
+        save_model(connection, model_row())
+        save_model(connection, model_row("pga_tm"))
+
+
+@pytest.mark.usefixtures("database")
+def test_nrml_of_several_blocks(shell: Shell) -> None:
+    Path("blocks.csv").write_text(BLOCKS)
+    told = shell.json("export", "nrml", "--blocks", "blocks.csv", "--out", "a.xml")
+    assert (told["functions"], told["model"]) == (2, "wls-pgv")
+    found = read_nrml("a.xml")
+    assert [f.name for f in found] == ["A7", "B2"]
+    x = np.linspace(0.3, 1.4, 50)
+    expected = rbfrag.predict(3.0, 0.1, pgv_m_s=x).probability
+    assert np.abs(found[0].at(x) - expected).max() < 1.2 * told["largest_grid_error"] + 1e-6
+
+
+@pytest.mark.usefixtures("database")
+def test_pelicun_of_one_block_in_pga(shell: Shell) -> None:
+    told = shell.json(
+        "export", "pelicun", "--p2", "3", "--kr", "0.1", "--imt", "PGA", "--tm", "0.5",
+        "--levels", "300", "--name", "boulder", "--out", "a.csv",
+    )  # fmt: skip
+    (found,) = read_pelicun("a.csv").functions
+    assert (found.name, found.kind.measure) == ("boulder", "pga_g")
+    x = np.linspace(0.4, 1.8, 50)
+    expected = rbfrag.predict(3.0, 0.1, pga_g=x, tm_s=0.5).probability
+    assert np.abs(found.at(x) - expected).max() < 1.2 * told["largest_grid_error"] + 1e-5
+
+
+@pytest.mark.usefixtures("database")
+def test_a_rock_mass_is_the_mean_of_its_toppling_blocks(shell: Shell) -> None:
+    Path("mass.toml").write_text(
+        "realisations = 300\nseed = 2\n[base]\ndip_deg = 5.0\n"
+        'spacing_m = { distribution = "uniform", low = 1.0, high = 2.0 }\n'
+        "[back]\ndip_deg = 85.0\nspacing_m = 0.4\n[friction]\nphi_deg = 40.0\n"
+    )
+    told = shell.json("export", "nrml", "--rockmass", "mass.toml", "--name", "m", "--out", "a.xml")
+    (found,) = read_nrml("a.xml")
+    shell("rockmass", "mass.toml", "--out", "blocks.csv")
+    rows = np.genfromtxt("blocks.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    rows = rows[(rows["mode"] == "topple") & (rows["kr"] > 0)]
+    assert f"{rows.size} stable toppling blocks" in told["warnings"][0]
+    x = np.linspace(0.2, 1.4, 30)
+    each = rbfrag.predict(rows["p2_1_s2"][:, None], rows["kr"][:, None], pgv_m_s=x[None, :])
+    mean = each.probability.mean(axis=0)
+    assert np.abs(found.at(x) - mean).max() < 1.2 * told["largest_grid_error"] + 1e-6
+
+
+@pytest.mark.usefixtures("database")
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--p2", "3", "--kr", "0.1", "--imt", "PGA"), "mean period with --tm"),
+        (("--p2", "3", "--kr", "0.1", "--imt", "SA(1)"), "--imt SA(1)"),
+        (("--p2", "3", "--kr", "0.1", "--levels", "2"), "at least 10"),
+        (("--p2", "3", "--kr", "0.1", "--blocks", "b.csv"), "not several of them"),
+        (("--p2", "3"), "--kr is missing"),
+        (("--blocks", "none.csv"), "no such file"),
+        (("--blocks", "bad.csv"), "block A7 has p2_1_s2 = 3 and kr = -1"),
+        (("--blocks", "twice.csv"), "'A7' is there twice"),
+    ],
+)
+def test_refusals(refuses: Callable[..., str], options: tuple[str, ...], words: str) -> None:
+    Path("bad.csv").write_text("block_id,p2_1_s2,kr\nA7,3,-1\n")
+    Path("twice.csv").write_text("block_id,p2_1_s2,kr\nA7,3,0.1\nB,3,0.1\nA7,3,0.1\n")
+    assert words in refuses("export", "nrml", *options, "--out", "a.xml")
+    assert not Path("a.xml").exists()
+
+
+@pytest.mark.usefixtures("database")
+def test_the_suffix_is_checked_first(refuses: Callable[..., str]) -> None:
+    assert "none of .xml" in refuses("export", "nrml", "--p2", "3", "--kr", "1", "--out", "a.csv")

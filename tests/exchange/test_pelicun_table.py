@@ -1,0 +1,91 @@
+"""pelicun tables: the samples, the way there and back, and rows that are not whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rbfrag.errors import InputError
+from rbfrag.exchange.fragility_function import discrete_function, lognormal_function
+from rbfrag.exchange.intensity_type import IntensityType
+from rbfrag.exchange.pelicun_table import pelicun_text, read_pelicun
+
+PGV = IntensityType("pgv_m_s", 0.01)
+
+
+def test_hazus_buildings(formats_dir: Path) -> None:
+    found = read_pelicun(formats_dir / "simcenter_hazus_v6.1_building_fragility.csv")
+    one = next(f for f in found.functions if f.name == "LF.W1.HC" and f.limit_state == "LS1")
+    assert (one.median, one.beta, one.kind.measure) == (0.26, 0.4, "pga_g")
+    assert found.skipped > 0
+
+
+def test_other_demands_are_counted_not_read(formats_dir: Path) -> None:
+    found = read_pelicun(formats_dir / "simcenter_fema_p58_component_fragility.csv")
+    assert found.functions == ()
+    assert found.skipped == 1250
+    assert len(found.incomplete) == 193
+    small = read_pelicun(formats_dir / "pelicun_damage_db_small.csv")
+    assert (small.skipped, small.incomplete) == (7, ("component.incomplete",))
+
+
+def test_there_and_back(tmp_path: Path) -> None:
+    x = np.geomspace(0.1, 2.0, 60)
+    p = 1.0 - np.exp(-((x / 0.7) ** 3))
+    curved = discrete_function("curved", "toppled", PGV, x, p, "test")
+    smooth = lognormal_function("smooth", "toppled", PGV, 0.4321, 0.3, "test")
+    path = tmp_path / "a.csv"
+    path.write_text(pelicun_text([curved, smooth]))
+    back = {f.name: f for f in read_pelicun(path).functions}
+    inside = np.linspace(0.1, 2.0, 500)
+    assert np.abs(back["smooth"].at(inside) - smooth.at(inside)).max() < 1e-9
+    assert np.abs(back["curved"].at(inside) - curved.at(inside)).max() < 1e-5  # six digits
+    assert back["curved"].probability is not None
+    assert (back["curved"].probability[0], back["curved"].probability[-1]) == (0.0, 1.0)
+    assert (np.diff(back["curved"].probability) > 1e-8).all()
+
+
+def test_what_cannot_be_written() -> None:
+    one = lognormal_function("a", "toppled", PGV, 0.5, 0.3, "test")
+    with pytest.raises(InputError, match="no fragility function"):
+        pelicun_text([])
+    with pytest.raises(InputError, match="'a' is there twice"):
+        pelicun_text([one, one])
+    spectral = lognormal_function("a", "toppled", IntensityType("sa_g", 1.0, 0.5), 1, 1, "test")
+    with pytest.raises(InputError, match=r"no demand for SA\(0.5\)"):
+        pelicun_text([spectral])
+
+
+HEAD = (
+    "ID,Incomplete,Demand-Type,Demand-Unit,Demand-Offset,Demand-Directional,LS1-Family,"
+    "LS1-Theta_0,LS1-Theta_1,LS1-DamageStateWeights\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("ID,x\n", "line 1: there is no column Demand-Type"),
+        (HEAD + "a,0,Peak Ground Velocity,mps\n", "line 2: 4 cells under 10 columns"),
+        (HEAD + "a,0,Peak Ground Velocity,knots,0,0,lognormal,1,1,\n", "in 'knots' is not known"),
+        (HEAD + "a,0,Peak Ground Velocity,mps,0,0,lognormal,x,1,\n", "Theta_0: 'x' is not"),
+        (HEAD + "a,0,Peak Ground Velocity,mps,0,0,lognormal,-1,1,\n", "median is -1"),
+        (HEAD + "a,0,Peak Ground Velocity,mps,0,0,lognormal,1,,\n", "Theta_1: '' is not"),
+        (HEAD + "a,0,Peak Ground Velocity,mps,0,0,gamma,1,1,\n", "family 'gamma' is not known"),
+        (HEAD + 'a,0,Peak Ground Velocity,mps,0,0,multilinear_CDF,"1,2",,\n', "levels|probab"),
+        (HEAD + 'a,0,Peak Ground Velocity,mps,0,0,multilinear_CDF,"2,1|0,1",,\n', "must rise"),
+    ],
+)
+def test_bad_tables_are_refused(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words.replace("|", r"\|")):
+        read_pelicun(path)
+
+
+def test_incomplete_rows_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(HEAD + "a,1,Peak Ground Velocity,mps,0,0,lognormal,,,\n")
+    assert read_pelicun(path).incomplete == ("a",)
