@@ -140,7 +140,7 @@ class _Search:
         bottom = self.limit * pga
         found = certified_map(drive, p2=self.p2, linear=self.linear, bottom=bottom, full=full_map)
         self.n_runs += found.runs
-        self.intervals = outcome_intervals(found, pga, drive.max_q)
+        self.intervals = outcome_intervals(found, pga, drive.max_q, bottom if full_map else None)
         bracket = bracket_of(found)
         scan = self._scan
         if found.k_up > bottom:
@@ -155,6 +155,11 @@ class _Search:
         if not self.certified:
             self._say_why(found)
             bracket = self._by_scan(scan, found, bottom, bracket)
+        elif full_map and not found.complete:
+            self.warnings.append(
+                f"the map was given up at {found.reached / pga:.6g} PGA, after its budget: what "
+                "lies below is undecided; the critical value is not touched by this"
+            )
         if bracket is None:
             return
         self.status = "found"

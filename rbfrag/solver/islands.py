@@ -31,18 +31,25 @@ class Islands(NamedTuple):
     reentrant: bool
 
 
-def outcome_intervals(found: CertifiedMap, pga_g: float, max_q: float) -> OutcomeIntervals:
+def outcome_intervals(
+    found: CertifiedMap, pga_g: float, max_q: float, bottom: float | None = None
+) -> OutcomeIntervals:
     """Return the map over k_r/PGA, rising, up to the k_r that no drive exceeds.
 
     Args:
         found: verdicts in k_r, falling.
         pga_g: PGA [g].
         max_q: greatest k_h/(1 + k_v).
+        bottom: k_r down to which the map reaches, undecided where the search was given up
+            above it; None for where the search ended.
     """
     low = found.low[::-1]
     high = found.high[::-1]
     words = [WORDS.get(int(v), "undecided") for v in found.verdict[::-1]]
     edges = [*low.tolist(), *high.tolist()[-1:]] or [found.k_up]
+    if bottom is not None and edges[0] > bottom:
+        edges.insert(0, bottom)
+        words.insert(0, "undecided")
     top = max(max_q, found.k_up)
     if top > found.k_up:
         edges.append(top)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,12 +16,15 @@ FloatArray = NDArray[np.float64]
 @kernel
 def examine_step(
     theta: float, u: FloatArray, order: int, theta_end: float, u_end: float, v_end: float
-) -> tuple[float, float, float]:
-    """Find what happens inside one step: (tau of the re-seat or -1, peak, tau of the peak).
+) -> tuple[float, float, float, float]:
+    """Find what happens inside one step.
 
     The step is cut at the turning points of theta into monotone stretches, so a peak and a
-    re-seat in one step, or a dip below zero between two positive ends, are all seen. The
-    peak is -1 where theta has no maximum before the re-seat.
+    re-seat in one step, or a dip below zero between two positive ends, are all seen.
+
+    Returns:
+        tau of the re-seat or -1; peak, -1 where theta has no maximum before the re-seat; tau
+        of the peak; lowest minimum above zero, infinite where there is none.
     """
     v_start = u[1]
     # a start from rest has U = 0: its direction is that of the acceleration
@@ -38,6 +43,7 @@ def examine_step(
 
     peak = -1.0
     peak_tau = -1.0
+    lowest = math.inf
     rising = u_start > 0.0
     left = 0.0
     theta_left = theta
@@ -58,9 +64,11 @@ def examine_step(
                 peak_tau = right
         elif theta_right <= 0.0:
             if theta_left <= 0.0:
-                return left, peak, peak_tau
-            return bracketed_root(0, theta, u, order, left, right), peak, peak_tau
+                return left, peak, peak_tau, lowest
+            return bracketed_root(0, theta, u, order, left, right), peak, peak_tau, lowest
+        elif stretch < 2:
+            lowest = min(lowest, theta_right)
         rising = not rising
         left = right
         theta_left = theta_right
-    return -1.0, peak, peak_tau
+    return -1.0, peak, peak_tau, lowest

@@ -149,6 +149,7 @@ def run_toppling(
     theta = 0.0
     rate = 0.0  # theta'/p
     error = 0.0  # bound on |error of theta| + |error of theta'/p|
+    drift = 0.0  # closer bound on the error of theta alone, which times a re-seat
 
     while i < last:
         g0 = k_h[i] - w[i] * kr
@@ -241,6 +242,7 @@ def run_toppling(
                     2.0 * (abs(theta_end) + abs(rate) + abs(s[0])) + 4.0 * ph * drive
                 )
                 error = error * _exponential(growth) + truncation + rounding
+                drift += ph * error + truncation + 2.0 * MACHINE_EPSILON * abs(theta_end)
 
                 if fresh:
                     fresh = False
@@ -259,7 +261,7 @@ def run_toppling(
                     else:
                         look = True
                     if look:
-                        x, top, top_at = examine_step(theta, u, order, theta_end, u_end, v_end)
+                        x, top, top_at, low = examine_step(theta, u, order, theta_end, u_end, v_end)
                         if top > peak:
                             peak = top
                             peak_error = error
@@ -272,6 +274,9 @@ def run_toppling(
                         if x >= 0.0:
                             reseat_at = at + part * x
                             rate = value(u, order, x) / ph
+                        elif low <= drift:
+                            # it may have touched after all, and lost the speed of the touch
+                            error += math.sqrt(2.0 * max(g0, g1, 0.0) * c_rest * drift)
                 if reseat_at >= 0.0:
                     break
                 theta = theta_end
@@ -303,14 +308,19 @@ def run_toppling(
             tau = min(reseat_at, 1.0)
             g = g0 + (g1 - g0) * tau
             impact = abs(rate)
-            if impact <= error:
-                # a graze: whether it touches at all is below the error, which lives on
-                pass
+            push = max(g * c_rest, 0.0)  # theta''/p² at theta = 0
+            if impact <= 2.0 * error or impact * impact <= 4.0 * push * drift:
+                # a graze: whether it touches at all is below the error, and if it does not it
+                # keeps its speed
+                error += impact + math.sqrt(2.0 * push * drift)
             elif g > 0.0:
                 # motion restarts at once; only the error of its starting time is left
-                error = min(error, g * error / impact)
+                late = 2.0 * drift / impact
+                error = push * late
+                drift = error * late
             else:
                 error = 0.0
+                drift = 0.0
             if filled < room:
                 history[0, filled] = time_s[i] + tau * interval_s[i]
                 history[1, filled] = 0.0

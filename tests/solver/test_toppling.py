@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.respond import OUTCOMES, respond, simulate
+from rbfrag.solver.respond import OUTCOMES, respond
 from rbfrag.solver.results import Outcome
-from rbfrag.solver.taylor import ORDER
 from tests.solver.reference import integrate
 
 
@@ -109,21 +108,6 @@ def test_gravity_close_to_zero_is_still_the_model() -> None:
     motion = nodes([0.0, 0.5, 1.0, 2.0], [0.0, 0.001, -0.3, 0.0])
     vertical = nodes([0.0, 0.5, 1.0, 2.0], [0.0, -1.0 + 1e-9, 0.0, 0.0])
     agree(motion, 2.0, 0.3, vertical)
-
-
-@pytest.mark.parametrize("order", [4, 5, 6, ORDER])
-def test_order_of_convergence(order: int) -> None:
-    # a start at a node and lengths that halve exactly: no step is cut short
-    motion = nodes([0.0, 0.0, 0.5, 1.0], [0.0, 0.5, 0.3, 0.1])
-    drive = excitation(motion)
-    exact = simulate(drive, p2=1.0, kr=0.3, order=16, ph_max=0.0625).peak_rad
-    steps = (0.5, 0.25, 0.125)
-    errors = [
-        abs(simulate(drive, p2=1.0, kr=0.3, order=order, ph_max=h).peak_rad - exact) for h in steps
-    ]
-    assert min(errors) > 1e-15
-    seen = math.log2(errors[1] / errors[2])
-    assert order - 0.3 < seen < order + 0.5
 
 
 @pytest.mark.parametrize("kr", [0.05, 0.2, 0.35])

@@ -1,0 +1,79 @@
+"""Blocks run inside intervals that have a verdict."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.solver.certified import MARGIN, keeps_order
+from rbfrag.solver.envelopes import ALL_SAFE, ALL_TOPPLE, decide
+from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.renewal import fresh_starts
+from rbfrag.solver.respond import runner
+from rbfrag.solver.taylor import PH_MAX
+from rbfrag.solver.toppling import STABLE, TOPPLED
+
+FloatArray = NDArray[np.float64]
+
+INNER = 10
+"""Blocks that are run inside each interval."""
+
+
+@dataclass
+class Count:
+    """Intervals checked, blocks run in them, blocks that did otherwise than was said."""
+
+    intervals: int = 0
+    topple: int = 0
+    blocks: int = 0
+    contradictions: int = 0
+    undetermined: int = 0
+
+    def check(
+        self, drive: Excitation, p2: float, low: float, high: float, topples: bool, kr: FloatArray
+    ) -> list[str]:
+        """Run blocks inside [low, high], of which it is said whether they topple."""
+        run = runner(drive, p2=p2, linear=False)
+        self.intervals += 1
+        self.topple += topples
+        wrong = []
+        for k in kr.tolist():
+            self.blocks += 1
+            outcome = run(k).outcome
+            if outcome not in (STABLE, TOPPLED):
+                self.undetermined += 1
+            elif (outcome == TOPPLED) != topples:
+                self.contradictions += 1
+                wrong.append(f"k_r {k!r} in [{low!r}, {high!r}] topples={topples}")
+        return wrong
+
+
+def inner_values(
+    drive: Excitation, low: float, high: float, rng: np.random.Generator
+) -> FloatArray:
+    """Ten k_r of [low, high]: both ends, samples of q that lie between, the rest at random."""
+    q = drive.q[(drive.q > low) & (drive.q < high)]
+    at_samples = rng.choice(q, min(3, q.size), replace=False) if q.size else q
+    random = rng.uniform(low, high, INNER - 2 - at_samples.size)
+    return np.concatenate([[low, high], at_samples, random])
+
+
+def verdict_on(drive: Excitation, p2: float, low: float, high: float) -> bool | None:
+    """Ask the rules of the search for one interval of k_r: all topple, none does, or None."""
+    n = drive.q.size
+    u, us, uc = np.empty(9), np.empty(9), np.empty(9)
+    check = not keeps_order(drive, False)
+    stretches = np.empty((4, n), dtype=np.int64)
+    record = (
+        drive.interval_s, drive.k_h, drive.w, drive.q, drive.tail_min_q, drive.block_max_q,
+        math.sqrt(p2), PH_MAX, False,
+    )  # fmt: skip
+    count, _, _ = fresh_starts(
+        *record, low, low * (1.0 - MARGIN), high * (1.0 + MARGIN), check, 0, n, stretches,
+        u, us, uc,
+    )  # fmt: skip
+    what, *_ = decide(*record, low, high, MARGIN, check, stretches, count, 0, u, us, uc)
+    return {ALL_SAFE: False, ALL_TOPPLE: True}.get(what)

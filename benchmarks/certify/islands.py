@@ -1,0 +1,99 @@
+"""Part `islands`: maps against brute force, on combinations that have islands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.certify.recordings import Combination
+from rbfrag.solver.critical import critical
+from rbfrag.solver.respond import runner
+from rbfrag.solver.results import CriticalResult
+from rbfrag.solver.toppling import STABLE, TOPPLED
+
+WIDE = 1e-6
+"""Least width of k_r/PGA of an island that makes a combination one with islands."""
+
+
+def safe_islands(result: CriticalResult) -> list[float]:
+    """Return the widths of the safe islands below the critical value, in k_r/PGA.
+
+    From the first to the last block known to be safe between two that topple.
+    """
+    widths: list[float] = []
+    first: float | None = None
+    last = 0.0
+    seen_toppling = False
+    for low, high, what in zip(
+        result.intervals.k_lo.tolist(), result.intervals.k_hi.tolist(), result.intervals.outcome,
+        strict=True,
+    ):  # fmt: skip
+        if what == "topples":
+            if seen_toppling and first is not None and last - first > WIDE:
+                widths.append(last - first)
+            seen_toppling = True
+            first = None
+        elif what == "safe":
+            first = low if first is None else first
+            last = high
+    return widths
+
+
+def study(combinations: Sequence[Combination], wanted: int, values: int) -> dict[str, Any]:
+    """Map combinations until `wanted` with islands are found, and run `values` blocks in each.
+
+    Half of the blocks are spread evenly in k_r, half in its logarithm.
+    """
+    looked = mapped = blocks = islands = undetermined = uncertified = higher = 0
+    wrong: list[str] = []
+    narrowest = np.inf
+    for one in combinations:
+        if mapped == wanted:
+            break
+        looked += 1
+        result = critical(
+            one.recording.motion, p2=one.p2, vertical=one.vertical, polarity=one.polarity,
+            full_map=True,
+        )  # fmt: skip
+        gaps = safe_islands(result)
+        if not gaps:
+            continue
+        mapped += 1
+        islands += len(gaps)
+        uncertified += not result.certified
+        narrowest = min(narrowest, *gaps)
+        said = np.array(result.intervals.outcome)
+        drive = one.drive()
+        run = runner(drive, p2=one.p2, linear=False)
+        bottom = result.search_limit
+        top = drive.max_q / drive.pga_g
+        half = values // 2
+        ratios = np.concatenate(
+            [np.linspace(bottom, top, half), np.geomspace(bottom, top, values - half)]
+        )
+        outcomes = np.array([run(r * drive.pga_g).outcome for r in ratios.tolist()])
+        blocks += ratios.size
+        at = np.minimum(np.searchsorted(result.intervals.k_hi, ratios), said.size - 1)
+        undetermined += int(((outcomes != STABLE) & (outcomes != TOPPLED)).sum())
+        bad = (said[at] == "safe") & (outcomes == TOPPLED)
+        bad |= (said[at] == "topples") & (outcomes == STABLE)
+        wrong += [
+            f"{one.name}: k_r/PGA {ratio!r} is not {what}"
+            for ratio, what in zip(ratios[bad].tolist(), said[at][bad].tolist(), strict=True)
+        ]
+        topples = ratios[outcomes == TOPPLED]
+        # what brute force alone would have called the critical value
+        higher += bool(result.lower > topples.max(initial=0.0) * (1.0 + 1e-3))
+    return {
+        "searched": looked,
+        "with_islands": mapped,
+        "safe_islands": islands,
+        "narrowest_safe_island": narrowest,
+        "not_certified": uncertified,
+        "blocks": blocks,
+        "undetermined": undetermined,
+        "contradictions": wrong,
+        "critical_value_missed_by_brute_force": higher,
+    }

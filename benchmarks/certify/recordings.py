@@ -1,0 +1,101 @@
+"""Every real recording of a folder with its manifest: horizontal traces and their verticals."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rbfrag.campaign.bench.cases import RECORDS_VARIABLE
+from rbfrag.campaign.plan import DEFAULT_P2
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.metadata import read_metadata
+from rbfrag.motions.recognise import read_motions
+from rbfrag.solver.excitation import Excitation, excitation
+from rbfrag.solver.results import POLARITIES, Polarity
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One horizontal trace as its file has it, and the vertical of the same recording."""
+
+    name: str
+    motion: GroundMotion
+    vertical: GroundMotion | None
+
+
+@dataclass(frozen=True, eq=False)
+class Combination:
+    """One critical search."""
+
+    recording: Recording
+    polarity: Polarity
+    p2: float
+    with_vertical: bool
+
+    @property
+    def vertical(self) -> GroundMotion | None:
+        return self.recording.vertical if self.with_vertical else None
+
+    @property
+    def name(self) -> str:
+        """What it is, for people."""
+        vertical = ", vertical" if self.with_vertical else ""
+        return f"{self.recording.name} {self.polarity} p2={self.p2:g}{vertical}"
+
+    def drive(self) -> Excitation:
+        return excitation(self.recording.motion, self.vertical, self.polarity)
+
+
+def recordings(folder: str | os.PathLike[str] | None = None) -> list[Recording]:
+    """Read all horizontal traces that MANIFEST.csv lists, each waveform once.
+
+    Args:
+        folder: None for the one that RBFRAG_TEST_RECORDS names.
+    """
+    root = Path(folder or os.environ.get(RECORDS_VARIABLE) or ".")
+    table = root / "MANIFEST.csv"
+    if not table.is_file():
+        raise SystemExit(f"there is no {table}: name the folder in {RECORDS_VARIABLE} or --records")
+    stated = read_metadata(table)
+    horizontal: list[tuple[str, str, GroundMotion]] = []
+    upward: dict[str, GroundMotion] = {}
+    for path in sorted(p for p in root.rglob("*") if p.is_file()):
+        about = stated.file(path)
+        if not about:
+            continue
+        try:
+            motions = read_motions(path)
+        except InputError:  # the file states no unit
+            motions = read_motions(path, units=about[0].units)
+        for row in about:
+            motion = motions[row.trace_index]
+            name = f"{path.relative_to(root)}#{row.trace_index}"
+            if row.is_vertical:
+                upward[row.companion_group] = motion
+            elif motion.npts > 1 and motion.acceleration_g.any():
+                horizontal.append((name, row.companion_group, motion))
+    once: dict[str, Recording] = {}
+    for name, group, motion in horizontal:
+        vertical = upward.get(group)
+        if vertical is not None and vertical.dt_s != motion.dt_s:
+            vertical = None
+        once.setdefault(motion.sha256, Recording(name, motion, vertical))
+    return list(once.values())
+
+
+def choose(
+    known: list[Recording], number: int, rng: np.random.Generator, *, with_vertical: bool
+) -> list[Combination]:
+    """Draw combinations of recording, polarity and p² without repeating one."""
+    usable = [r for r in known if r.vertical is not None] if with_vertical else known
+    every = [
+        Combination(recording, polarity, p2, with_vertical)
+        for recording in usable
+        for polarity in POLARITIES
+        for p2 in DEFAULT_P2
+    ]
+    return [every[i] for i in rng.permutation(len(every))[:number]]
