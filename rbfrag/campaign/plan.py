@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
+from rbfrag.campaign.companions import Companions, companions_of
 from rbfrag.db.campaign_store import combination_key
 from rbfrag.db.motion_store import motion_rows
+from rbfrag.db.queries import Vertical
 from rbfrag.db.rows import MotionRow
 from rbfrag.errors import InputError
 from rbfrag.solver.respond import positive
@@ -24,66 +26,159 @@ and that it maps every toppling and safe interval on the way."""
 
 @dataclass(frozen=True)
 class Case:
-    """One critical search of one motion."""
+    """One critical search of one motion.
+
+    Args:
+        natural_key: of the combination.
+        polarity: ``forward`` or ``reverse``.
+        p2: frequency parameter of the block [1/s²].
+        vertical_id: the vertical motion that goes with it, or None.
+    """
 
     natural_key: str
     polarity: Polarity
     p2: float
+    vertical_id: int | None = None
 
 
 @dataclass(frozen=True)
 class MotionPlan:
-    """All searches of one motion, so that its samples travel once."""
+    """All searches of one horizontal motion, so that its samples travel once.
 
-    motion_id: int
-    name: str
+    Args:
+        motion: the horizontal motion.
+        vertical: the vertical motion that some of the cases need, or None.
+        cases: the searches.
+    """
+
+    motion: MotionRow
+    vertical: MotionRow | None
     cases: tuple[Case, ...]
 
 
+@dataclass(frozen=True)
+class CampaignPlan:
+    """What a campaign is made of.
+
+    Args:
+        motions: the longest records first, so that no worker is left with one at the end.
+        without_vertical: horizontal motions that vertical shaking was asked for and have none.
+        warnings: sentences about these.
+    """
+
+    motions: tuple[MotionPlan, ...]
+    without_vertical: int
+    warnings: tuple[str, ...]
+
+    @property
+    def cases(self) -> list[Case]:
+        """All searches."""
+        return [case for plan in self.motions for case in plan.cases]
+
+
 def plan_campaign(
-    connection: Connection, *, suite: str | None, p2: Sequence[float]
-) -> list[MotionPlan]:
-    """Return every search of a campaign: horizontal motions x polarity x p².
+    connection: Connection,
+    *,
+    suite: str | None,
+    p2: Sequence[float],
+    vertical: Vertical = "without",
+) -> CampaignPlan:
+    """Return every search: horizontal motions x vertical or not x polarity x p².
 
     Args:
         connection: the database.
-        suite: only the motions of this suite.
+        suite: only the horizontal motions of this suite; their verticals need not be in it.
         p2: frequency parameters [1/s²].
+        vertical: ``without`` vertical motion, ``with`` that of the same recording, or ``both``.
 
     Raises:
-        InputError: no such suite, no horizontal motion, a p² that is not positive or repeats.
+        InputError: no such suite, no horizontal motion, none with a vertical one where it is
+            needed, a p² that is not positive or repeats.
     """
-    sizes = [positive(value, "p2", "1/s²") for value in p2]
-    repeated = sorted({value for value in sizes if sizes.count(value) > 1})
-    if repeated:
-        raise InputError(f"p2 = {repeated[0]:g} is in the list twice: name each value once")
-    if not sizes:
-        raise InputError("the list of p2 is empty: name at least one value in 1/s²")
+    if vertical not in ("without", "with", "both"):
+        raise InputError(f"--vertical must be without, with or both, not {vertical!r}")
+    sizes = _sizes(p2)
     rows = [row for row in motion_rows(connection, suite=suite) if not row.is_vertical]
     if not rows:
         where = "the database" if suite is None else f"suite {suite!r}"
         raise InputError(
             f"there is no horizontal motion in {where}: rbfrag motions add PATH  brings some"
         )
-    return [
+    found = Companions({}, {})
+    if vertical != "without":
+        found = companions_of(rows, motion_rows(connection))
+        if not found.vertical:
+            raise InputError(
+                f"none of the {len(rows)} horizontal motions has a vertical one that fits: "
+                f"{_first_reasons(found)}; add the vertical components, or leave --vertical out"
+            )
+    plans = [
         MotionPlan(
-            motion_id=row.id,
-            name=row.name,
-            cases=tuple(_case(row, polarity, value) for value in sizes for polarity in POLARITIES),
+            motion=row,
+            vertical=companion,
+            cases=tuple(
+                _case(row, up, polarity, value)
+                for up in _excitations(vertical, companion)
+                for value in sizes
+                for polarity in POLARITIES
+            ),
         )
         for row in rows
+        for companion in [found.vertical.get(row.id)]
     ]
+    lacking = 0 if vertical == "without" else len(rows) - len(found.vertical)
+    warnings = []
+    if lacking:
+        left = "left out" if vertical == "with" else "shaken without one only"
+        warnings.append(
+            f"{lacking} of {len(rows)} horizontal motions have no vertical one that fits and are "
+            f"{left}: {_first_reasons(found)}"
+        )
+    return CampaignPlan(
+        motions=tuple(
+            sorted(
+                (plan for plan in plans if plan.cases), key=lambda p: (-p.motion.npts, p.motion.id)
+            )
+        ),
+        without_vertical=lacking,
+        warnings=tuple(warnings),
+    )
 
 
-def _case(row: MotionRow, polarity: Polarity, p2: float) -> Case:
+def _sizes(p2: Sequence[float]) -> list[float]:
+    sizes = [positive(value, "p2", "1/s²") for value in p2]
+    repeated = sorted({value for value in sizes if sizes.count(value) > 1})
+    if repeated:
+        raise InputError(f"p2 = {repeated[0]:g} is in the list twice: name each value once")
+    if not sizes:
+        raise InputError("the list of p2 is empty: name at least one value in 1/s²")
+    return sizes
+
+
+def _excitations(vertical: Vertical, companion: MotionRow | None) -> Iterable[MotionRow | None]:
+    if vertical != "with":
+        yield None
+    if vertical != "without" and companion is not None:
+        yield companion
+
+
+def _case(row: MotionRow, up: MotionRow | None, polarity: Polarity, p2: float) -> Case:
     key = combination_key(
         motion_sha256=row.sha256,
         dt_s=row.dt_s,
-        vertical_sha256=None,
+        vertical_sha256=None if up is None else up.sha256,
         polarity=polarity,
         kind="toppling",
         p2=p2,
         settings=SETTINGS,
         numerics_version=NUMERICS_VERSION,
     )
-    return Case(natural_key=key, polarity=polarity, p2=p2)
+    return Case(
+        natural_key=key, polarity=polarity, p2=p2, vertical_id=None if up is None else up.id
+    )
+
+
+def _first_reasons(found: Companions, at_most: int = 3) -> str:
+    reasons = list(found.reasons.values())
+    more = f"; and {len(reasons) - at_most} more" if len(reasons) > at_most else ""
+    return "; ".join(reasons[:at_most]) + more

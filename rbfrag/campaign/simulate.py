@@ -1,35 +1,43 @@
-"""Running a campaign: local worker processes, one writer, resumed by its natural keys."""
+"""Running a campaign: workers compute, one writer stores, resumed by its natural keys."""
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import time
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
+from typing import Literal
 
 from sqlalchemy import Engine
 
+from rbfrag.campaign.dask_executor import connected, run_on_cluster
+from rbfrag.campaign.grid import checked_ratios, grid_of
+from rbfrag.campaign.local_executor import run_locally
 from rbfrag.campaign.made_on import made_on
-from rbfrag.campaign.plan import DEFAULT_P2, SETTINGS, MotionPlan, plan_campaign
-from rbfrag.campaign.worker import MotionResults, MotionWork, prepare_worker, run_work
+from rbfrag.campaign.plan import DEFAULT_P2, SETTINGS, CampaignPlan, plan_campaign
+from rbfrag.campaign.todo import MotionTasks, Todo, Wanted, still_to_do
+from rbfrag.campaign.worker import MotionResults, MotionWork
 from rbfrag.db.campaign_store import (
     CombinationRecord,
+    KnownCombination,
     finish_campaign,
     insert_combinations,
-    known_statuses,
+    insert_points,
     start_campaign,
 )
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motion_store import load_motion
+from rbfrag.db.queries import Vertical
+from rbfrag.db.response_store import insert_responses
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.solver.results import NUMERICS_VERSION
 
-QUEUED_PER_WORKER = 2
-"""Motions handed out ahead of each worker: enough to keep it busy, little enough for memory."""
+Executor = Callable[[Iterator[MotionWork], int], Iterator[MotionResults]]
+"""Takes the work and the number of motions; yields the answers in any order."""
+
+CLUSTER = "a cluster"
+"""Stands for the processor where workers are elsewhere: nobody's bits are promised then."""
 
 
 @dataclass(frozen=True)
@@ -58,14 +66,20 @@ class CampaignSummary:
     """What a finished campaign reports.
 
     Args:
-        combinations: critical searches asked for (motions x polarity x p²).
+        combinations: critical searches asked for (motions x vertical x polarity x p²).
         found: of these, with a critical value above the limit.
         below_limit: nothing topples down to the search limit (censored).
         no_motion: no block down to the limit ever lifts.
         outside_model: the motion is outside the model.
+        certified: with a proven answer.
+        reentrant: with a safe island below the critical value.
         runs: simulations made by this run.
+        grid_runs: of these, runs of the requested grid.
+        responses: histories that this run stored.
+        without_vertical: horizontal motions that vertical shaking was asked for and have none.
         seconds: wall time of this run.
-        resumed: combinations that were stored before.
+        resumed: combinations of which everything that is asked for was stored before.
+        warnings: what a reader of the results should know.
     """
 
     combinations: int
@@ -73,13 +87,19 @@ class CampaignSummary:
     below_limit: int
     no_motion: int
     outside_model: int
+    certified: int
+    reentrant: int
     runs: int
+    grid_runs: int
+    responses: int
+    without_vertical: int
     seconds: float
     resumed: int
+    warnings: tuple[str, ...] = field(default=())
 
-    def as_dict(self) -> dict[str, float | int]:
+    def as_dict(self) -> dict[str, object]:
         """Return the keys of the JSON contract."""
-        return asdict(self)
+        return {**asdict(self), "warnings": list(self.warnings)}
 
 
 def simulate(
@@ -87,121 +107,195 @@ def simulate(
     *,
     suite: str | None = None,
     p2: Sequence[float] = DEFAULT_P2,
+    vertical: Vertical = "without",
+    grid: int | Sequence[float] = (),
+    store_responses: Sequence[float | Literal["critical"]] = (),
     jobs: int | None = None,
+    scheduler: str | None = None,
     on_progress: Callable[[CampaignProgress], None] | None = None,
 ) -> CampaignSummary:
-    """Find the critical block of every motion x polarity x p² and store it.
+    """Find the critical block of every motion x vertical x polarity x p² and store it.
 
-    What is stored already is not computed again, and each combination is stored in a
-    transaction of its own: a run that was interrupted or killed is resumed by the same call.
+    What is stored already is not computed again, and each combination is stored with all that
+    belongs to it in one transaction: a run that was interrupted or killed is resumed by the
+    same call. The database is the same whatever does the work.
 
     Args:
         db: the database (path, URL, or None for the default).
         suite: only the motions of this suite.
         p2: frequency parameters [1/s²].
+        vertical: ``without`` vertical motion, ``with`` that of the same recording, or ``both``.
+        grid: run blocks for themselves too, and store their peak rotation: at these k_r/PGA, or
+            at that many from 0.99 down to 0.01, equally spaced in the logarithm.
+        store_responses: keep the motion in time of blocks of these k_r/PGA; ``critical`` stands
+            for the critical block of each combination.
         jobs: worker processes; None for one per processor, 1 for none (in this process).
+        scheduler: address of a Dask scheduler whose workers take the place of local ones.
         on_progress: called after each motion.
 
     Raises:
-        InputError: nothing to run, or a value that cannot be used.
+        InputError: nothing to run, a value that cannot be used, no scheduler at that address.
         DatabaseError: the database cannot be used.
         WorkFailedError: a worker died; what was finished is stored.
     """
     if jobs is not None and jobs < 1:
         raise InputError(f"--jobs must be at least 1, not {jobs}")
+    if jobs is not None and scheduler is not None:
+        raise InputError("--jobs counts local workers, --scheduler names others: give one of them")
+    wanted = _wanted(grid, store_responses)
     started = time.perf_counter()
     with opened_database(db) as engine:
-        with engine.begin() as connection:
-            plans = plan_campaign(connection, suite=suite, p2=p2)
-            keys = [case.natural_key for plan in plans for case in plan.cases]
-            statuses = known_statuses(connection, keys)
-            asked = {"suite": suite, "p2": list(map(float, p2)), **SETTINGS}
-            campaign_id = start_campaign(connection, {**asked, "made_on": made_on()})
-        resumed, runs = len(statuses), 0
-        todo = [_without_known(plan, statuses) for plan in plans]
-        todo = [plan for plan in todo if plan.cases]
-        workers = min(jobs or os.cpu_count() or 1, len(todo))
+        with engine.connect() as connection:
+            plan = plan_campaign(connection, suite=suite, p2=p2, vertical=vertical)
+            todo = still_to_do(connection, plan, wanted)
+        with _executor(jobs, scheduler if todo.tasks else None) as execute:
+            settings = {
+                "suite": suite,
+                "p2": list(map(float, p2)),
+                "vertical": vertical,
+                "grid": list(wanted.grid),
+                "store_responses": list(map(str, store_responses)),
+                "made_on": made_on() if scheduler is None else CLUSTER,
+                **SETTINGS,
+            }
+            with engine.begin() as connection:
+                campaign_id = start_campaign(connection, settings)
+            run = _Run(engine, campaign_id, plan, todo, started, on_progress)
+            run.tell()
+            for done in execute(_work(engine, todo), len(todo.motions)):
+                run.take(done)
+            with engine.begin() as connection:
+                finish_campaign(connection, campaign_id)
+    return run.summary()
 
-        def report() -> None:
-            if on_progress is not None:
-                seconds = time.perf_counter() - started
-                on_progress(CampaignProgress(len(statuses), len(keys), resumed, seconds))
 
-        report()
-        for done in _answers(_work(engine, todo), workers):
-            runs += sum(result.n_runs for result in done.results)
-            _store(engine, campaign_id, done)
-            statuses.update(
-                (case.natural_key, result.status)
-                for case, result in zip(done.cases, done.results, strict=True)
+class _Run:
+    """The writer of one run, and its counts."""
+
+    def __init__(
+        self,
+        engine: Engine,
+        campaign_id: int,
+        plan: CampaignPlan,
+        todo: Todo,
+        started: float,
+        on_progress: Callable[[CampaignProgress], None] | None,
+    ) -> None:
+        self._engine = engine
+        self._campaign_id = campaign_id
+        self._plan = plan
+        self._started = started
+        self._on_progress = on_progress
+        self._known = dict(todo.known)
+        self._total = len(plan.cases)
+        self._resumed = self._done = self._total - todo.tasks
+        self._runs = self._grid_runs = self._responses = 0
+
+    def take(self, done: MotionResults) -> None:
+        """Store the answers of one motion and count them."""
+        if done.numerics_version != NUMERICS_VERSION:
+            raise WorkFailedError(
+                f"a worker computes with numerics version {done.numerics_version}, this rbfrag "
+                f"with {NUMERICS_VERSION}: install the same version on all machines"
             )
-            report()
-        with engine.begin() as connection:
-            finish_campaign(connection, campaign_id)
-    count = Counter(statuses.values())
-    return CampaignSummary(
-        combinations=len(keys),
-        found=count["found"],
-        below_limit=count["below_limit"],
-        no_motion=count["no_motion"],
-        outside_model=count["outside_model"],
-        runs=runs,
-        seconds=time.perf_counter() - started,
-        resumed=resumed,
+        _store(self._engine, self._campaign_id, done)
+        for result in done.results:
+            self._done += 1
+            self._runs += result.runs
+            self._grid_runs += 0 if result.grid is None else len(result.grid.outcome)
+            self._responses += len(result.responses)
+            if result.search is not None:
+                found = result.search
+                self._known[result.case.natural_key] = KnownCombination(
+                    0, found.status, found.kr_over_pga, found.certified, found.reentrant
+                )
+        self.tell()
+
+    def tell(self) -> None:
+        """Report progress."""
+        if self._on_progress is not None:
+            self._on_progress(
+                CampaignProgress(self._done, self._total, self._resumed, self._seconds())
+            )
+
+    def summary(self) -> CampaignSummary:
+        """Return what the campaign reports."""
+        known = self._known.values()
+        status = [each.status for each in known]
+        return CampaignSummary(
+            combinations=self._total,
+            found=status.count("found"),
+            below_limit=status.count("below_limit"),
+            no_motion=status.count("no_motion"),
+            outside_model=status.count("outside_model"),
+            certified=sum(each.certified for each in known),
+            reentrant=sum(each.reentrant for each in known),
+            runs=self._runs,
+            grid_runs=self._grid_runs,
+            responses=self._responses,
+            without_vertical=self._plan.without_vertical,
+            seconds=self._seconds(),
+            resumed=self._resumed,
+            warnings=self._plan.warnings,
+        )
+
+    def _seconds(self) -> float:
+        return time.perf_counter() - self._started
+
+
+def _wanted(
+    grid: int | Sequence[float], store_responses: Sequence[float | Literal["critical"]]
+) -> Wanted:
+    histories = [value for value in store_responses if value != "critical"]
+    return Wanted(
+        grid=grid_of(grid) if isinstance(grid, int) else checked_ratios(grid, "--grid"),
+        histories=checked_ratios(histories, "--store-responses"),
+        critical_history="critical" in store_responses,
     )
 
 
-def _without_known(plan: MotionPlan, known: dict[str, str]) -> MotionPlan:
-    cases = tuple(case for case in plan.cases if case.natural_key not in known)
-    return MotionPlan(motion_id=plan.motion_id, name=plan.name, cases=cases)
-
-
-def _work(engine: Engine, plans: Sequence[MotionPlan]) -> Iterator[MotionWork]:
-    for plan in plans:
-        with engine.connect() as connection:
-            motion = load_motion(connection, plan.motion_id)
-        yield MotionWork(motion_id=plan.motion_id, motion=motion, cases=plan.cases)
-
-
-def _answers(work: Iterator[MotionWork], workers: int) -> Iterator[MotionResults]:
-    if workers <= 1:
-        yield from map(run_work, work)
+@contextmanager
+def _executor(jobs: int | None, scheduler: str | None) -> Iterator[Executor]:
+    if scheduler is None:
+        yield lambda work, motions: run_locally(work, min(jobs or os.cpu_count() or 1, motions))
         return
-    # spawn: the same on every system, and no lock or connection is inherited half-way
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=prepare_worker)
-    running: set[Future[MotionResults]] = set()
-    try:
-        for item in work:
-            running.add(pool.submit(run_work, item))
-            if len(running) >= workers * (1 + QUEUED_PER_WORKER):
-                finished, running = wait(running, return_when=FIRST_COMPLETED)
-                yield from (future.result() for future in finished)
-        while running:
-            finished, running = wait(running, return_when=FIRST_COMPLETED)
-            yield from (future.result() for future in finished)
-    except BrokenProcessPool:
-        raise WorkFailedError(
-            "a worker process died (killed, or out of memory); what was finished is stored: "
-            "run the same command again to go on, with fewer --jobs if memory is short"
-        ) from None
-    finally:
-        for future in running:
-            future.cancel()
-        pool.shutdown(wait=True, cancel_futures=True)
+    with connected(scheduler) as client:
+        yield lambda work, _: run_on_cluster(client, work)
+
+
+def _work(engine: Engine, todo: Todo) -> Iterator[MotionWork]:
+    for each in todo.motions:
+        yield _with_samples(engine, each)
+
+
+def _with_samples(engine: Engine, each: MotionTasks) -> MotionWork:
+    up = each.plan.vertical
+    needed = up is not None and any(task.case.vertical_id is not None for task in each.tasks)
+    with engine.connect() as connection:
+        return MotionWork(
+            motion_id=each.plan.motion.id,
+            motion=load_motion(connection, each.plan.motion.id),
+            vertical=load_motion(connection, up.id) if up is not None and needed else None,
+            tasks=each.tasks,
+        )
 
 
 def _store(engine: Engine, campaign_id: int, done: MotionResults) -> None:
     records = [
         CombinationRecord(
-            natural_key=case.natural_key,
+            natural_key=each.case.natural_key,
             motion_id=done.motion_id,
-            vertical_motion_id=None,
-            result=result,
+            vertical_motion_id=each.case.vertical_id,
+            result=each.search,
             settings=SETTINGS,
-            numerics_version=NUMERICS_VERSION,
+            numerics_version=done.numerics_version,
         )
-        for case, result in zip(done.cases, done.results, strict=True)
+        for each in done.results
+        if each.search is not None
     ]
+    points = {each.case.natural_key: each.grid for each in done.results if each.grid is not None}
+    responses = [record for each in done.results for record in each.responses]
     with engine.begin() as connection:
         insert_combinations(connection, campaign_id, records)
+        insert_points(connection, points)
+        insert_responses(connection, responses)

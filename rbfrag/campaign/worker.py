@@ -1,56 +1,139 @@
-"""What a worker process does: all searches of one motion, arrays in, results out."""
+"""What a worker does: everything that is asked of one motion, arrays in, results out."""
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
-import threading
 from dataclasses import dataclass
-from multiprocessing.connection import wait
 
+from rbfrag.campaign.grid import run_grid
 from rbfrag.campaign.plan import Case
+from rbfrag.db.natural_key import response_key
+from rbfrag.db.response_store import ResponseRecord
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.critical import critical
-from rbfrag.solver.results import CriticalResult
+from rbfrag.solver.excitation import excitation
+from rbfrag.solver.respond import respond
+from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, SearchPoints
 
 
 @dataclass(frozen=True)
+class Task:
+    """What is still to do for one combination.
+
+    Args:
+        case: the combination.
+        search: make the critical search; False when its answer is stored.
+        grid: k_r/PGA of blocks to run for themselves, falling.
+        histories: k_r/PGA of blocks whose motion in time is to be kept.
+        critical_history: keep that of the critical block too.
+        critical_kr_over_pga: the critical value, where it is stored already.
+    """
+
+    case: Case
+    search: bool = True
+    grid: tuple[float, ...] = ()
+    histories: tuple[float, ...] = ()
+    critical_history: bool = False
+    critical_kr_over_pga: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class TaskResult:
+    """What a task gave; None and () where nothing was asked for."""
+
+    case: Case
+    search: CriticalResult | None
+    grid: SearchPoints | None
+    responses: tuple[ResponseRecord, ...]
+
+    @property
+    def runs(self) -> int:
+        """How many simulations were made."""
+        return (
+            (0 if self.search is None else self.search.n_runs)
+            + (0 if self.grid is None else len(self.grid.outcome))
+            + len(self.responses)
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class MotionWork:
-    """One motion with the searches to make on it."""
+    """One horizontal motion with all that is to do on it: it travels once.
+
+    Args:
+        motion_id: row id of the motion.
+        motion: the motion.
+        vertical: the vertical one of its recording, if a task needs it.
+        tasks: what to do.
+    """
 
     motion_id: int
     motion: GroundMotion
-    cases: tuple[Case, ...]
+    vertical: GroundMotion | None
+    tasks: tuple[Task, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MotionResults:
-    """The answers, in the order of the cases."""
+    """The answers, in the order of the tasks, and the numerics of whoever gave them."""
 
     motion_id: int
-    cases: tuple[Case, ...]
-    results: tuple[CriticalResult, ...]
+    results: tuple[TaskResult, ...]
+    numerics_version: str
 
 
 def run_work(work: MotionWork) -> MotionResults:
-    """Make every search of one motion."""
-    results = tuple(
-        critical(work.motion, p2=case.p2, polarity=case.polarity, full_map=True)
-        for case in work.cases
+    """Do everything that is asked of one motion."""
+    results = tuple(_run_task(work, task) for task in work.tasks)
+    return MotionResults(work.motion_id, results, NUMERICS_VERSION)
+
+
+def _run_task(work: MotionWork, task: Task) -> TaskResult:
+    case = task.case
+    vertical = None if case.vertical_id is None else work.vertical
+    search = None
+    critical_kr_over_pga = task.critical_kr_over_pga
+    if task.search:
+        search = critical(
+            work.motion, p2=case.p2, polarity=case.polarity, vertical=vertical, full_map=True
+        )
+        critical_kr_over_pga = search.kr_over_pga
+    grid = None
+    if task.grid:
+        drive = excitation(work.motion, vertical, case.polarity)
+        grid = run_grid(drive, case.p2, task.grid)
+    wanted = list(task.histories)
+    if task.critical_history and critical_kr_over_pga is not None:
+        wanted.append(critical_kr_over_pga)
+    responses = tuple(_history(work, case, vertical, ratio) for ratio in dict.fromkeys(wanted))
+    return TaskResult(case, search, grid, responses)
+
+
+def _history(
+    work: MotionWork, case: Case, vertical: GroundMotion | None, kr_over_pga: float
+) -> ResponseRecord:
+    motion = work.motion
+    assert motion.dt_s is not None  # the database holds no other motions
+    kr = kr_over_pga * motion.pga_g
+    response = respond(
+        motion, p2=case.p2, kr=kr, vertical=vertical, polarity=case.polarity, history=True
     )
-    return MotionResults(motion_id=work.motion_id, cases=work.cases, results=results)
-
-
-def prepare_worker() -> None:
-    """Leave Ctrl-C to the main process, and end with it however it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        # A killed main process cannot tell its workers: without this they would wait for ever.
-        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
-
-
-def _end_with(sentinel: int) -> None:
-    wait([sentinel])
-    os._exit(1)
+    key = response_key(
+        motion_sha256=motion.sha256,
+        dt_s=motion.dt_s,
+        vertical_sha256=None if vertical is None else vertical.sha256,
+        polarity=case.polarity,
+        kind=response.kind,
+        p2=case.p2,
+        kr=kr,
+        numerics_version=NUMERICS_VERSION,
+    )
+    return ResponseRecord(
+        natural_key=key,
+        motion_id=work.motion_id,
+        vertical_motion_id=case.vertical_id,
+        polarity=case.polarity,
+        p2=case.p2,
+        kr=kr,
+        response=response,
+        numerics_version=NUMERICS_VERSION,
+    )

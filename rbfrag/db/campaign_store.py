@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ from rbfrag.db.clock import utc_now
 from rbfrag.db.insert import insert_rows
 from rbfrag.db.natural_key import canonical_json, combination_key
 from rbfrag.db.schema import campaign, combination, outcome_interval, simulation
+from rbfrag.errors import InputError
 from rbfrag.solver.results import (
     NUMERICS_VERSION,
     CriticalResult,
@@ -23,12 +25,15 @@ from rbfrag.version import __version__
 
 __all__ = [
     "CombinationRecord",
+    "KnownCombination",
     "combination_key",
+    "combinations_with_points",
     "finish_campaign",
     "insert_combination",
     "insert_combinations",
+    "insert_points",
+    "known_combinations",
     "known_keys",
-    "known_statuses",
     "start_campaign",
 ]
 
@@ -67,6 +72,17 @@ class CombinationRecord:
     numerics_version: str = NUMERICS_VERSION
 
 
+@dataclass(frozen=True)
+class KnownCombination:
+    """What a campaign asks about a combination that is stored already."""
+
+    id: int
+    status: str
+    kr_over_pga: float | None
+    certified: bool
+    reentrant: bool
+
+
 def start_campaign(
     connection: Connection,
     settings: Mapping[str, object],
@@ -99,19 +115,55 @@ def finish_campaign(connection: Connection, campaign_id: int) -> None:
     )
 
 
-def known_statuses(connection: Connection, keys: Iterable[str]) -> dict[str, str]:
-    """Return the status of each combination that is stored already, by natural key.
+def known_combinations(connection: Connection, keys: Iterable[str]) -> dict[str, KnownCombination]:
+    """Return what is stored of each combination, by natural key.
 
     Args:
         connection: the database.
         keys: the natural keys asked about; those that are not stored are left out.
     """
-    return {key: status for key, _, status in _found(connection, keys)}
+    column = combination.c
+    query = select(
+        column.natural_key,
+        column.id,
+        column.status,
+        column.kr_over_pga,
+        column.certified,
+        column.reentrant,
+    ).where(column.natural_key.in_(bindparam("keys", expanding=True)))
+    found: dict[str, KnownCombination] = {}
+    for some in _portions(keys):
+        for key, *values in connection.execute(query, {"keys": some}):
+            found[key] = KnownCombination(*values)
+    return found
 
 
 def known_keys(connection: Connection, keys: Iterable[str]) -> set[str]:
     """Return those natural keys whose combinations are stored already."""
-    return set(known_statuses(connection, keys))
+    return set(known_combinations(connection, keys))
+
+
+def combinations_with_points(
+    connection: Connection, keys: Iterable[str], kr_over_pga: Sequence[float]
+) -> set[str]:
+    """Return those natural keys whose combinations hold a simulation at each of some strengths.
+
+    Args:
+        connection: the database.
+        keys: natural keys.
+        kr_over_pga: block strengths over PGA, each once.
+    """
+    query = (
+        select(combination.c.natural_key, simulation.c.kr_over_pga)
+        .join(simulation)
+        .where(combination.c.natural_key.in_(bindparam("keys", expanding=True)))
+    )
+    # Compared here: a long list of strengths is no list of variables for every database.
+    wanted = set(kr_over_pga)
+    found: Counter[str] = Counter()
+    for some in _portions(keys):
+        found.update(key for key, k in connection.execute(query, {"keys": some}) if k in wanted)
+    return {key for key, number in found.items() if number == len(wanted)}
 
 
 def insert_combination(
@@ -163,36 +215,47 @@ def insert_combinations(
     new = {record.natural_key: record for record in records if record.natural_key not in there}
     rows = [_combination_row(campaign_id, record) for record in new.values()]
     insert_rows(connection, combination, _COLUMNS, rows)
-    ids = combination_ids(connection, new)
+    known = known_combinations(connection, new)
     intervals: list[tuple[object, ...]] = []
-    points: list[tuple[object, ...]] = []
     for key, record in new.items():
-        intervals += _interval_rows(ids[key], record.result.intervals)
-        points += _point_rows(ids[key], record.result.points)
+        intervals += _interval_rows(known[key].id, record.result.intervals)
     insert_rows(connection, outcome_interval, _INTERVAL_COLUMNS, intervals)
-    insert_rows(connection, simulation, _POINT_COLUMNS, points)
+    _insert_points(connection, known, {key: record.result.points for key, record in new.items()})
     return len(new)
 
 
-def combination_ids(connection: Connection, keys: Iterable[str]) -> dict[str, int]:
-    """Return the row id of each combination that is stored, by natural key.
+def insert_points(connection: Connection, points: Mapping[str, SearchPoints]) -> None:
+    """Store simulated blocks of combinations that are there; a strength that is there stays.
 
     Args:
-        connection: the database.
-        keys: the natural keys asked about; those that are not stored are left out.
+        connection: inside the caller's transaction.
+        points: the blocks, by the natural key of their combination.
+
+    Raises:
+        InputError: there is no such combination.
     """
-    return {key: row_id for key, row_id, _ in _found(connection, keys)}
+    known = known_combinations(connection, points)
+    missing = [key for key in points if key not in known]
+    if missing:
+        raise InputError(f"there is no combination {missing[0]} in the database")
+    _insert_points(connection, known, points)
 
 
-def _found(connection: Connection, keys: Iterable[str]) -> Iterator[tuple[str, int, str]]:
+def _insert_points(
+    connection: Connection,
+    known: Mapping[str, KnownCombination],
+    points: Mapping[str, SearchPoints],
+) -> None:
+    rows: list[tuple[object, ...]] = []
+    for key, simulated in points.items():
+        rows += _point_rows(known[key].id, simulated)
+    insert_rows(connection, simulation, _POINT_COLUMNS, rows)
+
+
+def _portions(keys: Iterable[str]) -> Iterator[list[str]]:
     wanted = list(dict.fromkeys(keys))
-    query = select(combination.c.natural_key, combination.c.id, combination.c.status).where(
-        combination.c.natural_key.in_(bindparam("keys", expanding=True))
-    )
     for start in range(0, len(wanted), _KEYS_AT_ONCE):
-        some = {"keys": wanted[start : start + _KEYS_AT_ONCE]}
-        for row in connection.execute(query, some):
-            yield row.natural_key, row.id, row.status
+        yield wanted[start : start + _KEYS_AT_ONCE]
 
 
 def _combination_row(campaign_id: int, record: CombinationRecord) -> tuple[object, ...]:

@@ -57,6 +57,52 @@ def combination_key(
     )
 
 
+def response_key(
+    *,
+    motion_sha256: str,
+    dt_s: float,
+    vertical_sha256: str | None,
+    polarity: str,
+    kind: str,
+    p2: float,
+    kr: float,
+    numerics_version: str,
+    linear: bool = False,
+) -> str:
+    """Return the key of one stored response: that of its block under its motion.
+
+    Args:
+        motion_sha256: hash of the horizontal samples.
+        dt_s: their interval [s].
+        vertical_sha256: hash of the vertical samples; None without vertical motion.
+        polarity: ``forward`` or ``reverse``.
+        kind: response kind (``toppling``).
+        p2: block frequency parameter p² [1/s²].
+        kr: rocking acceleration coefficient.
+        numerics_version: of the solver.
+        linear: True for the linear verification model.
+
+    Returns:
+        SHA-256 as 64 hexadecimal digits.
+
+    Raises:
+        InputError: a number that is not finite.
+    """
+    return _digest(
+        {
+            "motion": motion_sha256,
+            "dt_s": float(dt_s),
+            "vertical": vertical_sha256 or "-",
+            "polarity": polarity,
+            "kind": kind,
+            "linear": bool(linear),
+            "p2": float(p2),
+            "kr": float(kr),
+            "numerics": numerics_version,
+        }
+    )
+
+
 def canonical_json(value: object) -> str:
     """Return JSON text that is equal for equal values: sorted keys, shortest exact floats.
 

@@ -15,8 +15,8 @@ from rbfrag.db import schema
 from rbfrag.db.campaign_store import (
     combination_key,
     finish_campaign,
+    known_combinations,
     known_keys,
-    known_statuses,
     start_campaign,
 )
 from rbfrag.db.content import CONTENT_TABLES, content_digest, table_rows_by_natural_key
@@ -109,7 +109,8 @@ def test_a_combination_is_stored_once(
         # A point that the search came back to is stored once.
         assert _count(connection, schema.simulation) == 3
         assert known_keys(connection, [key, "0" * 64]) == {key}
-        assert known_statuses(connection, (k for k in [key, key])) == {key: "found"}
+        known = known_combinations(connection, (k for k in [key, key]))
+        assert {each: known[each].status for each in known} == {key: "found"}
         row = connection.execute(select(schema.combination)).mappings().one()
     assert row["campaign_id"] == campaign
     for name in ("kr_over_pga", "lower", "upper", "kr", "y_m_s", "k_up_over_pga", "island_width"):

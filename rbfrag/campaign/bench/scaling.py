@@ -15,7 +15,8 @@ from rbfrag.campaign.bench.methods import taylor_run
 from rbfrag.campaign.bench.timing import timed
 from rbfrag.campaign.plan import DEFAULT_P2
 from rbfrag.campaign.plan import Case as PlannedCase
-from rbfrag.campaign.worker import MotionWork, prepare_worker, run_work
+from rbfrag.campaign.local_executor import prepare
+from rbfrag.campaign.worker import MotionWork, Task, run_work
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.respond import simulate
@@ -99,7 +100,7 @@ def workers(
     rows = []
     for number in processes:
         context = get_context("spawn")
-        with ProcessPoolExecutor(number, mp_context=context, initializer=prepare_worker) as pool:
+        with ProcessPoolExecutor(number, mp_context=context, initializer=prepare) as pool:
             warm = [_work(motions[i % len(motions)], i, 1) for i in range(4 * number)]
             list(pool.map(run_work, warm))
             for wanted in combinations:
@@ -118,4 +119,5 @@ def _work(motion: GroundMotion, number: int, cases: int) -> MotionWork:
         for p2 in DEFAULT_P2
         for polarity in POLARITIES
     ]
-    return MotionWork(motion_id=number, motion=motion, cases=tuple(planned[:cases]))
+    tasks = tuple(Task(case) for case in planned[:cases])
+    return MotionWork(motion_id=number, motion=motion, vertical=None, tasks=tasks)

@@ -1,0 +1,122 @@
+"""Workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rbfrag.campaign.worker import MotionResults, MotionWork, run_work
+from rbfrag.errors import InputError, MissingExtraError, RbfragError, WorkFailedError
+from rbfrag.version import __version__
+
+CONNECT_TIMEOUT_S = 10.0
+"""How long to wait for the scheduler to answer [s]."""
+
+WORKER_TIMEOUT_S = 60.0
+"""How long to wait for the first worker of a scheduler that has none [s]."""
+
+QUEUED_PER_THREAD = 2
+"""Motions handed out ahead of each thread of the cluster."""
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Any]:
+    """Connect to a scheduler for a ``with`` block.
+
+    Args:
+        address: such as ``tcp://host:8786``.
+
+    Returns:
+        The client, for :func:`run_on_cluster`.
+
+    Raises:
+        MissingExtraError: distributed is not installed.
+        InputError: nobody answers there.
+        WorkFailedError: the scheduler has no workers.
+    """
+    if importlib.util.find_spec("distributed") is None:
+        raise MissingExtraError("Dask clusters need distributed", "dask")
+    import distributed
+
+    try:
+        client = distributed.Client(address, timeout=CONNECT_TIMEOUT_S, set_as_default=False)
+    except (OSError, TimeoutError, ValueError, TypeError) as error:
+        raise InputError(
+            f"--scheduler: no Dask scheduler answers at {address}: {_first_line(error)}; start one "
+            "with  dask scheduler  and name the address that it prints (tcp://host:8786)"
+        ) from None
+    try:
+        try:
+            client.wait_for_workers(1, timeout=WORKER_TIMEOUT_S)
+        except TimeoutError:
+            raise WorkFailedError(
+                f"the scheduler at {address} has no workers: start some with  dask worker "
+                f"{address}  and run the same command again"
+            ) from None
+        yield client
+    finally:
+        client.close(timeout=CONNECT_TIMEOUT_S)
+
+
+def run_on_cluster(client: Any, work: Iterator[MotionWork]) -> Iterator[MotionResults]:
+    """Yield the answers as they come from a cluster.
+
+    A motion travels inside its task, so that the scheduler can give the task to another worker
+    when one is lost. Work is fetched as it is handed out, and no more than three motions a
+    thread are under way.
+
+    Args:
+        client: from :func:`connected`.
+        work: what to do.
+
+    Raises:
+        WorkFailedError: workers died again and again, the scheduler was lost, or the workers
+            hold no rbfrag that can do it.
+    """
+    import distributed
+
+    waiting = distributed.as_completed(loop=client.loop)
+    address = client.scheduler.address
+    try:
+        for item in work:
+            waiting.add(client.submit(run_work, item, pure=False))
+            while waiting.count() >= _most_under_way(client):
+                yield _result(next(waiting), address)
+        while waiting.count():
+            yield _result(next(waiting), address)
+    finally:
+        if not waiting.is_empty():
+            client.cancel(list(waiting.futures))
+
+
+def _most_under_way(client: Any) -> int:
+    threads = int(sum(client.nthreads().values()))  # workers come and go
+    return max(threads, 1) * (1 + QUEUED_PER_THREAD)
+
+
+def _result(future: Any, address: str) -> MotionResults:
+    if future.status == "finished":
+        answer: MotionResults = future.result()
+        return answer
+    if future.status == "error":
+        error = future.exception()
+        if isinstance(error, RbfragError):
+            raise error
+        if isinstance(error, ImportError | AttributeError):
+            raise WorkFailedError(
+                f"the workers of {address} cannot run rbfrag {__version__}: {_first_line(error)}; "
+                "install the same version there"
+            ) from None
+        if type(error).__name__ != "KilledWorker":
+            raise error
+    raise WorkFailedError(
+        f"the cluster at {address} was lost, or its workers died again and again; what was "
+        "finished is stored: run the same command again to go on"
+    )
+
+
+def _first_line(error: BaseException) -> str:
+    text = str(error).strip()
+    return text.splitlines()[0] if text else type(error).__name__
