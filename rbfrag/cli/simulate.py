@@ -76,8 +76,9 @@ def simulate(
 ) -> None:
     """Find and store the critical block of every motion x vertical x polarity x p2.
 
-    Each combination is stored as soon as it is found, with the map of all blocks that topple. After Ctrl-C, a crash or a kill, the
-    same command goes on where it stopped; what is stored is not computed again.
+    Each combination is stored as soon as it is found, with the map of all blocks that topple.
+    After Ctrl-C, a crash or a kill, the same command goes on where it stopped; what is stored is
+    not computed again.
     """
     from rbfrag.campaign.simulate import simulate as run
 

@@ -13,9 +13,9 @@ import numpy as np
 from rbfrag.campaign.bench.cases import Case
 from rbfrag.campaign.bench.methods import taylor_run
 from rbfrag.campaign.bench.timing import timed
+from rbfrag.campaign.local_executor import prepare
 from rbfrag.campaign.plan import DEFAULT_P2
 from rbfrag.campaign.plan import Case as PlannedCase
-from rbfrag.campaign.local_executor import prepare
 from rbfrag.campaign.worker import MotionWork, Task, run_work
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation

@@ -1,0 +1,123 @@
+"""A Dask cluster in the place of local workers: the same database."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rbfrag.campaign import dask_executor
+from rbfrag.campaign.simulate import CampaignProgress, simulate
+from rbfrag.db.engine import opened_database
+from rbfrag.db.queries import database_info
+from rbfrag.errors import InputError, MissingExtraError, WorkFailedError
+
+distributed = pytest.importorskip("distributed")
+
+P2 = (10.0, 1.0)
+Digest = Callable[[Path], str]
+Copy = Callable[[Path, str], Path]
+
+# distributed's own clean-up at the end of a process is not what is looked at here
+pytestmark = pytest.mark.filterwarnings("default::ResourceWarning", "default::DeprecationWarning")
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    """Two worker processes of one thread each."""
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
+    ) as made:
+        yield made
+
+
+def test_the_database_is_that_of_local_workers(
+    cluster: Any, three_component_database: Path, copy_of: Copy, digest_of: Digest
+) -> None:
+    local = three_component_database
+    remote = copy_of(local, "remote.db")
+    asked: dict[str, Any] = {"p2": P2, "vertical": "both", "grid": 5, "store_responses": [0.4]}
+    one = simulate(local, jobs=1, **asked)
+    seen: list[CampaignProgress] = []
+    two = simulate(remote, scheduler=cluster.scheduler_address, on_progress=seen.append, **asked)
+    assert (one.runs, one.found, one.responses) == (two.runs, two.found, two.responses)
+    assert [seen[0].done, seen[-1].done] == [0, one.combinations]
+    assert digest_of(local) == digest_of(remote)
+    again = simulate(remote, scheduler=cluster.scheduler_address, **asked)
+    assert again.resumed == again.combinations
+
+
+def test_a_lost_worker_changes_nothing(
+    cluster: Any, three_component_database: Path, copy_of: Copy, digest_of: Digest
+) -> None:
+    undisturbed = copy_of(three_component_database, "undisturbed.db")
+    simulate(undisturbed, p2=P2, jobs=1)
+    with distributed.Client(cluster.scheduler_address, set_as_default=False) as client:
+        victims = list(client.run(os.getpid).values())
+    killed = threading.Event()
+
+    def kill(progress: CampaignProgress) -> None:
+        if progress.done and not killed.is_set():
+            os.kill(victims[0], signal.SIGKILL)
+            killed.set()
+
+    told = simulate(
+        three_component_database, p2=P2, scheduler=cluster.scheduler_address, on_progress=kill
+    )
+    assert killed.is_set()
+    assert told.combinations == 20
+    assert digest_of(three_component_database) == digest_of(undisturbed)
+
+
+def test_nobody_at_the_address(
+    three_component_database: Path, digest_of: Digest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dask_executor, "CONNECT_TIMEOUT_S", 0.5)
+    before = digest_of(three_component_database)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    for address in (f"tcp://127.0.0.1:{port}", "carrier-pigeon://x:1", "nonsense"):
+        with pytest.raises(InputError, match="no Dask scheduler answers at"):
+            simulate(three_component_database, p2=P2, scheduler=address)
+    assert digest_of(three_component_database) == before
+    with (
+        opened_database(three_component_database, read_only=True) as engine,
+        engine.connect() as connection,
+    ):
+        assert database_info(connection).rows["campaign"] == 0
+
+
+def test_no_workers(three_component_database: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dask_executor, "WORKER_TIMEOUT_S", 0.3)
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address=":0") as empty,
+        pytest.raises(WorkFailedError, match="has no workers"),
+    ):
+        simulate(three_component_database, p2=P2, scheduler=empty.scheduler_address)
+
+
+def test_the_extra_is_missing(
+    three_component_database: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(dask_executor.importlib.util, "find_spec", lambda _: None)
+    with pytest.raises(MissingExtraError, match=r"rbfrag\[dask\]"):
+        simulate(three_component_database, p2=P2, scheduler="tcp://127.0.0.1:8786")
+
+
+def test_jobs_are_not_for_a_cluster(three_component_database: Path) -> None:
+    with pytest.raises(InputError, match="give one of them"):
+        simulate(three_component_database, p2=P2, jobs=2, scheduler="tcp://127.0.0.1:8786")
+
+
+def test_only_a_campaign_with_a_cluster_loads_dask() -> None:
+    program = "import sys, rbfrag.campaign.simulate; sys.exit('distributed' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
