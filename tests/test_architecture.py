@@ -146,7 +146,7 @@ def test_room_packages_import_nothing() -> None:
 def test_every_imported_library_is_declared() -> None:
     with (ROOT / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)["project"]
-    runtime = ("plot", "postgres", "parquet")
+    runtime = ("plot", "postgres", "parquet", "dask")
     declared = [*project["dependencies"]]
     for extra in runtime:
         declared += project["optional-dependencies"][extra]
