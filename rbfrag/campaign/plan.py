@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
-from rbfrag.campaign.companions import Companions, companions_of
 from rbfrag.db.campaign_store import combination_key
 from rbfrag.db.motion_store import motion_rows
 from rbfrag.db.queries import Vertical
 from rbfrag.db.rows import MotionRow
+from rbfrag.db.vertical_pairs import VerticalPair, vertical_pairs
 from rbfrag.errors import InputError
 from rbfrag.solver.respond import positive
 from rbfrag.solver.results import NUMERICS_VERSION, POLARITIES, SEARCH_LIMIT, Polarity
@@ -47,12 +47,12 @@ class MotionPlan:
 
     Args:
         motion: the horizontal motion.
-        vertical: the vertical motion that some of the cases need, or None.
+        vertical: the vertical motion of its recording, where some of the cases need it.
         cases: the searches.
     """
 
     motion: MotionRow
-    vertical: MotionRow | None
+    vertical: VerticalPair | None
     cases: tuple[Case, ...]
 
 
@@ -104,35 +104,33 @@ def plan_campaign(
         raise InputError(
             f"there is no horizontal motion in {where}: rbfrag motions add PATH  brings some"
         )
-    found = Companions({}, {})
-    if vertical != "without":
-        found = companions_of(rows, motion_rows(connection))
-        if not found.vertical:
-            raise InputError(
-                f"none of the {len(rows)} horizontal motions has a vertical one that fits: "
-                f"{_first_reasons(found)}; add the vertical components, or leave --vertical out"
-            )
+    pairs = {} if vertical == "without" else vertical_pairs(connection, suite=suite)
+    fitting = {each.motion_id: each for each in pairs.values() if each.vertical_id is not None}
+    lacking = [each.reason for each in pairs.values() if each.vertical_id is None]
+    if vertical != "without" and not fitting:
+        raise InputError(
+            f"none of the {len(rows)} horizontal motions has a vertical one that fits: "
+            f"{_first(lacking)}; add the vertical components, or leave --vertical out"
+        )
     plans = [
         MotionPlan(
             motion=row,
-            vertical=companion,
+            vertical=fitting.get(row.id),
             cases=tuple(
                 _case(row, up, polarity, value)
-                for up in _excitations(vertical, companion)
+                for up in _excitations(vertical, fitting.get(row.id))
                 for value in sizes
                 for polarity in POLARITIES
             ),
         )
         for row in rows
-        for companion in [found.vertical.get(row.id)]
     ]
-    lacking = 0 if vertical == "without" else len(rows) - len(found.vertical)
     warnings = []
     if lacking:
         left = "left out" if vertical == "with" else "shaken without one only"
         warnings.append(
-            f"{lacking} of {len(rows)} horizontal motions have no vertical one that fits and are "
-            f"{left}: {_first_reasons(found)}"
+            f"{len(lacking)} of {len(rows)} horizontal motions have no vertical one that fits and "
+            f"are {left}: {_first(lacking)}"
         )
     return CampaignPlan(
         motions=tuple(
@@ -140,7 +138,7 @@ def plan_campaign(
                 (plan for plan in plans if plan.cases), key=lambda p: (-p.motion.npts, p.motion.id)
             )
         ),
-        without_vertical=lacking,
+        without_vertical=len(lacking),
         warnings=tuple(warnings),
     )
 
@@ -155,18 +153,20 @@ def _sizes(p2: Sequence[float]) -> list[float]:
     return sizes
 
 
-def _excitations(vertical: Vertical, companion: MotionRow | None) -> Iterable[MotionRow | None]:
+def _excitations(
+    vertical: Vertical, companion: VerticalPair | None
+) -> Iterable[VerticalPair | None]:
     if vertical != "with":
         yield None
     if vertical != "without" and companion is not None:
         yield companion
 
 
-def _case(row: MotionRow, up: MotionRow | None, polarity: Polarity, p2: float) -> Case:
+def _case(row: MotionRow, up: VerticalPair | None, polarity: Polarity, p2: float) -> Case:
     key = combination_key(
         motion_sha256=row.sha256,
         dt_s=row.dt_s,
-        vertical_sha256=None if up is None else up.sha256,
+        vertical_sha256=None if up is None else up.vertical_sha256,
         polarity=polarity,
         kind="toppling",
         p2=p2,
@@ -174,11 +174,14 @@ def _case(row: MotionRow, up: MotionRow | None, polarity: Polarity, p2: float) -
         numerics_version=NUMERICS_VERSION,
     )
     return Case(
-        natural_key=key, polarity=polarity, p2=p2, vertical_id=None if up is None else up.id
+        natural_key=key,
+        polarity=polarity,
+        p2=p2,
+        vertical_id=None if up is None else up.vertical_id,
     )
 
 
-def _first_reasons(found: Companions, at_most: int = 3) -> str:
-    reasons = list(found.reasons.values())
-    more = f"; and {len(reasons) - at_most} more" if len(reasons) > at_most else ""
-    return "; ".join(reasons[:at_most]) + more
+def _first(reasons: Sequence[str], at_most: int = 3) -> str:
+    different = list(dict.fromkeys(reasons))
+    more = f"; and {len(different) - at_most} more" if len(different) > at_most else ""
+    return "; ".join(different[:at_most]) + more

@@ -269,13 +269,12 @@ def _work(engine: Engine, todo: Todo) -> Iterator[MotionWork]:
 
 
 def _with_samples(engine: Engine, each: MotionTasks) -> MotionWork:
-    up = each.plan.vertical
-    needed = up is not None and any(task.case.vertical_id is not None for task in each.tasks)
+    up = next((t.case.vertical_id for t in each.tasks if t.case.vertical_id is not None), None)
     with engine.connect() as connection:
         return MotionWork(
             motion_id=each.plan.motion.id,
             motion=load_motion(connection, each.plan.motion.id),
-            vertical=load_motion(connection, up.id) if up is not None and needed else None,
+            vertical=None if up is None else load_motion(connection, up),
             tasks=each.tasks,
         )
 

@@ -129,7 +129,7 @@ def _key(motion: MotionPlan, case: Case, kr_over_pga: float) -> str:
     return response_key(
         motion_sha256=row.sha256,
         dt_s=row.dt_s,
-        vertical_sha256=None if up is None else up.sha256,
+        vertical_sha256=None if up is None else up.vertical_sha256,
         polarity=case.polarity,
         kind="toppling",
         p2=case.p2,

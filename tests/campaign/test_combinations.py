@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,6 @@ import numpy as np
 import pytest
 from sqlalchemy import select, update
 
-from rbfrag.campaign.companions import companions_of
 from rbfrag.campaign.grid import grid_of
 from rbfrag.campaign.resimulate import resimulate
 from rbfrag.campaign.simulate import simulate
@@ -112,22 +110,6 @@ class TestVertical:
             simulate(database, p2=P2, vertical="with", jobs=1)
         with pytest.raises(InputError, match="'up'"):
             simulate(database, p2=P2, vertical="up", jobs=1)  # type: ignore[arg-type]
-
-    def test_why_there_is_no_companion(self, three_component_database: Path) -> None:
-        database = three_component_database
-        with opened_database(database, read_only=True) as engine, engine.connect() as connection:
-            rows = motion_rows(connection)
-        sideways = [row for row in rows if not row.is_vertical]
-        ups = [row for row in rows if row.is_vertical]
-        found = companions_of(sideways, rows)
-        assert sorted(found.vertical) == [row.id for row in sideways[:4]]
-        assert "no vertical component" in found.reasons[sideways[4].id]
-        doubled = companions_of(sideways, [*ups, replace(ups[0], id=99)])
-        assert "several vertical components" in doubled.reasons[sideways[0].id]
-        slower = companions_of(sideways, [replace(ups[0], dt_s=0.01)])
-        assert "dt = 0.01 s instead of 0.02 s" in slower.reasons[sideways[0].id]
-        elsewhere = companions_of(sideways, [replace(ups[0], event_id="another")])
-        assert not elsewhere.vertical
 
 
 class TestGrid:
