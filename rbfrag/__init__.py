@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from rbfrag.solver.block import Block as Block
     from rbfrag.solver.block_arrays import BlockArray as BlockArray
     from rbfrag.solver.critical import critical as critical
-    from rbfrag.solver.respond import respond as respond
+    from rbfrag.solver.response import respond as respond
     from rbfrag.solver.results import CriticalResult as CriticalResult
     from rbfrag.solver.results import Outcome as Outcome
     from rbfrag.solver.results import Response as Response
@@ -70,7 +70,7 @@ _HOME = {
     "read_hazard_curves": "rbfrag.exchange.hazard_file",
     "read_motions": "rbfrag.motions.recognise",
     "read_table": "rbfrag.exchange.read_table",
-    "respond": "rbfrag.solver.respond",
+    "respond": "rbfrag.solver.response",
     "simulate": "rbfrag.campaign.simulate",
     "stability": "rbfrag.solver.stability",
     "stability_arrays": "rbfrag.solver.stability_arrays",

@@ -97,6 +97,7 @@ def deviations(
                     f"{run.outcome.value}"
                 )
         elif theta is not None and run.peak_theta_n is not None:
+            assert run.critical_angle_deg is not None
             error = run.error_estimate / math.radians(run.critical_angle_deg)
             if abs(theta - run.peak_theta_n) > error + ROTATION_ERROR * run.peak_theta_n:
                 yield (

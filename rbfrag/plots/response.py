@@ -59,6 +59,7 @@ def plot_response(
     history = response.history
     if history is None:
         raise InputError("this response holds no history: ask for it with history=True")
+    assert response.critical_angle_deg is not None
     theta_c = math.radians(response.critical_angle_deg)
     ratio = history.theta_rad / theta_c
     remaining = theta_c - history.theta_rad

@@ -5,11 +5,12 @@ from __future__ import annotations
 import csv
 import math
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from rbfrag.errors import InputError
-from rbfrag.solver.results import Response
+from rbfrag.solver.results import Response, ResponseHistory
 
 HISTORY_COLUMNS = (
     "time_s",
@@ -35,8 +36,27 @@ def as_dict(response: Response) -> dict[str, Any]:
         "steps": response.steps,
         "samples_moved": response.samples_moved,
         "samples_total": response.samples_total,
+        "final_theta_rad": response.final_theta_rad,
+        "displacement_m": response.displacement_m,
+        "peak_displacement_m": response.peak_displacement_m,
+        "centroid_displacement_m": response.centroid_displacement_m,
+        "stopped_s": response.stopped_s,
+        "mode_changes": [
+            {"time_s": change.time_s, "motion": change.motion} for change in response.mode_changes
+        ],
         "warnings": list(response.warnings),
     }
+
+
+MOTION_COLUMNS = (
+    *HISTORY_COLUMNS,
+    "displacement_m",
+    "velocity_m_s",
+    "centroid_x_m",
+    "centroid_y_m",
+    "strength_g",
+)
+"""Columns for the models in which the block is displaced; empty where one does not apply."""
 
 
 def write_history(response: Response, path: str | os.PathLike[str]) -> None:
@@ -52,27 +72,47 @@ def write_history(response: Response, path: str | os.PathLike[str]) -> None:
     history = response.history
     if history is None:
         raise InputError("this response holds no history: ask for it with history=True")
-    theta_c = math.radians(response.critical_angle_deg)
     target = Path(path)
     partial = target.with_name(target.name + ".part")
     try:
         with partial.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
-            writer.writerow(HISTORY_COLUMNS)
-            writer.writerows(
-                zip(
-                    history.time_s.tolist(),
-                    history.theta_rad.tolist(),
-                    (history.theta_rad / theta_c).tolist(),
-                    history.theta_dot_rad_s.tolist(),
-                    history.k_h.tolist(),
-                    history.k_v.tolist(),
-                    strict=True,
-                )
-            )
+            writer.writerow(HISTORY_COLUMNS if history.displacement_m is None else MOTION_COLUMNS)
+            writer.writerows(_rows(response, history))
         partial.replace(target)
     except OSError as error:
         partial.unlink(missing_ok=True)
         raise InputError(
             f"cannot write {target}: {error.strerror}; name a folder you may write"
         ) from None
+
+
+def _rows(response: Response, history: ResponseHistory) -> Iterator[tuple[float | str, ...]]:
+    columns: list[list[float] | list[str]] = [
+        history.time_s.tolist(),
+        history.theta_rad.tolist(),
+        _over_critical(response, history),
+        history.theta_dot_rad_s.tolist(),
+        history.k_h.tolist(),
+        history.k_v.tolist(),
+    ]
+    if history.displacement_m is not None:
+        centroid = history.centroid_m
+        columns += [
+            values.tolist() if values is not None else [""] * history.time_s.size
+            for values in (
+                history.displacement_m,
+                history.velocity_m_s,
+                None if centroid is None else centroid[:, 0],
+                None if centroid is None else centroid[:, 1],
+                history.strength_g,
+            )
+        ]
+    return zip(*columns, strict=True)
+
+
+def _over_critical(response: Response, history: ResponseHistory) -> list[float] | list[str]:
+    if response.critical_angle_deg is None:
+        return [""] * history.time_s.size
+    ratio: list[float] = (history.theta_rad / math.radians(response.critical_angle_deg)).tolist()
+    return ratio

@@ -63,6 +63,13 @@ class ResponseHistory:
         theta_dot_rad_s: rotation rate [rad/s], shape (n,).
         k_h: driving horizontal acceleration, polarity applied [g], shape (n,).
         k_v: vertical acceleration, upwards positive [g], shape (n,).
+        displacement_m: displacement along the base, of the sliding block, of the heel of a
+            slumping one, of the toe of a confined one [m], shape (n,); None for toppling.
+        velocity_m_s: rate of it [m/s], shape (n,), for sliding; None otherwise.
+        centroid_m: position of the centroid in the base frame with the heel at rest as
+            origin [m], shape (n, 2); None for toppling.
+        strength_g: driving acceleration at which the block, where it is, neither speeds up nor
+            slows down while 1 + k_v = 1 [g], shape (n,); None for toppling.
     """
 
     time_s: FloatArray
@@ -70,6 +77,23 @@ class ResponseHistory:
     theta_dot_rad_s: FloatArray
     k_h: FloatArray
     k_v: FloatArray
+    displacement_m: FloatArray | None = None
+    velocity_m_s: FloatArray | None = None
+    centroid_m: FloatArray | None = None
+    strength_g: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class ModeChange:
+    """A change of what the block does within one run.
+
+    Args:
+        time_s: when [s].
+        motion: what it does from then on.
+    """
+
+    time_s: float
+    motion: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,24 +104,36 @@ class Response:
         kind: the model that was run (``toppling``).
         outcome: how it ended.
         peak_theta_n: peak rotation over the critical angle; None when the block topples.
-        peak_theta_rad: peak rotation [rad]; None when the block topples.
-        critical_angle_deg: rotation at which the block balances on its toe [deg].
-        started_s: time of the first lift-off [s]; None if the block never moves.
-        toppled_s: time at which toppling became inevitable [s]; None unless it topples.
-        error_estimate: estimated bound on the error of the peak rotation [rad]; for a
-            toppling block, on the rotation at the moment of the verdict.
+        peak_theta_rad: peak rotation [rad]; None when the block topples, and for sliding.
+        critical_angle_deg: rotation at which the block at rest has no strength left: it
+            balances on its toe, or slumps of itself [deg]; None where there is none.
+        started_s: time of the first motion [s]; None if the block never moves.
+        toppled_s: time at which failure became inevitable [s]; None unless it fails.
+        error_estimate: estimated bound on the error of the peak rotation [rad] (sliding: of
+            the peak displacement [m]); for a toppling block, on the rotation at the moment
+            of the verdict.
         steps: integration steps taken.
         samples_moved: sample intervals that had to be integrated.
         samples_total: sample intervals of the record.
         warnings: sentences about suspicious input.
         history: the motion in time, only if it was asked for.
+        final_theta_rad: rotation that is left at the end of the run [rad]; None for toppling
+            and sliding, and when the block fails.
+        displacement_m: permanent displacement along the base, down the slope positive: of
+            the sliding block, of the heel of a slumping one, of the toe of a confined
+            one [m]; None for toppling, and when the block fails.
+        peak_displacement_m: greatest displacement along the base [m]; None likewise.
+        centroid_displacement_m: distance of the centroid from where it was [m]; None likewise.
+        stopped_s: time of the last standstill, or at which the model ended [s]; None if the
+            block never moved, and for toppling.
+        mode_changes: what the block did after its first motion, one entry a change.
     """
 
     kind: str
     outcome: Outcome
     peak_theta_n: float | None
     peak_theta_rad: float | None
-    critical_angle_deg: float
+    critical_angle_deg: float | None
     started_s: float | None
     toppled_s: float | None
     error_estimate: float
@@ -106,6 +142,12 @@ class Response:
     samples_total: int
     warnings: tuple[str, ...] = ()
     history: ResponseHistory | None = None
+    final_theta_rad: float | None = None
+    displacement_m: float | None = None
+    peak_displacement_m: float | None = None
+    centroid_displacement_m: float | None = None
+    stopped_s: float | None = None
+    mode_changes: tuple[ModeChange, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

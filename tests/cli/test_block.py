@@ -157,11 +157,28 @@ def test_only_the_model_that_the_mode_calls_for_is_run(
     refuses: Refuses, tmp_path: Path, change: tuple[str, str], words: list[str]
 ) -> None:
     (tmp_path / "b.toml").write_text(FILE.replace(*change))
+    message = refuses("predict", "--pgv", "0.6", "--block", "b.toml")
+    for word in (*words, "b.toml"):
+        assert word in message
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        (("beta_deg = 5", "beta_deg = 26"), "unstable"),
+        (("beta_deg = 5", "beta_deg = 25"), "k_r = 0 g"),
+        (("beta_deg = 5\n", ""), "beta_deg or --beta is missing"),
+        (("phi_deg = 35", "phi_deg = 35\nkv = 0.2"), "kv"),
+    ],
+)
+def test_respond_refuses_what_no_motion_decides(
+    refuses: Refuses, tmp_path: Path, change: tuple[str, str], word: str
+) -> None:
+    (tmp_path / "b.toml").write_text(FILE.replace(*change))
     record = write_at2(tmp_path / "record.AT2", shaking(3))
-    for command in (("respond", record), ("predict", "--pgv", "0.6")):
-        message = refuses(*command, "--block", "b.toml")
-        for word in (*words, "b.toml"):
-            assert word in message
+    message = refuses("respond", record, "--block", "b.toml")
+    assert word in message
+    assert "b.toml" in message
 
 
 def test_a_block_is_given_once(refuses: Refuses, tmp_path: Path) -> None:

@@ -19,6 +19,8 @@ from tests.synthetic import shaking, write_at2, write_suite
 RESPOND_KEYS = {
     "kind", "outcome", "peak_theta_n", "peak_theta_rad", "critical_angle_deg", "started_s",
     "toppled_s", "error_estimate", "steps", "samples_moved", "samples_total", "warnings",
+    "final_theta_rad", "displacement_m", "peak_displacement_m", "centroid_displacement_m",
+    "stopped_s", "mode_changes",
 }  # fmt: skip
 CRITICAL_KEYS = {
     "kr_over_pga", "lower", "upper", "kr", "y_m_s", "status", "certified", "k_up_over_pga",

@@ -1,0 +1,199 @@
+"""A block that topples under an overhanging back plane: its toe slides out, its heel up that plane.
+
+The equation of two sliding contacts (`rbfrag.solver.one_freedom.two_contacts`) holds up to the
+first standstill, or until the base edge stands at right angles to the back plane, where the toe
+stops and free toppling follows. At a standstill the back plane holds the block only while
+
+    k_h > (1 + k_v) tan(α3 - θ - β);
+
+below that the heel leaves the plane and the block rocks back about its toe, which stays
+displaced. What a block does that is back on its base with a gap at the heel, or whose heel meets
+the plane again, is not verified: there the run ends.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from rbfrag.errors import InputError
+from rbfrag.solver.block import Block
+from rbfrag.solver.one_freedom.equation import Ending, Equation, Exit, Mechanism, Phase, Pose
+from rbfrag.solver.one_freedom.harmonics import Harmonics, Vector, constant, turning
+from rbfrag.solver.one_freedom.rocking import rocking_equation
+from rbfrag.solver.one_freedom.two_contacts import Contact, two_contact_equation
+from rbfrag.solver.response_model import BlockOnPlanes, MechanismModel
+from rbfrag.solver.results import Outcome
+
+
+def mechanism(site: BlockOnPlanes) -> Mechanism:
+    """Return the confined block.
+
+    Args:
+        site: the block and its planes.
+
+    Raises:
+        InputError: no back plane hinders the block.
+    """
+    block = site.block
+    assert block is not None
+    if not site.back_fracture or not block.confines:
+        raise InputError(
+            "a block that no overhanging plane confines topples freely: the model of toppling "
+            "describes it"
+        )
+    rocking = rocking_equation(block, site.beta_rad, site.phi_rad)
+    square, flat = free_from(block), lies_on_its_face(block)
+    slip = toe_slip(block)
+    start = (block.base_m, 0.0)
+
+    def pose_with(slipped: Harmonics) -> Callable[[float], Pose]:
+        def pose(theta: float) -> Pose:
+            arm = turning(block.toe, -1)
+            out = slipped(theta)
+            return Pose(-theta, (start[0] + out - arm.x(theta), -arm.y(theta)), out)
+
+        return pose
+
+    def after_confined(exit: Exit) -> Phase | Ending:
+        if exit.reason == "reverse":
+            return rocks_back(exit)
+        if flat <= square:
+            return _fallen(exit)
+        stays = constant(slip(square))
+        return Phase(
+            name="topples freely about its toe",
+            forward=rocking_equation(block, site.beta_rad),
+            pose=pose_with(stays),
+            after=after_free,
+            sticks=False,
+            seats=False,
+            lowest=square,
+            highest=flat,
+        )
+
+    def after_free(exit: Exit) -> Ending:
+        if exit.reason == "upper":
+            return _fallen(exit)
+        return Ending(
+            Outcome.CONTACT_LOST,
+            f"at {exit.time_s:.3f} s the heel comes back against its plane after a stretch of free "
+            "toppling: the motion after it is not verified",
+        )
+
+    def rocks_back(exit: Exit) -> Phase:
+        return Phase(
+            name="rocks back about its toe, the heel off its plane",
+            forward=rocking,
+            pose=pose_with(constant(slip(exit.x))),
+            after=after_rocking,
+            sticks=False,
+            seats=False,
+            lowest=0.0,
+            highest=exit.x,
+        )
+
+    def after_rocking(exit: Exit) -> Ending:
+        if exit.reason == "upper":
+            return Ending(
+                Outcome.CONTACT_LOST,
+                f"at {exit.time_s:.3f} s the heel meets its plane again: the motion after it is "
+                "not verified",
+            )
+        return _seated_with_a_gap(site, block, exit)
+
+    confined = equation(site)
+    return Mechanism(
+        first=Phase(
+            name="topples against its back plane",
+            forward=confined,
+            reverse=rocking,
+            leaves_in_reverse=True,
+            pose=pose_with(slip),
+            after=after_confined,
+            highest=min(square, flat),
+        ),
+        rotates=True,
+        critical=_positive(math.radians(block.alpha3_deg) - site.beta_rad),
+    )
+
+
+def equation(site: BlockOnPlanes) -> Equation:
+    """Return the equation of motion up to the first standstill."""
+    block = site.block
+    assert block is not None
+    gamma = math.radians(block.gamma_deg)
+    phi1, phi2 = site.phi_rad, site.phi_back_rad
+    return two_contact_equation(
+        base=Contact(
+            arm=turning(block.toe, -1),
+            direction=(-math.sin(phi1), math.cos(phi1)),
+            lost="the toe lifts off the base",
+        ),
+        back=Contact(
+            arm=turning(block.lowest_on_back, -1),
+            direction=(math.sin(gamma + phi2), math.cos(gamma + phi2)),
+            lost="the heel leaves the back plane while the block topples",
+        ),
+        path=Vector(toe_slip(block), constant(0.0)) - turning(block.toe, -1),
+        clockwise=True,
+        inertia_m2=block.inertia_m2,
+        beta_rad=site.beta_rad,
+    )
+
+
+def toe_slip(block: Block) -> Harmonics:
+    """Return how far the toe has slid out [m], so that the heel stays on its plane."""
+    gamma = math.radians(block.gamma_deg)
+    off_plane = _base_off_plane(block)
+    return (constant(off_plane(0.0)) - off_plane) * (1.0 / math.sin(gamma))
+
+
+def free_from(block: Block) -> float:
+    """Return the rotation at which the toe stops and the heel is free (γ - 90° by a whole heel)."""
+    _, along, across, *_ = _base_off_plane(block).coefficients
+    return math.atan2(-across, -along)
+
+
+def lies_on_its_face(block: Block) -> float:
+    """Return the rotation about the toe that lays the front face on the base."""
+    toe_x, toe_y = block.toe
+    return min(
+        math.atan2(y - toe_y, x - toe_x) for x, y in block.outline if y - toe_y > 1e-9 * block.r3_m
+    )
+
+
+def _base_off_plane(block: Block) -> Harmonics:
+    """Return the distance, normal to the back plane, from the toe to the contact on it [m]."""
+    gamma = math.radians(block.gamma_deg)
+    edge = turning(block.lowest_on_back, -1) - turning(block.toe, -1)
+    return edge.x * math.sin(gamma) + edge.y * math.cos(gamma)
+
+
+def _fallen(exit: Exit) -> Ending:
+    return Ending(Outcome.TOPPLED, f"at {exit.time_s:.3f} s the block lies on its front face")
+
+
+def _seated_with_a_gap(site: BlockOnPlanes, block: Block, exit: Exit) -> Ending:
+    """Return what is known of a block that is back on its base with a gap at the heel."""
+    beta, phi = site.beta_rad, site.phi_rad
+    forward = math.tan(math.radians(block.alpha3_deg) - beta)
+    backward = max(
+        math.tan(max(math.radians(block.alpha1_deg) - beta, -1.57)),
+        -math.tan(phi + beta) if phi + beta < 0.5 * math.pi else -math.inf,
+    )
+    seated = f"at {exit.time_s:.3f} s the block is back on its base, its toe displaced"
+    if exit.rest_max_q <= forward and exit.rest_min_q >= backward:
+        return Ending(Outcome.STABLE, f"{seated}; the rest of the record does not move it")
+    return Ending(
+        Outcome.CONTACT_LOST,
+        f"{seated} and a gap at the heel: its further motion, which the rest of the record drives, "
+        "is not verified",
+    )
+
+
+def _positive(angle_rad: float) -> float | None:
+    return angle_rad if angle_rad > 0.0 else None
+
+
+MODEL = MechanismModel(kind="confined_toppling", mode="confined_topple", mechanism=mechanism)

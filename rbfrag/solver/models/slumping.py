@@ -1,0 +1,114 @@
+"""A block that slumps: it turns backward while its heel slides down the base and its back edge
+down the back plane.
+
+Friction is fully mobilised at both contacts, against the motion: forward (sense 1) or, when
+the ground drives the block back up, in reverse (sense -1). The equation of two sliding contacts is
+derived in `rbfrag.solver.one_freedom.two_contacts`; it has the form of toppling,
+
+    θ'' = p_s²(θ) [k_h - (1 + k_v) k_s(θ)] - q(θ) θ'²
+
+and reads, as all mechanisms here do, inertia θ'' = drive k_h - resistance (1 + k_v) - braking θ'².
+The dissertation's own chapter on slumping is not available; this is derived from rigid-body
+mechanics.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rbfrag.errors import InputError
+from rbfrag.solver.block import Block
+from rbfrag.solver.one_freedom.equation import Ending, Equation, Exit, Mechanism, Phase, Pose
+from rbfrag.solver.one_freedom.harmonics import Harmonics, Vector, constant, turning
+from rbfrag.solver.one_freedom.two_contacts import Contact, two_contact_equation
+from rbfrag.solver.response_model import BlockOnPlanes, MechanismModel
+from rbfrag.solver.results import Outcome
+
+
+def mechanism(site: BlockOnPlanes) -> Mechanism:
+    """Return the slumping block.
+
+    Args:
+        site: the block and its planes.
+
+    Raises:
+        InputError: there is no back plane, or the corner at the heel is missing.
+    """
+    block = site.block
+    assert block is not None
+    if not site.back_fracture:
+        raise InputError("a block without a plane behind it cannot slump: it turns over backward")
+    if block.lowest_on_back != block.heel:
+        raise InputError(
+            "slumping in time is known for blocks whose heel lies on the back plane: the corner "
+            "at the heel of this outline is missing"
+        )
+    edge_x, edge_y = (b - h for b, h in zip(block.back, block.heel, strict=True))
+    # the back edge then lies on the base
+    flat = math.pi - math.atan2(edge_y, edge_x)
+    slip = heel_slip(block)
+    path = centroid_path(block)
+
+    def pose(theta: float) -> Pose:
+        return Pose(theta, (path.x(theta), path.y(theta)), slip(theta))
+
+    def after(exit: Exit) -> Ending:
+        return Ending(
+            Outcome.TOPPLED,
+            f"at {exit.time_s:.3f} s the back edge of the block lies on the base plane: it slides "
+            "on from there, which is not followed",
+        )
+
+    forward = equation(site, 1.0)
+    return Mechanism(
+        first=Phase(
+            name="slumps",
+            forward=forward,
+            reverse=equation(site, -1.0),
+            pose=pose,
+            after=after,
+            highest=flat,
+        ),
+        rotates=True,
+        critical=forward.first_without_strength(flat),
+    )
+
+
+def equation(site: BlockOnPlanes, sense: float) -> Equation:
+    """Return the equation of motion, forward (1) or in reverse (-1)."""
+    block = site.block
+    assert block is not None
+    gamma = math.radians(block.gamma_deg)
+    phi1, phi2 = sense * site.phi_rad, sense * site.phi_back_rad
+    return two_contact_equation(
+        base=Contact(
+            arm=turning(block.heel),
+            direction=(-math.sin(phi1), math.cos(phi1)),
+            lost="the heel lifts off the base",
+        ),
+        back=Contact(
+            arm=turning(block.back),
+            direction=(math.sin(gamma - phi2), math.cos(gamma - phi2)),
+            lost="the block leaves its back plane",
+        ),
+        path=centroid_path(block),
+        clockwise=False,
+        inertia_m2=block.inertia_m2,
+        beta_rad=site.beta_rad,
+    )
+
+
+def heel_slip(block: Block) -> Harmonics:
+    """Return how far the heel has slid down the base [m], so that contact 2 stays on its plane."""
+    gamma = math.radians(block.gamma_deg)
+    edge = turning(block.back) - turning(block.heel)
+    off_plane = edge.x * math.sin(gamma) + edge.y * math.cos(gamma)
+    return (constant(off_plane(0.0)) - off_plane) * (1.0 / math.sin(gamma))
+
+
+def centroid_path(block: Block) -> Vector:
+    """Return the position of the centroid, from the heel at rest [m]."""
+    return Vector(heel_slip(block), constant(0.0)) - turning(block.heel)
+
+
+MODEL = MechanismModel(kind="slumping", mode="slump", mechanism=mechanism)

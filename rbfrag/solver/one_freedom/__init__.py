@@ -1,0 +1,1 @@
+"""Motion with one degree of freedom: the engine that the response models share."""

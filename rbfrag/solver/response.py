@@ -1,0 +1,220 @@
+"""What a block does under a ground motion: the one function that every model answers through."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.block import Block
+from rbfrag.solver.quantity import angle, positive
+from rbfrag.solver.response_model import BlockOnPlanes, ResponseModel, Shaking
+from rbfrag.solver.response_models import model_of_kind, model_of_mode
+from rbfrag.solver.results import Polarity, Response
+from rbfrag.solver.stability import Stability, stability
+
+
+def respond(
+    motion: GroundMotion,
+    *,
+    p2: float | None = None,
+    kr: float | None = None,
+    ky: float | None = None,
+    block: Block | None = None,
+    beta_deg: float | None = None,
+    phi_deg: float | None = None,
+    phi_back_deg: float | None = None,
+    back_fracture: bool = True,
+    cohesion_pa: float = 0.0,
+    density_kg_m3: float | None = None,
+    vertical: GroundMotion | None = None,
+    polarity: Polarity = "forward",
+    kind: str | None = None,
+    linear: bool = False,
+    two_way: bool = False,
+    horizontal: bool = False,
+    history: bool = False,
+) -> Response:
+    """Return what a block does under a ground motion.
+
+    The block is given in one of three ways: `p2` and `kr` (it topples), `ky` (it slides), or
+    `block` with `beta_deg` and `phi_deg`, whose failure mode chooses the model.
+
+    Args:
+        motion: horizontal ground motion.
+        p2: frequency parameter p² of a toppling block [1/s²], > 0.
+        kr: its rocking acceleration coefficient k_r = tan(critical angle), > 0; with
+            `linear` the critical angle itself [rad].
+        ky: yield acceleration coefficient tan(φ - β) of a block that slides, whatever its
+            shape, on a plane that dips by `beta_deg` (default 0), > 0.
+        block: shape and size.
+        beta_deg: dip of the base, out of the slope positive [deg].
+        phi_deg: friction angle of the base [deg].
+        phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
+        back_fracture: False for a block without a plane behind it.
+        cohesion_pa: cohesion of the base [Pa]; only a block that topples may have any.
+        density_kg_m3: density of the rock [kg/m³], needed with a cohesion.
+        vertical: vertical motion of the same recording, upward positive.
+        polarity: ``forward`` (positive samples drive forward motion) or ``reverse``.
+        kind: ``toppling``, ``sliding``, ``slumping`` or ``confined_toppling``; None for the
+            model of the failure mode.
+        linear: toppling by the linear model, for verification against closed forms only.
+        two_way: sliding up the base too, where the ground drives the block that way.
+        horizontal: sliding without the factor cos(φ - β)/cos φ, as Newmark's horizontal block.
+        history: keep the motion in time.
+
+    Raises:
+        InputError: a value outside its range, a block given in no way or in two, a block that
+            fails at rest or that nothing moves, an unknown kind or polarity, an option of
+            another model, components that cannot be brought together.
+    """
+    settings = {"linear": linear, "two_way": two_way, "horizontal": horizontal}
+    conditions = {
+        "beta_deg": beta_deg,
+        "phi_deg": phi_deg,
+        "phi_back_deg": phi_back_deg,
+        "density_kg_m3": density_kg_m3,
+    }
+    given = [name for name, value in conditions.items() if value is not None]
+    if block is not None:
+        for name, value in (("p2", p2), ("kr", kr), ("ky", ky)):
+            if value is not None:
+                raise InputError(f"{name} does not go with a block, which is given by its shape")
+        if beta_deg is None or phi_deg is None:
+            name = "beta_deg" if beta_deg is None else "phi_deg"
+            raise InputError(f"{name} is missing: the mode of a block depends on dip and friction")
+        found = stability(
+            block,
+            beta_deg=beta_deg,
+            phi_deg=phi_deg,
+            phi_back_deg=phi_back_deg,
+            back_fracture=back_fracture,
+            cohesion_pa=cohesion_pa,
+            density_kg_m3=density_kg_m3,
+        )
+        return _by_mode(block, found, kind, settings, Shaking(motion, vertical, polarity, history))
+    if ky is not None:
+        if p2 is not None or kr is not None:
+            raise InputError("ky belongs to sliding, p2 and kr to toppling: give one or the other")
+        if extra := [name for name in given if name != "beta_deg"]:
+            raise InputError(f"{extra[0]} does not go with ky: it follows from ky and beta_deg")
+        model = _asked_for(kind, "slide", "ky")
+        site = _sliding_site(ky, beta_deg or 0.0, _known(model, settings))
+        return model.respond(site, Shaking(motion, vertical, polarity, history))
+    if p2 is None or kr is None:
+        missing = "p2" if p2 is None else "kr"
+        raise InputError(
+            f"{missing} is missing: give p2 and kr, or ky, or a block with beta_deg and phi_deg"
+        )
+    if given:
+        raise InputError(f"{given[0]} does not go with p2 and kr, which say all about the block")
+    model = _asked_for(kind, "topple", "p2 and kr")
+    _known(model, settings)
+    from rbfrag.solver.respond import respond as toppling
+
+    return toppling(
+        motion,
+        p2=p2,
+        kr=kr,
+        vertical=vertical,
+        polarity=polarity,
+        linear=linear,
+        history=history,
+    )
+
+
+def _by_mode(
+    block: Block,
+    found: Stability,
+    kind: str | None,
+    settings: dict[str, bool],
+    shaking: Shaking,
+) -> Response:
+    """Run the model that a block's mode calls for, or the one that was asked for."""
+    model = model_of_mode(found.mode) if kind is None else model_of_kind(kind)
+    _refuse_what_no_motion_decides(found)
+    remarks = found.warnings
+    if model.mode != found.mode:
+        remarks = (
+            *remarks,
+            f"the mode of the block is {_words(found.mode)}: by it, {model.kind} is not what it "
+            "would do",
+        )
+    site = BlockOnPlanes(
+        block=block,
+        beta_rad=math.radians(found.beta_deg),
+        phi_rad=math.radians(found.phi_deg),
+        phi_back_rad=math.radians(found.phi_back_deg),
+        back_fracture=found.back_fracture,
+        cohesive=found.cohesion is not None,
+        yield_g=found.yield_acceleration if model.mode == found.mode else None,
+        settings=_known(model, settings),
+    )
+    return model.respond(
+        site, Shaking(shaking.motion, shaking.vertical, shaking.polarity, shaking.history, remarks)
+    )
+
+
+def _sliding_site(ky: float, beta_deg: float, settings: dict[str, Any]) -> BlockOnPlanes:
+    """Return a plane of which only the yield acceleration is known."""
+    ky = positive(ky, "ky", "the yield acceleration coefficient of sliding, in g")
+    beta_deg = angle(beta_deg, "beta_deg", -90.0, 90.0)
+    phi_rad = math.radians(beta_deg) + math.atan(ky)
+    if not 0.0 <= phi_rad < 0.5 * math.pi:
+        raise InputError(
+            f"ky = {ky:g} on a plane of beta_deg = {beta_deg:g} means a friction angle of "
+            f"{math.degrees(phi_rad):.4g} degrees: it must be from 0 to below 90"
+        )
+    return BlockOnPlanes(
+        block=None,
+        beta_rad=math.radians(beta_deg),
+        phi_rad=phi_rad,
+        phi_back_rad=phi_rad,
+        back_fracture=False,
+        cohesive=False,
+        yield_g=ky,
+        settings=settings,
+    )
+
+
+def _asked_for(kind: str | None, mode: Any, numbers: str) -> ResponseModel:
+    """Return the model that numbers alone suffice for, unless another was asked for."""
+    model = model_of_mode(mode)
+    if kind is not None and model_of_kind(kind) is not model:
+        raise InputError(
+            f"{kind} needs the shape of the block: give a block with beta_deg and phi_deg instead "
+            f"of {numbers}, which mean {model.kind}"
+        )
+    return model
+
+
+def _known(model: ResponseModel, settings: dict[str, bool]) -> dict[str, Any]:
+    given = {name: value for name, value in settings.items() if value}
+    unknown = sorted(set(given) - set(model.settings))
+    if unknown:
+        understood = " and ".join(model.settings) or "no such option"
+        raise InputError(
+            f"{unknown[0]} does not go with {model.kind}, the model of this block, which knows "
+            f"{understood}"
+        )
+    return given
+
+
+def _refuse_what_no_motion_decides(found: Stability) -> None:
+    k = found.yield_acceleration
+    if found.state == "locked":
+        raise InputError(
+            f"the block is locked in its mode, {_words(found.mode)}: no horizontal acceleration "
+            "moves it"
+        )
+    if found.state == "unstable" or k <= 0.0:
+        name = {"topple": "k_r", "slide": "k_y", "slump": "k_s"}.get(found.mode, "k_ct")
+        raise InputError(
+            f"the block is {found.state} at rest (mode {_words(found.mode)}, {name} = {k:.4g} g): "
+            "no earthquake decides about it"
+        )
+
+
+def _words(mode: str) -> str:
+    return mode.replace("_", " ")

@@ -1,0 +1,97 @@
+"""`rbfrag respond` on blocks of every failure mode."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from tests.cli.conftest import Refuses, Shell
+from tests.synthetic import shaking, write_at2
+
+SLIDE = ("--s1", "1", "--s2", "2", "--gamma", "60", "--beta", "20", "--phi", "30")
+SLUMP = ("--alpha1", "45", "--alpha3", "65", "--r3", "1", "--beta", "0", "--phi", "35")
+CONFINED = ("--alpha1", "-40", "--alpha3", "20", "--r3", "1", "--beta", "5", "--phi", "30")
+TOPPLE = ("--alpha1", "-10", "--alpha3", "25", "--r3", "1.5", "--beta", "5", "--phi", "35")
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Path:
+    return write_at2(tmp_path / "record.AT2", shaking(3))
+
+
+@pytest.mark.parametrize(
+    ("block", "kind"),
+    [
+        (SLIDE, "sliding"),
+        (SLUMP, "slumping"),
+        (CONFINED, "confined_toppling"),
+        (TOPPLE, "toppling"),
+    ],
+)
+def test_the_mode_chooses_the_model(
+    shell: Shell, record: Path, tmp_path: Path, block: tuple[str, ...], kind: str
+) -> None:
+    answer = shell.json("respond", record, *block, "--csv", "m.csv", "--plot", "m.png")
+    assert answer["kind"] == kind
+    # the same model when it is asked for, and the same answer
+    again = shell.json("respond", record, *block, "--kind", kind)
+    assert again == answer
+    rows = (tmp_path / "m.csv").read_text().splitlines()
+    assert rows[0].startswith("time_s,theta_rad")
+    assert ("displacement_m" in rows[0]) == (kind != "toppling")
+    assert len(rows) > 100
+    assert (tmp_path / "m.png").stat().st_size > 10_000
+
+
+def test_sliding_by_its_yield_and_by_its_shape(shell: Shell, record: Path) -> None:
+    by_shape = shell.json("respond", record, *SLIDE, "--no-back")
+    ky = repr(math.tan(math.radians(10.0)))
+    by_yield = shell.json("respond", record, "--ky", ky, "--beta", "20")
+    assert by_yield["displacement_m"] == pytest.approx(by_shape["displacement_m"], rel=1e-9)
+    assert by_shape["displacement_m"] > 0.0
+    assert by_shape["peak_theta_rad"] is None
+    assert by_shape["critical_angle_deg"] is None
+    flat = shell.json("respond", record, "--ky", ky, "--beta", "20", "--horizontal")
+    factor = math.cos(math.radians(10.0)) / math.cos(math.radians(30.0))
+    assert by_yield["displacement_m"] == pytest.approx(factor * flat["displacement_m"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        ((), "no block"),
+        (("--p2", "3"), "--kr is missing"),
+        (("--p2", "3", "--kr", "0.1", "--ky", "0.1"), "ky belongs to sliding"),
+        (("--ky", "0.1", *SLUMP), "--ky does not go with --alpha1"),
+        (("--ky", "0.1", "--phi", "20"), "phi_deg does not go with ky"),
+        (("--ky", "0.1", "--no-back"), "--no-back does not go with --ky"),
+        (("--ky", "-0.1"), "ky"),
+        (("--ky", "1e9", "--beta", "80"), "friction angle"),
+        (("--ky", "0.1", "--kind", "slumping"), "needs the shape"),
+        (("--p2", "3", "--kr", "0.1", "--kind", "sliding"), "needs the shape"),
+        (("--p2", "3", "--kr", "0.1", "--two-way"), "two_way does not go with toppling"),
+        (("--p2", "3", "--kr", "0.1", "--beta", "3"), "beta_deg does not go with p2"),
+        ((*SLUMP, "--linear"), "linear does not go with slumping"),
+        ((*SLUMP, "--kind", "rolling"), "unknown kind 'rolling'"),
+        ((*SLUMP, "--kind", "confined_toppling"), "topples freely"),
+        ((*SLUMP[:6], "--beta", "40", "--phi", "35"), "unstable"),
+    ],
+)
+def test_refused(refuses: Refuses, record: Path, options: tuple[str, ...], word: str) -> None:
+    assert word in refuses("respond", record, *options)
+
+
+def test_a_model_against_the_mode_says_so(shell: Shell, record: Path) -> None:
+    answer = shell.json("respond", record, *SLUMP, "--kind", "sliding")
+    assert answer["kind"] == "sliding"
+    assert any("mode of the block is slump" in warning for warning in answer["warnings"])
+
+
+def test_cohesion_is_refused_where_motion_breaks_it(refuses: Refuses, record: Path) -> None:
+    Path("b.toml").write_text(
+        "s1_m = 1\ns2_m = 2\ngamma_deg = 60\nbeta_deg = 20\nphi_deg = 30\n"
+        "cohesion_pa = 100\ndensity_kg_m3 = 2700\n"
+    )
+    assert "cohesion_pa" in refuses("respond", record, "--block", "b.toml")
