@@ -28,7 +28,10 @@ def critical(
     linear: options.Linear = False,
     full_map: Annotated[
         bool,
-        typer.Option("--map", help="Map every toppling and safe interval of k_r/PGA down to 0.01."),
+        typer.Option(
+            "--map",
+            help="Map the toppling and safe intervals of k_r/PGA down to 0.01, borders to 1e-4.",
+        ),
     ] = False,
     units: options.Units = None,
     dt: options.Dt = None,

@@ -25,11 +25,17 @@ DEPTH = 1e-9
 ORDERLESS_DEPTH = 1e-3
 """The same where the order of motions is lost, which no narrower interval brings back."""
 
+MAP_DEPTH = 1e-4
+"""Width of k_r/PGA that a map leaves undecided below the critical value, at every border."""
+
 FIRST_STEP = 1e-3
 """Relative width of the first interval below K_up."""
 
 STEP_BUDGET = 40_000_000
 """Integration steps after which a search is given up: about three seconds."""
+
+MAP_STEPS = 8_000_000
+"""Integration steps of a map below the deciding island, after which the rest of it is undecided."""
 
 MAX_INTERVALS = 20_000
 
@@ -88,7 +94,13 @@ def keeps_order(drive: Excitation, linear: bool) -> bool:
 
 
 def certified_map(
-    drive: Excitation, *, p2: float, linear: bool, bottom: float, full: bool
+    drive: Excitation,
+    *,
+    p2: float,
+    linear: bool,
+    bottom: float,
+    full: bool,
+    map_depth: float = MAP_DEPTH,
 ) -> CertifiedMap:
     """Give verdicts from K_up down to the first toppling block, or to `bottom`.
 
@@ -98,6 +110,8 @@ def certified_map(
         linear: the linear model.
         bottom: least k_r of interest.
         full: go on to `bottom`.
+        map_depth: width of k_r/PGA that may be left undecided below the first toppling interval
+            as wide as RESOLUTION.
     """
     p = math.sqrt(p2)
     n = drive.q.size
@@ -131,7 +145,8 @@ def certified_map(
     goal = TO_BOTTOM if full else TO_BRACKET
     count, reached, made_runs, made_steps = march(
         drive.time_s, *record, k_up, bottom, MARGIN, DEPTH, ORDERLESS_DEPTH, still, FIRST_STEP,
-        check, goal, RESOLUTION * drive.pga_g, STEP_BUDGET, low, high, verdict, point,
+        check, goal, RESOLUTION * drive.pga_g, map_depth * drive.pga_g, STEP_BUDGET,
+        MAP_STEPS, low, high, verdict, point,
     )  # fmt: skip
     done = full or not bool(((verdict[:count] == TOPPLES) | np.isfinite(point[:count])).any())
     return CertifiedMap(

@@ -14,7 +14,7 @@ import math
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.certified import CertifiedMap, bracket_of, certified_map
+from rbfrag.solver.certified import MAP_DEPTH, CertifiedMap, bracket_of, certified_map
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.islands import islands_by_blocks, islands_of_map, outcome_intervals
 from rbfrag.solver.respond import positive, refuse_endless
@@ -44,6 +44,7 @@ def critical(
     linear: bool = False,
     search_limit: float = SEARCH_LIMIT,
     full_map: bool = False,
+    map_depth: float = MAP_DEPTH,
 ) -> CriticalResult:
     """Return the largest k_r/PGA that a ground motion topples, with its bracket.
 
@@ -56,6 +57,8 @@ def critical(
         search_limit: smallest k_r/PGA looked at.
         full_map: go on below the critical value and map every toppling and safe interval down
             to the limit.
+        map_depth: width of k_r/PGA at which the map leaves an interval undecided. The bracket
+            does not depend on it; a finer map costs more.
 
     Raises:
         InputError: a value that is not a positive finite number, an unknown polarity,
@@ -65,13 +68,14 @@ def critical(
     """
     p2 = positive(p2, "p2", "1/s²")
     search_limit = positive(search_limit, "search_limit", "the smallest k_r/PGA looked at")
+    map_depth = positive(map_depth, "map_depth", "a width of k_r/PGA")
     drive = excitation(motion, vertical, polarity)
     refuse_endless(drive, p2)
     said = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion)), *drive.warnings]
     if vertical is not None:
         said += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
     search = _Search(drive, p2, linear, search_limit)
-    search.run(full_map)
+    search.run(full_map, map_depth)
     points = search.points()
     found = search.status == "found"
     kr = search.lower * drive.pga_g if found else None
@@ -122,7 +126,7 @@ class _Search:
         self.n_runs = 0
         self._scan = BlockScan(drive, p2=p2, linear=linear)
 
-    def run(self, full_map: bool) -> None:
+    def run(self, full_map: bool, map_depth: float) -> None:
         """Make the search; the answer is left in the attributes."""
         drive = self.drive
         if drive.jump_node < drive.w.size:
@@ -138,7 +142,14 @@ class _Search:
             self.certified = True
             return
         bottom = self.limit * pga
-        found = certified_map(drive, p2=self.p2, linear=self.linear, bottom=bottom, full=full_map)
+        found = certified_map(
+            drive,
+            p2=self.p2,
+            linear=self.linear,
+            bottom=bottom,
+            full=full_map,
+            map_depth=map_depth,
+        )
         self.n_runs += found.runs
         self.intervals = outcome_intervals(found, pga, drive.max_q, bottom if full_map else None)
         bracket = bracket_of(found)
@@ -167,7 +178,7 @@ class _Search:
         resolution = RESOLUTION * pga
         lower = self.lower * pga
         if full_map and found.complete:
-            islands = islands_of_map(found, lower, resolution)
+            islands = islands_of_map(found, scan, lower, resolution)
         else:
             islands = islands_by_blocks(scan, lower, bottom, resolution)
         self.island_width = islands.width / pga

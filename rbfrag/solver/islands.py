@@ -72,11 +72,20 @@ def outcome_intervals(
     )
 
 
-def islands_of_map(found: CertifiedMap, lower: float, resolution: float) -> Islands:
+def islands_of_map(
+    found: CertifiedMap, scan: BlockScan, lower: float, resolution: float
+) -> Islands:
     """Read the islands off a full map.
 
-    Undecided slivers count to the interval above them. A safe gap narrower than the resolution
+    Undecided slivers count to the interval above them; the lower end of the deciding island,
+    which lies in one, is closed in on by single blocks. A safe gap narrower than the resolution
     does not end a toppling island for `resolved`, nor make the set reentrant.
+
+    Args:
+        found: the map, in k_r.
+        scan: the blocks.
+        lower: greatest k_r that topples.
+        resolution: width of k_r below which islands are ignored.
     """
     width: float | None = None
     resolved: float | None = None
@@ -93,7 +102,7 @@ def islands_of_map(found: CertifiedMap, lower: float, resolution: float) -> Isla
             if gap_top is None:
                 gap_top = high
             if width is None:
-                width = lower - high
+                width = lower - scan.border(min(bottom, lower), high)[0]
             if gap_top - low > resolution:
                 reentrant = True
         elif verdict == TOPPLES:

@@ -112,7 +112,9 @@ def march(
     check: bool,
     goal: int,
     resolution: float,
+    map_depth: float,
     max_steps: int,
+    map_steps: int,
     low: FloatArray,
     high: FloatArray,
     verdict: IntArray,
@@ -133,7 +135,10 @@ def march(
         check: check D >= 0 on the way.
         goal: TO_BRACKET, TO_ISLANDS or TO_BOTTOM.
         resolution: width of k_r of the islands that count for TO_ISLANDS.
+        map_depth: width of k_r below which an interval is left undecided once a toppling
+            interval as wide as the resolution has been met.
         max_steps: integration steps after which the march is given up.
+        map_steps: the same for those taken after the first toppling interval.
         low: filled with the lower ends of the intervals, falling.
         high: filled with their upper ends.
         verdict: filled with SAFE, TOPPLES, UNKNOWN or ORDERLESS.
@@ -166,6 +171,7 @@ def march(
     wide_island = False
     gap = 0.0  # width of the safe interval being passed below a toppling one
     wide_gap = False
+    until = map_steps
     hi = top
     width = first_step * top
     steady = width  # width of the last interval that got a verdict
@@ -175,7 +181,6 @@ def march(
     edge_high = top  # a border known by two blocks: one of `side` above, one of the other below
     edge_low = top
     edge_point = top
-    clear = max(0.25 * depth, 2.0 * margin)  # of the margins of the enclosing motions
     far, made = follow(
         time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear,
         top * (1.0 - depth), 0, n, u, us, uc,
@@ -189,8 +194,12 @@ def march(
         )  # fmt: skip
         runs += made_runs
         steps += made
-        edge_low = edge_point - clear * top
+        edge_low = edge_point - max(0.25 * depth, 2.0 * margin) * top
     while hi > bottom and steps < max_steps and count < low.size - 1:
+        if not wide_island:
+            until = steps + map_steps
+        elif steps >= until:
+            break
         if hi == edge_high and edge_low < hi:
             high[count] = hi
             low[count] = edge_low
@@ -205,13 +214,15 @@ def march(
                 if goal == TO_BRACKET:
                     break
             continue
+        finest = max(depth * hi, map_depth) if wide_island else depth * hi
+        clear = max(0.25 * finest, 2.0 * margin * hi)  # of the margins of the enclosing motions
         lo = max(hi - width, bottom)
-        if lo < bottom * (1.0 + 0.1 * depth):
+        if lo < bottom + 0.1 * finest:
             lo = bottom
         if lo < edge_high < hi:
             # towards a border the distance left is shared out: all of it at once seldom works
             lo = edge_high
-            if hi - lo > 3.0 * depth * hi:
+            if hi - lo > 3.0 * finest:
                 lo = hi - share * (hi - lo)
         if lo < coarse_k or (check and hi > coarse_other):
             coarse_k = max(bottom, lo - 0.5 * (hi - lo) - 0.1 * hi)
@@ -260,7 +271,7 @@ def march(
         elif lo < peak < hi:
             width = hi - peak
             continue
-        elif hi - lo > (order_depth if what == NO_ORDER else depth) * hi:
+        elif hi - lo > (max(order_depth * hi, finest) if what == NO_ORDER else finest):
             if what == SPLIT and not (lo <= edge_high < hi):
                 # is a border the reason? then verdicts can go as far as that
                 far, made = follow(
@@ -272,12 +283,13 @@ def march(
                 if (far > 0.0) == (side == SAFE):
                     edge_point, edge_high, made_runs, made = border(
                         time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max,
-                        linear, lo, far, hi, BORDER, window, window_end, u, us, uc,
+                        linear, lo, far, hi, max(BORDER, 0.1 * finest / hi) if wide_island else BORDER,
+                        window, window_end, u, us, uc,
                     )  # fmt: skip
                     runs += made_runs
                     steps += made
-                    edge_low = max(edge_point - clear * hi, lo)
-                    edge_high = min(edge_high + clear * hi, hi)
+                    edge_low = max(edge_point - clear, lo)
+                    edge_high = min(edge_high + clear, hi)
                     width = hi - edge_high
                     share = 0.6
                     continue

@@ -176,7 +176,7 @@ class OutcomeIntervals:
         k_lo: lower ends, k_r/PGA, shape (n,); `k_lo[i + 1] == k_hi[i]`.
         k_hi: upper ends, k_r/PGA, shape (n,). Nothing above the last one ever lifts.
         outcome: ``topples`` (every block of the interval), ``safe`` (none) or ``undecided``,
-            length n. The border between two of them is an undecided interval too.
+            length n. The border between two of them lies in an undecided interval.
     """
 
     k_lo: FloatArray
@@ -214,7 +214,8 @@ class CriticalResult:
             a full map its lower end is looked for by single blocks.
         kr_over_pga_resolved: the same search with islands narrower than 1e-6 ignored.
         reentrant: True when a safe island wider than 1e-6 lies below the critical value. With
-            a full map False is proven; otherwise it means that none was met.
+            a full map False is proven but for what the map leaves undecided; otherwise it means
+            that none was met.
         n_runs: number of simulations made.
         warnings: sentences about suspicious input or an uncertain answer.
         points: the blocks that were simulated for themselves.

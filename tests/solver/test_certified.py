@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import read_motions
-from rbfrag.solver.certified import certified_map, keeps_order
+from rbfrag.solver.certified import MAP_DEPTH, certified_map, keeps_order
 from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.respond import simulate
@@ -118,14 +118,57 @@ def test_brute_force_finds_nothing_that_the_map_denies(seed: int) -> None:
 def test_maps_have_islands_and_little_that_is_undecided() -> None:
     islands = 0
     for seed in range(8):
-        result = critical(noise(seed + 20), p2=12.0, search_limit=0.1, full_map=True)
-        gaps = result.intervals.outcome.count("safe") - 1
-        islands += gaps
-        assert result.reentrant == (gaps > 0)
-        width = result.intervals.k_hi - result.intervals.k_lo
-        unknown = np.array(result.intervals.outcome) == "undecided"
-        assert width[unknown].sum() < 1e-6
+        for depth in (1e-9, MAP_DEPTH):
+            result = critical(
+                noise(seed + 20), p2=12.0, search_limit=0.1, full_map=True, map_depth=depth
+            )
+            gaps = result.intervals.outcome.count("safe") - 1
+            islands += gaps
+            assert result.reentrant == (gaps > 0)
+            width = result.intervals.k_hi - result.intervals.k_lo
+            unknown = width[np.array(result.intervals.outcome) == "undecided"]
+            assert unknown.sum() <= 4.0 * unknown.size * depth
+            assert depth > 1e-9 or unknown.sum() < 1e-6
     assert islands > 0
+
+
+@pytest.mark.parametrize("kind", sorted(MAKERS))
+def test_coarse_and_fine_maps_agree_where_both_decide(kind: str) -> None:
+    compared = 0
+    for seed in range(4):
+        motion = MAKERS[kind](seed + 60)
+        fine, coarse = (
+            critical(motion, p2=6.0, search_limit=0.1, full_map=True, map_depth=depth)
+            for depth in (1e-7, 1e-3)
+        )
+        # what depends on the bracket alone does not depend on the depth of the map
+        assert (fine.lower, fine.upper, fine.undecided) == (
+            coarse.lower, coarse.upper, coarse.undecided,
+        )  # fmt: skip
+        assert coarse.intervals.k_lo[0] == fine.intervals.k_lo[0]
+        assert coarse.intervals.k_hi[-1] == fine.intervals.k_hi[-1]
+        edges = np.unique(np.concatenate([fine.intervals.k_hi, coarse.intervals.k_hi]))
+        middles = 0.5 * (edges[1:] + edges[:-1])
+        said = [
+            np.array(one.intervals.outcome)[np.searchsorted(one.intervals.k_hi, middles)]
+            for one in (fine, coarse)
+        ]
+        both = (said[0] != "undecided") & (said[1] != "undecided")
+        assert np.array_equal(said[0][both], said[1][both])
+        compared += int(both.sum())
+    assert compared > 0
+
+
+def test_what_a_map_does_not_reach_is_undecided_in_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    motion = noise(21)
+    short = critical(motion, p2=12.0, search_limit=0.05)
+    monkeypatch.setattr("rbfrag.solver.certified.MAP_STEPS", 1)
+    result = critical(motion, p2=12.0, search_limit=0.05, full_map=True)
+    assert result.certified
+    assert (result.lower, result.upper) == (short.lower, short.upper)
+    assert result.intervals.k_lo[0] == pytest.approx(0.05, rel=1e-12)
+    assert result.intervals.outcome[0] == "undecided"
+    assert any("the map" in sentence for sentence in result.warnings)
 
 
 def test_short_answer_agrees_with_the_full_map() -> None:
