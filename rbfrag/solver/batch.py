@@ -83,9 +83,7 @@ def run_blocks(
         )  # fmt: skip
 
 
-def simulate_many(
-    drive: Excitation, *, p2: ArrayLike, kr: ArrayLike, linear: bool = False
-) -> Runs:
+def simulate_many(drive: Excitation, *, p2: ArrayLike, kr: ArrayLike, linear: bool = False) -> Runs:
     """Run many blocks under one excitation.
 
     Args:

@@ -283,7 +283,7 @@ def march(
                 if (far > 0.0) == (side == SAFE):
                     edge_point, edge_high, made_runs, made = border(
                         time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max,
-                        linear, lo, far, hi, max(BORDER, 0.1 * finest / hi) if wide_island else BORDER,
+                        linear, lo, far, hi, max(BORDER, 0.1 * finest / hi if wide_island else 0.0),
                         window, window_end, u, us, uc,
                     )  # fmt: skip
                     runs += made_runs
