@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError
+from rbfrag.fragility.scores import GRID_OF_Y0_OVER_PGV
+from rbfrag.fragility.source import FitSource
 from rbfrag.fragility.terms import Term
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -17,6 +18,7 @@ FloatArray = NDArray[np.float64]
 
 FEWEST_EVENTS = 3
 FEWEST_FOUND = 10
+FEW_EVENTS = 10
 
 _CENSORED = ("below_limit", "no_motion")
 
@@ -31,9 +33,13 @@ class FitData:
         found: True for critical values that were found, False for censored ones.
         event: number of the point's earthquake, shape (n,).
         event_names: the earthquakes by that number.
+        motion: number of the point's motion, shape (n,).
         pgv_m_s: peak ground velocity [m/s], shape (n,).
+        pga_g: peak ground acceleration [g], shape (n,).
         p2: frequency parameter p² [1/s²], shape (n,).
         tm_s: mean period [s], NaN where not defined, shape (n,).
+        topples: outcomes of the blocks of :attr:`y0_m_s`, shape (n, 25): 1 topples, 0 safe, NaN
+            not known.
         n_total: number of combinations read.
         n_excluded: found combinations left out because the term is not defined.
         n_outside_model: combinations for which the block model does not apply.
@@ -46,35 +52,52 @@ class FitData:
     found: NDArray[np.bool_]
     event: NDArray[np.intp]
     event_names: tuple[str, ...]
+    motion: NDArray[np.int64]
     pgv_m_s: FloatArray
+    pga_g: FloatArray
     p2: FloatArray
     tm_s: FloatArray
+    topples: FloatArray
     n_total: int
     n_excluded: int
     n_outside_model: int
     guessed_events: int
     fingerprint: str
 
+    @property
+    def y0_m_s(self) -> FloatArray:
+        """Toppling velocities of the blocks whose outcomes are known [m/s], shape (n, 25)."""
+        return self.pgv_m_s[:, None] * GRID_OF_Y0_OVER_PGV
 
-def fit_data(table: CombinationTable, term: Term) -> FitData:
+    @property
+    def has_outcomes(self) -> bool:
+        """Whether any outcome is known."""
+        return bool(np.isfinite(self.topples).any())
+
+
+def fit_data(source: FitSource, term: Term) -> FitData:
     """Select the points of a fit.
 
     Args:
-        table: critical values as the database returns them.
+        source: critical values, spectra and outcomes as the database returns them.
         term: the intensity term.
 
     Raises:
         FitError: the data cannot carry the fit; the message says why and what to do.
     """
+    table = source.table
     n_total = int(table.p2.size)
     if n_total == 0:
         raise FitError(
             "no critical values to fit: add motions with  rbfrag motions add  and run  "
             "rbfrag simulate"
         )
-    x = np.asarray(
-        term.intensity_m_s({name: getattr(table, name) for name in term.inputs}), dtype=np.float64
-    )
+    measures = {
+        name: source.xp_m_s if name == "xp_m_s" else getattr(table, name) for name in term.inputs
+    }
+    x = np.asarray(term.intensity_m_s(measures), dtype=np.float64)
+    for values in measures.values():
+        x = np.where(np.isfinite(values), x, np.nan)
     is_found = table.status == "found"
     is_censored = np.isin(table.status.astype(str), _CENSORED)
     usable = np.isfinite(x)
@@ -82,6 +105,11 @@ def fit_data(table: CombinationTable, term: Term) -> FitData:
         raise FitError(
             f"the term {term.name} needs the mean period Tm, which none of the {n_total} "
             "combinations has: add the motions again with their samples, or fit --term pgv"
+        )
+    if not usable.any() and "xp_m_s" in term.inputs:
+        raise FitError(
+            "the term xp needs the toppling spectrum X(p), which is stored for none of the "
+            f"{n_total} combinations: run  rbfrag simulate  again, which adds it"
         )
     limit = table.search_limit * table.pga_g * STANDARD_GRAVITY_M_S2 / np.sqrt(table.p2)
     y = np.where(is_found, table.y_m_s, limit)
@@ -97,15 +125,20 @@ def fit_data(table: CombinationTable, term: Term) -> FitData:
         found=found,
         event=event.astype(np.intp),
         event_names=tuple(names.tolist()),
+        motion=np.unique(table.motion_id[chosen], return_inverse=True)[1].astype(np.int64),
         pgv_m_s=table.pgv_m_s[chosen],
+        pga_g=table.pga_g[chosen],
         p2=table.p2[chosen],
         tm_s=table.tm_s[chosen],
+        topples=source.topples[chosen],
         n_total=n_total,
         n_excluded=int((is_found & ~usable).sum()),
         n_outside_model=int((table.status == "outside_model").sum()),
         guessed_events=len(set(table.event_id[chosen][table.event_guessed[chosen]].tolist())),
         fingerprint=_fingerprint(
-            table.natural_key[chosen][found], x[chosen][found], y[chosen][found]
+            table.natural_key[chosen] + " " + table.event_id[chosen].astype(str).astype(object),
+            x[chosen],
+            np.where(found, y[chosen], 0.0),
         ),
     )
     _refuse_thin(data, term)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rbfrag.db.rows import CombinationTable
-from rbfrag.fragility.terms import TERMS
+from rbfrag.fragility.terms import SINGLE_TERMS, TERMS
 from rbfrag.fragility.wls import clustered_line
 
 
@@ -57,7 +57,7 @@ def power_law(table: CombinationTable) -> PowerLaw | None:
 
 
 def log_correlations(table: CombinationTable) -> dict[str, float]:
-    """Return the correlation of ln y with ln x for each term, the strongest first.
+    """Return the correlation of ln y with ln x for each single term, the strongest first.
 
     All terms are judged on the same points: those for which every term is defined. A term
     without variation is left out.
@@ -65,9 +65,10 @@ def log_correlations(table: CombinationTable) -> dict[str, float]:
     found = table.status == "found"
     columns = {
         name: np.asarray(
-            term.intensity_m_s({key: getattr(table, key) for key in term.inputs}), dtype=np.float64
+            TERMS[name].intensity_m_s({key: getattr(table, key) for key in TERMS[name].inputs}),
+            dtype=np.float64,
         )
-        for name, term in TERMS.items()
+        for name in SINGLE_TERMS
     }
     with np.errstate(invalid="ignore"):
         used = found & (table.y_m_s > 0.0)

@@ -1,68 +1,66 @@
-"""A fitted fragility model and the formulas that models answer by.
+"""A fitted fragility model, ready to answer.
 
-A method of fitting is one file with its formula and one line in `FORMULAS`. No library is
-loaded here: `predict` needs it.
+No library is loaded here: `predict` needs it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import ModelError
-from rbfrag.fragility import straight_line
-from rbfrag.fragility.functions import Functions, N
+from rbfrag.fragility import formulas
 from rbfrag.fragility.terms import TERMS, Term
 
+_OF_CRITICAL = (
+    "probability that the critical toppling velocity of the motion is at least the block's; "
+    "safe islands below the critical value are not taken off"
+)
+_OF_OUTCOME = "probability that the block topples"
 
-@dataclass(frozen=True)
-class Formula:
-    """How models of one method answer.
-
-    Args:
-        meaning: what the probability is a probability of.
-        score: ``score(parameters, x, y, functions)`` gives z, whose normal distribution
-            function is the probability, and the slopes of z by each parameter.
-        negative_share: ``negative_share(parameters, x, functions)`` gives the probability
-            spent on critical velocities below zero.
-        rise: ``rise(parameters, x, y)`` is negative where the probability falls with
-            growing intensity.
-    """
-
-    meaning: str
-    score: Callable[..., Any]
-    negative_share: Callable[..., Any]
-    rise: Callable[..., Any]
-
-
-FORMULAS: Mapping[str, Formula] = {
-    "wls": Formula(
-        meaning=straight_line.MEANING,
-        score=straight_line.score,
-        negative_share=straight_line.negative_share,
-        rise=straight_line.rise,
-    ),
+MEANINGS: Mapping[str, str] = {
+    "wls": _OF_CRITICAL,
+    "lognormal": _OF_CRITICAL,
+    "logistic": _OF_OUTCOME,
+    "weibull": _OF_OUTCOME,
+    "bounded": _OF_OUTCOME,
+    "record": _OF_OUTCOME,
+    "power": _OF_OUTCOME,
 }
-"""The formula of each method of fitting."""
+"""What the probability of each method is a probability of."""
+
+METHODS_BEST_FIRST = ("record", "power", "bounded", "weibull", "logistic", "lognormal", "wls")
+"""The methods by falling skill on held-out earthquakes (docs/theory/model-choice.md)."""
 
 
 @dataclass(frozen=True)
 class FragilityModel:
-    """One fitted fragility model: a stored row together with its term and formula.
+    """One fitted fragility model: a stored row in the form that answers.
 
     Args:
         row: the model as stored.
         term: the intensity term it reads.
-        formula: how it answers.
-        parameters: values of the coefficients in their fixed order.
+        shape: number of its formula in :mod:`rbfrag.fragility.formulas`.
+        link: number of its link there.
+        parameters: values of the coefficients, without those that the model does not have.
+        padded: the six parameters of the formula.
+        packed_covariance: the 21 numbers of :func:`rbfrag.fragility.formulas.standard_error`.
+        floor: least widths of the interval, or empty.
+        vertical: whether it was fitted with vertical motion.
+        degrees_of_freedom: earthquakes less one, which the interval is widened by; 0 for none.
     """
 
     row: ModelRow
     term: Term
-    formula: Formula
+    shape: int
+    link: int
     parameters: tuple[float, ...]
+    padded: tuple[float, ...]
+    packed_covariance: tuple[float, ...]
+    floor: tuple[float, ...]
+    vertical: bool
+    degrees_of_freedom: int
 
     @classmethod
     def from_row(cls, row: ModelRow) -> FragilityModel:
@@ -72,12 +70,13 @@ class FragilityModel:
             ModelError: this rbfrag does not know the model's term or method, or the row is
                 not whole.
         """
-        term, formula = TERMS.get(row.term), FORMULAS.get(row.method)
-        if term is None or formula is None:
+        term, shape = TERMS.get(row.term), formulas.SHAPES.get((row.method, row.term))
+        if term is None or shape is None:
+            methods = ", ".join(dict.fromkeys(method for method, _ in formulas.SHAPES))
             raise ModelError(
                 f"model {row.name!r} is of term {row.term!r} and method {row.method!r}, which "
                 f"this rbfrag does not know (terms {', '.join(TERMS)}; methods "
-                f"{', '.join(FORMULAS)}): update rbfrag or choose another model"
+                f"{methods}): update rbfrag or choose another model"
             )
         parameters = tuple(float(value) for value in row.coefficients.values())
         size = len(parameters)
@@ -86,33 +85,45 @@ class FragilityModel:
                 f"model {row.name!r} has {size} coefficients but a covariance of another size: "
                 "fit it again"
             )
-        return cls(row, term, formula, parameters)
+        names = formulas.PARAMETERS[shape]
+        if not 2 <= size <= len(names) or tuple(row.coefficients) != names[:size]:
+            raise ModelError(
+                f"model {row.name!r} has the coefficients {', '.join(row.coefficients)}, but "
+                f"method {row.method} on {row.term} has {', '.join(names)}: fit it again"
+            )
+        floor = row.diagnostics.get("interval_floor") or ()
+        if not isinstance(floor, list | tuple) or len(floor) not in (0, formulas.FLOOR_NODES):
+            raise ModelError(f"model {row.name!r} holds a torn table of widths: fit it again")
+        freedom = row.diagnostics.get("degrees_of_freedom")
+        return cls(
+            row=row,
+            term=term,
+            shape=shape,
+            link=formulas.LINKS[row.method],
+            parameters=parameters,
+            padded=parameters + (0.0,) * (formulas.MOST_PARAMETERS - size),
+            packed_covariance=packed(row.covariance),
+            floor=tuple(float(value) for value in floor),
+            vertical=row.diagnostics.get("vertical", "without") != "without",
+            degrees_of_freedom=freedom if isinstance(freedom, int) else 0,
+        )
 
     @property
     def name(self) -> str:
         """Unique name in the database."""
         return self.row.name
 
-    def score(self, x: N, y: N, functions: Functions[N]) -> tuple[N, N]:
-        """Return z and its standard error by the delta method.
-
-        The standard error is sqrt(gᵀ Σ g) with g the slopes of z by the parameters and Σ
-        their covariance.
-
-        Args:
-            x: intensity [m/s].
-            y: toppling velocity of the block [m/s].
-            functions: functions for the kind of number given.
-        """
-        z, slopes = self.formula.score(self.parameters, x, y, functions)
-        return z, functions.sqrt(functions.floor(_form(self.row.covariance, slopes), 0.0))
+    @property
+    def meaning(self) -> str:
+        """What the probability is a probability of."""
+        return MEANINGS[self.row.method]
 
 
-def _form(covariance: Sequence[Sequence[float]], slopes: Sequence[N]) -> N:
-    total = slopes[0] * 0.0
-    for i, line in enumerate(covariance):
-        part = slopes[i] * line[i]
-        for j in range(i):
-            part = part + slopes[j] * (2.0 * line[j])
-        total = total + slopes[i] * part
-    return total
+def packed(covariance: tuple[tuple[float, ...], ...]) -> tuple[float, ...]:
+    """Return a covariance as the 21 numbers of `formulas.standard_error`."""
+    size = len(covariance)
+    return tuple(
+        (float(covariance[i][j]) * (1.0 if i == j else 2.0)) if i < size else 0.0
+        for i in range(formulas.MOST_PARAMETERS)
+        for j in range(i + 1)
+    )

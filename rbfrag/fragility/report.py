@@ -71,7 +71,7 @@ class FitReport:
             "name": self.name,
             "term": self.term,
             "method": self.method,
-            "meaning": self.model.formula.meaning,
+            "meaning": self.model.meaning,
             "coefficients": dict(self.coefficients),
             "standard_errors": dict(self.standard_errors),
             "n": self.n,

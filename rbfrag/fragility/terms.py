@@ -70,6 +70,21 @@ def pga_tm_m_s(pga_g: N, tm_s: N) -> N:
     return pga_g * STANDARD_GRAVITY_M_S2 * tm_s / (2.0 * math.pi)
 
 
+def bounded_pgv_m_s(pgv_m_s: N, pga_g: N) -> N:
+    """Return PGV [m/s]: PGA bounds the blocks that it can topple and does not scale it."""
+    return pgv_m_s
+
+
+def bounded_pgv_tm_m_s(pgv_m_s: N, pga_g: N, tm_s: N) -> N:
+    """Return PGV [m/s]; PGA and Tm enter the model by themselves."""
+    return pgv_m_s
+
+
+def spectrum_m_s(xp_m_s: N, pga_g: N) -> N:
+    """Return the toppling spectrum X(p) [m/s] of the motion at the block's size."""
+    return xp_m_s
+
+
 def pgd_tm_m_s(pgd_m: N, tm_s: N) -> N:
     """Return 2π·PGD/Tm [m/s] from PGD [m] and the mean period [s] (equation 4.31)."""
     return pgd_m * (2.0 * math.pi) / tm_s
@@ -95,9 +110,32 @@ TERMS: Mapping[str, Term] = {
             pgd_tm_m_s,
             2,
         ),
+        Term(
+            "pgv_pga",
+            "peak ground velocity, with PGA",
+            "PGV",
+            ("pgv_m_s", "pga_g"),
+            bounded_pgv_m_s,
+            1,
+        ),
+        Term(
+            "pgv_pga_tm",
+            "peak ground velocity, with PGA and Tm",
+            "PGV",
+            ("pgv_m_s", "pga_g", "tm_s"),
+            bounded_pgv_tm_m_s,
+            1,
+        ),
+        Term("xp", "toppling spectrum", "X(p)", ("xp_m_s", "pga_g"), spectrum_m_s, 1),
     )
 }
-"""The terms by name, the one that predicts best first (physics: PGV, PGA·Tm, PGD/Tm)."""
+"""The terms by name: those of the dissertation, then those that know more of the motion."""
+
+SINGLE_TERMS = ("pgv", "pga_tm", "pgd_tm")
+"""Terms that are one number: what the dissertation compares."""
+
+BEST_FIRST = ("xp", "pgv_pga_tm", "pgv_pga", "pgv", "pga_tm", "pgd_tm")
+"""The terms by falling skill on held-out earthquakes (docs/theory/model-choice.md)."""
 
 
 def intensity_term(name: str) -> Term:
@@ -116,4 +154,4 @@ def intensity_term(name: str) -> Term:
 
 def terms_from(given: Collection[str]) -> tuple[str, ...]:
     """Return the names of the terms that the given measures suffice for, best first."""
-    return tuple(name for name, term in TERMS.items() if set(term.inputs) <= set(given))
+    return tuple(name for name in BEST_FIRST if set(TERMS[name].inputs) <= set(given))

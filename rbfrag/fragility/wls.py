@@ -117,6 +117,14 @@ def clustered_line(
     return np.asarray(result.params), np.asarray(result.cov_params()), float(result.rsquared)
 
 
+def naive_line_errors(x: FloatArray, weights: FloatArray, residuals: FloatArray) -> FloatArray:
+    """Return the standard errors of the line that take all points for independent, shape (2,)."""
+    columns = np.column_stack([np.ones(x.size), x])
+    bread = np.linalg.inv((columns * weights[:, None]).T @ columns)
+    scale = float(weights @ residuals**2) / (x.size - 2)
+    return np.sqrt(np.diag(bread) * scale)
+
+
 def event_bootstrap(
     bins: Bins,
     y: FloatArray,

@@ -3,46 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import FitError
 from rbfrag.fragility import scores
 from rbfrag.fragility.checks import NEGATIVE_SHARE_LIMIT
-from rbfrag.fragility.fit_data import FitData
+from rbfrag.fragility.fit_data import FEW_EVENTS, FitData
 from rbfrag.fragility.functions import array_functions
+from rbfrag.fragility.judgement import Outcomes, outcomes_of, score_intervals, scores_of
+from rbfrag.fragility.method_result import MethodResult
+from rbfrag.fragility.scatter import nested_scatter
 from rbfrag.fragility.straight_line import mean_m_s, negative_share, score, variance_m2_s2
 from rbfrag.fragility.terms import Term
 from rbfrag.fragility.variance import FLOOR_SHARE, Bins
-from rbfrag.fragility.wls import TOLERANCE, LineFit, clustered_line, event_bootstrap, iterate
+from rbfrag.fragility.wls import TOLERANCE, LineFit, clustered_line, event_bootstrap, iterate, naive_line_errors
 
 FloatArray = NDArray[np.float64]
 
 REPLICATES = 400
-FEW_EVENTS = 10
-
-
-@dataclass(frozen=True, eq=False)
-class MethodResult:
-    """What a method of fitting hands back.
-
-    Args:
-        coefficients: value of each parameter by name, in the order of the formula.
-        covariance: covariance of the parameters in that order.
-        standard_errors: standard error of each parameter by name.
-        scores: how well the model predicts, by name.
-        details: everything else the report states, JSON-able.
-        warnings: sentences for people.
-    """
-
-    coefficients: dict[str, float]
-    covariance: tuple[tuple[float, ...], ...]
-    standard_errors: dict[str, float]
-    scores: dict[str, float]
-    details: dict[str, object]
-    warnings: tuple[str, ...]
 
 
 def fit_wls(data: FitData, term: Term, *, seed: int) -> MethodResult:
@@ -77,6 +56,7 @@ def fit_wls(data: FitData, term: Term, *, seed: int) -> MethodResult:
     parameters = tuple(fit.parameters.tolist())
     variance = variance_m2_s2(parameters, x)
     line, clustered, r_squared = clustered_line(x, y, 1.0 / variance, events)
+    naive = naive_line_errors(x, 1.0 / variance, y - mean_m_s(parameters, x))
     samples, unstable = event_bootstrap(
         bins, y, events, term.variance_degree, fit.parameters, replicates=REPLICATES, seed=seed
     )
@@ -84,6 +64,8 @@ def fit_wls(data: FitData, term: Term, *, seed: int) -> MethodResult:
     labels = ["c0", "c1", *(f"v{i}" for i in range(term.variance_degree + 1))]
     spread = dict(zip(labels, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     residuals = y - mean_m_s(parameters, x)
+    seen = outcomes_of(data)
+    in_sample, held_out, density = _judged(data, seen, bins, y, events, names, fit, term)
     return MethodResult(
         coefficients=dict(zip(labels, parameters, strict=True)),
         covariance=tuple(tuple(row) for row in covariance.tolist()),
@@ -92,8 +74,16 @@ def fit_wls(data: FitData, term: Term, *, seed: int) -> MethodResult:
             "c0": math.sqrt(clustered[0, 0]),
             "c1": math.sqrt(clustered[1, 1]),
         },
-        scores=_scores(data, bins, y, events, names, fit, term.variance_degree),
+        scores={
+            "log_density_in_sample": float(_log_density(fit.parameters, bins.x, y).mean()),
+            "log_density_held_out": float(density.mean()),
+            **scores_of(seen, in_sample, held_out),
+        },
         details={
+            "judged_on": seen.kind,
+            "score_intervals": score_intervals(data, seen, held_out, seed=seed),
+            "scatter_ln_y": _scatter(data, parameters),
+            "naive_standard_errors": dict(zip(("c0", "c1"), naive.tolist(), strict=True)),
             "intercept_m_s": float(line[0]),
             "slope": float(line[1]),
             "standard_error_kinds": {
@@ -116,6 +106,7 @@ def fit_wls(data: FitData, term: Term, *, seed: int) -> MethodResult:
             "variance_floor_share": FLOOR_SHARE,
         },
         warnings=tuple(_warnings(data, fit, x, names.size, unstable)),
+        held_out=held_out,
     )
 
 
@@ -128,34 +119,36 @@ def _refuse_without_scatter(x: FloatArray, y: FloatArray) -> None:
         )
 
 
-def _scores(
+def _judged(
     data: FitData,
+    seen: Outcomes,
     bins: Bins,
     y: FloatArray,
     events: NDArray[np.intp],
     names: NDArray[np.intp],
     fit: LineFit,
-    degree: int,
-) -> dict[str, float]:
-    y0, outcome, known = scores.critical_outcomes(data.y, data.found, data.pgv_m_s)
-    inside = _probability(fit.parameters, data.x, y0)
+    term: Term,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    inside = _probability(fit.parameters, data.x, seen.y0_m_s)
     held_out = inside.copy()
     # An earthquake with censored points only has no share in the fit: it is held out already.
     density = np.empty(y.size)
     for number, name in enumerate(names.tolist()):
         left_out = events == number
-        part = iterate(bins, y, (~left_out).astype(np.float64), degree, fit.parameters)
+        rest = (~left_out).astype(np.float64)
+        part = iterate(bins, y, rest, term.variance_degree, fit.parameters)
         judged = data.event == name
-        held_out[judged] = _probability(part.parameters, data.x[judged], y0[judged])
+        held_out[judged] = _probability(part.parameters, data.x[judged], seen.y0_m_s[judged])
         density[left_out] = _log_density(part.parameters, bins.x[left_out], y[left_out])
-    return {
-        "log_density_in_sample": float(_log_density(fit.parameters, bins.x, y).mean()),
-        "log_density_held_out": float(density.mean()),
-        "log_loss_in_sample": scores.log_loss(inside, outcome, known),
-        "log_loss_held_out": scores.log_loss(held_out, outcome, known),
-        "brier_in_sample": scores.brier(inside, outcome, known),
-        "brier_held_out": scores.brier(held_out, outcome, known),
-    }
+    return inside, held_out, density
+
+
+def _scatter(data: FitData, parameters: tuple[float, ...]) -> dict[str, float] | None:
+    mean = mean_m_s(parameters, data.x)
+    used = data.found & (mean > 0.0) & (data.y > 0.0)
+    residual = np.log(data.y[used] / mean[used])
+    scatter = nested_scatter(residual, data.event[used], data.motion[used])
+    return None if scatter is None else vars(scatter)
 
 
 def _probability(parameters: FloatArray, x: FloatArray, y0: FloatArray) -> FloatArray:

@@ -1,0 +1,269 @@
+"""The formulas of all models for one block and one motion: plain arithmetic on single numbers.
+
+Written once: `predict` calls these functions as they stand, and for many rows the same
+functions are compiled (`rbfrag.fragility.compiled_formulas`), so that both give the same bits.
+No library is loaded here.
+
+A model is eta = Σ b_i f_i and P = F(eta); the numbers (1)-(9) are those of
+docs/theory/fragility.md. The slopes of eta by the parameters are the f_i, except for the two
+normal models, whose parameters enter by their scatter too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+LINE = 0
+LOGNORMAL = 1
+RATIO = 2
+ODDS_PGV, ODDS_PGA, ODDS_TM = 3, 4, 5
+BOUNDED_PGV, BOUNDED_PGA, BOUNDED_TM = 6, 7, 8
+RECORD = 9
+POWER = 10
+
+NORMAL, LOGIT, LOGLOG, COMPLEMENT = 0, 1, 2, 3
+
+FREE, NOT_LIFTED, ABOVE_TWICE_PGV, ABOVE_SPECTRUM = 0, 1, 2, 3
+"""Why P is 0 by mechanics: not at all; k_r >= PGA; y >= 2 PGV; y >= X(p)."""
+
+MOST_PARAMETERS = 6
+
+FLOOR_FROM, FLOOR_STEP, FLOOR_NODES = -10.0, 0.5, 41
+"""Nodes of eta at which the least width of an interval, over its quantile, is tabulated."""
+
+SHAPES = {
+    ("wls", "pgv"): LINE,
+    ("wls", "pga_tm"): LINE,
+    ("wls", "pgd_tm"): LINE,
+    ("wls", "xp"): LINE,
+    ("lognormal", "pgv"): LOGNORMAL,
+    ("lognormal", "pga_tm"): LOGNORMAL,
+    ("lognormal", "pgd_tm"): LOGNORMAL,
+    ("lognormal", "xp"): LOGNORMAL,
+    ("logistic", "pgv"): RATIO,
+    ("logistic", "pga_tm"): RATIO,
+    ("logistic", "pgd_tm"): RATIO,
+    ("logistic", "xp"): RATIO,
+    ("weibull", "pgv"): ODDS_PGV,
+    ("weibull", "pgv_pga"): ODDS_PGA,
+    ("weibull", "pgv_pga_tm"): ODDS_TM,
+    ("bounded", "pgv"): BOUNDED_PGV,
+    ("bounded", "pgv_pga"): BOUNDED_PGA,
+    ("bounded", "pgv_pga_tm"): BOUNDED_TM,
+    ("record", "xp"): RECORD,
+    ("power", "xp"): POWER,
+}
+"""The formula of each method and term that go together."""
+
+LINKS = {
+    "wls": NORMAL,
+    "lognormal": NORMAL,
+    "logistic": LOGIT,
+    "weibull": LOGLOG,
+    "bounded": LOGLOG,
+    "record": LOGIT,
+    "power": COMPLEMENT,
+}
+"""How each method turns eta into a probability."""
+
+PARAMETERS = {
+    LINE: ("c0", "c1", "v0", "v1", "v2"),
+    LOGNORMAL: ("ln_median", "slope", "ln_sigma", "m_minus_1"),
+    RATIO: ("b0", "b_ln_x_over_y", "b_ln_p"),
+    ODDS_PGV: ("b0", "b_logit_share"),
+    ODDS_PGA: ("b0", "b_logit_r", "b_ln_z"),
+    ODDS_TM: ("b0", "b_logit_r", "b_ln_z", "b_ln_zt"),
+    BOUNDED_PGV: ("b0", "b_ln_share", "b_ln_1_minus_share"),
+    BOUNDED_PGA: ("b0", "b_ln_r", "b_ln_1_minus_r", "b_ln_1_minus_share", "b_ln_z"),
+    BOUNDED_TM: ("b0", "b_ln_r", "b_ln_1_minus_r", "b_ln_1_minus_share", "b_ln_z", "b_ln_zt"),
+    RECORD: ("b0", "b_ln_xp_over_y", "b_ln_s"),
+    POWER: ("b0", "b_ln_xp_over_y"),
+}
+"""The parameters of each formula, in their order; a model may have fewer from the end."""
+
+_ROOT_HALF = math.sqrt(0.5)
+
+
+def bound(shape: int, y: float, p: float, x: float, pga_g: float) -> int:
+    """Return which bound of mechanics says that the block cannot topple, or FREE.
+
+    Args:
+        shape: one of LINE … POWER.
+        y: toppling velocity of the block [m/s].
+        p: its frequency parameter [1/s].
+        x: intensity [m/s]; X(p) for RECORD and POWER.
+        pga_g: PGA [g], for the shapes that need it.
+    """
+    if shape <= RATIO:
+        return FREE
+    if shape >= RECORD:
+        return ABOVE_SPECTRUM if y >= x else FREE
+    if shape != ODDS_PGV and shape != BOUNDED_PGV and y * p >= pga_g * STANDARD_GRAVITY_M_S2:
+        return NOT_LIFTED
+    if (shape == ODDS_PGV or shape >= BOUNDED_PGV) and y >= 2.0 * x:
+        return ABOVE_TWICE_PGV
+    return FREE
+
+
+def features(
+    shape: int, y: float, p: float, x: float, pga_g: float, tm_s: float
+) -> tuple[float, float, float, float, float, float]:
+    """Return f_0 … f_5 of a linear model, zero beyond its parameters.
+
+    Only where :func:`bound` says FREE. Arguments as there, and Tm [s] for the shapes that
+    need it.
+    """
+    ln_y = math.log(y)
+    if shape == RATIO:  # (4)
+        return 1.0, math.log(x) - ln_y, math.log(p), 0.0, 0.0, 0.0
+    if shape == POWER:  # (9)
+        return 1.0, math.log(x) - ln_y, 0.0, 0.0, 0.0, 0.0
+    ground = pga_g * STANDARD_GRAVITY_M_S2
+    if shape == RECORD:  # (8)
+        return 1.0, math.log(x) - ln_y, math.log(p * x / ground), 0.0, 0.0, 0.0
+    share = y / (2.0 * x)
+    if shape == ODDS_PGV:  # (5)
+        return 1.0, math.log((1.0 - share) / share), 0.0, 0.0, 0.0, 0.0
+    if shape == BOUNDED_PGV:  # (7)
+        return 1.0, -math.log(share), math.log(1.0 - share), 0.0, 0.0, 0.0
+    r = y * p / ground
+    ln_z = math.log(p * x / ground)
+    ln_zt = math.log(p * tm_s / (2.0 * math.pi)) if shape == ODDS_TM or shape == BOUNDED_TM else 0.0
+    if shape <= ODDS_TM:  # (6)
+        return 1.0, math.log((1.0 - r) / r), ln_z, ln_zt, 0.0, 0.0
+    return 1.0, -math.log(r), math.log(1.0 - r), math.log(1.0 - share), ln_z, ln_zt  # (7)
+
+
+def score(
+    shape: int,
+    b: Sequence[float],
+    y: float,
+    p: float,
+    x: float,
+    pga_g: float,
+    tm_s: float,
+) -> tuple[float, float, float, float, float, float, float]:
+    """Return eta and its slopes by the six parameters.
+
+    Args:
+        shape: one of LINE … POWER.
+        b: six parameters, zero beyond those of the model.
+        y: toppling velocity of the block [m/s], > 0.
+        p: its frequency parameter [1/s].
+        x: intensity [m/s], > 0.
+        pga_g: PGA [g], for the shapes that need it.
+        tm_s: Tm [s], for the shapes that need it.
+    """
+    if shape == LINE:  # (1), (2)
+        variance = (b[4] * x + b[3]) * x + b[2]
+        sigma = math.sqrt(variance)
+        eta = (b[1] * x + b[0] - y) / sigma
+        by_v = eta / (variance * -2.0)
+        return eta, 1.0 / sigma, x / sigma, by_v, by_v * x, by_v * x * x, 0.0
+    if shape == LOGNORMAL:  # (3)
+        sigma = math.exp(b[2])
+        ln_x, ln_p = math.log(x), math.log(p)
+        eta = (b[0] + b[1] * ln_x + b[3] * ln_p - math.log(y)) / sigma
+        return eta, 1.0 / sigma, ln_x / sigma, -eta, ln_p / sigma, 0.0, 0.0
+    f0, f1, f2, f3, f4, f5 = features(shape, y, p, x, pga_g, tm_s)
+    eta = b[0] * f0 + b[1] * f1 + b[2] * f2 + b[3] * f3 + b[4] * f4 + b[5] * f5
+    return eta, f0, f1, f2, f3, f4, f5
+
+
+def probability(link: int, eta: float) -> float:
+    """Return P = F(eta): normal, logistic, exp(-exp(-eta)) or 1 - exp(-eta)."""
+    if link == NORMAL:
+        return 0.5 * math.erfc(-eta * _ROOT_HALF)
+    if link == LOGIT:
+        if eta >= 0.0:
+            return 1.0 / (1.0 + math.exp(-eta if eta < 700.0 else -700.0))
+        odds = math.exp(eta if eta > -700.0 else -700.0)
+        return odds / (1.0 + odds)
+    if link == LOGLOG:
+        return math.exp(-math.exp(-eta if eta > -700.0 else 700.0))
+    return -math.expm1(-eta) if eta > 0.0 else 0.0
+
+
+def standard_error(
+    v: Sequence[float], f0: float, f1: float, f2: float, f3: float, f4: float, f5: float
+) -> float:
+    """Return sqrt(fᵀ Σ f).
+
+    Args:
+        v: the 21 elements of Σ on and below the diagonal, row by row, those off it doubled.
+        f0: slope of eta by the first parameter; f1 … f5 those by the others.
+        f1: slope.
+        f2: slope.
+        f3: slope.
+        f4: slope.
+        f5: slope.
+    """
+    total = (
+        f0 * (f0 * v[0])
+        + f1 * (f0 * v[1] + f1 * v[2])
+        + f2 * (f0 * v[3] + f1 * v[4] + f2 * v[5])
+        + f3 * (f0 * v[6] + f1 * v[7] + f2 * v[8] + f3 * v[9])
+        + f4 * (f0 * v[10] + f1 * v[11] + f2 * v[12] + f3 * v[13] + f4 * v[14])
+        + f5 * (f0 * v[15] + f1 * v[16] + f2 * v[17] + f3 * v[18] + f4 * v[19] + f5 * v[20])
+    )
+    return math.sqrt(total) if total > 0.0 else 0.0
+
+
+def least_width(floor: Sequence[float], eta: float) -> float:
+    """Return the least width of the interval over its quantile at eta, linear between nodes."""
+    place = (eta - FLOOR_FROM) / FLOOR_STEP
+    if not place > 0.0:
+        return floor[0]
+    if place >= FLOOR_NODES - 1.0:
+        return floor[FLOOR_NODES - 1]
+    node = int(place)
+    return floor[node] + (place - node) * (floor[node + 1] - floor[node])
+
+
+def answer(
+    shape: int,
+    link: int,
+    b: Sequence[float],
+    v: Sequence[float],
+    floor: Sequence[float],
+    half_width: float,
+    y: float,
+    p: float,
+    x: float,
+    pga_g: float,
+    tm_s: float,
+) -> tuple[float, float, float]:
+    """Return P and the ends of its confidence interval.
+
+    Args:
+        shape: one of LINE … POWER.
+        link: one of NORMAL … COMPLEMENT.
+        b: six parameters.
+        v: their covariance as for :func:`standard_error`.
+        floor: least widths as for :func:`least_width`; empty for none.
+        half_width: quantile of the confidence level.
+        y: toppling velocity of the block [m/s], > 0.
+        p: its frequency parameter [1/s].
+        x: intensity [m/s], > 0.
+        pga_g: PGA [g], for the shapes that need it.
+        tm_s: Tm [s], for the shapes that need it.
+    """
+    if bound(shape, y, p, x, pga_g) != FREE:
+        return 0.0, 0.0, 0.0
+    eta, f0, f1, f2, f3, f4, f5 = score(shape, b, y, p, x, pga_g, tm_s)
+    reach = half_width * standard_error(v, f0, f1, f2, f3, f4, f5)
+    middle = probability(link, eta)
+    low, high = probability(link, eta - reach), probability(link, eta + reach)
+    if len(floor) > 0:
+        lacking = half_width * least_width(floor, eta) - (high - low)
+        if lacking > 0.0:
+            low, high = low - 0.5 * lacking, high + 0.5 * lacking
+            if low < 0.0:
+                low, high = 0.0, high - low
+            elif high > 1.0:
+                low, high = low - (high - 1.0), 1.0
+            low, high = max(low, 0.0), min(high, 1.0)
+    return middle, low, high

@@ -1,0 +1,157 @@
+"""Why knowing less never gives a narrower interval.
+
+The interval of a model says how well its parameters are known. A model of few measures has
+few parameters, so that its interval may come out narrower than that of a model which knows
+more of the motion, though the answer is vaguer. To keep the order, every model carries a
+table: the widest interval that any model which knows more gives, at level 0.95, for a block
+and a motion at which the model itself has that eta. Its own intervals are never narrower.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.fragility import formulas
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.quantiles import student_half_width
+from rbfrag.fragility.source import FitSource
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+FloatArray = NDArray[np.float64]
+
+LEVEL = 0.95
+MARGIN = 1.02
+"""For what lies between the sampled points."""
+
+RICHER = {
+    "pgv": ("pgv_pga", "pgv_pga_tm"),
+    "pga_tm": ("pgv_pga_tm",),
+    "pgd_tm": ("xp",),
+    "pgv_pga": ("pgv_pga_tm",),
+    "pgv_pga_tm": ("xp",),
+    "xp": (),
+}
+"""The terms of the models that know more than one of each term, directly or by their table."""
+
+_BLOCKS = np.geomspace(0.02, 2.0, 60)
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Blocks and motions at which intervals are compared, arrays of shape (n,).
+
+    Args:
+        y: toppling velocities of the blocks [m/s].
+        p: their frequency parameters [1/s].
+        pga_g: PGA [g].
+        tm_s: Tm [s].
+        intensity_m_s: intensity of each term [m/s] by its name.
+    """
+
+    y: FloatArray
+    p: FloatArray
+    pga_g: FloatArray
+    tm_s: FloatArray
+    intensity_m_s: dict[str, FloatArray]
+
+
+def of_motions(source: FitSource) -> Sample:
+    """Return 60 blocks for every fitted motion, polarity and p² that has a spectrum."""
+    table = source.table
+    usable = np.isfinite(source.xp_m_s) & np.isfinite(table.tm_s) & (table.pgv_m_s > 0.0)
+    usable &= source.xp_m_s > 0.0
+
+    def each(column: FloatArray) -> FloatArray:
+        return np.repeat(column[usable], _BLOCKS.size)
+
+    pgv, pga, tm = each(table.pgv_m_s), each(table.pga_g), each(table.tm_s)
+    y = (table.pgv_m_s[usable][:, None] * _BLOCKS).ravel()
+    intensity = _intensities(pgv, pga, tm)
+    intensity["pgd_tm"] = each(table.pgd_m) * 2.0 * math.pi / tm
+    intensity["xp"] = each(source.xp_m_s)
+    return Sample(y, np.sqrt(each(table.p2)), pga, tm, intensity)
+
+
+def of_sizes(source: FitSource, *, seed: int = 0) -> Sample:
+    """Return blocks of any p² in the fitted range for every motion that has a mean period."""
+    table = source.table
+    random = np.random.default_rng(seed)
+    usable = np.isfinite(table.tm_s) & (table.pgv_m_s > 0.0) & (table.pga_g > 0.0)
+    numbers = np.repeat(np.flatnonzero(usable), _BLOCKS.size // 2)
+    ends = 0.5 * np.log([table.p2.min(), table.p2.max()])
+    p = np.exp(random.uniform(ends[0], ends[1], numbers.size))
+    pgv, pga, tm = table.pgv_m_s[numbers], table.pga_g[numbers], table.tm_s[numbers]
+    y = pgv * np.exp(random.uniform(np.log(_BLOCKS[0]), np.log(_BLOCKS[-1]), numbers.size))
+    return Sample(y, p, pga, tm, _intensities(pgv, pga, tm))
+
+
+def _intensities(pgv: FloatArray, pga: FloatArray, tm: FloatArray) -> dict[str, FloatArray]:
+    return {
+        "pgv": pgv,
+        "pgv_pga": pgv,
+        "pgv_pga_tm": pgv,
+        "pga_tm": pga * STANDARD_GRAVITY_M_S2 * tm / (2.0 * math.pi),
+    }
+
+
+def interval_floor(
+    model: FragilityModel, richer: Sequence[FragilityModel], sample: Sample
+) -> list[float]:
+    """Return the least width of the model's interval over its quantile, at each node of eta.
+
+    Args:
+        model: the model that knows less.
+        richer: models that know more, with their own tables.
+        sample: where they are compared.
+    """
+    from rbfrag.fragility.compiled_formulas import answers, etas
+
+    if not richer:
+        return []
+    eta, widest = np.empty(sample.y.size), np.zeros(sample.y.size)
+    etas(
+        model.shape,
+        np.array(model.padded),
+        sample.y,
+        sample.p,
+        sample.intensity_m_s[model.term.name],
+        sample.pga_g,
+        sample.tm_s,
+        eta,
+    )
+    for other in richer:
+        middle, low, high = np.empty((3, sample.y.size))
+        half_width = student_half_width(LEVEL, other.degrees_of_freedom)
+        answers(
+            other.shape,
+            other.link,
+            np.array(other.padded),
+            np.array(other.packed_covariance),
+            np.array(other.floor),
+            half_width,
+            sample.y,
+            sample.p,
+            sample.intensity_m_s[other.term.name],
+            sample.pga_g,
+            sample.tm_s,
+            middle,
+            low,
+            high,
+        )
+        widest = np.fmax(widest, (high - low) / half_width)
+    return _table(eta, widest * MARGIN)
+
+
+def _table(eta: FloatArray, width: FloatArray) -> list[float]:
+    known = np.isfinite(eta)
+    cell = np.floor((eta[known] - formulas.FLOOR_FROM) / formulas.FLOOR_STEP).astype(np.int64)
+    cell = np.clip(cell, -1, formulas.FLOOR_NODES - 1) + 1  # the first and last have no end
+    by_cell = np.zeros(formulas.FLOOR_NODES + 1)
+    np.maximum.at(by_cell, cell, width[known])
+    # A line between nodes is nowhere below a cell whose two ends are not.
+    return [float(width) for width in np.maximum(by_cell[:-1], by_cell[1:])]

@@ -1,0 +1,78 @@
+"""What every fit starts from: critical values, spectra and outcomes of one selection of motions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.db.rows import CombinationTable
+from rbfrag.fragility.scores import GRID_OF_Y0_OVER_PGV
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection
+
+    from rbfrag.db.queries import Vertical
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FitSource:
+    """Combinations with all that the methods of fitting read, columns of equal length.
+
+    Args:
+        table: critical values and intensities.
+        xp_m_s: toppling spectrum at each combination's p² and polarity [m/s], shape (n,); NaN
+            where it is not stored.
+        topples: what becomes of blocks at y0 = PGV times `GRID_OF_Y0_OVER_PGV`, shape (n, 25):
+            1 topples, 0 safe, NaN not known. The grid does not depend on the outcome.
+    """
+
+    table: CombinationTable
+    xp_m_s: FloatArray
+    topples: FloatArray
+
+    @classmethod
+    def of_table(cls, table: CombinationTable) -> FitSource:
+        """Return a source of critical values alone."""
+        n = table.p2.size
+        grid = np.full((n, GRID_OF_Y0_OVER_PGV.size), np.nan)
+        return cls(table, np.full(n, np.nan), grid)
+
+    def only(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> FitSource:
+        """Return some of the combinations."""
+        part = {f.name: getattr(self.table, f.name)[chosen] for f in fields(self.table)}
+        return FitSource(CombinationTable(**part), self.xp_m_s[chosen], self.topples[chosen])
+
+
+def read_source(
+    connection: Connection, *, suite: str | None = None, vertical: Vertical = "without"
+) -> FitSource:
+    """Read critical values, spectra and outcomes from the database.
+
+    Args:
+        connection: the database.
+        suite: only motions of this suite.
+        vertical: ``without`` vertical motion, ``with`` it, or ``both``.
+    """
+    from rbfrag.db.outcome_maps import outcome_maps
+    from rbfrag.db.queries import combination_table
+    from rbfrag.db.spectrum_store import spectrum_values
+
+    table = combination_table(connection, suite=suite, vertical=vertical)
+    spectra = spectrum_values(connection)
+    keys = zip(table.motion_id.tolist(), table.polarity, table.p2.tolist(), strict=True)
+    xp_m_s = np.array([spectra.get(key, np.nan) for key in keys], dtype=np.float64)
+    maps = outcome_maps(connection, table.combination_id)
+    return FitSource(table, xp_m_s, maps.outcomes(kr_over_pga_of_grid(table)))
+
+
+def kr_over_pga_of_grid(table: CombinationTable) -> FloatArray:
+    """Return k_r/PGA of the blocks that outcomes are asked for, shape (n, 25)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        z = np.sqrt(table.p2) * table.pgv_m_s / (table.pga_g * STANDARD_GRAVITY_M_S2)
+    return np.asarray(z[:, None] * GRID_OF_Y0_OVER_PGV)
