@@ -20,15 +20,32 @@ def fit(
         str,
         typer.Option(
             "--term",
-            help="Intensity term [m/s]: pgv; pga_tm = PGA g Tm/(2 pi); pgd_tm = 2 pi PGD/Tm.",
+            help="Intensity term [m/s]: pgv; pga_tm = PGA g Tm/(2 pi); pgd_tm = 2 pi PGD/Tm; "
+            "pgv_pga and pgv_pga_tm: PGV with PGA (and Tm); xp: the toppling spectrum X(p).",
             show_default=False,
         ),
     ],
     method: Annotated[
         str,
-        typer.Option("--method", help="wls: weighted least squares with iterated variance."),
+        typer.Option(
+            "--method",
+            help="Of critical values: wls (weighted least squares, the dissertation's), lognormal "
+            "(with censored motions). Of outcomes: logistic, weibull, bounded; of outcomes on xp: "
+            "record, power.",
+        ),
     ] = "wls",
     suite: options.Suite = None,
+    vertical: Annotated[
+        str,
+        typer.Option("--vertical", help="Combinations without vertical motion, with it, or both."),
+    ] = "without",
+    free_m: Annotated[
+        bool,
+        typer.Option(
+            "--free-m",
+            help="Estimate the exponent M of y = k_r g/p^M instead of M = 1 (lognormal, logistic).",
+        ),
+    ] = False,
     name: Annotated[
         str | None,
         typer.Option("--name", help="Name of the model. Default: method-term.", show_default=False),
@@ -40,7 +57,7 @@ def fit(
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Fit critical toppling velocities y = k_r g/p against an intensity term and store the model.
+    """Fit a fragility model to the stored critical values or outcomes and store it.
 
     The first model of a database becomes its default (rbfrag models default NAME changes it).
     """
@@ -52,7 +69,16 @@ def fit(
 
     # reading takes no lock, so that a campaign may go on meanwhile
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        report = run(connection, term=term, method=method, suite=suite, name=name, seed=seed)
+        report = run(
+            connection,
+            term=term,
+            method=method,
+            suite=suite,
+            vertical=vertical,  # type: ignore[arg-type]
+            name=name,
+            seed=seed,
+            estimate_m=free_m,
+        )
     with opened_database(db) as engine, engine.begin() as connection:
         row = save_model(connection, report.model.row, replace=replace)
     print_report(FitReport.from_model(FragilityModel.from_row(row)), json=json)
@@ -66,22 +92,33 @@ def print_report(report: FitReport, *, json: bool) -> None:
     details: dict[str, Any] = dict(report.details)
     default = ", the default" if report.model.row.is_default else ""
     print(f"model {report.name}: {report.method} on {report.term}{default}")
+    print(f"says: {report.model.meaning}")
+    kinds = details.get("standard_error_kinds") or {}
+    bootstrap = (details.get("bootstrap") or {}).get("standard_errors", {})
+    naive = details.get("naive_standard_errors") or {}
     print_table(
-        ("parameter", "value", "standard error"),
+        ("parameter", "value", "standard error", "by bootstrap", "taken as independent"),
         [
-            (name, value, report.standard_errors.get(name))
+            (name, value, report.standard_errors.get(name), bootstrap.get(name), naive.get(name))
             for name, value in report.coefficients.items()
         ],
     )
+    for kind in dict.fromkeys(kinds.values()):
+        print(f"standard error: {kind}")
+    for name, pair in (details.get("natural") or {}).items():
+        print(f"{name}: {cell(pair[0])} ± {cell(pair[1])}")
     print()
-    print_pairs(
-        {
-            "combinations": details.get("n_total"),
-            "found, fitted": report.n,
-            "below the search limit (left out)": report.n_censored,
-            "earthquakes": report.events,
-        }
-    )
+    counts: dict[str, object] = {
+        "combinations": details.get("n_total"),
+        "critical value found": report.n,
+        "below the search limit": report.n_censored,
+        "outside the model": details.get("n_outside_model"),
+        "earthquakes": report.events,
+    }
+    if "n_outcomes" in details:
+        counts["outcomes fitted (toppled)"] = f"{details['n_outcomes']} ({details['n_toppled']})"
+        counts["outcomes certain by mechanics"] = details["n_bounded"]
+    print_pairs(counts)
     law = details.get("power_law")
     if law:
         print_pairs({f"power law {name}": value for name, value in law.items()})
@@ -89,6 +126,16 @@ def print_report(report: FitReport, *, json: bool) -> None:
     if correlations:
         ranked = ", ".join(f"{name} {cell(value)}" for name, value in correlations.items())
         print(f"correlation of ln y with ln x: {ranked}")
+    scatter = details.get("scatter_ln_y")
+    if scatter:
+        parts = ", ".join(
+            f"{name.replace('_', ' ')} {value:.3f}" for name, value in scatter.items()
+        )
+        print(f"scatter of ln y about the median: {parts}")
+    intervals = details.get("score_intervals") or {}
+    print(f"scores, judged on {details.get('judged_on', 'critical values')}:")
     for name, value in report.scores.items():
-        print(f"{name}: {cell(value)}")
+        around = intervals.get(name)
+        ends = f"  ({cell(around[0])} to {cell(around[1])} by earthquakes)" if around else ""
+        print(f"  {name}: {cell(value)}{ends}")
     print_warnings(report.warnings)

@@ -37,6 +37,7 @@ def plot_fit(
     from rbfrag.db.queries import combination_table
     from rbfrag.fragility.fit_data import fit_data
     from rbfrag.fragility.model import FragilityModel
+    from rbfrag.fragility.source import FitSource
     from rbfrag.plots.fit import plot_fit as draw
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
@@ -45,7 +46,7 @@ def plot_fit(
         table = combination_table(connection, suite=None if suite is None else str(suite))
     draw(table, fitted, out)
     print(out)
-    if fit_data(table, fitted.term).fingerprint != fitted.row.data_fingerprint:
+    if fit_data(FitSource.of_table(table), fitted.term).fingerprint != fitted.row.data_fingerprint:
         print_warnings(
             [
                 f"the data have changed since {fitted.name} was fitted: the points are those of "

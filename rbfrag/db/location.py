@@ -48,3 +48,12 @@ def locate(db: str | PathLike[str] | None) -> Path | str:
             f"--db {text}: give an SQLite database as a path, or as sqlite:///path without options"
         )
     return Path(name)
+
+
+REFERENCE = Path(__file__).parents[1] / "reference" / "reference.db"
+"""The database that is shipped with rbfrag, read-only and without samples, if there is one."""
+
+
+def reference_file() -> Path | None:
+    """Return the shipped reference database, or None where none is shipped."""
+    return REFERENCE if REFERENCE.is_file() else None

@@ -121,7 +121,7 @@ def _log_likelihood(theta: FloatArray, data: CensoredData) -> FloatArray:
 
     u = theta[-1] * data.y - data.columns @ theta[:-1]
     density = np.log(theta[-1]) - 0.5 * u * u - 0.5 * np.log(2.0 * np.pi)
-    return np.where(data.found, density, log_ndtr(u))
+    return np.asarray(np.where(data.found, density, log_ndtr(u)))
 
 
 def _loss(theta: FloatArray, data: CensoredData, w: FloatArray) -> float:

@@ -11,6 +11,8 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic
 
+from rbfrag.fragility import straight_line
+from rbfrag.fragility.formulas import ABOVE_SPECTRUM, ABOVE_TWICE_PGV, LINE, NOT_LIFTED
 from rbfrag.fragility.functions import Functions, N
 from rbfrag.fragility.model import FragilityModel
 
@@ -28,8 +30,10 @@ _WORDS = {
     "pga_g": ("g", "the peak ground acceleration in g, 0 or more"),
     "pgd_m": ("m", "the peak ground displacement in m, 0 or more"),
     "tm_s": ("s", "the mean period in s, above 0"),
+    "xp_m_s": ("m/s", "the toppling spectrum X(p) in m/s, 0 or more"),
     "intensity_m_s": ("m/s", ""),
     "y_m_s": ("m/s", ""),
+    "pgv_over_pga_s": ("s", ""),
 }
 
 # Beyond these no rock block and no earthquake exists, and arithmetic might overflow.
@@ -39,6 +43,13 @@ _SUSPECTS = (
     ("pgv_m_s", 0.0, 5.0, "larger than ever recorded (it is in m/s): did you mean cm/s?"),
     ("pga_g", 0.0, 5.0, "larger than ever recorded (it is in g): did you mean cm/s² or m/s²?"),
     ("pgd_m", 0.0, 20.0, "larger than ever recorded (it is in m): did you mean cm?"),
+    (
+        "pgv_over_pga_s",
+        0.005,
+        2.0,
+        "not that of an earthquake (PGV in m/s over 9.81 times PGA in g lies between 0.005 and 2 "
+        "s): is PGV in m/s and PGA in g?",
+    ),
     ("tm_s", 0.02, 10.0, "not the mean period of an earthquake (it is in s): is it a frequency?"),
     ("kr", 0.0, 5.0, "steeper than 78°: it is the tangent of the critical angle, not degrees"),
 )
@@ -120,31 +131,57 @@ def doubts(
 ) -> Iterator[Finding[N]]:
     """Yield where the model stops making sense, and suspicious values."""
     x, y = values["intensity_m_s"], values["y_m_s"]
-    outside = "outside the range where the straight-line normal model makes sense"
-    share = model.formula.negative_share(model.parameters, x, functions)
-    yield Finding(
-        share > NEGATIVE_SHARE_LIMIT,
-        "intensity_m_s",
-        x,
-        f"is {outside}: there it gives more than {100 * NEGATIVE_SHARE_LIMIT:g} % probability to "
-        "negative critical velocities",
-    )
-    yield Finding(
-        model.formula.rise(model.parameters, x, y) < 0.0,
-        "y_m_s",
-        y,
-        f"is {outside}: there the probability falls with growing intensity",
-    )
+    if model.shape == LINE:
+        outside = "outside the range where the straight-line normal model makes sense"
+        share = straight_line.negative_share(model.parameters, x, functions)
+        yield Finding(
+            share > NEGATIVE_SHARE_LIMIT,
+            "intensity_m_s",
+            x,
+            f"is {outside}: there it gives more than {100 * NEGATIVE_SHARE_LIMIT:g} % probability "
+            "to negative critical velocities",
+        )
+        yield Finding(
+            straight_line.rise(model.parameters, x, y) < 0.0,
+            "y_m_s",
+            y,
+            f"is {outside}: there the probability falls with growing intensity",
+        )
     for name, low, high, text in _SUSPECTS:
         if name in values:
             value = values[name]
             yield Finding((value < low) | (value > high), name, value, f"is {text}")
-    if "pga_g" in values:
-        kr, pga = values["kr"], values["pga_g"]
-        yield Finding(
-            kr >= pga,
-            "kr",
-            kr,
-            "is not below PGA: without vertical motion the ground cannot lift this block at all, "
-            "which the model does not know",
-        )
+
+
+def not_lifted(model: FragilityModel, values: Mapping[str, N]) -> Finding[N] | None:
+    """Return where PGA is known and does not lift the block: P is 0, whatever the model."""
+    if "pga_g" not in values or model.vertical:
+        return None
+    kr = values["kr"]
+    return Finding(
+        kr >= values["pga_g"],
+        "kr",
+        kr,
+        "is not below PGA: without vertical motion the ground cannot lift this block, P = 0 by "
+        "mechanics, not by the model",
+    )
+
+
+BOUNDS = {
+    NOT_LIFTED: (
+        "kr",
+        "is not below PGA: without vertical motion the ground cannot lift this block, P = 0 by "
+        "mechanics, not by the model",
+    ),
+    ABOVE_TWICE_PGV: (
+        "y_m_s",
+        "is not below 2 PGV, which no fresh excursion exceeds: P = 0 by mechanics, not by the "
+        "model",
+    ),
+    ABOVE_SPECTRUM: (
+        "y_m_s",
+        "is not below the toppling spectrum X(p) of the motion, which no fresh excursion exceeds: "
+        "P = 0 by mechanics, not by the model",
+    ),
+}
+"""What is said where :func:`rbfrag.fragility.formulas.bound` says that P is 0."""

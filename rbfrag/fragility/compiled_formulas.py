@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from types import FunctionType
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility import formulas
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.compiled import kernel
 
 FloatArray = NDArray[np.float64]
@@ -22,6 +24,7 @@ _PARTS = (
     "standard_error",
     "least_width",
     "answer",
+    "is_plain",
 )
 
 
@@ -40,6 +43,7 @@ _features = _parts["features"]
 _score = _parts["score"]
 _probability = _parts["probability"]
 _answer = _parts["answer"]
+_is_plain = _parts["is_plain"]
 
 
 @kernel
@@ -143,3 +147,60 @@ def etas(
             out[i] = np.nan
         else:
             out[i] = _score(shape, b, y[i], p[i], x[i], pga_g[i], tm_s[i])[0]
+
+
+@kernel
+def plain_answers(
+    shape: int,
+    link: int,
+    b: FloatArray,
+    v: FloatArray,
+    floor: FloatArray,
+    half_width: float,
+    limits: FloatArray,
+    p2: FloatArray,
+    kr: FloatArray,
+    x: FloatArray,
+    pgv_m_s: FloatArray,
+    pga_g: FloatArray,
+    tm_s: FloatArray,
+    pgd_m: FloatArray,
+    strides: NDArray[np.int64],
+    y: FloatArray,
+    middle: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    plain: NDArray[np.bool_],
+) -> None:
+    """Fill y [m/s], and where there is nothing else to say P and the ends of its interval.
+
+    Arguments as for :func:`rbfrag.fragility.formulas.answer` and `is_plain`. Inputs are arrays of
+    shape (n,) or (1,); `strides` is 1 or 0 for each of the seven, in their order.
+    """
+    for i in range(y.size):
+        size, strength = p2[i * strides[0]], kr[i * strides[1]]
+        intensity, velocity = x[i * strides[2]], pgv_m_s[i * strides[3]]
+        pga, tm, pgd = pga_g[i * strides[4]], tm_s[i * strides[5]], pgd_m[i * strides[6]]
+        p = math.sqrt(size)
+        y[i] = strength * STANDARD_GRAVITY_M_S2 / p
+        plain[i] = _is_plain(
+            shape, b, limits, size, strength, y[i], intensity, velocity, pga, tm, pgd
+        )
+        if plain[i]:
+            middle[i], low[i], high[i] = _answer(
+                shape, link, b, v, floor, half_width, y[i], p, intensity, pga, tm
+            )
+
+
+@kernel
+def bounds(
+    shape: int,
+    y: FloatArray,
+    p: FloatArray,
+    x: FloatArray,
+    pga_g: FloatArray,
+    out: NDArray[np.int64],
+) -> None:
+    """Fill the code of the bound of each row; arguments as for :func:`feature_rows`."""
+    for i in range(y.size):
+        out[i] = _bound(shape, y[i], p[i], x[i], pga_g[i])

@@ -20,6 +20,7 @@ from rbfrag.fragility.lognormal_method import fit_lognormal
 from rbfrag.fragility.method_result import MethodResult
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.outcome_method import fit_outcomes
+from rbfrag.fragility.prediction_values import pgv_over_pga_s
 from rbfrag.fragility.report import FitReport
 from rbfrag.fragility.source import FitSource, read_source
 from rbfrag.fragility.terms import TERMS, Term, intensity_term
@@ -234,7 +235,7 @@ def _domain(data: FitData, method: str, term: Term) -> dict[str, tuple[float, fl
             "intensity_m_s": data.x,
             "y_m_s": data.y0_m_s if of_outcomes else data.y,
             "tm_s": data.tm_s,
-            "pgv_over_pga_s": data.pgv_m_s / data.pga_g,
+            "pgv_over_pga_s": pgv_over_pga_s(data.pgv_m_s, data.pga_g),
         }
     if "pgv_m_s" not in term.inputs or "pga_g" not in term.inputs:
         del columns["pgv_over_pga_s"]

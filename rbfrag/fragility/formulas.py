@@ -31,6 +31,9 @@ FREE, NOT_LIFTED, ABOVE_TWICE_PGV, ABOVE_SPECTRUM = 0, 1, 2, 3
 
 MOST_PARAMETERS = 6
 
+LEAST_Y_M_S = 1e-290
+"""Velocities and accelerations are taken for at least this much, which no logarithm minds."""
+
 FLOOR_FROM, FLOOR_STEP, FLOOR_NODES = -10.0, 0.5, 41
 """Nodes of eta at which the least width of an interval, over its quantile, is tabulated."""
 
@@ -131,7 +134,7 @@ def features(
         return 1.0, -math.log(share), math.log(1.0 - share), 0.0, 0.0, 0.0
     r = y * p / ground
     ln_z = math.log(p * x / ground)
-    ln_zt = math.log(p * tm_s / (2.0 * math.pi)) if shape == ODDS_TM or shape == BOUNDED_TM else 0.0
+    ln_zt = math.log(p * tm_s / (2.0 * math.pi)) if shape in (ODDS_TM, BOUNDED_TM) else 0.0
     if shape <= ODDS_TM:  # (6)
         return 1.0, math.log((1.0 - r) / r), ln_z, ln_zt, 0.0, 0.0
     return 1.0, -math.log(r), math.log(1.0 - r), math.log(1.0 - share), ln_z, ln_zt  # (7)
@@ -267,3 +270,55 @@ def answer(
                 low, high = low - (high - 1.0), 1.0
             low, high = max(low, 0.0), min(high, 1.0)
     return middle, low, high
+
+
+def is_plain(
+    shape: int,
+    b: Sequence[float],
+    limits: Sequence[float],
+    p2: float,
+    kr: float,
+    y: float,
+    x: float,
+    pgv_m_s: float,
+    pga_g: float,
+    tm_s: float,
+    pgd_m: float,
+) -> bool:
+    """Return whether there is nothing to say about an input but its probability.
+
+    False sends it to the checks of :mod:`rbfrag.fragility.checks`, which find the words; it may
+    be false where they find none, never true where they find one.
+
+    Args:
+        shape: one of LINE … POWER.
+        b: six parameters.
+        limits: low and high edges of p², x, y, Tm and PGV/(PGA g).
+        p2: frequency parameter of the block [1/s²].
+        kr: its yield acceleration coefficient.
+        y: its toppling velocity [m/s].
+        x: intensity [m/s].
+        pgv_m_s: PGV [m/s], or 1 where it is not given.
+        pga_g: PGA [g], or 5 where it is not given.
+        tm_s: Tm [s], or 1 where it is not given.
+        pgd_m: PGD [m], or 1 where it is not given.
+    """
+    ground = pga_g * STANDARD_GRAVITY_M_S2
+    if not (
+        limits[0] <= p2 <= limits[1]
+        and limits[2] <= x <= limits[3]
+        and limits[4] <= y <= limits[5]
+        and limits[6] <= tm_s <= limits[7]
+        and 0.0 < kr < pga_g <= 5.0
+        and 0.0 < pgv_m_s <= 5.0
+        and 0.02 <= tm_s <= 10.0
+        and 0.0 < pgd_m <= 20.0
+        and limits[8] * ground <= pgv_m_s <= limits[9] * ground
+    ):
+        return False
+    if shape != LINE:
+        return bound(shape, y, math.sqrt(p2), x, pga_g) == FREE
+    mean = b[1] * x + b[0]
+    variance = (b[4] * x + b[3]) * x + b[2]
+    # 2.5 % below zero is a mean of 1.96 standard deviations; the checks decide near it
+    return mean > 0.0 and mean * mean > 3.9 * variance and y >= b[0]

@@ -130,7 +130,7 @@ def _probability(
         if estimate_m:
             mean = mean + parameters[2] * 0.5 * np.log(data.p2)
         z = (mean[:, None] - np.log(seen.y0_m_s)) / np.exp(parameters[-1])
-    return np.nan_to_num(np.asarray(ndtr(z)), nan=0.0)
+    return np.asarray(np.nan_to_num(np.asarray(ndtr(z)), nan=0.0))
 
 
 def _bootstrap(points: CensoredData, parameters: FloatArray, seed: int) -> FloatArray:

@@ -5,6 +5,7 @@ No library is loaded here: `predict` needs it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -47,8 +48,12 @@ class FragilityModel:
         padded: the six parameters of the formula.
         packed_covariance: the 21 numbers of :func:`rbfrag.fragility.formulas.standard_error`.
         floor: least widths of the interval, or empty.
+        limits: edges of the fitted ranges for :func:`rbfrag.fragility.formulas.is_plain`.
+        limits_with_both: the same where PGV and PGA are both given, with the range of PGV/PGA
+            that earthquakes have.
         vertical: whether it was fitted with vertical motion.
         degrees_of_freedom: earthquakes less one, which the interval is widened by; 0 for none.
+        notes: what every answer says of the model, such as where it comes from.
     """
 
     row: ModelRow
@@ -59,8 +64,11 @@ class FragilityModel:
     padded: tuple[float, ...]
     packed_covariance: tuple[float, ...]
     floor: tuple[float, ...]
+    limits: tuple[float, ...]
+    limits_with_both: tuple[float, ...]
     vertical: bool
     degrees_of_freedom: int
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def from_row(cls, row: ModelRow) -> FragilityModel:
@@ -94,6 +102,11 @@ class FragilityModel:
         floor = row.diagnostics.get("interval_floor") or ()
         if not isinstance(floor, list | tuple) or len(floor) not in (0, formulas.FLOOR_NODES):
             raise ModelError(f"model {row.name!r} holds a torn table of widths: fit it again")
+        limits = tuple(
+            edge
+            for variable in ("p2", "intensity_m_s", "y_m_s", "tm_s", "pgv_over_pga_s")
+            for edge in row.domain.get(variable, (formulas.LEAST_Y_M_S, math.inf))
+        )
         freedom = row.diagnostics.get("degrees_of_freedom")
         return cls(
             row=row,
@@ -104,6 +117,8 @@ class FragilityModel:
             padded=parameters + (0.0,) * (formulas.MOST_PARAMETERS - size),
             packed_covariance=packed(row.covariance),
             floor=tuple(float(value) for value in floor),
+            limits=limits,
+            limits_with_both=(*limits[:8], max(limits[8], 0.005), min(limits[9], 2.0)),
             vertical=row.diagnostics.get("vertical", "without") != "without",
             degrees_of_freedom=freedom if isinstance(freedom, int) else 0,
         )

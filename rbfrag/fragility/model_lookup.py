@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
-from rbfrag.db.location import locate
+from rbfrag.db.location import locate, reference_file
 from rbfrag.db.model_record import unknown_model
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model import METHODS_BEST_FIRST, FragilityModel
 from rbfrag.fragility.terms import TERMS, terms_from
 
 _BLOCK = ("p2", "kr")
+
+LEVELS = {"xp": 3, "pgv_pga_tm": 2, "pgv_pga": 1}
+"""How much a term knows of the motion; the single terms know least, 0."""
+
+FROM_REFERENCE = (
+    "answered by the reference model that is shipped with rbfrag: there is no rbfrag.db here and "
+    "no --db or RBFRAG_DB names another"
+)
+
+_Stamp = tuple[int, ...]
+_stored_before: dict[str, tuple[_Stamp, list[FragilityModel]]] = {}
+_rows_before: dict[int, tuple[ModelRow, FragilityModel]] = {}
+_MOST_ROWS = 64
 
 
 def find_model(
@@ -23,26 +38,90 @@ def find_model(
 ) -> FragilityModel:
     """Return the model that answers for the given measures of the motion.
 
+    The more is known of the motion, the better the model: one on X(p), then PGV with PGA and Tm,
+    then PGV with PGA, then a single term. Among the stored models of the best kind that the
+    measures suffice for, the database's default answers, else the best method.
+
     Args:
-        model: a model, the name of a stored one, or None: the database's default if the
-            given measures suffice for it, else the best that they suffice for.
+        model: a model, the name of a stored one, or None.
         given: names of the measures that are known (``pgv_m_s``, ``pga_g``, …).
-        db: database; None for ``RBFRAG_DB``, or else ``rbfrag.db`` in the current folder.
+        db: database; None for ``RBFRAG_DB``, or else ``rbfrag.db`` in the current folder, or
+            else the reference that is shipped.
 
     Raises:
         InputError: the measures do not suffice.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    measures = [name for name in given if name not in _BLOCK]
-    if model is None:
-        return _suited(db, measures)
-    if isinstance(model, str):
-        model = _named(model, db)
-    chosen = model if isinstance(model, FragilityModel) else FragilityModel.from_row(model)
-    if chosen.term.name not in terms_from(measures):
-        raise InputError(_wanting(chosen, measures))
+    if type(model) is FragilityModel:
+        chosen = model
+    elif model is None:
+        return suited_models(given, db)[0]
+    elif isinstance(model, str):
+        chosen = _named(model, db)
+    else:
+        chosen = _of_row(model)  # type: ignore[arg-type]
+    for name in chosen.term.inputs:
+        if name not in given:
+            raise InputError(_wanting(chosen, _measures(given)))
     return chosen
+
+
+def suited_models(
+    given: Collection[str], db: str | PathLike[str] | None = None
+) -> list[FragilityModel]:
+    """Return one stored model for each term that the measures suffice for, the recommended first.
+
+    Args:
+        given: names of the measures that are known.
+        db: database, as for :func:`find_model`.
+
+    Raises:
+        InputError: the measures do not suffice for any.
+        UnknownModelError: the database holds no model.
+        DatabaseError: the database cannot be read.
+    """
+    possible = terms_from(given)
+    if not possible:
+        wanted = ", or ".join(" and ".join(TERMS[name].inputs) for name in _ASKED)
+        raise InputError(
+            f"{_known(_measures(given))} is given: a prediction needs {wanted}, or a motion"
+        )
+    stored, place = _stored(db)
+    if not stored:
+        raise UnknownModelError(unknown_model(None, [], place))
+    best: dict[str, FragilityModel] = {}
+    for model in stored:
+        name = model.term.name
+        if name in possible and (name not in best or _merit(model) > _merit(best[name])):
+            best[name] = model
+    if not best:
+        have = ", ".join(f"{model.name} ({model.term.name})" for model in stored)
+        raise InputError(
+            f"no stored model works with {_known(_measures(given))}; stored are {have}: give the "
+            "measures that one of them needs, or fit another with  rbfrag fit --term "
+            f"{' or '.join(possible)}"
+        )
+    order = {name: number for number, name in enumerate(possible)}
+    return sorted(
+        best.values(),
+        key=lambda model: (
+            -LEVELS.get(model.term.name, 0),
+            not model.row.is_default,
+            order[model.term.name],
+        ),
+    )
+
+
+_ASKED = ("pgv", "pga_tm", "pgd_tm")
+
+
+def _merit(model: FragilityModel) -> tuple[bool, int]:
+    return model.row.is_default, -METHODS_BEST_FIRST.index(model.row.method)
+
+
+def _measures(given: Collection[str]) -> list[str]:
+    return [name for name in given if name not in _BLOCK]
 
 
 def _known(measures: Collection[str]) -> str:
@@ -57,50 +136,73 @@ def _wanting(model: FragilityModel, measures: Collection[str]) -> str:
     )
 
 
-def _suited(db: str | PathLike[str] | None, measures: Collection[str]) -> FragilityModel:
-    possible = terms_from(measures)
-    if not possible:
-        wanted = ", or ".join(" and ".join(term.inputs) for term in TERMS.values())
-        raise InputError(f"{_known(measures)} is given: a prediction needs {wanted}")
-    rows = _stored(db)
-    if not rows:
-        raise UnknownModelError(unknown_model(None, [], str(locate(db))))
-    for row in rows:
-        if row.is_default and row.term in possible:
-            return FragilityModel.from_row(row)
-    for term in possible:
-        for row in rows:
-            if row.term == term:
-                return FragilityModel.from_row(row)
-    have = ", ".join(f"{row.name} ({row.term})" for row in rows)
-    terms = " or ".join(possible)
-    raise InputError(
-        f"no stored model works with {_known(measures)}; stored are {have}: give the measures "
-        f"that one of them needs, or fit another with  rbfrag fit --term {terms}"
-    )
+def _of_row(row: ModelRow) -> FragilityModel:
+    kept = _rows_before.get(id(row))
+    if kept is not None and kept[0] is row:
+        return kept[1]
+    model = FragilityModel.from_row(row)
+    if len(_rows_before) >= _MOST_ROWS:
+        _rows_before.clear()
+    _rows_before[id(row)] = (row, model)
+    return model
 
 
-def _named(name: str, db: str | PathLike[str] | None) -> ModelRow:
+def _place(db: str | PathLike[str] | None) -> tuple[Path | str, bool]:
+    """Return where the models are, and whether that is the shipped reference."""
     place = locate(db)
+    if db is None and not os.environ.get("RBFRAG_DB") and not Path(place).exists():
+        shipped = reference_file()
+        if shipped is not None:
+            return shipped, True
+    return place, False
+
+
+def _named(name: str, db: str | PathLike[str] | None) -> FragilityModel:
+    stored, place = _stored(db)
+    for model in stored:
+        if model.name == name:
+            return model
+    raise UnknownModelError(unknown_model(name, sorted(m.name for m in stored), place))
+
+
+def _stored(db: str | PathLike[str] | None) -> tuple[list[FragilityModel], str]:
+    place, shipped = _place(db)
     if isinstance(place, Path):
-        from rbfrag.db.model_file import read_model
-
-        return read_model(place, name)
-    from rbfrag.db.engine import opened_database
-    from rbfrag.db.model_store import load_model
-
-    with opened_database(place, read_only=True) as engine, engine.connect() as connection:
-        return load_model(connection, name)
-
-
-def _stored(db: str | PathLike[str] | None) -> list[ModelRow]:
-    place = locate(db)
-    if isinstance(place, Path):
-        from rbfrag.db.model_file import read_models
-
-        return read_models(place)
+        return _stored_in_file(place, shipped), str(place)
     from rbfrag.db.engine import opened_database
     from rbfrag.db.model_store import model_rows
 
     with opened_database(place, read_only=True) as engine, engine.connect() as connection:
-        return model_rows(connection)
+        rows = model_rows(connection)
+        label = str(engine.url)
+    return [_of_row(row) for row in rows], label
+
+
+def _stored_in_file(path: Path, shipped: bool) -> list[FragilityModel]:
+    """Return the models of a file, read again only when the file has changed."""
+    key = os.path.abspath(path)  # noqa: PTH100  (Path takes ten times as long)
+    stamp = _stamp(key)
+    kept = _stored_before.get(key)
+    if kept is not None and stamp and kept[0] == stamp:
+        return kept[1]
+    from rbfrag.db.model_file import read_models
+
+    models = [FragilityModel.from_row(row) for row in read_models(path)]
+    if shipped:
+        models = [replace(model, notes=(FROM_REFERENCE,)) for model in models]
+    if stamp:
+        _stored_before[key] = (stamp, models)
+    return models
+
+
+def _stamp(path: str) -> _Stamp:
+    try:
+        file = os.stat(path)  # noqa: PTH116
+    except OSError:
+        return ()
+    stamp = (file.st_mtime_ns, file.st_size, file.st_ino)
+    try:
+        log = os.stat(path + "-wal")  # noqa: PTH116
+    except OSError:
+        return stamp
+    return (*stamp, log.st_mtime_ns, log.st_size)

@@ -165,7 +165,7 @@ def outcome_rows(data: FitData, shape: int, k: int) -> OutcomeRows:
     positive = (y > 0.0) & (columns[1] > 0.0) & (columns[2] > 0.0)
     y = np.where(positive, y, 1.0)
     columns[1], columns[2] = (np.where(positive, c, 1.0) for c in columns[1:3])
-    feature_rows(shape, y, *columns, features, codes)
+    feature_rows(shape, y, *columns, features, codes)  # type: ignore[call-arg]
     topples = data.topples.ravel()
     known = np.isfinite(topples) & positive
     used = np.flatnonzero(known & (codes == formulas.FREE) & np.isfinite(features).all(axis=1))
@@ -198,7 +198,7 @@ def median_y_m_s(shape: int, parameters: FloatArray, data: FitData) -> FloatArra
         middle = 0.5 * (low + high)
         probabilities(shape, link, b, np.exp(middle), p, data.x, data.pga_g, data.tm_s, out)
         low, high = np.where(out >= 0.5, middle, low), np.where(out >= 0.5, high, middle)
-    return np.exp(0.5 * (low + high))
+    return np.asarray(np.exp(0.5 * (low + high)))
 
 
 _METHOD_SHAPES = {(method, shape) for (method, _), shape in formulas.SHAPES.items()}
@@ -255,7 +255,7 @@ def _held_out(
 
 def _jackknife(left_out: FloatArray, parameters: FloatArray) -> FloatArray:
     g = left_out.shape[0]
-    return np.sqrt((g - 1.0) / g * ((left_out - parameters) ** 2).sum(axis=0))
+    return np.asarray(np.sqrt((g - 1.0) / g * ((left_out - parameters) ** 2).sum(axis=0)))
 
 
 def _bootstrap(data: BinomialData, link: Link, parameters: FloatArray, seed: int) -> FloatArray:
@@ -284,8 +284,8 @@ def _warnings(
         )
     if rows.bounded_toppled:
         result.append(
-            f"{rows.bounded_toppled} of {int(rows.bounded.sum())} blocks that cannot topple without "
-            "vertical motion did: the model gives them P = 0"
+            f"{rows.bounded_toppled} of {int(rows.bounded.sum())} blocks that cannot topple "
+            "without vertical motion did: the model gives them P = 0"
         )
     unknown = ~np.isfinite(data.topples)
     if unknown.any():
@@ -299,5 +299,3 @@ def _warnings(
             "say: a few earthquakes decide this fit"
         )
     return result
-
-

@@ -26,7 +26,9 @@ def student_half_width(level: float, degrees_of_freedom: int) -> float:
         InputError: the level is not between 0 and 1.
     """
     if isinstance(level, bool):
-        raise InputError(f"level = {level!r}: a confidence level lies between 0 and 1, such as 0.95")
+        raise InputError(
+            f"level = {level!r}: a confidence level lies between 0 and 1, such as 0.95"
+        )
     start = normal_half_width(level)
     if degrees_of_freedom < FEWEST_FREEDOMS:
         return start

@@ -70,19 +70,9 @@ def pga_tm_m_s(pga_g: N, tm_s: N) -> N:
     return pga_g * STANDARD_GRAVITY_M_S2 * tm_s / (2.0 * math.pi)
 
 
-def bounded_pgv_m_s(pgv_m_s: N, pga_g: N) -> N:
-    """Return PGV [m/s]: PGA bounds the blocks that it can topple and does not scale it."""
-    return pgv_m_s
-
-
-def bounded_pgv_tm_m_s(pgv_m_s: N, pga_g: N, tm_s: N) -> N:
-    """Return PGV [m/s]; PGA and Tm enter the model by themselves."""
-    return pgv_m_s
-
-
-def spectrum_m_s(xp_m_s: N, pga_g: N) -> N:
-    """Return the toppling spectrum X(p) [m/s] of the motion at the block's size."""
-    return xp_m_s
+def first_m_s(*measures: N) -> N:
+    """Return the first measure [m/s]; the others enter the model by themselves."""
+    return measures[0]
 
 
 def pgd_tm_m_s(pgd_m: N, tm_s: N) -> N:
@@ -115,7 +105,7 @@ TERMS: Mapping[str, Term] = {
             "peak ground velocity, with PGA",
             "PGV",
             ("pgv_m_s", "pga_g"),
-            bounded_pgv_m_s,
+            first_m_s,
             1,
         ),
         Term(
@@ -123,10 +113,10 @@ TERMS: Mapping[str, Term] = {
             "peak ground velocity, with PGA and Tm",
             "PGV",
             ("pgv_m_s", "pga_g", "tm_s"),
-            bounded_pgv_tm_m_s,
+            first_m_s,
             1,
         ),
-        Term("xp", "toppling spectrum", "X(p)", ("xp_m_s", "pga_g"), spectrum_m_s, 1),
+        Term("xp", "toppling spectrum", "X(p)", ("xp_m_s", "pga_g"), first_m_s, 1),
     )
 }
 """The terms by name: those of the dissertation, then those that know more of the motion."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +18,14 @@ from rbfrag.fragility.scatter import nested_scatter
 from rbfrag.fragility.straight_line import mean_m_s, negative_share, score, variance_m2_s2
 from rbfrag.fragility.terms import Term
 from rbfrag.fragility.variance import FLOOR_SHARE, Bins
-from rbfrag.fragility.wls import TOLERANCE, LineFit, clustered_line, event_bootstrap, iterate, naive_line_errors
+from rbfrag.fragility.wls import (
+    TOLERANCE,
+    LineFit,
+    clustered_line,
+    event_bootstrap,
+    iterate,
+    naive_line_errors,
+)
 
 FloatArray = NDArray[np.float64]
 

@@ -15,6 +15,7 @@ def test_terms_of_one_harmonic_motion_agree():
         "pga_g": v * 2 * math.pi / tm / 9.80665,
         "pgd_m": v * tm / (2 * math.pi),
         "tm_s": tm,
+        "xp_m_s": v,
     }
     for term in TERMS.values():
         assert term.intensity_m_s(measures) == pytest.approx(v, rel=1e-14)
@@ -23,7 +24,8 @@ def test_terms_of_one_harmonic_motion_agree():
 @pytest.mark.parametrize("name", TERMS)
 def test_array_and_scalar_have_the_same_bits(name):
     random = np.random.default_rng(3)
-    columns = {key: random.uniform(0.01, 2.0, 200) for key in ("pgv_m_s", "pga_g", "pgd_m", "tm_s")}
+    names = ("pgv_m_s", "pga_g", "pgd_m", "tm_s", "xp_m_s")
+    columns = {key: random.uniform(0.01, 2.0, 200) for key in names}
     together = TERMS[name].intensity_m_s(columns)
     for i in range(200):
         one = TERMS[name].intensity_m_s({key: float(col[i]) for key, col in columns.items()})
@@ -41,6 +43,9 @@ def test_terms_that_measures_suffice_for():
     assert terms_from(["tm_s", "pga_g"]) == ("pga_tm",)
     assert terms_from(["pgv_m_s", "pgd_m", "tm_s"]) == ("pgv", "pgd_tm")
     assert terms_from(["pga_g"]) == ()
+    assert terms_from(["pgv_m_s", "pga_g"]) == ("pgv_pga", "pgv")
+    assert terms_from(["pgv_m_s", "pga_g", "tm_s"]) == ("pgv_pga_tm", "pgv_pga", "pgv", "pga_tm")
+    assert terms_from(["xp_m_s", "pga_g"]) == ("xp",)
 
 
 def test_unknown_term_lists_the_known_ones():

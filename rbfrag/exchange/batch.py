@@ -1,0 +1,285 @@
+"""Predictions for a table of blocks: the table again, with the answers appended."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.exchange.block_table import pyarrow, table_path
+from rbfrag.fragility.answers import PredictionArray
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model_lookup import find_model
+from rbfrag.fragility.prediction import answer_given
+
+FloatArray = NDArray[np.float64]
+
+BLOCK_COLUMNS = {"p2_1_s2": "p2", "kr": "kr"}
+MEASURE_COLUMNS = ("pgv_m_s", "pga_g", "tm_s", "pgd_m")
+ANSWERS = ("probability", "ci_low", "ci_high", "in_domain", "reason")
+"""The columns that are appended; a table that has them gets new ones."""
+
+ROWS = 1 << 18
+"""Rows that are read, answered and written at a time."""
+
+NOT_TOPPLING = "the block's mode is {mode}: the toppling model says nothing about it"
+
+
+def predict_table(
+    source: str | PathLike[str],
+    target: str | PathLike[str],
+    *,
+    measures: Mapping[str, float],
+    model: str | None,
+    level: float,
+    db: str | PathLike[str] | None,
+) -> dict[str, object]:
+    """Answer every block of a table and write the table with the answers.
+
+    A row that cannot be answered keeps an empty probability and says why; a row whose `mode` is
+    not `topple` is not answered.
+
+    Args:
+        source: table, ``.csv`` or ``.parquet``, with columns p2_1_s2, kr and measures.
+        target: table to write, of either kind; written whole or not at all.
+        measures: measures that are the same for all rows.
+        model: name of the model; None for the best for what is given.
+        level: confidence level of the interval.
+        db: database of the model.
+
+    Returns:
+        Counts: rows, answered, without an answer, in_domain; model, term, method; warnings.
+
+    Raises:
+        InputError: a file that cannot be read or written, a missing column, a cell that holds
+            no number; the message names the line.
+    """
+    origin, goal = Path(source), table_path(target)
+    suffix = origin.suffix.lower()
+    if suffix not in (".csv", ".parquet"):
+        raise InputError(f"{origin}: a block table ends in .csv or .parquet, not {suffix!r}")
+    if origin.exists() and goal.exists() and origin.samefile(goal):
+        raise InputError(f"--out {goal} is the table itself: name another file")
+    partial = goal.with_name(f".{goal.name}.{os.getpid()}.part")
+    try:
+        with ExitStack() as stack:
+            header, parts = (_csv_parts if suffix == ".csv" else _parquet_parts)(origin, stack)
+            names = _columns(origin, header, measures)
+            chosen = find_model(model, [*BLOCK_COLUMNS.values(), *names.values(), *measures], db)
+            writer = _csv_writer if goal.suffix.lower() == ".csv" else _parquet_writer
+            write = writer(partial, [name for name in header if name not in ANSWERS], stack)
+            counts = np.zeros(3, dtype=np.int64)
+            for first_line, part in parts:
+                answer = _answer(origin, part, names, first_line, measures, chosen, level)
+                for name in ANSWERS:
+                    part.pop(name, None)
+                write(part, answer)
+                known = np.isfinite(answer["probability"])
+                counts += [known.size, int(known.sum()), int(answer["in_domain"].sum())]
+        partial.replace(goal)
+    except OSError as error:
+        where = error.filename or str(origin)
+        raise InputError(f"{where}: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{origin}: not a text file (UTF-8)") from None
+    except csv.Error as error:
+        raise InputError(f"{origin}: not a CSV file: {error}") from None
+    finally:
+        partial.unlink(missing_ok=True)
+    rows, answered, inside = counts.tolist()
+    return {
+        "rows": rows,
+        "answered": answered,
+        "without_answer": rows - answered,
+        "in_domain": inside,
+        "model": chosen.name,
+        "term": chosen.term.name,
+        "method": chosen.row.method,
+        "warnings": list(chosen.notes),
+    }
+
+
+def _columns(origin: Path, header: list[str], measures: Mapping[str, float]) -> dict[str, str]:
+    """Return what each column of numbers is called in `predict`."""
+    for name in BLOCK_COLUMNS:
+        if name not in header:
+            raise InputError(
+                f"{origin}: there is no column {name}; the columns are "
+                f"{', '.join(header) or 'none'}"
+            )
+    doubled = [name for name in header if header.count(name) > 1]
+    if doubled:
+        raise InputError(f"{origin}: the column {doubled[0]} is there twice")
+    found = {name: name for name in MEASURE_COLUMNS if name in header}
+    for name in found:
+        if name in measures:
+            raise InputError(f"{name} is an option and a column of {origin}: give it once")
+    return {**BLOCK_COLUMNS, **found}
+
+
+def _answer(
+    origin: Path,
+    part: dict[str, Any],
+    names: Mapping[str, str],
+    first_line: int,
+    measures: Mapping[str, float],
+    model: FragilityModel,
+    level: float,
+) -> dict[str, NDArray[Any]]:
+    values = {names[column]: _numbers(origin, column, part[column], first_line) for column in names}
+    predicted = answer_given(model, {**values, **measures}, level)
+    assert isinstance(predicted, PredictionArray)
+    answer: dict[str, NDArray[Any]] = {
+        "probability": predicted.probability,
+        "ci_low": predicted.ci_low,
+        "ci_high": predicted.ci_high,
+        "in_domain": predicted.in_domain,
+        "reason": predicted.reason,
+    }
+    if "mode" in part:
+        modes = np.array(["" if m is None else str(m).strip() for m in part["mode"]], dtype=object)
+        other = ~np.isin(modes.astype(str), ("", "topple"))
+        for name in ("probability", "ci_low", "ci_high"):
+            answer[name][other] = np.nan
+        answer["in_domain"][other] = False
+        for i in np.flatnonzero(other).tolist():
+            answer["reason"][i] = NOT_TOPPLING.format(mode=str(modes[i]).replace("_", " "))
+    return answer
+
+
+def _numbers(origin: Path, column: str, cells: Any, first_line: int) -> FloatArray:
+    if isinstance(cells, np.ndarray):
+        return cells
+    try:
+        return np.array([float(cell) if cell.strip() else np.nan for cell in cells])
+    except ValueError:
+        for number, cell in enumerate(cells):
+            try:
+                float(cell.strip() or "nan")
+            except ValueError:
+                raise InputError(
+                    f"{origin}, line {first_line + number}: {column} = {cell.strip()!r} is not a "
+                    "number"
+                ) from None
+        raise
+
+
+_Parts = Iterator[tuple[int, dict[str, Any]]]
+_Write = Callable[[dict[str, Any], dict[str, NDArray[Any]]], None]
+
+
+def _csv_parts(origin: Path, stack: ExitStack) -> tuple[list[str], _Parts]:
+    file = stack.enter_context(origin.open(newline="", encoding="utf-8-sig"))
+    reader = csv.reader(file)
+    header = [cell.strip() for cell in next(reader, [])]
+
+    def parts() -> _Parts:
+        rows: list[list[str]] = []
+        first = reader.line_num + 1
+        for row in reader:
+            if not row:
+                continue
+            if len(row) != len(header):
+                raise InputError(
+                    f"{origin}, line {reader.line_num}: {len(row)} cells under "
+                    f"{len(header)} columns"
+                )
+            rows.append(row)
+            if len(rows) == ROWS:
+                yield first, dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
+                rows, first = [], reader.line_num + 1
+        if rows:
+            yield first, dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
+
+    return header, parts()
+
+
+def _parquet_parts(origin: Path, stack: ExitStack) -> tuple[list[str], _Parts]:
+    arrow, parquet = pyarrow()
+    numeric = {*BLOCK_COLUMNS, *MEASURE_COLUMNS}
+    try:
+        file = stack.enter_context(parquet.ParquetFile(origin))
+    except arrow.ArrowException as error:
+        raise InputError(f"{origin}: not a Parquet file: {error}") from None
+    header = list(file.schema_arrow.names)
+
+    def parts() -> _Parts:
+        first = 1
+        for group in file.iter_batches(batch_size=ROWS):
+            part: dict[str, Any] = {}
+            for name, column in zip(header, group.columns, strict=True):
+                if name in numeric:
+                    try:
+                        column = column.cast(arrow.float64()).to_numpy(zero_copy_only=False)
+                    except arrow.ArrowException:
+                        raise InputError(f"{origin}: the column {name} holds no numbers") from None
+                    part[name] = np.array(column, dtype=np.float64)
+                elif name == "mode":
+                    part[name] = column.to_pylist()
+                else:
+                    part[name] = column
+            yield first, part
+            first += group.num_rows
+
+    return header, parts()
+
+
+def _csv_writer(partial: Path, header: list[str], stack: ExitStack) -> _Write:
+    file = stack.enter_context(partial.open("w", newline="", encoding="utf-8"))
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow([*header, *ANSWERS])
+
+    def write(part: dict[str, Any], answer: dict[str, NDArray[Any]]) -> None:
+        columns = [_cells(part[name]) for name in header]
+        columns += [_cells(answer[name]) for name in ANSWERS]
+        writer.writerows(zip(*columns, strict=True))
+
+    return write
+
+
+def _cells(column: Any) -> list[Any]:
+    if not isinstance(column, np.ndarray):
+        values: list[Any] = column if isinstance(column, list) else column.to_pylist()
+        return ["" if value is None else value for value in values]
+    if column.dtype.kind == "f":
+        return ["" if value != value else value for value in column.tolist()]
+    if column.dtype.kind == "b":
+        return ["true" if value else "false" for value in column.tolist()]
+    return list(column.tolist())
+
+
+def _parquet_writer(partial: Path, header: list[str], stack: ExitStack) -> _Write:
+    arrow, parquet = pyarrow()
+    open_file: list[Any] = []
+
+    def write(part: dict[str, Any], answer: dict[str, NDArray[Any]]) -> None:
+        numeric = {*BLOCK_COLUMNS, *MEASURE_COLUMNS}
+        columns: dict[str, Any] = {}
+        for name in header:
+            column = part[name]
+            if isinstance(column, list) and name in numeric:
+                column = np.array([float(c) if c.strip() else np.nan for c in column])
+            if isinstance(column, np.ndarray):
+                column = arrow.array(column, mask=np.isnan(column))
+            columns[name] = column
+        for name in ANSWERS:
+            values = answer[name]
+            if name == "reason":
+                columns[name] = arrow.array(values, type=arrow.string())
+            else:
+                missing = np.isnan(values) if values.dtype.kind == "f" else None
+                columns[name] = arrow.array(values, mask=missing)
+        table = arrow.table(columns)
+        if not open_file:
+            open_file.append(stack.enter_context(parquet.ParquetWriter(partial, table.schema)))
+        open_file[0].write_table(table.cast(open_file[0].schema))
+
+    return write
