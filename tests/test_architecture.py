@@ -115,6 +115,7 @@ def test_every_folder_is_a_known_room() -> None:
         ("statsmodels", {"fragility"}),
         ("numba", {"solver"}),
         ("pyarrow", {"exchange"}),
+        ("pyogrio", {"exchange"}),
         ("typer", {"cli"}),
         ("pyslammer", set()),
     ],
@@ -146,7 +147,7 @@ def test_room_packages_import_nothing() -> None:
 def test_every_imported_library_is_declared() -> None:
     with (ROOT / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)["project"]
-    runtime = ("plot", "postgres", "parquet", "dask")
+    runtime = ("plot", "postgres", "parquet", "gis", "dask")
     declared = [*project["dependencies"]]
     for extra in runtime:
         declared += project["optional-dependencies"][extra]

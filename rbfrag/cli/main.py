@@ -18,6 +18,7 @@ from rbfrag.cli import critical, database, demo, fit, models, motions, plot, pre
 from rbfrag.cli import export as export_command
 from rbfrag.cli import hazard as hazard_command
 from rbfrag.cli import rockmass as rockmass_command
+from rbfrag.cli import shakemap as shakemap_command
 from rbfrag.cli import simulate as simulate_command
 from rbfrag.cli import spectrum as spectrum_command
 from rbfrag.errors import RbfragError
@@ -77,6 +78,7 @@ app.command("simulate", epilog=simulate_command.EXAMPLE)(simulate_command.simula
 app.command("fit", epilog=fit.EXAMPLE)(fit.fit)
 app.command("predict", epilog=predict.EXAMPLE)(predict.predict)
 app.command("hazard", epilog=hazard_command.EXAMPLE)(hazard_command.hazard)
+app.command("shakemap", epilog=shakemap_command.EXAMPLE)(shakemap_command.shakemap)
 app.add_typer(export_command.app, name="export")
 app.add_typer(models.app, name="models")
 app.add_typer(plot.app, name="plot")

@@ -16,12 +16,13 @@ from rbfrag.fragility.component import component as component_named
 from rbfrag.fragility.hazard_curve import HazardCurve
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.model_lookup import find_model
+from rbfrag.fragility.normal_steps import normal_steps
 from rbfrag.fragility.prediction import Model, predict
 from rbfrag.fragility.velocity_conversion import velocity_conversion
 
 FloatArray = NDArray[np.float64]
 
-_SCATTER_POINTS = 9
+_SCATTER_POINTS = 17
 _CHUNK = 512
 _NOTABLE = 0.01
 
@@ -126,11 +127,8 @@ def hazard(
             if meaning.name != "single"
             else "the curve is of a single component, as the models are"
         )
-    xi, weight = np.polynomial.hermite_e.hermegauss(_SCATTER_POINTS)
-    if meaning.scatter == 0.0:
-        xi, weight = np.zeros(1), np.ones(1)
+    xi, weight = normal_steps(1 if meaning.scatter == 0.0 else _SCATTER_POINTS)
     shift = factor / meaning.ratio * np.exp(meaning.scatter * xi)
-    weight = weight / weight.sum()
 
     chosen = find_model(model, ("p2", "kr", name, *fixed), db)
     parts = []

@@ -1,0 +1,143 @@
+"""Map of the probability of toppling in one earthquake."""
+
+from __future__ import annotations
+
+import math
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+
+FloatArray = NDArray[np.float64]
+
+LEAST = 1e-3
+"""Smaller probabilities are left white."""
+
+_KM_PER_DEGREE = 111.195
+
+
+def plot_shakemap(
+    lon: FloatArray,
+    lat: FloatArray,
+    probability: FloatArray,
+    path: str | PathLike[str],
+    *,
+    title: str,
+    epicentre: tuple[float, float] | None = None,
+    shape: tuple[int, int] | None = None,
+) -> Path:
+    """Draw probabilities at nodes or blocks on a map with colour bar, epicentre and scale.
+
+    Args:
+        lon: longitudes [deg], shape (n,).
+        lat: latitudes [deg], shape (n,).
+        probability: probabilities, NaN where there is none, shape (n,).
+        path: file to write: .png, .pdf or .svg.
+        title: what is drawn.
+        epicentre: longitude and latitude of the epicentre [deg].
+        shape: rows and columns if the places are the nodes of a whole grid; points otherwise.
+
+    Raises:
+        InputError: nothing to draw, or a path that cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    plot_path(path)
+    if not np.isfinite(probability).any():
+        raise InputError("there is no probability to draw")
+    west, east, south, north = _frame(lon, lat, probability, epicentre)
+    middle = math.cos(math.radians(0.5 * (south + north)))
+    wide = max((east - west) * middle, 1e-3)
+    tall = max(north - south, 1e-3)
+    height = min(max(6.0 * tall / wide, 3.2), 8.0)
+    figure = new_figure(7.2, height + 0.6)
+    from matplotlib import colormaps
+    from matplotlib.colors import LogNorm
+    from matplotlib.ticker import FuncFormatter
+
+    axes = figure.add_subplot()
+    colours = colormaps["YlOrRd"].with_extremes(under="white")
+    norm = LogNorm(LEAST, 1.0)
+    shown = np.where(np.isfinite(probability), np.maximum(probability, 1e-12), np.nan)
+    drawn: ScalarMappable
+    if shape is not None:
+        drawn = axes.pcolormesh(
+            lon.reshape(shape), lat.reshape(shape), np.ma.masked_invalid(shown.reshape(shape)),
+            cmap=colours, norm=norm, shading="nearest", rasterized=True,
+        )  # fmt: skip
+    else:
+        drawn = axes.scatter(
+            lon, lat, c=shown, cmap=colours, norm=norm, s=22, edgecolors="#555555", linewidths=0.4
+        )
+    if epicentre is not None:
+        axes.plot(*epicentre, marker="*", ms=15, mfc="white", mec="black", mew=1.2, ls="none",
+                  label="epicentre")  # fmt: skip
+        inside = west <= epicentre[0] <= east and south <= epicentre[1] <= north
+        if inside:
+            axes.legend(loc="upper right", fontsize=9, framealpha=0.9)
+    axes.set_xlim(west, east)
+    axes.set_ylim(south, north)
+    axes.set_aspect(1.0 / middle)
+    _scale(axes, west, east, south, north, middle)
+    axes.set_xlabel("longitude [°]")
+    axes.set_ylabel("latitude [°]")
+    axes.set_title(title, fontsize=10)
+    bar = figure.colorbar(drawn, ax=axes, extend="min", label="probability of toppling", shrink=0.9)
+    bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    return save_figure(figure, path)
+
+
+def _frame(
+    lon: FloatArray,
+    lat: FloatArray,
+    probability: FloatArray,
+    epicentre: tuple[float, float] | None,
+) -> tuple[float, float, float, float]:
+    """Return west, east, south, north around all that is coloured, within the places given."""
+    shown = probability >= LEAST
+    if not shown.any():
+        shown = np.ones(lon.shape, dtype=bool)
+    x, y = lon[shown], lat[shown]
+    if epicentre is not None:
+        near = lon.min() <= epicentre[0] <= lon.max() and lat.min() <= epicentre[1] <= lat.max()
+        if near:
+            x, y = np.append(x, epicentre[0]), np.append(y, epicentre[1])
+    margin = max(0.2 * float(np.ptp(x)), 0.2 * float(np.ptp(y)), 0.05)
+    room = 0.02 * max(float(np.ptp(lon)), float(np.ptp(lat)), 0.1)
+    return (
+        max(float(x.min()) - margin, float(lon.min()) - room),
+        min(float(x.max()) + margin, float(lon.max()) + room),
+        max(float(y.min()) - margin, float(lat.min()) - room),
+        min(float(y.max()) + margin, float(lat.max()) + room),
+    )
+
+
+def _scale(axes: Axes, west: float, east: float, south: float, north: float, cos: float) -> None:
+    whole = (east - west) * cos * _KM_PER_DEGREE
+    if whole <= 0.0:
+        return
+    target = 0.25 * whole
+    unit = 10.0 ** math.floor(math.log10(target))
+    length = max(step * unit for step in (1.0, 2.0, 5.0) if step * unit <= target)
+    width = length / (_KM_PER_DEGREE * cos)
+    x = west + 0.05 * (east - west)
+    y = south + 0.06 * (north - south)
+    axes.plot([x, x + width], [y, y], color="black", lw=3.0, solid_capstyle="butt", zorder=5)
+    axes.annotate(
+        f"{length:g} km",
+        (x + 0.5 * width, y),
+        xytext=(0, 4),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+        fontsize=9,
+        bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "alpha": 0.7, "lw": 0},
+    )

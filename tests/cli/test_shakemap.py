@@ -1,0 +1,116 @@
+"""`rbfrag shakemap`: a map in, a map out."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rbfrag
+from rbfrag.db.engine import opened_database
+from rbfrag.db.model_store import save_model
+from tests.cli.conftest import Shell
+from tests.exchange.test_shakemap_grid import GRID, UNCERTAINTY
+from tests.fragility.conftest import model_row
+
+SINGLE = ("--component", "single")
+
+
+@pytest.fixture
+def grid(shell: Shell) -> Path:
+    path = Path("grid.xml")
+    path.write_text(GRID.replace(" 10 5", " 60 40"))
+    Path("uncertainty.xml").write_text(UNCERTAINTY)
+    with opened_database("rbfrag.db", create=True) as engine, engine.begin() as connection:
+        save_model(connection, model_row())
+    return path
+
+
+def test_one_block_at_every_node(shell: Shell, grid: Path) -> None:
+    told = shell.json("shakemap", grid, "--p2", "3", "--kr", "0.1", "--out", "a.geojson", *SINGLE)
+    features = json.loads(Path("a.geojson").read_text())["features"]
+    assert len(features) == told["places"] == 6
+    assert features[0]["geometry"]["coordinates"] == [20.0, 41.0]
+    expected = rbfrag.predict(3.0, 0.1, pgv_m_s=0.6, pga_g=0.4).probability
+    assert features[0]["properties"]["probability"] == pytest.approx(expected, rel=1e-12)
+    assert told["largest_probability"] == pytest.approx(expected, rel=1e-12)
+    assert any("uncertainty of PGV is not given" in text for text in told["warnings"])
+
+
+def test_blocks_at_their_places(shell: Shell, grid: Path) -> None:
+    Path("b.csv").write_text("block_id,p2_1_s2,kr,lon,lat\nA,3,0.1,20.0,40.5\nB,3,0.1,30.0,40.5\n")
+    told = shell.json("shakemap", grid, "--blocks", "b.csv", "--out", "a.csv", *SINGLE)
+    with Path("a.csv").open() as file:
+        first, second = csv.DictReader(file)
+    assert first["block_id"] == "A"
+    assert float(first["probability"]) == pytest.approx(told["expected_failures"])
+    assert second["probability"] == ""
+    assert any("1 of 2 blocks lie off the map" in text for text in told["warnings"])
+    points = {
+        "type": "FeatureCollection",
+        "features": [
+            {
+                "type": "Feature",
+                "geometry": {"type": "Point", "coordinates": [20.0, 40.5]},
+                "properties": {"block_id": "A", "p2_1_s2": 3, "kr": 0.1},
+            }
+        ],
+    }
+    Path("b.geojson").write_text(json.dumps(points))
+    same = shell.json("shakemap", grid, "--blocks", "b.geojson", "--out", "a.csv", *SINGLE)
+    assert same["expected_failures"] == told["expected_failures"]
+
+
+def test_a_class_of_blocks_with_uncertainty(shell: Shell, grid: Path) -> None:
+    Path("b.csv").write_text("p2_1_s2,kr,weight\n3,0.1,3\n10,0.2,1\n")
+    shell("shakemap", grid, "--blocks", "b.csv", "--out", "certain.csv", *SINGLE)
+    told = shell.json(
+        "shakemap", grid, "--blocks", "b.csv", "--out", "a.csv", *SINGLE,
+        "--uncertainty", "uncertainty.xml", "--plot", "a.svg",
+    )  # fmt: skip
+    assert told["uncertainty_integrated"]
+    assert "probability of toppling" in Path("a.svg").read_text()
+    certain, mean = (
+        np.genfromtxt(name, delimiter=",", names=True)["probability"]
+        for name in ("certain.csv", "a.csv")
+    )
+    assert (mean[[1, 4]] > certain[[1, 4]]).all()  # weak shaking: what is not known adds failures
+
+
+def test_geopackage(shell: Shell, grid: Path) -> None:
+    raw = pytest.importorskip("pyogrio.raw")
+    shell("shakemap", grid, "--p2", "3", "--kr", "0.1", "--out", "a.gpkg")
+    meta, _, geometry, _ = raw.read("a.gpkg")
+    assert len(geometry) == 6
+    assert "probability" in list(meta["fields"])
+    assert meta["crs"] == "EPSG:4326"
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--p2", "3", "--kr", "0.1", "--out", "a.tif"), "none of .geojson"),
+        (("--p2", "3", "--kr", "0.1", "--out", "a.csv", "--component", "x"), "'x' is not known"),
+        (("--out", "a.csv"), "--p2 is missing"),
+        (("--out", "a.csv", "--blocks", "half.csv"), "lon and lat go together"),
+        (("--out", "a.csv", "--blocks", "bad.csv"), "block 1 has p2_1_s2 = 3 and kr = 0"),
+        (("--out", "a.csv", "--blocks", "far.csv"), "block 1 at lon = 200"),
+        (("--out", "a.csv", "--blocks", "off.csv"), "none of the blocks lies on the map"),
+        (("--out", "a.csv", "--blocks", "bad.geojson"), "features[0]: the geometry is no Point"),
+        (("--p2", "3", "--kr", "0.1", "--out", "a.csv", "--uncertainty", "grid.xml"), "STDPGV"),
+    ],
+)
+def test_refusals(
+    refuses: Callable[..., str], grid: Path, options: tuple[str, ...], words: str
+) -> None:
+    Path("half.csv").write_text("p2_1_s2,kr,lon\n3,0.1,20\n")
+    Path("bad.csv").write_text("p2_1_s2,kr\n3,0\n")
+    Path("far.csv").write_text("p2_1_s2,kr,lon,lat\n3,0.1,200,40\n")
+    Path("off.csv").write_text("p2_1_s2,kr,lon,lat\n3,0.1,100,40\n")
+    Path("bad.geojson").write_text('{"type": "FeatureCollection", "features": [{}]}')
+    assert words in refuses("shakemap", grid, *options)
+    assert not Path("a.csv").exists()
