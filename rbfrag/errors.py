@@ -10,7 +10,8 @@
     │   ├── NotADatabaseError
     │   ├── SchemaVersionError      older or newer than this rbfrag
     │   ├── DatabaseReadOnlyError
-    │   └── DatabaseBusyError       locked by another process
+    │   ├── DatabaseBusyError       locked by another process
+    │   └── MergeConflictError      two databases that contradict each other
     ├── ModelError                                                                (exit 2)
     │   ├── UnknownModelError       no fitted model of that name
     │   └── FitError                the data cannot carry the fit; the reason is in the message
@@ -110,6 +111,10 @@ class DatabaseReadOnlyError(DatabaseError):
 
 class DatabaseBusyError(DatabaseError):
     """Another process holds the database."""
+
+
+class MergeConflictError(DatabaseError):
+    """Two databases that say different things about the same input."""
 
 
 class ModelError(RbfragError):

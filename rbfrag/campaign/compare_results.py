@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
+from rbfrag.db.compare_maps import BORDER_ERROR, Interval, contradictions
 from rbfrag.db.stored_combination import StoredCombination
 from rbfrag.solver.results import CriticalResult, OutcomeIntervals, Response
 
@@ -24,9 +25,8 @@ _VALUES = (
     "n_runs",
 )
 
-# Relative error of a border, and of a rotation: what another processor's last bits can do.
-BORDER_ERROR = 1e-7
 ROTATION_ERROR = 1e-6
+"""Relative error of a rotation that another processor's last bits can make."""
 
 
 def differences(
@@ -85,7 +85,10 @@ def deviations(
                 f"its bracket {values['lower']!r} to {values['upper']!r} does not meet the one "
                 f"computed again, {again.lower!r} to {again.upper!r}"
             )
-    yield from _contradictions(stored.intervals, again.intervals)
+    for low, high, then, now in contradictions(
+        _intervals(stored.intervals), _intervals(again.intervals)
+    ):
+        yield f"its map says {then} from kr/PGA {low!r} to {high!r}, computed again {now}"
     then_at = dict(zip(stored.points.kr_over_pga.tolist(), _ends(stored), strict=True))
     borders = _borders(again)
     for k, run in runs.items():
@@ -134,17 +137,5 @@ def _borders(result: CriticalResult) -> list[float]:
     ]
 
 
-def _contradictions(one: OutcomeIntervals, other: OutcomeIntervals) -> Iterator[str]:
-    """Yield stretches that one map has toppling and the other safe."""
-    for low, high, word in zip(one.k_lo.tolist(), one.k_hi.tolist(), one.outcome, strict=True):
-        for low_2, high_2, word_2 in zip(
-            other.k_lo.tolist(), other.k_hi.tolist(), other.outcome, strict=True
-        ):
-            if {word, word_2} != {"topples", "safe"}:
-                continue
-            shared = min(high, high_2) - max(low, low_2)
-            if shared > BORDER_ERROR * min(high, high_2):
-                yield (
-                    f"its map says {word} from kr/PGA {max(low, low_2)!r} to "
-                    f"{min(high, high_2)!r}, computed again {word_2}"
-                )
+def _intervals(of: OutcomeIntervals) -> list[Interval]:
+    return list(zip(of.k_lo.tolist(), of.k_hi.tolist(), of.outcome, strict=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import asdict
 from typing import Annotated
 
@@ -147,3 +148,36 @@ def export(
     else:
         print_table(("table", "rows"), report.rows.items())
         print(f"written to {report.folder}")
+
+
+@app.command("merge", epilog="Example:  rbfrag db merge theirs.db --db ours.db")
+def merge(
+    other: Annotated[
+        str,
+        typer.Argument(
+            metavar="OTHER",
+            help="Database to read: a path or an SQLAlchemy URL. It is not changed.",
+            show_default=False,
+        ),
+    ],
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Add all that another database holds: motions, suites, results, models.
+
+    Merging twice changes nothing. If the two contradict each other, nothing is written."""
+    from rbfrag.db.merge import merge_databases
+
+    report = merge_databases(other, db=db)
+    if json:
+        print_json(report.as_dict())
+        return
+    for note in report.notes:
+        print(f"note: {note}", file=sys.stderr)
+    tables = sorted(report.added.keys() | report.same.keys())
+    rows = [(name, report.added.get(name, 0), report.same.get(name, 0)) for name in tables]
+    print_table(("table", "added", "already here"), rows)
+    if report.restated:
+        print(f"earthquakes stated instead of guessed: {report.restated} motions")
+    if report.within_error:
+        print(f"equal within the error of the solver, ours kept: {report.within_error}")

@@ -1,0 +1,66 @@
+"""What a merge did, and what stands in its way."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+CONFLICTS_SHOWN = 5
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """One thing that two databases say differently.
+
+    Args:
+        table: where.
+        row: what it is about, in words that mean the same in both databases.
+        column: what differs.
+        here: the value in the database that is merged into.
+        there: the value in the other.
+    """
+
+    table: str
+    row: str
+    column: str
+    here: object
+    there: object
+
+    def __str__(self) -> str:
+        """Return one clause with both values."""
+        return (
+            f"{self.table} {self.row}: {self.column} is {self.here!r} here and {self.there!r} there"
+        )
+
+
+@dataclass
+class Ledger:
+    """Counts, notes and conflicts, gathered while a merge goes on.
+
+    Args:
+        added: rows added by table.
+        same: rows that were there already by table.
+        restated: motions whose guessed earthquake became a stated one.
+        within_error: combinations and histories that differ by no more than the solver's error.
+        notes: sentences about what was kept though the other database says it differently.
+        conflicts: what cannot be merged.
+    """
+
+    added: Counter[str] = field(default_factory=Counter)
+    same: Counter[str] = field(default_factory=Counter)
+    restated: int = 0
+    within_error: int = 0
+    notes: list[str] = field(default_factory=list)
+    conflicts: list[Conflict] = field(default_factory=list)
+
+    def conflict(self, table: str, row: str, column: str, here: object, there: object) -> None:
+        """Note, once, that two values cannot both be kept."""
+        found = Conflict(table, row, column, here, there)
+        if found not in self.conflicts:
+            self.conflicts.append(found)
+
+    def keep(self, table: str, row: str, column: str, here: object, there: object) -> None:
+        """Note, once, that the value here stays, though the other differs."""
+        note = f"kept: {Conflict(table, row, column, here, there)}"
+        if note not in self.notes:
+            self.notes.append(note)
