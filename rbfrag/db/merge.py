@@ -82,7 +82,7 @@ def merge_databases(
         with opened_database(db, create=True) as ours, ours.begin() as target:
             _keep_writers_out(target)
             motions = merge_motions(source, target, ledger)
-            merge_suites(source, target, motions, ledger)
+            merge_suites(source, target, motions.ids, ledger)
             campaigns = merge_campaigns(source, target, ledger)
             merge_spectra(source, target, motions, ledger)
             merge_combinations(source, target, motions, campaigns, ledger)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Any
 
 from sqlalchemy import Connection, RowMapping, Select, delete, exists, func, insert, select, update
@@ -20,17 +21,8 @@ _MEASURED = (
     "final_velocity_m_s",
     "final_displacement_m",
 )
-_LABELS = (
-    "component",
-    "orientation_deg",
-    "is_vertical",
-    "source_file",
-    "trace_index",
-    "file_format",
-    "processing",
-    "flags",
-    "remarks",
-)
+_OWN = ("id", "recording_id", "dt_s", "npts", "samples_sha256", "samples", "added")
+_LABELS = tuple(c.name for c in motion.c if c.name not in (*_OWN, *_MEASURED))
 # Sums over some 1e5 samples, in another order on another processor.
 _ROUNDING = 1e-9
 
@@ -38,37 +30,46 @@ UNKNOWN_EVENT = "unknown event of "
 """How the id of an event begins of which nothing at all is known."""
 
 
-def merge_motions(source: Connection, target: Connection, ledger: Ledger) -> dict[int, int]:
+@dataclass(frozen=True)
+class MergedMotions:
+    """Where the motions of the other database are now.
+
+    Args:
+        ids: the row id here of each motion there.
+        other_bits: of motions made from the same samples of a file by the same filter, whose
+            last bits another machine rounded otherwise: the sha256 of the samples here, by the
+            row id there.
+    """
+
+    ids: dict[int, int] = field(default_factory=dict)
+    other_bits: dict[int, str] = field(default_factory=dict)
+
+
+def merge_motions(source: Connection, target: Connection, ledger: Ledger) -> MergedMotions:
     """Bring motions in; what makes a motion is its samples and their interval.
+
+    The same samples of a file, processed alike, are one motion too (as for `motions add`).
 
     Args:
         source: the other database.
         target: the database that is merged into, inside the caller's transaction.
         ledger: what was done, and conflicts.
-
-    Returns:
-        The row id here of each motion there.
     """
-    ids: dict[int, int] = {}
+    merged = MergedMotions()
+    ids = merged.ids
     left: set[int] = set()
     for theirs in list(source.execute(_motions().order_by(*_key())).mappings()):
-        ours = (
-            target.execute(
-                _motions().where(
-                    motion.c.samples_sha256 == theirs["samples_sha256"],
-                    motion.c.dt_s == theirs["dt_s"],
-                )
-            )
-            .mappings()
-            .one_or_none()
-        )
+        ours = _find(target, theirs)
         if ours is None:
             ids[theirs["id"]] = _add(source, target, theirs, ledger)
             ledger.added["motion"] += 1
             continue
         ids[theirs["id"]] = ours["id"]
+        if ours["samples_sha256"] != theirs["samples_sha256"]:
+            merged.other_bits[theirs["id"]] = ours["samples_sha256"]
         _compare_measures(ours, theirs, ledger)
-        if ours["no_samples"] and not theirs["no_samples"]:
+        same_bits = theirs["id"] not in merged.other_bits
+        if same_bits and ours["no_samples"] and not theirs["no_samples"]:
             filled = update(motion).where(motion.c.id == ours["id"])
             target.execute(filled.values(samples=_samples(source, theirs["id"])))
         if ours["guessed"] and not theirs["guessed"]:
@@ -81,7 +82,7 @@ def merge_motions(source: Connection, target: Connection, ledger: Ledger) -> dic
             ledger.same["motion"] += 1
             _compare_labels(target, ours, theirs, ledger)
     _delete_left(target, left)
-    return ids
+    return merged
 
 
 def merge_suites(
@@ -127,6 +128,19 @@ def _motions() -> Select[Any]:
     ).select_from(motion.join(recording).join(earthquake))
 
 
+def _find(target: Connection, theirs: RowMapping) -> RowMapping | None:
+    query = _motions().where(motion.c.dt_s == theirs["dt_s"])
+    same = query.where(motion.c.samples_sha256 == theirs["samples_sha256"])
+    ours = target.execute(same).mappings().one_or_none()
+    if ours is None and theirs["processing_applied"] is not None:
+        origin = query.where(
+            motion.c.source_sha256 == theirs["source_sha256"],
+            motion.c.processing_applied == theirs["processing_applied"],
+        )
+        ours = target.execute(origin.order_by(motion.c.id)).mappings().first()
+    return ours
+
+
 def _samples(source: Connection, motion_id: int) -> bytes | None:
     return source.scalar(select(motion.c.samples).where(motion.c.id == motion_id))
 
@@ -136,10 +150,8 @@ def _name(row: RowMapping) -> str:
 
 
 def _add(source: Connection, target: Connection, theirs: RowMapping, ledger: Ledger) -> int:
-    values = {
-        name: theirs[name]
-        for name in ("dt_s", "npts", "samples_sha256", "added", *_MEASURED, *_LABELS)
-    }
+    copied = ("dt_s", "npts", "samples_sha256", "added", *_MEASURED, *_LABELS)
+    values = {name: theirs[name] for name in copied}
     values["samples"] = _samples(source, theirs["id"])
     values["recording_id"] = _recording_id(target, theirs, ledger)
     done = target.execute(insert(motion).values(**values))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -13,9 +14,12 @@ from rbfrag.db.campaign_store import combination_ids
 from rbfrag.db.compare_maps import BORDER_ERROR, contradictions
 from rbfrag.db.insert import insert_if_new, insert_rows
 from rbfrag.db.merge_ledger import Ledger
+from rbfrag.db.merge_motions import MergedMotions
+from rbfrag.db.natural_key import combination_key
 from rbfrag.db.schema import (
     campaign,
     combination,
+    motion,
     outcome_interval,
     response,
     simulation,
@@ -32,6 +36,7 @@ ROTATION_ERROR = 1e-6
 """Relative error of a rotation that another processor's last bits can make."""
 
 Point = tuple[float, float | None, str]
+AnyRow = RowMapping | Mapping[str, Any]
 
 
 def merge_campaigns(source: Connection, target: Connection, ledger: Ledger) -> dict[int, int]:
@@ -71,7 +76,7 @@ def merge_campaigns(source: Connection, target: Connection, ledger: Ledger) -> d
 def merge_combinations(
     source: Connection,
     target: Connection,
-    motions: Mapping[int, int],
+    motions: MergedMotions,
     campaigns: Mapping[int, int],
     ledger: Ledger,
 ) -> None:
@@ -80,17 +85,18 @@ def merge_combinations(
     Args:
         source: the other database.
         target: the database that is merged into, inside the caller's transaction.
-        motions: the row id here of each motion there.
+        motions: where the motions are here.
         campaigns: the row id here of each campaign there.
         ledger: what was done, and conflicts.
     """
     last = 0
     while True:
         query = select(combination).where(combination.c.id > last).order_by(combination.c.id)
-        rows = source.execute(query.limit(_AT_ONCE)).mappings().all()
-        if not rows:
+        found = source.execute(query.limit(_AT_ONCE)).mappings().all()
+        if not found:
             return
-        last = rows[-1]["id"]
+        last = found[-1]["id"]
+        rows = [{**row, "natural_key": _key_here(source, row, motions)} for row in found]
         known = combination_ids(target, (row["natural_key"] for row in rows))
         _add(source, target, [row for row in rows if row["natural_key"] not in known],
              motions, campaigns, ledger)  # fmt: skip
@@ -102,8 +108,8 @@ def merge_combinations(
 def _add(
     source: Connection,
     target: Connection,
-    rows: Sequence[RowMapping],
-    motions: Mapping[int, int],
+    rows: Sequence[Mapping[str, Any]],
+    motions: MergedMotions,
     campaigns: Mapping[int, int],
     ledger: Ledger,
 ) -> None:
@@ -114,7 +120,7 @@ def _add(
         own = {
             **row,
             "campaign_id": campaigns[row["campaign_id"]],
-            "motion_id": motions[row["motion_id"]],
+            "motion_id": motions.ids[row["motion_id"]],
             "vertical_motion_id": _vertical(motions, row["vertical_motion_id"]),
         }
         values.append(tuple(own[name] for name in _COLUMNS))
@@ -133,8 +139,31 @@ def _add(
         ledger.added[table.name] += len(children)
 
 
-def _vertical(motions: Mapping[int, int], motion_id: int | None) -> int | None:
-    return None if motion_id is None else motions[motion_id]
+def _vertical(motions: MergedMotions, motion_id: int | None) -> int | None:
+    return None if motion_id is None else motions.ids[motion_id]
+
+
+def _key_here(source: Connection, row: AnyRow, motions: MergedMotions) -> str:
+    """Return the natural key that a combination there has with the samples here."""
+    inputs = (row["motion_id"], row["vertical_motion_id"])
+    if not motions.other_bits.keys() & set(inputs):
+        return str(row["natural_key"])
+    shas = {None: None}
+    query = select(motion.c.id, motion.c.samples_sha256, motion.c.dt_s)
+    rows = source.execute(query.where(motion.c.id.in_([i for i in inputs if i]))).all()
+    shas |= {row.id: motions.other_bits.get(row.id, row.samples_sha256) for row in rows}
+    (dt_s,) = {found.dt_s for found in rows if found.id == row["motion_id"]}
+    return combination_key(
+        motion_sha256=str(shas[row["motion_id"]]),
+        dt_s=dt_s,
+        vertical_sha256=shas[row["vertical_motion_id"]],
+        polarity=row["polarity"],
+        kind=row["kind"],
+        p2=row["p2"],
+        settings=json.loads(row["settings"]),
+        numerics_version=row["numerics_version"],
+        linear=row["linear"],
+    )
 
 
 def _children(
@@ -153,7 +182,7 @@ def _children(
 def _compare(
     source: Connection,
     target: Connection,
-    rows: Sequence[RowMapping],
+    rows: Sequence[Mapping[str, Any]],
     known: Mapping[str, int],
     ledger: Ledger,
 ) -> None:
@@ -183,8 +212,8 @@ def _compare(
 
 def _within_error(
     name: str,
-    ours: RowMapping,
-    theirs: RowMapping,
+    ours: AnyRow,
+    theirs: AnyRow,
     here_map: Sequence[Any],
     there_map: Sequence[Any],
     ledger: Ledger,
@@ -206,15 +235,15 @@ def _within_error(
     return True
 
 
-def _lower(row: RowMapping) -> float:
+def _lower(row: AnyRow) -> float:
     return float(row["kr_over_pga"] if row["lower"] is None else row["lower"])
 
 
-def _upper(row: RowMapping) -> float:
+def _upper(row: AnyRow) -> float:
     return float(row["kr_over_pga"] if row["upper"] is None else row["upper"])
 
 
-def _band(ours: RowMapping, theirs: RowMapping) -> tuple[float, float] | None:
+def _band(ours: AnyRow, theirs: AnyRow) -> tuple[float, float] | None:
     """Return where runs of the other search belong to its bracket, not to ours."""
     if ours["status"] != "found":
         return None
@@ -250,18 +279,18 @@ def _more_points(
 
 
 def merge_spectra(
-    source: Connection, target: Connection, motions: Mapping[int, int], ledger: Ledger
+    source: Connection, target: Connection, motions: MergedMotions, ledger: Ledger
 ) -> None:
     """Bring toppling spectra in.
 
     Args:
         source: the other database.
         target: the database that is merged into, inside the caller's transaction.
-        motions: the row id here of each motion there.
+        motions: where the motions are here.
         ledger: what was done, and conflicts.
     """
     for theirs in source.execute(select(toppling_spectrum)).mappings():
-        values = {**theirs, "motion_id": motions[theirs["motion_id"]]}
+        values = {**theirs, "motion_id": motions.ids[theirs["motion_id"]]}
         if insert_if_new(target, toppling_spectrum, values):
             ledger.added["toppling_spectrum"] += 1
             continue
@@ -274,20 +303,26 @@ def merge_spectra(
 
 
 def merge_responses(
-    source: Connection, target: Connection, motions: Mapping[int, int], ledger: Ledger
+    source: Connection, target: Connection, motions: MergedMotions, ledger: Ledger
 ) -> None:
     """Bring histories in.
 
     Args:
         source: the other database.
         target: the database that is merged into, inside the caller's transaction.
-        motions: the row id here of each motion there.
+        motions: where the motions are here.
         ledger: what was done, and conflicts.
     """
     for their_id in list(source.scalars(select(response.c.id).order_by(response.c.id))):
         theirs = source.execute(select(response).where(response.c.id == their_id)).mappings().one()
+        if motions.other_bits.keys() & {theirs["motion_id"], theirs["vertical_motion_id"]}:
+            ledger.notes.append(
+                f"left out: history {theirs['natural_key'][:12]}… of samples whose last bits "
+                "are other here: rbfrag simulate  makes it again"
+            )
+            continue
         values = {name: value for name, value in theirs.items() if name != "id"}
-        values["motion_id"] = motions[theirs["motion_id"]]
+        values["motion_id"] = motions.ids[theirs["motion_id"]]
         values["vertical_motion_id"] = _vertical(motions, theirs["vertical_motion_id"])
         if insert_if_new(target, response, values):
             ledger.added["response"] += 1

@@ -159,6 +159,8 @@ class TestMaps:
         ({"npts": 63}, "not 8 x 63"),
         ({"flags": "{}"}, "its flags are no JSON list"),
         ({"remarks": "["}, "its remarks cannot be read"),
+        ({"processing_applied": "{"}, "its processing_applied cannot be read"),
+        ({"source_sha256": "0" * 64}, "no processing is said to be applied"),
     ],
 )
 def test_measures_are_calculated_anew(filled: Engine, values: Any, problem: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from rbfrag.errors import (
     InputError,
     MergeConflictError,
 )
+from rbfrag.motions.ground_motion import GroundMotion
 
 QUAKE = EarthquakeInfo("chi-chi-1999", magnitude=7.62, guessed=False)
 
@@ -225,6 +227,33 @@ class TestTogether:
         with theirs.connect() as connection:
             samples = connection.scalars(select(schema.motion.c.samples)).all()
         assert None not in samples
+
+
+def _filtered(motion: GroundMotion, scale: float) -> GroundMotion:
+    """The same samples of a file behind the same filter, rounded by another machine."""
+    return replace(
+        motion,
+        acceleration_g=motion.acceleration_g * scale,
+        source_sha256="5" * 64,
+        processing_applied={"filter": "Butterworth"},
+    )
+
+
+def test_filters_that_round_otherwise_make_no_second_motion(
+    engine: Engine, theirs: Engine, make_motion: Any, make_result: Any, store_result: Any
+) -> None:
+    for place, scale, sizes in ((engine, 1.0, (3.0,)), (theirs, 1.0 + 1e-15, (3.0, 1.0))):
+        motion = _filtered(make_motion(1), scale)
+        with place.begin() as connection:
+            motion_id, _ = add_motion(connection, motion, earthquake=QUAKE, is_vertical=False)
+            campaign = start_campaign(connection, {"p2": list(sizes)})
+            for p2 in sizes:
+                result = make_result(motion.pga_g, p2=p2)
+                store_result(connection, campaign, motion, motion_id, result)
+    report = _merge(theirs, engine)
+    assert report.added == {"campaign": 1, "combination": 1, "simulation": 3}
+    assert report.same["motion"] == 1
+    assert _merge(theirs, engine).added == {}
 
 
 class TestGuesses:
@@ -444,8 +473,6 @@ class TestModels:
     def test_one_name_two_models(
         self, engine: Engine, theirs: Engine, model: ModelRow, tmp_path: Path
     ) -> None:
-        from dataclasses import replace
-
         with engine.begin() as connection:
             save_model(connection, model)
         other = replace(model, data_fingerprint="0" * 64, created="2025-01-01T00:00:00+00:00")
@@ -474,8 +501,6 @@ class TestModels:
     def test_the_time_of_a_fit_makes_no_other_model(
         self, engine: Engine, theirs: Engine, model: ModelRow
     ) -> None:
-        from dataclasses import replace
-
         with engine.begin() as connection:
             save_model(connection, model)
         with theirs.begin() as connection:
