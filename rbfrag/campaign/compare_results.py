@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 from rbfrag.db.compare_maps import BORDER_ERROR, Interval, contradictions
 from rbfrag.db.stored_combination import StoredCombination
-from rbfrag.solver.results import CriticalResult, OutcomeIntervals, Response
+from rbfrag.solver.results import CriticalResult, OutcomeIntervals
 
 _VALUES = (
     "status",
@@ -29,8 +30,23 @@ ROTATION_ERROR = 1e-6
 """Relative error of a rotation that another processor's last bits can make."""
 
 
+@dataclass(frozen=True)
+class SingleRun:
+    """One block run for itself.
+
+    Args:
+        outcome: how it ended.
+        theta_n: peak rotation over the critical angle; None when it toppled.
+        error: estimated bound on its error.
+    """
+
+    outcome: str
+    theta_n: float | None
+    error: float
+
+
 def differences(
-    stored: StoredCombination, again: CriticalResult, runs: Mapping[float, Response]
+    stored: StoredCombination, again: CriticalResult, runs: Mapping[float, SingleRun]
 ) -> Iterator[str]:
     """Yield every value that is not the same bit for bit.
 
@@ -48,7 +64,7 @@ def differences(
         yield "its map of intervals is another when computed again"
     points = stored.points
     then_at = dict(zip(points.kr_over_pga.tolist(), _ends(stored), strict=True))
-    now_at = {k: _end(run.peak_theta_n, run.outcome.value) for k, run in runs.items()}
+    now_at = {k: _end(run.theta_n, run.outcome) for k, run in runs.items()}
     for k, theta, outcome in zip(
         again.points.kr_over_pga.tolist(),
         again.points.theta_n.tolist(),
@@ -64,7 +80,7 @@ def differences(
 
 
 def deviations(
-    stored: StoredCombination, again: CriticalResult, runs: Mapping[float, Response]
+    stored: StoredCombination, again: CriticalResult, runs: Mapping[float, SingleRun]
 ) -> Iterator[str]:
     """Yield what differs by more than the error of the solver.
 
@@ -93,20 +109,18 @@ def deviations(
     borders = _borders(again)
     for k, run in runs.items():
         outcome, theta = then_at[k]
-        if outcome != run.outcome.value:
+        if outcome != run.outcome:
             if not any(math.isclose(k, at, rel_tol=BORDER_ERROR) for at in borders):
-                yield (
-                    f"the simulation at kr/PGA {k!r} is {outcome}, computed again "
-                    f"{run.outcome.value}"
-                )
-        elif theta is not None and run.peak_theta_n is not None:
-            assert run.critical_angle_deg is not None
-            error = run.error_estimate / math.radians(run.critical_angle_deg)
-            if abs(theta - run.peak_theta_n) > error + ROTATION_ERROR * run.peak_theta_n:
-                yield (
-                    f"the simulation at kr/PGA {k!r} reaches {theta!r} of the critical angle, "
-                    f"computed again {run.peak_theta_n!r}"
-                )
+                yield (f"the simulation at kr/PGA {k!r} is {outcome}, computed again {run.outcome}")
+        elif (
+            theta is not None
+            and run.theta_n is not None
+            and abs(theta - run.theta_n) > run.error + ROTATION_ERROR * run.theta_n
+        ):
+            yield (
+                f"the simulation at kr/PGA {k!r} reaches {theta!r} of the critical angle, "
+                f"computed again {run.theta_n!r}"
+            )
 
 
 def _ends(stored: StoredCombination) -> list[tuple[str, float | None]]:

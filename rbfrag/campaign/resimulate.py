@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
-from rbfrag.campaign.compare_results import deviations, differences
+from rbfrag.campaign.compare_results import SingleRun, deviations, differences
+from rbfrag.campaign.grid import run_grid
 from rbfrag.campaign.made_on import made_on
 from rbfrag.db.finding import COMPUTE_AGAIN, Finding
 from rbfrag.db.motion_store import load_motion
@@ -20,8 +22,9 @@ from rbfrag.db.stored_combination import (
 from rbfrag.errors import RbfragError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.critical import critical
+from rbfrag.solver.excitation import excitation
 from rbfrag.solver.respond import respond
-from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, Response
+from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,7 @@ def _finding(stored: StoredCombination, problem: str) -> Finding:
 
 def _compute(
     connection: Connection, stored: StoredCombination
-) -> tuple[CriticalResult, dict[float, Response]]:
+) -> tuple[CriticalResult, dict[float, SingleRun]]:
     values = stored.values
     motion = load_motion(connection, stored.motion_id)
     vertical = None
@@ -118,15 +121,13 @@ def _runs(
     motion: GroundMotion,
     vertical: GroundMotion | None,
     strengths: list[float],
-) -> Iterator[tuple[float, Response]]:
+) -> Iterator[tuple[float, SingleRun]]:
     """Yield the runs that were asked for beside the search, by k_r/PGA."""
-    for k in strengths:
-        response = respond(
-            motion,
-            p2=stored.values["p2"],
-            kr=k * stored.pga_g,
-            vertical=vertical,
-            polarity=stored.values["polarity"],
-            linear=stored.values["linear"],
-        )
-        yield k, response
+    values = stored.values
+    polarity, p2 = values["polarity"], values["p2"]
+    grid = run_grid(excitation(motion, vertical, polarity), p2, strengths)
+    for k, theta_n, outcome in zip(strengths, grid.theta_n.tolist(), grid.outcome, strict=True):
+        kr = k * stored.pga_g
+        alone = respond(motion, p2=p2, kr=kr, vertical=vertical, polarity=polarity)
+        error = alone.error_estimate / math.atan(kr)
+        yield k, SingleRun(outcome, None if math.isnan(theta_n) else theta_n, error)

@@ -213,15 +213,31 @@ def insert_combinations(
     """
     there = known_keys(connection, (record.natural_key for record in records))
     new = {record.natural_key: record for record in records if record.natural_key not in there}
-    rows = [_combination_row(campaign_id, record) for record in new.values()]
+    # In one order: two campaigns on one server then wait for each other, never both at once.
+    rows = [_combination_row(campaign_id, new[key]) for key in sorted(new)]
     insert_rows(connection, combination, _COLUMNS, rows)
     known = known_combinations(connection, new)
+    # What another campaign stored meanwhile stays all its own: two processors may have made
+    # maps that differ in the last bits, and a mixture of both would be none.
+    own = _of_campaign(connection, campaign_id, new)
+    new = {key: record for key, record in new.items() if key in own}
     intervals: list[tuple[object, ...]] = []
     for key, record in new.items():
         intervals += _interval_rows(known[key].id, record.result.intervals)
     insert_rows(connection, outcome_interval, _INTERVAL_COLUMNS, intervals)
     _insert_points(connection, known, {key: record.result.points for key, record in new.items()})
     return len(new)
+
+
+def _of_campaign(connection: Connection, campaign_id: int, keys: Iterable[str]) -> set[str]:
+    query = select(combination.c.natural_key).where(
+        combination.c.natural_key.in_(bindparam("keys", expanding=True)),
+        combination.c.campaign_id == campaign_id,
+    )
+    found: set[str] = set()
+    for some in _portions(keys):
+        found.update(connection.scalars(query, {"keys": some}))
+    return found
 
 
 def insert_points(connection: Connection, points: Mapping[str, SearchPoints]) -> None:

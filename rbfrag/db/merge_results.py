@@ -10,7 +10,7 @@ from typing import Any
 
 from sqlalchemy import Connection, RowMapping, Table, insert, select, update
 
-from rbfrag.db.campaign_store import combination_ids
+from rbfrag.db.campaign_store import known_combinations
 from rbfrag.db.compare_maps import BORDER_ERROR, contradictions
 from rbfrag.db.insert import insert_if_new, insert_rows
 from rbfrag.db.merge_ledger import Ledger
@@ -97,12 +97,13 @@ def merge_combinations(
             return
         last = found[-1]["id"]
         rows = [{**row, "natural_key": _key_here(source, row, motions)} for row in found]
-        known = combination_ids(target, (row["natural_key"] for row in rows))
+        known = known_combinations(target, (row["natural_key"] for row in rows))
         _add(source, target, [row for row in rows if row["natural_key"] not in known],
              motions, campaigns, ledger)  # fmt: skip
         shared = [row for row in rows if row["natural_key"] in known]
         if shared:
-            _compare(source, target, shared, known, ledger)
+            ids = {key: stored.id for key, stored in known.items()}
+            _compare(source, target, shared, ids, ledger)
 
 
 def _add(
@@ -126,8 +127,8 @@ def _add(
         values.append(tuple(own[name] for name in _COLUMNS))
     insert_rows(target, combination, _COLUMNS, values)
     ledger.added["combination"] += len(rows)
-    ids = combination_ids(target, (row["natural_key"] for row in rows))
-    here = {row["id"]: ids[row["natural_key"]] for row in rows}
+    ids = known_combinations(target, (row["natural_key"] for row in rows))
+    here = {row["id"]: ids[row["natural_key"]].id for row in rows}
     for table in (outcome_interval, simulation):
         names = tuple(column.name for column in table.c)
         children = [

@@ -24,7 +24,7 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """The content of a database after a small campaign."""
     folder = tmp_path_factory.mktemp("campaign")
     add_motions([write_suite(folder / "records", 2)], db=folder / "a.db")
-    simulate(folder / "a.db", p2=(10.0, 1.0), jobs=1)
+    simulate(folder / "a.db", p2=(10.0, 1.0), jobs=1, grid=7)
     return (folder / "a.db").read_bytes()
 
 

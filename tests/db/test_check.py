@@ -12,6 +12,7 @@ from sqlalchemy import Engine, delete, func, insert, select, update
 from rbfrag.db import schema
 from rbfrag.db.check import check_database
 from rbfrag.db.engine import opened_database
+from rbfrag.db.natural_key import response_key
 
 # The map of the first found combination of `filled`, whose critical kr/PGA is 0.1.
 MAP = (
@@ -198,27 +199,28 @@ def test_numbers_must_be_finite(filled: Engine, value: float) -> None:
     assert len(wrong) == 6
 
 
-def test_a_history_has_the_length_it_states(filled: Engine) -> None:
+def test_a_history_has_the_key_and_the_length_it_states(filled: Engine) -> None:
+    motion, response = schema.motion, schema.response
+    block = {
+        "polarity": "forward", "kind": "toppling", "linear": False, "p2": 3.0, "kr": 0.1,
+        "numerics_version": "2",
+    }  # fmt: skip
     with filled.begin() as connection:
-        motion_id = connection.scalar(select(func.min(schema.motion.c.id)))
+        row = connection.execute(select(motion).order_by(motion.c.id)).first()
+        assert row is not None
+        key = response_key(
+            motion_sha256=row.samples_sha256, dt_s=row.dt_s, vertical_sha256=None, **block
+        )
         series = dict.fromkeys(("time_s", "theta_rad", "theta_dot_rad_s", "k_h", "k_v"), b"0" * 16)
-        values = {
-            "natural_key": "0" * 64,
-            "motion_id": motion_id,
-            "polarity": "forward",
-            "kind": "toppling",
-            "linear": False,
-            "p2": 3.0,
-            "kr": 0.1,
-            "numerics_version": "2",
-            "outcome": "stable",
-            "npts": 2,
-        }
-        connection.execute(insert(schema.response).values(**values, **series))
+        values = {"natural_key": key, "motion_id": row.id, "outcome": "stable", "npts": 2}
+        connection.execute(insert(response).values(**values, **block, **series))
         assert check_database(connection) == []
-        connection.execute(update(schema.response).values(theta_rad=b"0" * 8))
+        connection.execute(update(response).values(theta_rad=b"0" * 8))
         (finding,) = check_database(connection)
-    assert finding.problem == "theta_rad holds 8 bytes, not 8 x 2"
+        assert finding.problem == "theta_rad holds 8 bytes, not 8 x 2"
+        connection.execute(update(response).values(theta_rad=b"0" * 16, kr=0.2))
+        (finding,) = check_database(connection)
+        assert finding.problem == "its natural key is not the hash of its inputs"
 
 
 def test_numerics_of_the_campaign_agree(filled: Engine) -> None:

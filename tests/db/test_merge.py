@@ -21,6 +21,7 @@ from rbfrag.db.engine import open_database, opened_database
 from rbfrag.db.merge import MergeReport, merge_databases
 from rbfrag.db.model_store import load_model, model_rows, save_model
 from rbfrag.db.motion_store import add_motion
+from rbfrag.db.natural_key import response_key
 from rbfrag.db.queries import database_info
 from rbfrag.db.rows import EarthquakeInfo, ModelRow
 from rbfrag.errors import (
@@ -176,7 +177,8 @@ class TestTogether:
                     schema.combination.c.status == "found"
                 )
             )
-            block = {"motion_id": motion_id, "polarity": "forward", "p2": 3.0}
+            block_of_key: dict[str, Any] = {"polarity": "forward", "p2": 3.0}
+            block = {"motion_id": motion_id, **block_of_key}
             x = {**block, "numerics_version": "2", "x_m_s": 0.3}
             connection.execute(insert(schema.toppling_spectrum).values(**x))
             for low, high, outcome in ((0.01, 0.1, "topples"), (0.1, 1.0, "safe")):
@@ -184,10 +186,15 @@ class TestTogether:
                 connection.execute(
                     insert(schema.outcome_interval).values(combination_id=combination_id, **row)
                 )
+            sha = select(schema.motion.c.samples_sha256).where(schema.motion.c.id == motion_id)
+            key = response_key(
+                motion_sha256=str(connection.scalar(sha)), dt_s=0.01, kind="toppling", kr=0.1,
+                vertical_sha256=connection.scalar(sha), numerics_version="2", **block_of_key,
+            )  # fmt: skip
             arrays = ("time_s", "theta_rad", "theta_dot_rad_s", "k_h", "k_v")
             connection.execute(
                 insert(schema.response).values(
-                    natural_key="e" * 64, kind="toppling", linear=False, kr=0.1, npts=1,
+                    natural_key=key, kind="toppling", linear=False, kr=0.1, npts=1,
                     numerics_version="2", outcome="stable", peak_theta_n=0.5,
                     vertical_motion_id=motion_id, **block,
                     **dict.fromkeys(arrays, b"\x00" * 8),
