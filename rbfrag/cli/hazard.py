@@ -37,6 +37,16 @@ def hazard(
             show_default=False,
         ),
     ] = None,
+    rockmass: Annotated[
+        str | None,
+        typer.Option(
+            "--rockmass",
+            metavar="FILE",
+            help="Rock mass file (.toml, .csv): the rate of a block drawn from its stable toppling "
+            "blocks.",
+            show_default=False,
+        ),
+    ] = None,
     imt: Annotated[
         str | None,
         typer.Option("--imt", help="Intensity measure of the curve: PGV, PGA, 'SA(1.0)'."),
@@ -96,20 +106,20 @@ def hazard(
         from rbfrag.plots.canvas import plot_path
 
         plot_path(plot)
-    table, remarks = _blocks(p2, kr, block, blocks)
+    table, remarks = _blocks(p2, kr, block, blocks, rockmass)
     curves = suited_curves(
         read_hazard_curves(curve, imt=imt, site=site),
         with_mean_period=tm is not None,
         converted_period_s=None if convert is None else velocity_conversion(convert).period_s,
     )
-    if plot is not None and (len(curves) > 1 or len(table["kr"]) > 1):
+    if plot is not None and (len(curves) > 1 or len(table["block_id"]) > 1):
         raise InputError(
             "--plot draws one block at one site: choose them with --site, --p2 and --kr"
         )
     found = [
         answer(
             one, table["p2_1_s2"], table["kr"], tm_s=tm, convert=convert, component=component,
-            years=years, model=model, level=level, db=db,
+            years=years, model=model, level=level, db=db, one_class=rockmass is not None,
         )
         for one in curves
     ]  # fmt: skip
@@ -162,8 +172,26 @@ def hazard(
 
 
 def _blocks(
-    p2: float | None, kr: float | None, block: str | None, blocks: str | None
+    p2: float | None,
+    kr: float | None,
+    block: str | None,
+    blocks: str | None,
+    rockmass: str | None,
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
+    if rockmass is not None:
+        if blocks is not None or p2 is not None or kr is not None or block is not None:
+            raise InputError("--rockmass goes without --p2, --kr, --block and --blocks")
+        from rbfrag.fragility.rockmass_file import read_rock_mass
+        from rbfrag.fragility.rockmass_table import toppling_blocks
+
+        p2s, krs, share = toppling_blocks(read_rock_mass(rockmass).realise(None, None))
+        if krs.size == 0:
+            raise InputError(f"{rockmass}: no block of it topples: the rate has no model")
+        remark = (
+            f"the rate is that of a block drawn from {krs.size} stable toppling blocks, "
+            f"{100.0 * share:.3g} % of the rock mass; the others have no part in it"
+        )
+        return {"block_id": ["rock mass"], "p2_1_s2": p2s, "kr": krs}, (remark,)
     if blocks is None:
         p2, kr, remarks = toppling_block(p2, kr, block)
         return {"block_id": [None], "p2_1_s2": [p2], "kr": [kr]}, remarks

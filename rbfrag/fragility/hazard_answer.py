@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -79,6 +81,7 @@ def hazard(
     model: Model | None = None,
     level: float = 0.95,
     db: str | PathLike[str] | None = None,
+    one_class: bool = False,
 ) -> HazardAnswer:
     """Return how often per year blocks topple under a seismic hazard curve.
 
@@ -100,6 +103,8 @@ def hazard(
         model: as in :func:`rbfrag.predict`.
         level: confidence level of the interval.
         db: as in :func:`rbfrag.predict`.
+        one_class: the blocks stand for one class, and the answer is the rate of a block drawn
+            from it: one rate, by the mean of their fragilities.
 
     Raises:
         InputError: the curve's measure does not suffice, or a value that cannot be used.
@@ -132,7 +137,7 @@ def hazard(
 
     chosen = find_model(model, ("p2", "kr", name, *fixed), db)
     parts = []
-    for start in range(0, p2s.size, _CHUNK):
+    for start in range(0, 0 if one_class else p2s.size, _CHUNK):
         some = slice(start, start + _CHUNK)
 
         def bands(levels: FloatArray, some: slice = some) -> FloatArray:
@@ -144,6 +149,9 @@ def hazard(
             return averaged
 
         parts.append((p2s[some].size, failure_rate(curve, bands)))
+    if one_class:
+        mean = _mean_bands(curve, p2s, krs, name, shift, fixed, chosen, level)
+        parts.append((1, failure_rate(curve, lambda levels: mean(levels) @ weight)))
     rates = [_split(part.annual_rate, m) for m, part in parts]
     rate, low, high = (np.concatenate([r[i] for r in rates]) for i in range(3))
     contribution = np.concatenate([part.contribution[:m] for m, part in parts])
@@ -154,7 +162,10 @@ def hazard(
     edges = parts[0][1].edges
     shaking = {name: factor / meaning.ratio * np.sqrt(edges[None, 1:] * edges[None, :-1]), **fixed}
     known = _predicted(p2s[:, None], krs[:, None], shaking, chosen, level).in_domain
-    _extrapolated(rate, np.where(known, 0.0, contribution).sum(axis=1), warnings)
+    unknown = 1.0 - known
+    if one_class:
+        unknown = unknown.mean(axis=0, keepdims=True)
+    _extrapolated(rate, (unknown * contribution).sum(axis=1), warnings)
     return HazardAnswer(
         annual_rate=rate,
         ci_low=low,
@@ -212,6 +223,45 @@ def _measure(
         "conversion is not in the answer"
     )
     return "pgv_m_s", used.factor, {}
+
+
+def _mean_bands(
+    curve: HazardCurve,
+    p2: FloatArray,
+    kr: FloatArray,
+    name: str,
+    shift: FloatArray,
+    fixed: dict[str, float],
+    model: FragilityModel,
+    level: float,
+) -> Callable[[FloatArray], FloatArray]:
+    """Return a function for P and its two ends, (3, levels, shifts), meaned over the blocks.
+
+    The means are tabled on steps of 1 % and interpolated by monotone cubics: a mean over blocks
+    is smooth, and thousands of blocks at every node of the integral would take minutes.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    end = curve.levels[-1] if curve.end_level is None else curve.end_level
+    low, high = math.log(curve.levels[0] * shift.min()), math.log(end * shift.max())
+    u = np.linspace(low, high, max(64, math.ceil((high - low) / 0.01)))
+    total = np.zeros((3, u.size))
+    for start in range(0, p2.size, _CHUNK):
+        some = slice(start, start + _CHUNK)
+        shaking = {name: np.exp(u)[None, :], **fixed}
+        found = _predicted(p2[some, None], kr[some, None], shaking, model, level)
+        for row, values in zip(
+            total, (found.probability, found.ci_low, found.ci_high), strict=True
+        ):
+            row += values.sum(axis=0)
+    total[total < 1e-100] = 0.0  # the cubics divide by differences
+    smooth = PchipInterpolator(u, total / p2.size, axis=1)
+
+    def bands(levels: FloatArray) -> FloatArray:
+        x = np.clip(np.log(levels[:, None] * shift), low, high)
+        return np.asarray(smooth(x), dtype=np.float64)
+
+    return bands
 
 
 def _predicted(

@@ -62,6 +62,31 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     assert answers[1]["block_id"] == "B2"
 
 
+def test_a_rock_mass_is_one_class(shell: Shell, curve: Path) -> None:
+    Path("mass.toml").write_text(
+        "realisations = 300\nseed = 2\n[base]\ndip_deg = 5.0\n"
+        'spacing_m = { distribution = "uniform", low = 1.0, high = 2.0 }\n'
+        "[back]\ndip_deg = 85.0\nspacing_m = 0.4\n[friction]\nphi_deg = 40.0\n"
+    )
+    found = shell.json("hazard", curve, "--rockmass", "mass.toml", "--component", "rotd50",
+                       "--out", "rates.csv")  # fmt: skip
+    shell("rockmass", "mass.toml", "--out", "blocks.csv")
+    with Path("blocks.csv").open() as file:
+        rows = [r for r in csv.DictReader(file) if r["mode"] == "topple" and float(r["kr"]) > 0]
+    with Path("each.csv").open("w") as file:
+        writer = csv.writer(file)
+        writer.writerow(["block_id", "p2_1_s2", "kr"])
+        writer.writerows([r["block_id"], r["p2_1_s2"], r["kr"]] for r in rows)
+    each = shell.json("hazard", curve, "--blocks", "each.csv", "--component", "rotd50")["answers"]
+    # the mean of the rates is the rate of the mean fragility
+    for key in ("annual_rate", "ci_low", "ci_high"):
+        mean = np.mean([answer[key] for answer in each])
+        assert found[key] == pytest.approx(mean, rel=1e-4)
+    with Path("rates.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    assert (row["block_id"], row["kr"]) == ("rock mass", "")
+
+
 def test_plot(shell: Shell, curve: Path) -> None:
     shell("hazard", curve, "--p2", "3", "--kr", "0.1", "--plot", "rate.svg")
     assert "share of the rate" in Path("rate.svg").read_text()
