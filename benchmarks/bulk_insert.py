@@ -1,0 +1,155 @@
+"""Writing results beside plain sqlite3:  python -m benchmarks.bulk_insert DATABASE
+
+The combinations of a finished campaign are written again into empty copies: by rbfrag as a campaign
+writes them, one transaction a motion, and by `sqlite3.executemany` of the very same tuples, once
+with the same transactions and once in a single one. In turns, processor time, least of three.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import sys
+import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from pathlib import Path
+
+from sqlalchemy import select
+
+from rbfrag.db import schema
+from rbfrag.db.campaign_store import CombinationRecord, insert_combinations
+from rbfrag.db.engine import opened_database
+from rbfrag.db.sqlite_file import connect_sqlite
+from rbfrag.db.stored_combination import stored_combination
+from rbfrag.solver.results import CriticalResult
+
+TABLES = ("combination", "outcome_interval", "simulation")
+ROUNDS = 3
+
+Rows = dict[str, list[tuple[object, ...]]]
+
+
+def main() -> None:
+    print(measure(Path(sys.argv[1])))
+
+
+def measure(finished: Path) -> dict[str, float]:
+    """Return rows, seconds of processor time of each way, and their ratios."""
+    records, rows = read(finished)
+    with tempfile.TemporaryDirectory() as folder:
+        empty = Path(folder) / "empty.db"
+        make_empty(finished, empty)
+        ways: dict[str, Callable[[Path], None]] = {
+            "rbfrag": lambda place: by_rbfrag(place, records),
+            "plain": lambda place: by_sqlite3(place, rows, list(rows)),
+            "plain, one transaction": lambda place: by_sqlite3(place, rows, None),
+        }
+        best = {name: (float("inf"), float("inf")) for name in ways}
+        for number in range(ROUNDS):
+            for name, way in ways.items():
+                place = Path(folder) / f"{number}.db"
+                place.write_bytes(empty.read_bytes())
+                used, passed = time.process_time(), time.perf_counter()
+                way(place)
+                taken = time.process_time() - used, time.perf_counter() - passed
+                best[name] = min(best[name], taken)
+                check(place, rows)
+                place.unlink()
+    count = sum(len(some) for by_table in rows.values() for some in by_table.values())
+    return {
+        "rows": count,
+        "transactions": len(rows),
+        **{f"{name}, processor [s]": taken[0] for name, taken in best.items()},
+        **{f"{name}, wall [s]": taken[1] for name, taken in best.items()},
+        "ratio": best["rbfrag"][0] / best["plain"][0],
+        "ratio to one transaction": best["rbfrag"][0] / best["plain, one transaction"][0],
+    }
+
+
+def read(finished: Path) -> tuple[dict[int, list[CombinationRecord]], dict[int, Rows]]:
+    """Return what a campaign stored, by motion: as the solver gave it, and as rows."""
+    records: dict[int, list[CombinationRecord]] = defaultdict(list)
+    motion_of: dict[int, int] = {}
+    with opened_database(finished, read_only=True) as engine, engine.connect() as connection:
+        for key in connection.scalars(select(schema.combination.c.natural_key)).all():
+            stored = stored_combination(connection, key)
+            motion_of[stored.id] = stored.motion_id
+            values = stored.values
+            given = {
+                name: values[name] for name in CriticalResult.__dataclass_fields__ if name in values
+            }
+            result = CriticalResult(
+                **{
+                    **given,
+                    "pga_g": stored.pga_g,
+                    "warnings": tuple(stored.warnings),
+                    "points": stored.points,
+                    "intervals": stored.intervals,
+                }
+            )
+            records[stored.motion_id].append(
+                CombinationRecord(
+                    natural_key=key,
+                    motion_id=stored.motion_id,
+                    vertical_motion_id=stored.vertical_motion_id,
+                    result=result,
+                    settings=stored.settings,
+                    numerics_version=values["numerics_version"],
+                )
+            )
+    rows: dict[int, Rows] = {motion: {table: [] for table in TABLES} for motion in records}
+    raw = sqlite3.connect(finished)
+    for table in TABLES:
+        for row in raw.execute(f"SELECT * FROM {table}"):
+            rows[motion_of[row[0]]][table].append(row)
+    raw.close()
+    return records, rows
+
+
+def make_empty(finished: Path, empty: Path) -> None:
+    """Copy a database without its results."""
+    raw = sqlite3.connect(finished)
+    raw.execute("VACUUM INTO ?", (str(empty),))
+    raw.close()
+    raw = sqlite3.connect(empty, isolation_level=None)
+    for table in ("simulation", "outcome_interval", "combination"):
+        raw.execute(f"DELETE FROM {table}")
+    raw.execute("VACUUM")
+    raw.execute("PRAGMA journal_mode = WAL")
+    raw.close()
+
+
+def by_rbfrag(place: Path, records: dict[int, list[CombinationRecord]]) -> None:
+    with opened_database(place) as engine:
+        for some in records.values():
+            with engine.begin() as connection:
+                insert_combinations(connection, 1, some)
+
+
+def by_sqlite3(place: Path, rows: dict[int, Rows], motions: list[int] | None) -> None:
+    raw = connect_sqlite(place, read_only=False)
+    groups = [[motion] for motion in motions] if motions is not None else [list(rows)]
+    for group in groups:
+        raw.execute("BEGIN IMMEDIATE")
+        for table in TABLES:
+            some = [row for motion in group for row in rows[motion][table]]
+            marks = ", ".join("?" for _ in some[0])
+            raw.executemany(f"INSERT INTO {table} VALUES ({marks})", some)
+        raw.execute("COMMIT")
+    raw.close()
+
+
+def check(place: Path, rows: dict[int, Rows]) -> None:
+    """Make sure that every way wrote as much as the others."""
+    raw = sqlite3.connect(place)
+    for table in TABLES:
+        (found,) = raw.execute(f"SELECT count(*) FROM {table}").fetchone()
+        wanted = sum(len(by_table[table]) for by_table in rows.values())
+        if found != wanted:
+            raise SystemExit(f"{table}: {found} rows instead of {wanted}")
+    raw.close()
+
+
+if __name__ == "__main__":
+    main()
