@@ -7,6 +7,7 @@ with the same transactions and once in a single one. In turns, processor time, l
 
 from __future__ import annotations
 
+import json
 import sqlite3
 import sys
 import tempfile
@@ -83,7 +84,7 @@ def read(finished: Path) -> tuple[dict[int, list[CombinationRecord]], dict[int, 
                 **{
                     **given,
                     "pga_g": stored.pga_g,
-                    "warnings": tuple(stored.warnings),
+                    "warnings": tuple(json.loads(values["warnings"])),
                     "points": stored.points,
                     "intervals": stored.intervals,
                 }

@@ -26,7 +26,9 @@ def used() -> dict[str, float]:
     """Return processor times [s] and peak memory [MB] of this process and of its workers."""
     # counted in kB, on macOS in bytes
     unit = 1e6 if sys.platform == "darwin" else 1e3
-    own, workers = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    own, workers = (
+        resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
     return {
         "writer_s": own.ru_utime + own.ru_stime,
         "workers_s": workers.ru_utime + workers.ru_stime,

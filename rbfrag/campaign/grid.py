@@ -8,8 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from rbfrag.errors import InputError
+from rbfrag.solver.batch import simulate_many
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.respond import OUTCOMES, positive, runner
+from rbfrag.solver.respond import OUTCOMES, positive
 from rbfrag.solver.results import SEARCH_LIMIT, SearchPoints
 
 GRID_TOP = 0.99
@@ -60,11 +61,9 @@ def run_grid(drive: Excitation, p2: float, kr_over_pga: Sequence[float]) -> Sear
         kr_over_pga: block strengths over PGA, falling.
     """
     ratio = np.array(kr_over_pga, dtype=np.float64)
-    run = runner(drive, p2=p2, linear=False)
-    kr = ratio * drive.pga_g
-    runs = [run(value) for value in kr.tolist()]
+    runs = simulate_many(drive, p2=p2, kr=ratio * drive.pga_g)
     return SearchPoints(
         kr_over_pga=ratio,
-        theta_n=np.array([each.peak_rad for each in runs]) / np.arctan(kr),
-        outcome=tuple(OUTCOMES[each.outcome].value for each in runs),
+        theta_n=runs.theta_n,
+        outcome=tuple(OUTCOMES[code].value for code in runs.outcome.tolist()),
     )

@@ -13,15 +13,16 @@ from rbfrag.db.queries import Vertical
 from rbfrag.db.rows import MotionRow
 from rbfrag.db.vertical_pairs import VerticalPair, vertical_pairs
 from rbfrag.errors import InputError
+from rbfrag.solver.certified import MAP_DEPTH
 from rbfrag.solver.respond import positive
 from rbfrag.solver.results import NUMERICS_VERSION, POLARITIES, SEARCH_LIMIT, Polarity
 
 DEFAULT_P2 = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1)
 """The dissertation's block sizes, as p² [1/s²]: 0.25 m to 74 m from centroid to toe."""
 
-SETTINGS = {"search_limit": SEARCH_LIMIT, "map": "full"}
+SETTINGS = {"search_limit": SEARCH_LIMIT, "map": "full", "map_depth": MAP_DEPTH}
 """What else decides an answer, as it goes into the natural key: how far down the search goes,
-and that it maps every toppling and safe interval on the way."""
+that it maps every toppling and safe interval on the way, and how finely."""
 
 
 @dataclass(frozen=True)

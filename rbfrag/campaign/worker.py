@@ -9,6 +9,7 @@ from rbfrag.campaign.plan import Case
 from rbfrag.db.natural_key import response_key
 from rbfrag.db.response_store import ResponseRecord
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.certified import MAP_DEPTH
 from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.respond import respond
@@ -94,7 +95,12 @@ def _run_task(work: MotionWork, task: Task) -> TaskResult:
     critical_kr_over_pga = task.critical_kr_over_pga
     if task.search:
         search = critical(
-            work.motion, p2=case.p2, polarity=case.polarity, vertical=vertical, full_map=True
+            work.motion,
+            p2=case.p2,
+            polarity=case.polarity,
+            vertical=vertical,
+            full_map=True,
+            map_depth=MAP_DEPTH,
         )
         critical_kr_over_pga = search.kr_over_pga
     grid = None
