@@ -1,4 +1,4 @@
-"""The tables of docs/performance.md: each stands between two marks and is written by one script."""
+"""The measured tables of the documentation: each stands between two marks, by one script."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def parser(description: str | None) -> argparse.ArgumentParser:
     return made
 
 
-def report(name: str, text: str, *, write: bool) -> None:
+def report(name: str, text: str, *, write: bool, page: Path = PAGE) -> None:
     """Print a table with its machine; put it into the page if asked to."""
     text = f"{text}\n\n{machine_sentence()}"
     print(f"\n{text}", flush=True)
     if write:
-        PAGE.write_text(replaced(PAGE.read_text(encoding="utf-8"), name, text), encoding="utf-8")
+        page.write_text(replaced(page.read_text(encoding="utf-8"), name, text), encoding="utf-8")
 
 
 def replaced(page: str, name: str, text: str) -> str:

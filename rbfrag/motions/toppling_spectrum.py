@@ -14,7 +14,7 @@ closed form.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, overload
 
 import numpy as np
@@ -30,10 +30,15 @@ FloatArray = NDArray[np.float64]
 SERIES_BELOW = 0.5
 """p·h below which the weights of an interval are summed as power series in it."""
 
-_TERMS = 14
 # ∫_0^1 (1 − u) exp(−z u) du = Σ (−z)^k / (k + 2)!,   ∫_0^1 u exp(−z u) du = Σ (−z)^k / (k! (k + 2))
-_NEAR_SERIES = [(-1.0) ** k / math.factorial(k + 2) for k in range(_TERMS)]
-_FAR_SERIES = [(-1.0) ** k / (math.factorial(k) * (k + 2)) for k in range(_TERMS)]
+_SERIES = np.array(
+    [
+        ((-1.0) ** k / math.factorial(k + 2), (-1.0) ** k / (math.factorial(k) * (k + 2)))
+        for k in range(14)
+    ]
+)
+
+_LARGEST = 1e300
 
 
 @overload
@@ -70,8 +75,8 @@ def toppling_spectrum(
     driving = driving_acceleration_g(motion.acceleration_g, polarity)
     a, h = _without_rest(driving, motion.interval_s)
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-        peaks = [_greatest_velocity(a, h, math.sqrt(each)) for each in sizes.ravel().tolist()]
-    spectrum = STANDARD_GRAVITY_M_S2 * np.array(peaks, dtype=np.float64).reshape(sizes.shape)
+        greatest = _greatest_velocities(a, h, np.sqrt(sizes.ravel()))
+        spectrum = STANDARD_GRAVITY_M_S2 * greatest.reshape(sizes.shape)
     if not np.isfinite(spectrum).all():
         raise InputError(
             f"the toppling spectrum of a motion with PGA {float(np.abs(a).max()):g} g lasting "
@@ -103,45 +108,73 @@ def _without_rest(a: FloatArray, h: FloatArray) -> tuple[FloatArray, FloatArray]
     return a[first : last + 1], h[first:last]
 
 
-def _greatest_velocity(a: FloatArray, h: FloatArray, p: float) -> float:
-    """Return the greatest H [g·s] of one p [1/s]; H is zero after the record."""
+def _greatest_velocities(a: FloatArray, h: FloatArray, p: FloatArray) -> FloatArray:
+    """Return the greatest H [g·s] of each p [1/s], shape of p; H is zero after the record."""
+    greatest = np.zeros(p.size)
     if not h.size:
-        return 0.0
-    still = _still_to_come(a, h, p)
+        return greatest
+    equal = bool((h == h[0]).all())
+    still, excess = np.zeros(a.size), np.empty(a.size)
+    diagonals = np.ones((2, h.size), order="F")
+    # one row a value of p, and one column an interval unless all are of one length
+    for i, (each, weights) in enumerate(zip(p.tolist(), _rows(h, p, equal), strict=True)):
+        _fill_still_to_come(still, a, weights, diagonals)
+        np.multiply(still, each, out=excess)
+        excess -= a  # H' = p H − a
+        greatest[i] = _greatest(a, h, each, still, excess)
+    return greatest
+
+
+def _rows(h: FloatArray, p: FloatArray, equal: bool) -> Iterator[tuple[FloatArray, ...]]:
+    if equal:
+        yield from zip(*_weights(h[:1], p[:, None]), strict=True)
+    else:
+        yield from (_weights(h, each) for each in p)
+
+
+def _fill_still_to_come(
+    still: FloatArray, a: FloatArray, weights: tuple[FloatArray, ...], diagonals: FloatArray
+) -> None:
+    """Fill H [g·s] at every node, by H_i = exp(−p h) H_{i+1} + what the interval adds.
+
+    These are the equations of a matrix with two diagonals, solved from the last row upwards.
+
+    Args:
+        still: filled, shape (n,); its last value is zero and stays.
+        a: acceleration [g], shape (n,).
+        weights: of :func:`_weights`, shapes (n - 1,) or (1,).
+        diagonals: the matrix in LAPACK's form, shape (2, n - 1); the second row is one.
+    """
+    # here, because importing it takes longer than a scalar answer may
+    from scipy.linalg.lapack import dtbtrs
+
+    decay, near, far = weights
+    added = still[:-1]
+    np.multiply(a[:-1], near, out=added)
+    added += far * a[1:]
+    np.negative(decay[:-1] if decay.size > 1 else decay, out=diagonals[0, 1:])
+    added[:] = dtbtrs(diagonals, added, uplo="U", trans="N", diag="U", overwrite_b=1)[0]
+
+
+def _greatest(
+    a: FloatArray, h: FloatArray, p: float, still: FloatArray, excess: FloatArray
+) -> float:
     greatest = max(float(still.max()), 0.0)
-    excess = p * still - a  # H' = p H − a
     # where a does not rise, the signs can only differ by rounding
-    turning = np.flatnonzero((excess[:-1] > 0.0) & (excess[1:] < 0.0) & (a[:-1] < a[1:]))
+    signs = excess > 0.0
+    turning = np.flatnonzero(signs[:-1] > signs[1:])
     # H bends down where it has a maximum: it stays below both tangents
     reach = np.minimum(
         still[turning] + excess[turning] * h[turning],
         still[turning + 1] - excess[turning + 1] * h[turning],
     )
-    turning = turning[reach > greatest]
+    turning = turning[(reach > greatest) & (a[turning] < a[turning + 1])]
     if not turning.size:
         return greatest
     inside = _turning_values(
         a[turning], a[turning + 1], h[turning], still[turning + 1], excess[turning + 1], p
     )
     return max(greatest, float(inside.max()))
-
-
-def _still_to_come(a: FloatArray, h: FloatArray, p: float) -> FloatArray:
-    """Return H [g·s] at every node, by H_i = exp(−p h) H_{i+1} + what the interval adds.
-
-    These are the equations of a matrix with two diagonals, solved from the last row upwards.
-    """
-    # here, because importing it takes longer than a scalar answer may
-    from scipy.linalg.lapack import dtbtrs
-
-    equal = bool((h == h[0]).all())
-    decay, near, far = _weights(h[:1] if equal else h, p)
-    added = near * a[:-1] + far * a[1:]
-    diagonals = np.ones((2, h.size), order="F")
-    diagonals[0, 1:] = -decay if equal else -decay[:-1]
-    solved, _ = dtbtrs(diagonals, added, uplo="U", trans="N", diag="U")
-    still: FloatArray = np.append(solved, 0.0)
-    return still
 
 
 def _turning_values(
@@ -159,25 +192,23 @@ def _turning_values(
     """
     # s/p + (excess − s/p) exp(−p r) = 0 at the time r before the end, s the slope of a
     share = -excess / (a1 - a0)
-    x = np.minimum(p * h * share, 1e300)
+    x = np.minimum(p * h * share, _LARGEST)
     ratio = np.divide(np.log1p(x), x, out=np.ones_like(x), where=x > 0.0)
     fraction = np.minimum(share * ratio, 1.0)
     decay, near, far = _weights(h * fraction, p)
     return decay * end + near * (a1 - fraction * (a1 - a0)) + far * a1
 
 
-def _weights(h: FloatArray, p: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _weights(h: FloatArray, p: FloatArray | float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return, for intervals of length h [s], what H takes over from their ends.
 
     Returns:
         exp(−p h); and h ∫_0^1 (1 − u) exp(−p h u) du and h ∫_0^1 u exp(−p h u) du [s], the
-        weights of a at the start and at the end.
+        weights of a at the start and at the end; of the common shape of p and h.
     """
-    z = np.minimum(p * h, 1e300)
+    z = np.minimum(p * h, _LARGEST)
     decay = np.exp(-z)
-    small = np.minimum(z, SERIES_BELOW)
-    near = np.polynomial.polynomial.polyval(small, _NEAR_SERIES)
-    far = np.polynomial.polynomial.polyval(small, _FAR_SERIES)
+    near, far = np.polynomial.polynomial.polyval(np.minimum(z, SERIES_BELOW), _SERIES)
     if (z > SERIES_BELOW).any():
         large = np.maximum(z, SERIES_BELOW)
         mean = -np.expm1(-large) / large
