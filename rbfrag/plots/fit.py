@@ -4,47 +4,59 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.straight_line import mean_m_s, variance_m2_s2
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.density import density
+from rbfrag.plots.failure_lines import failure_line
+from rbfrag.plots.numbers import plain_numbers
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _LINES = (
-    (1.959963984540054, "--", "#b2182b", "2.5 % probability of failure"),
-    (0.0, "-", "black", "mean critical velocity"),
-    (-1.959963984540054, "-.", "#2166ac", "97.5 % probability of failure"),
+    (0.025, "--", "#b2182b", "2.5 % probability of failure"),
+    (0.5, "-", "black", "50 % probability of failure"),
+    (0.975, "-.", "#2166ac", "97.5 % probability of failure"),
 )
 
+_BARS = 40
 
-def plot_fit(table: CombinationTable, model: FragilityModel, path: str | PathLike[str]) -> Path:
+
+def plot_fit(
+    table: CombinationTable,
+    model: FragilityModel,
+    path: str | PathLike[str],
+    *,
+    log: bool = False,
+) -> Path:
     """Draw critical toppling velocities against intensity with the lines of a model.
 
     A block above the upper line fails with less than 2.5 % probability, one below the lower
-    line with more than 97.5 %.
+    line with more than 97.5 %. Histograms at the edges show how the data are distributed.
 
     Args:
         table: the critical values.
-        model: a model of method ``wls``.
+        model: a model of a term that is one number: pgv, pga_tm or pgd_tm.
         path: file to write: .png, .pdf or .svg.
+        log: logarithmic axes.
 
     Returns:
         The path.
 
     Raises:
-        InputError: nothing to draw, a model of another method, or a path that cannot be written.
+        InputError: nothing to draw, a model of another term, or a path that cannot be written.
         MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
-    if model.row.method != "wls":
-        raise InputError(
-            f"model {model.name!r} is fitted by {model.row.method!r}: the figure of a fit draws "
-            "models of method 'wls'"
-        )
     term = model.term
+    failure_line(model, np.ones(1), 0.5)  # refuses models of other terms
     x = np.asarray(
         term.intensity_m_s({name: getattr(table, name) for name in term.inputs}), dtype=np.float64
     )
@@ -53,56 +65,62 @@ def plot_fit(table: CombinationTable, model: FragilityModel, path: str | PathLik
         raise InputError(
             f"there is no critical value with the term {term.name} to draw: run  rbfrag simulate"
         )
-    figure = new_figure(7.6, 5.6)
-    from matplotlib import colormaps
-    from matplotlib.colors import ListedColormap, LogNorm
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
-
+    figure = new_figure(7.6, 6.0)
     x, y = x[shown], table.y_m_s[shown]
-    right = 1.03 * float(x.max())
-    line_x = np.linspace(0.0, right, 400)
-    mean, sigma = (
-        mean_m_s(model.parameters, line_x),
-        np.sqrt(variance_m2_s2(model.parameters, line_x)),
-    )
+    left, right = (0.9 * float(x.min()), 1.1 * float(x.max())) if log else (0.0, 1.03 * x.max())
+    line_x = np.geomspace(left, right, 400) if log else np.linspace(right / 400.0, right, 400)
+    lines = [failure_line(model, line_x, probability) for probability, *_ in _LINES]
     # The data fill the sheet; a line far above them may leave it.
-    highest = float((mean + _LINES[0][0] * sigma).max())
+    highest = float(np.nanmax(lines[0], initial=0.0))
     top = max(float(y.max()), min(highest, 1.3 * float(y.max()))) * 1.05
+    bottom = 0.8 * float(y.min()) if log else 0.0
 
-    axes = figure.add_subplot()
-    # Neither white for a single block nor so dark that a line disappears.
-    greys = ListedColormap(colormaps["Greys"](np.linspace(0.18, 0.72, 256)))
-    # As many cells upwards as make the hexagons regular on the sheet.
-    cells = axes.hexbin(
-        x,
-        y,
-        gridsize=(60, 25),
-        extent=(0.0, right, 0.0, top),
-        mincnt=1,
-        cmap=greys,
-        linewidths=0.2,
-    )
-    most = max(int(np.asarray(cells.get_array()).max()), 2)
-    cells.set_norm(LogNorm(1, most))
-    for factor, style, colour, words in _LINES:
-        line = mean + factor * sigma
-        label = words if line.max() > 0.01 * top else f"{words}\n(near or below zero)"
+    grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 0.16], height_ratios=[0.16, 1.0])
+    axes = figure.add_subplot(grid[1, 0])
+    above = figure.add_subplot(grid[0, 0], sharex=axes)
+    beside = figure.add_subplot(grid[1, 1], sharey=axes)
+    if log:
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+    density(figure, axes, x, y, (left, right), (bottom, top), beside=[beside, above])
+    if log:
+        plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
+        plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    for (_, style, colour, words), line in zip(_LINES, lines, strict=True):
+        label = words if np.isfinite(line).any() else f"{words}\n(below zero)"
         axes.plot(line_x, line, style, color=colour, linewidth=1.8, label=label)
-    axes.set_xlim(0.0, right)
-    axes.set_ylim(0.0, top)
     axes.set_xlabel(term.label)
     axes.set_ylabel("critical toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
+    spaced = np.geomspace if log else np.linspace
+    _histogram(above, x, spaced(left, right, _BARS + 1), horizontal=False)
+    _histogram(beside, y, spaced(bottom, top, _BARS + 1), horizontal=True)
     n_events = len(set(table.event_id[shown].tolist()))
     n_censored = int(np.isin(table.status.astype(str), ("below_limit", "no_motion")).sum())
-    axes.set_title(
+    figure.suptitle(
         f"{model.name}: {x.size} critical blocks of {n_events} earthquakes\n"
         f"not shown: {n_censored} whose critical block lies below the search limit",
         fontsize=10,
     )
     figure.legend(loc="outside lower center", ncols=len(_LINES), fontsize=8.5, frameon=False)
-    bar = figure.colorbar(cells, ax=axes, label="critical blocks per cell")
-    ticks = [t * 10**k for k in range(7) for t in (1, 2, 5) if t * 10**k <= most]
-    bar.ax.yaxis.set_major_locator(FixedLocator(ticks))
-    bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0f}"))
-    bar.ax.yaxis.set_minor_locator(NullLocator())
     return save_figure(figure, path)
+
+
+def _histogram(
+    axes: Axes, values: NDArray[np.float64], edges: NDArray[np.float64], *, horizontal: bool
+) -> None:
+    axes.hist(
+        values,
+        bins=edges.tolist(),
+        orientation="horizontal" if horizontal else "vertical",
+        color="#8a8a8a",
+        edgecolor="white",
+        linewidth=0.3,
+    )
+    if horizontal:
+        axes.set_xlabel("blocks", fontsize=8)
+        axes.tick_params(labelleft=False, labelsize=8)
+    else:
+        axes.set_ylabel("blocks", fontsize=8)
+        axes.tick_params(labelbottom=False, labelsize=8)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)

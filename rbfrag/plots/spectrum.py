@@ -16,10 +16,10 @@ from rbfrag.motions.polarity import POLARITIES, Polarity
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.numbers import plain_numbers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
 
 # Told apart by people who do not see red and green alike.
 COLOURS = ("#1f4e79", "#d98c1f", "#4c9a6a", "#8c2d4f", "#7f7f7f", "#56b4e9", "#c44e52", "#5e3c99")
@@ -94,11 +94,11 @@ def plot_spectrum(
     axes.set_xlabel("frequency parameter of the block, $p^2$ [1/s$^2$]")
     axes.set_ylabel("toppling spectrum $X(p)$ and PGV [m/s]")
     axes.grid(visible=True, which="both", lw=0.3, alpha=0.5)
-    _plain_numbers(axes.xaxis, 1.0, 3.0)
-    _plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    plain_numbers(axes.xaxis, 1.0, 3.0)
+    plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
     above = axes.secondary_xaxis("top", functions=(block_size_m, block_size_m))
     above.set_xlabel("size of a rectangular block, $r_3 = 3g/(4p^2)$ [m]", labelpad=7)
-    _plain_numbers(above.xaxis, 1.0, 2.0, 5.0)
+    plain_numbers(above.xaxis, 1.0, 2.0, 5.0)
     for words, style in _key(polarities):
         axes.plot([], [], style, color="black", lw=1.2, label=words)
     figure.legend(loc="outside lower center", ncols=2, fontsize=8.5, frameon=False)
@@ -113,11 +113,3 @@ def _key(polarities: Sequence[Polarity]) -> list[tuple[str, str]]:
 def _lowest(axes: Axes) -> float:
     values = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in axes.lines])
     return float(values[values > 0.0].min())
-
-
-def _plain_numbers(axis: Axis, *digits: float) -> None:
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    axis.set_major_locator(LogLocator(subs=digits))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())

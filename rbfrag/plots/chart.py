@@ -1,0 +1,129 @@
+"""Design chart: the probability that a block topples, to be read by hand."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.failure_lines import failure_line
+from rbfrag.plots.numbers import plain_numbers
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+CONTOURS = (0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
+
+_BOLD = (0.05, 0.5, 0.95)
+
+_DIAGONALS = (0.7, 1.0, 1.3, 1.6)
+"""Where labels stand, in turn: the sum of their distances from the left and lower edge."""
+_POINTS = 300
+_SPAN = 1.6
+"""Factor by which the sheet goes beyond the fitted range."""
+
+_DEFAULT_RANGE = (0.01, 2.0)
+
+
+def plot_chart(model: FragilityModel, path: str | PathLike[str]) -> Path:
+    """Draw lines of equal probability of toppling over intensity and block.
+
+    The ordinate is the block's toppling velocity k_r g/p: one chart serves blocks of every size
+    and strength. Outside the ranges that were fitted the sheet is shaded.
+
+    Args:
+        model: a model of a term that is one number: pgv, pga_tm or pgd_tm.
+        path: file to write: .png, .pdf or .svg.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: a model of another term, or a path that cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    plot_path(path)
+    domain = model.row.domain
+    fitted_x = domain.get("intensity_m_s") or domain.get(model.term.inputs[0]) or _DEFAULT_RANGE
+    low, high = (max(float(edge), 1e-4) for edge in fitted_x)
+    x = np.geomspace(low / _SPAN, _SPAN * high, _POINTS)
+    lines = {p: failure_line(model, x, p) for p in CONTOURS}
+    figure = new_figure(7.0, 7.0)
+    axes = figure.add_subplot()
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    bottom, top = _vertical_range(x, lines[0.99], lines[0.01])
+    axes.set_xlim(x[0], x[-1])
+    axes.set_ylim(bottom, top)
+    axes.set_aspect("equal")
+    for number, (probability, y) in enumerate(lines.items()):
+        width = 1.9 if probability in _BOLD else 0.9
+        axes.plot(x, y, color="#1f4e79", lw=width)
+        diagonal = _DIAGONALS[number % len(_DIAGONALS)]
+        _write_on(axes, x, y, f"{100.0 * probability:g} %", diagonal)
+    _shade_outside(axes, (low, high), domain.get("y_m_s"))
+    axes.set_xlabel(model.term.label)
+    axes.set_ylabel("toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
+    plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
+    plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    axes.grid(visible=True, which="major", lw=0.6, color="#9a9a9a")
+    axes.grid(visible=True, which="minor", lw=0.3, color="#c8c8c8")
+    axes.set_axisbelow(True)
+    axes.set_title(_caption(model), fontsize=10)
+    return save_figure(figure, path)
+
+
+def _vertical_range(x: np.ndarray, weak: np.ndarray, strong: np.ndarray) -> tuple[float, float]:
+    top = 1.3 * float(np.nanmax(strong))
+    known = weak[np.isfinite(weak)]
+    bottom = float(known.min()) if known.size else 0.1 * float(x[0])
+    # a straight line of a model without a bound falls to zero within the sheet
+    return 0.8 * max(bottom, 0.1 * float(x[0])), top
+
+
+def _write_on(axes: Axes, x: np.ndarray, y: np.ndarray, words: str, diagonal: float) -> None:
+    """Write the probability on its line, where the line crosses a falling diagonal."""
+    left, right = np.log(axes.get_xlim())
+    bottom, top = np.log(axes.get_ylim())
+    across = (np.log(x) - left) / (right - left)
+    with np.errstate(invalid="ignore"):
+        up = (np.log(y) - bottom) / (top - bottom)
+    beside = np.where(np.isfinite(up), np.abs(across + up - diagonal), np.inf)
+    at = int(np.argmin(beside))
+    if not np.isfinite(beside[at]) or not 0.0 < up[at] < 1.0:
+        return
+    axes.text(
+        x[at],
+        y[at],
+        words,
+        fontsize=7.5,
+        ha="center",
+        va="center",
+        color="#1f4e79",
+        bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none"},
+    )
+
+
+def _shade_outside(axes: Axes, across: tuple[float, float], up: tuple[float, float] | None) -> None:
+    left, right = axes.get_xlim()
+    bottom, top = axes.get_ylim()
+    shade = {"facecolor": "#8a8a8a", "alpha": 0.25, "lw": 0.0, "zorder": 0.5}
+    axes.axvspan(left, across[0], **shade)
+    axes.axvspan(across[1], right, **shade)
+    if up is not None:
+        axes.axhspan(bottom, max(float(up[0]), bottom), **shade)
+        axes.axhspan(min(float(up[1]), top), top, **shade)
+
+
+def _caption(model: FragilityModel) -> str:
+    about = model.row.diagnostics
+    n, events = about.get("n"), about.get("events")
+    counts = f"fitted on {n} critical blocks of {events} earthquakes; " if n and events else ""
+    return (
+        f"Probability that the block topples: model {model.name}\n"
+        f"{counts}shaded: outside the fitted range"
+    )

@@ -1,0 +1,130 @@
+"""Fragility curve of one block: probability of toppling over the strength of the shaking."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.prediction import predict
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+
+AXIS = {
+    "pgv_m_s": "peak ground velocity, PGV [m/s]",
+    "pga_g": "peak ground acceleration, PGA [g]",
+    "pgd_m": "peak ground displacement, PGD [m]",
+    "xp_m_s": "toppling spectrum at the block's size, $X(p)$ [m/s]",
+}
+"""What a curve runs over: the measure that a model's term names first."""
+
+FIXED = {"pga_g": "PGA = {:g} g", "tm_s": "$T_m$ = {:g} s"}
+
+_POINTS = 241
+_START = 1e-6
+
+
+def plot_curve(
+    model: FragilityModel,
+    p2: float,
+    kr: float,
+    path: str | PathLike[str],
+    *,
+    fixed: Mapping[str, float] | None = None,
+    level: float = 0.95,
+) -> Path:
+    """Draw the fragility curve of one block with its confidence band.
+
+    Outside the fitted ranges the curve is dashed.
+
+    Args:
+        model: the model; the abscissa is the measure that its term names first.
+        p2: frequency parameter p² of the block [1/s²].
+        kr: its rocking acceleration coefficient.
+        path: file to write: .png, .pdf or .svg.
+        fixed: the other measures that the term reads, by name, held at one value.
+        level: confidence level of the band.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: a value that cannot be used, a measure that is missing, or a path that
+            cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    plot_path(path)
+    varied, *others = model.term.inputs
+    held = dict(fixed or {})
+    missing = [name for name in others if name not in held]
+    if missing or varied not in AXIS:
+        raise InputError(
+            f"model {model.name!r} reads {' and '.join(model.term.inputs)}: give "
+            f"{' and '.join(missing) or varied} for the curve"
+        )
+    y = kr * STANDARD_GRAVITY_M_S2 / np.sqrt(p2)
+    end = _right_end(model, p2, kr, varied, {name: held[name] for name in others}, float(y))
+    x = np.linspace(0.0, end, _POINTS)
+    x[0] = _START * end
+    given = {varied: x, **{name: np.full(x.shape, held[name]) for name in others}}
+    answer = predict(np.full(x.shape, p2), np.full(x.shape, kr), model=model, level=level, **given)
+    known = answer.in_domain
+    figure = new_figure(7.0, 4.6)
+    axes = figure.add_subplot()
+    axes.fill_between(
+        x, answer.ci_low, answer.ci_high, color="#1f4e79", alpha=0.2, lw=0.0,
+        label=f"{100.0 * level:g} % confidence in the curve",
+    )  # fmt: skip
+    if not known.all():
+        axes.plot(
+            x, answer.probability, "--", color="#1f4e79", lw=1.2, label="outside the fitted range"
+        )
+    axes.plot(
+        x, np.where(known, answer.probability, np.nan), color="#1f4e79", lw=2.0,
+        label="probability of toppling",
+    )  # fmt: skip
+    axes.set_xlim(0.0, end)
+    axes.set_ylim(0.0, 1.0)
+    axes.set_xlabel(AXIS[varied])
+    axes.set_ylabel("probability that the block topples")
+    axes.grid(visible=True, lw=0.3, alpha=0.6)
+    words = ", ".join(FIXED.get(name, name + " = {:g}").format(held[name]) for name in others)
+    about = model.row.diagnostics
+    counts = (
+        f", fitted on {about['n']} critical blocks of {about['events']} earthquakes"
+        if about.get("n") and about.get("events")
+        else ""
+    )
+    axes.set_title(
+        f"block $p^2$ = {p2:g} s$^{{-2}}$, $k_r$ = {kr:g}, $y$ = {y:.3g} m/s"
+        + (f"; {words}" if words else "")
+        + f"\nmodel {model.name}{counts}",
+        fontsize=10,
+    )
+    figure.legend(loc="outside lower center", ncols=3, fontsize=8.5, frameon=False)
+    return save_figure(figure, path)
+
+
+def _right_end(
+    model: FragilityModel,
+    p2: float,
+    kr: float,
+    varied: str,
+    held: Mapping[str, float],
+    y_m_s: float,
+) -> float:
+    """Where the curve has nearly reached its top, found by doubling."""
+    unit = y_m_s if varied in ("pgv_m_s", "xp_m_s") else kr if varied == "pga_g" else 0.1 * y_m_s
+    x = unit * 2.0 ** np.arange(0.0, 12.0, 0.5)
+    given = {varied: x, **{name: np.full(x.shape, value) for name, value in held.items()}}
+    answer = predict(np.full(x.shape, p2), np.full(x.shape, kr), model=model, **given)
+    high = np.flatnonzero(answer.probability > 0.97)
+    if high.size:
+        return float(x[high[0]])
+    # a curve with a lower ceiling: as far as it still grows
+    top = float(np.nanmax(answer.probability))
+    return float(x[int(np.argmax(answer.probability >= 0.99 * top))])

@@ -1,0 +1,95 @@
+"""Figure of critical strength over frequency: records beside the lines of single lobes."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from rbfrag.db.rows import CombinationTable
+from rbfrag.errors import InputError
+from rbfrag.fragility.lobes import LOBES, lobe_line
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.density import density
+from rbfrag.plots.numbers import plain_numbers
+
+STYLES = {
+    "rectangular": ("-", "#b2182b"),
+    "half-sine": ("--", "#1f4e79"),
+    "triangular": ("-.", "#2e7d32"),
+}
+
+
+def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data: str = "") -> Path:
+    """Draw critical k_r/PGA against ω_m/p with the lines of lobes half a mean period long.
+
+    The legend says how many of the critical values lie above each line.
+
+    Args:
+        table: the critical values.
+        path: file to write: .png, .pdf or .svg.
+        data: what the data are, for the title.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: no critical value of a motion with a mean period, or a path that cannot
+            be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    plot_path(path)
+    ratio = 2.0 * np.pi / (table.tm_s * np.sqrt(table.p2))
+    shown = (table.status == "found") & np.isfinite(ratio) & np.isfinite(table.kr_over_pga)
+    if not shown.any():
+        raise InputError(
+            "there is no critical value of a motion with a mean period to draw: run  "
+            "rbfrag simulate"
+        )
+    x, y = ratio[shown], table.kr_over_pga[shown]
+    censored = np.isin(table.status.astype(str), ("below_limit", "no_motion"))
+    limit = float(table.search_limit[shown | censored].min())
+    figure = new_figure(7.4, 5.6)
+    axes = figure.add_subplot()
+    left, right = 0.8 * float(x.min()), 1.25 * float(x.max())
+    bottom, top = 0.8 * min(limit, float(y.min())), 1.25 * max(1.0, float(y.max()))
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    density(figure, axes, x, y, (left, right), (bottom, top))
+    line_x = np.geomspace(left, right, 300)
+    for name in LOBES:
+        style, colour = STYLES[name]
+        above = int(np.sum(y > lobe_line(name, x)))
+        axes.plot(
+            line_x,
+            lobe_line(name, line_x),
+            style,
+            color=colour,
+            lw=1.8,
+            label=f"{name} lobe: {above} above ({100.0 * above / x.size:.1f} %)",
+        )
+    if censored.any():
+        axes.axhline(limit, color="black", lw=0.8, ls=":")
+        axes.annotate(
+            f"search limit; {int(censored.sum())} critical values lie below it",
+            (0.01, limit),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, 4),
+            textcoords="offset points",
+            fontsize=8,
+        )
+    axes.set_xlabel(r"frequency of the motion over that of the block, $\omega_m/p$")
+    axes.set_ylabel(r"critical strength, $k_r/\mathrm{PGA}$")
+    events = len(set(table.event_id[shown].tolist()))
+    motions = len(set(table.motion_id[shown].tolist()))
+    axes.set_title(
+        f"{x.size} critical blocks, {motions} motions of {events} earthquakes"
+        + (f"\n{data}" if data else ""),
+        fontsize=10,
+    )
+    axes.grid(visible=True, which="major", lw=0.3, alpha=0.5)
+    plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
+    plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.09), fontsize=8.5, frameon=False)
+    return save_figure(figure, path)
