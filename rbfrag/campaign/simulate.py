@@ -16,6 +16,7 @@ from rbfrag.campaign.grid import checked_ratios, grid_of
 from rbfrag.campaign.local_executor import run_locally
 from rbfrag.campaign.made_on import made_on
 from rbfrag.campaign.plan import DEFAULT_P2, SETTINGS, CampaignPlan, plan_campaign
+from rbfrag.campaign.spectra import store_spectra
 from rbfrag.campaign.todo import MotionTasks, Todo, Wanted, still_to_do
 from rbfrag.campaign.worker import MotionResults, MotionWork
 from rbfrag.db.campaign_store import (
@@ -116,8 +117,9 @@ def simulate(
 ) -> CampaignSummary:
     """Find the critical block of every motion x vertical x polarity x p² and store it.
 
-    What is stored already is not computed again, and each combination is stored with all that
-    belongs to it in one transaction: a run that was interrupted or killed is resumed by the
+    The toppling spectrum of every motion at these p² is stored with them. What is stored already
+    is not computed again, and each combination is stored with all that belongs to it in one
+    transaction: a run that was interrupted or killed is resumed by the
     same call. The database is the same whatever does the work.
 
     Args:
@@ -160,6 +162,7 @@ def simulate(
             }
             with engine.begin() as connection:
                 campaign_id = start_campaign(connection, settings)
+            store_spectra(engine, [each.motion.id for each in plan.motions], p2)
             run = _Run(engine, campaign_id, plan, todo, started, on_progress)
             run.tell()
             for done in execute(_work(engine, todo), len(todo.motions)):

@@ -30,6 +30,23 @@ Motion = Annotated[
     ),
 ]
 
+Motions = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="MOTION...",
+        help="Accelerograms: files, FILE#INDEX for one trace of several, or database ids.",
+        show_default=False,
+    ),
+]
+
+Polarity = Annotated[
+    str,
+    typer.Option(
+        "--polarity",
+        help="forward: positive samples drive forward; reverse: negative ones; both.",
+    ),
+]
+
 Vertical = Annotated[
     str | None,
     typer.Option(

@@ -1,4 +1,4 @@
-"""`rbfrag plot`: pictures of fits, responses and failure modes."""
+"""`rbfrag plot`: pictures of models, data, responses and failure modes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rbfrag.cli.motion_argument import find_motion, find_vertical
 from rbfrag.cli.output import print_warnings
 
 app = typer.Typer(
-    help="Draw fits, responses and failure modes (.png, .pdf, .svg).",
+    help="Draw models, data, spectra, responses and failure modes (.png, .pdf, .svg).",
     no_args_is_help=True,
     rich_markup_mode=None,
     epilog="Example:  rbfrag plot fit --out fit.png",
@@ -29,9 +29,10 @@ def plot_fit(
         str | None,
         typer.Option("--model", help="Name of the model. Default: the database's default."),
     ] = None,
+    log: Annotated[bool, typer.Option("--log", help="Logarithmic axes.")] = False,
     db: options.Db = None,
 ) -> None:
-    """Draw the data of a fit with its mean and its 2.5 % and 97.5 % failure lines."""
+    """Draw the data of a fit with its 2.5 %, 50 % and 97.5 % failure lines and histograms."""
     from rbfrag.db.engine import opened_database
     from rbfrag.db.model_store import load_model
     from rbfrag.db.queries import combination_table
@@ -44,7 +45,7 @@ def plot_fit(
         fitted = FragilityModel.from_row(load_model(connection, model))
         suite = fitted.row.diagnostics.get("suite")
         table = combination_table(connection, suite=None if suite is None else str(suite))
-    draw(table, fitted, out)
+    draw(table, fitted, out, log=log)
     print(out)
     if fit_data(FitSource.of_table(table), fitted.term).fingerprint != fitted.row.data_fingerprint:
         print_warnings(
@@ -53,6 +54,93 @@ def plot_fit(
                 "today; rbfrag fit --replace  fits them anew"
             ]
         )
+
+
+@app.command("chart", epilog="Example:  rbfrag plot chart --model lognormal-pgv --out chart.pdf")
+def plot_chart(
+    out: Out,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            "--model", help="Model of PGV, PGA*Tm or PGD/Tm. Default: the one that answers for PGV."
+        ),
+    ] = None,
+    db: options.Db = None,
+) -> None:
+    """Draw lines of equal probability of toppling over intensity and block, to read by hand."""
+    from rbfrag.fragility.model_lookup import find_model
+    from rbfrag.plots.chart import plot_chart as draw
+
+    given = ["pgv_m_s"] if model is None else ["pgv_m_s", "pga_g", "tm_s", "pgd_m"]
+    draw(find_model(model, given, db), out)
+    print(out)
+
+
+@app.command(
+    "curve", epilog="Example:  rbfrag plot curve --p2 3 --kr 0.1 --pga 0.4 --out curve.png"
+)
+def plot_curve(
+    p2: options.P2,
+    kr: options.Kr,
+    out: Out,
+    pga: options.Pga = None,
+    tm: options.Tm = None,
+    model: Annotated[
+        str | None,
+        typer.Option("--model", help="Name of the model. Default: the best for what is given."),
+    ] = None,
+    level: options.Level = 0.95,
+    db: options.Db = None,
+) -> None:
+    """Draw the fragility curve of one block over PGV, with its confidence band.
+
+    PGA and Tm are held at the values given. A model of another measure runs over that one.
+    """
+    from rbfrag.fragility.model_lookup import find_model
+    from rbfrag.plots.curve import plot_curve as draw
+
+    held = {name: value for name, value in (("pga_g", pga), ("tm_s", tm)) if value is not None}
+    varied = ["pgv_m_s"] if model is None else ["pgv_m_s", "pga_g", "pgd_m", "xp_m_s"]
+    draw(find_model(model, [*varied, *held], db), p2, kr, out, fixed=held, level=level)
+    print(out)
+
+
+@app.command("sensitivity", epilog="Example:  rbfrag plot sensitivity --out sensitivity.png")
+def plot_sensitivity(out: Out, suite: options.Suite = None, db: options.Db = None) -> None:
+    """Draw critical k_r/PGA over the frequency ratio omega_m/p, with the lines of single lobes."""
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.queries import combination_table
+    from rbfrag.plots.sensitivity import plot_sensitivity as draw
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        table = combination_table(connection, suite=suite)
+    draw(table, out, data="without vertical motion" + (f", suite {suite}" if suite else ""))
+    print(out)
+
+
+@app.command("spectrum", epilog="Example:  rbfrag plot spectrum 1 5 --polarity both --out x.png")
+def plot_spectrum(
+    motions: options.Motions,
+    out: Out,
+    p2: Annotated[
+        str, typer.Option("--p2", help="The figure spans at least these p² [1/s²].")
+    ] = "0.1,30",
+    polarity: options.Polarity = "both",
+    units: options.Units = None,
+    dt: options.Dt = None,
+    db: options.Db = None,
+) -> None:
+    """Draw the toppling spectra of motions over the size of the block, with PGV beside them."""
+    from rbfrag.cli.number_list import number_list
+    from rbfrag.cli.polarity_argument import polarities
+    from rbfrag.plots.canvas import plot_path
+    from rbfrag.plots.spectrum import plot_spectrum as draw
+
+    sizes, wanted = number_list(p2, "--p2"), polarities(polarity)
+    plot_path(out)
+    found = [find_motion(text, db=db, units=units, dt_s=dt) for text in motions]
+    draw(found, out, polarities=wanted, p2=sizes)
+    print(out)
 
 
 @app.command("response", epilog="Example:  rbfrag plot response 1 --p2 3 --kr 0.1 --out a.png")

@@ -10,37 +10,22 @@ from rbfrag.cli import options
 from rbfrag.cli.motion_argument import find_motion
 from rbfrag.cli.number_list import number_list
 from rbfrag.cli.output import print_json, print_table, print_warnings
-from rbfrag.errors import InputError
+from rbfrag.cli.polarity_argument import polarities as polarities_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from rbfrag.motions.polarity import Polarity
-
 EXAMPLE = "Example:  rbfrag spectrum record.AT2 --polarity both --plot spectrum.png"
 
 
 def spectrum(
-    motions: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="MOTION...",
-            help="Accelerograms: files, FILE#INDEX for one trace of several, or database ids.",
-            show_default=False,
-        ),
-    ],
+    motions: options.Motions,
     p2: Annotated[
         str, typer.Option("--p2", help="Frequency parameters p² [1/s²], separated by commas.")
     ] = "30,10,3,1,0.3,0.1",
-    polarity: Annotated[
-        str,
-        typer.Option(
-            "--polarity",
-            help="forward: positive samples drive forward; reverse: negative ones; both.",
-        ),
-    ] = "forward",
+    polarity: options.Polarity = "forward",
     csv: Annotated[
         str | None,
         typer.Option("--csv", help="Write the values (.csv or .parquet).", show_default=False),
@@ -67,7 +52,7 @@ def spectrum(
     from rbfrag.motions.quality import quality_flags
     from rbfrag.motions.toppling_spectrum import toppling_spectrum
 
-    sizes, polarities = number_list(p2, "--p2"), _polarities(polarity)
+    sizes, polarities = number_list(p2, "--p2"), polarities_of(polarity)
     if csv is not None:
         table_path(csv)
     if plot is not None:
@@ -108,17 +93,6 @@ def spectrum(
     print_warnings(
         dict.fromkeys(f"{one['motion']}: {word}" for one in answers for word in one["warnings"])
     )
-
-
-def _polarities(polarity: str) -> Sequence[Polarity]:
-    from rbfrag.motions.polarity import POLARITIES
-
-    if polarity == "both":
-        return POLARITIES
-    chosen = [each for each in POLARITIES if each == polarity]
-    if not chosen:
-        raise InputError(f"--polarity is {polarity!r}: write forward, reverse or both")
-    return chosen
 
 
 def _columns(answers: Sequence[dict[str, Any]]) -> dict[str, NDArray[Any]]:

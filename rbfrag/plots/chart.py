@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +20,7 @@ CONTOURS = (0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
 
 _BOLD = (0.05, 0.5, 0.95)
 
-_DIAGONALS = (0.7, 1.0, 1.3, 1.6)
+_DIAGONALS = (0.55, 0.8, 1.05, 1.3)
 """Where labels stand, in turn: the sum of their distances from the left and lower edge."""
 _POINTS = 300
 _SPAN = 1.6
@@ -111,7 +111,7 @@ def _write_on(axes: Axes, x: np.ndarray, y: np.ndarray, words: str, diagonal: fl
 def _shade_outside(axes: Axes, across: tuple[float, float], up: tuple[float, float] | None) -> None:
     left, right = axes.get_xlim()
     bottom, top = axes.get_ylim()
-    shade = {"facecolor": "#8a8a8a", "alpha": 0.25, "lw": 0.0, "zorder": 0.5}
+    shade: dict[str, Any] = {"facecolor": "#8a8a8a", "alpha": 0.25, "lw": 0.0, "zorder": 0.5}
     axes.axvspan(left, across[0], **shade)
     axes.axvspan(across[1], right, **shade)
     if up is not None:

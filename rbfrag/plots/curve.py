@@ -10,9 +10,9 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import predict
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.model_answers import model_answers
 
 AXIS = {
     "pgv_m_s": "peak ground velocity, PGV [m/s]",
@@ -59,19 +59,18 @@ def plot_curve(
     """
     plot_path(path)
     varied, *others = model.term.inputs
-    held = dict(fixed or {})
-    missing = [name for name in others if name not in held]
+    missing = [name for name in others if name not in (fixed or {})]
     if missing or varied not in AXIS:
         raise InputError(
             f"model {model.name!r} reads {' and '.join(model.term.inputs)}: give "
             f"{' and '.join(missing) or varied} for the curve"
         )
+    held = {name: float((fixed or {})[name]) for name in others}
     y = kr * STANDARD_GRAVITY_M_S2 / np.sqrt(p2)
-    end = _right_end(model, p2, kr, varied, {name: held[name] for name in others}, float(y))
+    end = _right_end(model, p2, kr, varied, held, float(y))
     x = np.linspace(0.0, end, _POINTS)
     x[0] = _START * end
-    given = {varied: x, **{name: np.full(x.shape, held[name]) for name in others}}
-    answer = predict(np.full(x.shape, p2), np.full(x.shape, kr), model=model, level=level, **given)
+    answer = model_answers(model, p2, kr, {varied: x, **held}, level=level)
     known = answer.in_domain
     figure = new_figure(7.0, 4.6)
     axes = figure.add_subplot()
@@ -120,8 +119,7 @@ def _right_end(
     """Where the curve has nearly reached its top, found by doubling."""
     unit = y_m_s if varied in ("pgv_m_s", "xp_m_s") else kr if varied == "pga_g" else 0.1 * y_m_s
     x = unit * 2.0 ** np.arange(0.0, 12.0, 0.5)
-    given = {varied: x, **{name: np.full(x.shape, value) for name, value in held.items()}}
-    answer = predict(np.full(x.shape, p2), np.full(x.shape, kr), model=model, **given)
+    answer = model_answers(model, p2, kr, {varied: x, **held})
     high = np.flatnonzero(answer.probability > 0.97)
     if high.size:
         return float(x[high[0]])

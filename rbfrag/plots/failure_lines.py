@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import predict
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.plots.model_answers import model_answers
 
 FloatArray = NDArray[np.float64]
 
@@ -56,21 +56,15 @@ def failure_line(model: FragilityModel, x_m_s: FloatArray, probability: float) -
 def toppling_probability(model: FragilityModel, x_m_s: FloatArray, y_m_s: FloatArray) -> FloatArray:
     """Return the probability of blocks y [m/s] at intensities x [m/s], arrays of one shape."""
     kr = y_m_s * math.sqrt(_P2) / STANDARD_GRAVITY_M_S2
-    answer = predict(
-        np.full(kr.shape, _P2),
-        kr,
-        model=model,
-        **{name: np.asarray(value) for name, value in _measures(model, x_m_s).items()},
-    )
-    return np.asarray(answer.probability)
+    return model_answers(model, _P2, kr, _measures(model, x_m_s)).probability
 
 
 def _measures(model: FragilityModel, x_m_s: FloatArray) -> Mapping[str, FloatArray]:
     name = model.term.name
     if name not in ONE_NUMBER_TERMS:
         raise InputError(
-            f"model {model.name!r} reads {' and '.join(model.term.inputs)}: this figure draws models "
-            f"of one number, {', '.join(ONE_NUMBER_TERMS)}"
+            f"model {model.name!r} reads {' and '.join(model.term.inputs)}: this figure draws "
+            f"models of one number, {', '.join(ONE_NUMBER_TERMS)}"
         )
     tm = np.full(x_m_s.shape, _TM_S)
     if name == "pga_tm":

@@ -19,6 +19,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.motion_store import load_motion
 from rbfrag.db.outcome_maps import outcome_maps
 from rbfrag.db.queries import combination_table, database_info
+from rbfrag.db.spectrum_store import spectrum_values
 from rbfrag.errors import InputError
 from rbfrag.solver.respond import respond
 from tests.synthetic import write_suite
@@ -162,3 +163,20 @@ def test_nothing_to_run_is_said(tmp_path: Path) -> None:
         simulate(database, p2=(3.0, 3.0))
     with pytest.raises(InputError, match="empty"):
         simulate(database, p2=())
+
+
+def test_spectra_are_stored_with_the_campaign(database: Path) -> None:
+    simulate(database, p2=P2, jobs=1)
+    with opened_database(database, read_only=True) as engine, engine.connect() as connection:
+        x = spectrum_values(connection)
+        table = combination_table(connection)
+    assert len(x) == 6 * 2 * len(P2)
+    bound = [
+        x[each]
+        for each in zip(
+            table.motion_id.tolist(), table.polarity.tolist(), table.p2.tolist(), strict=True
+        )
+    ]
+    found = table.status == "found"
+    assert found.any()
+    assert (table.y_m_s[found] <= 1.02 * np.array(bound)[found]).all()

@@ -84,3 +84,9 @@ def test_bad_values(
     before = sorted(tmp_path.iterdir())
     assert words in refuses("spectrum", record, *options)
     assert sorted(tmp_path.iterdir()) == before
+
+
+def test_plot_spectrum(shell: Shell, record: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "p.svg"
+    assert shell("plot", "spectrum", record, "--out", picture).stdout.strip() == str(picture)
+    assert picture.stat().st_size > 5000

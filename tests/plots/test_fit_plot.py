@@ -79,13 +79,15 @@ def test_the_file_is_written(table, model, tmp_path, suffix):
 def test_what_the_figure_says(table, model, tmp_path, drawn):
     plot_fit(table, model, tmp_path / "fit.png")
     figure = drawn[0]
-    axes, bar = figure.axes
+    axes, above, beside, bar = figure.axes
     assert axes.get_xlabel() == "peak ground velocity, PGV [m/s]"
     assert "[m/s]" in axes.get_ylabel()
-    assert "360 critical blocks of 7 earthquakes" in axes.get_title()
-    assert "40 whose critical block lies below the search limit" in axes.get_title()
+    assert "360 critical blocks of 7 earthquakes" in figure.get_suptitle()
+    assert "40 whose critical block lies below the search limit" in figure.get_suptitle()
     assert bar.get_ylabel() == "critical blocks per cell"
     assert int(axes.collections[0].get_array().sum()) == 360
+    assert sum(patch.get_height() for patch in above.patches) == 360
+    assert sum(patch.get_width() for patch in beside.patches) == 360
 
 
 def test_the_failure_lines_have_their_probabilities(table, model, tmp_path, drawn):
@@ -95,7 +97,7 @@ def test_the_failure_lines_have_their_probabilities(table, model, tmp_path, draw
     lines = {line.get_label(): line for line in drawn[0].axes[0].lines}
     expected = {
         "2.5 % probability of failure": 0.025,
-        "mean critical velocity": 0.5,
+        "50 % probability of failure": 0.5,
         "97.5 % probability of failure": 0.975,
     }
     assert set(lines) == set(expected)
@@ -113,9 +115,13 @@ def test_nothing_overlaps(table, model, tmp_path, drawn):
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
         renderer = canvas.get_renderer()
-        axes, bar = figure.axes
+        axes, above, beside, bar = figure.axes
         boxes = [
-            axes.title.get_window_extent(renderer),
+            figure._suptitle.get_window_extent(renderer),
+            above.get_window_extent(renderer),
+            above.yaxis.label.get_window_extent(renderer),
+            beside.get_window_extent(renderer),
+            beside.xaxis.label.get_window_extent(renderer),
             axes.xaxis.label.get_window_extent(renderer),
             axes.yaxis.label.get_window_extent(renderer),
             axes.get_window_extent(renderer),
@@ -127,6 +133,15 @@ def test_nothing_overlaps(table, model, tmp_path, drawn):
             assert figure.bbox.x0 <= box.x0 < box.x1 <= figure.bbox.x1
             assert figure.bbox.y0 <= box.y0 < box.y1 <= figure.bbox.y1
             assert not any(box.overlaps(other) for other in boxes[:i])
+
+
+def test_logarithmic_axes_show_every_block(table, model, tmp_path, drawn):
+    plot_fit(table, model, tmp_path / "fit.png", log=True)
+    axes, above, beside, _ = drawn[0].axes
+    assert axes.get_xscale() == axes.get_yscale() == "log"
+    assert int(axes.collections[0].get_array().sum()) == 360
+    assert sum(patch.get_height() for patch in above.patches) == 360
+    assert sum(patch.get_width() for patch in beside.patches) == 360
 
 
 def test_nothing_to_draw_is_refused(table, model, tmp_path):

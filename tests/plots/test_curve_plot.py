@@ -1,0 +1,45 @@
+"""The fragility curve: predict's own numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.prediction import predict
+from rbfrag.plots import curve as module
+from rbfrag.plots.curve import plot_curve
+from tests.plots.critical_values import straight_line_model
+
+
+def test_curve_and_band_are_those_of_predict(tmp_path, caught) -> None:
+    figures = caught(module)
+    model = straight_line_model()
+    plot_curve(model, 3.0, 0.1, tmp_path / "c.png", level=0.9)
+    axes = figures[0].axes[0]
+    dashed, solid = (line for line in axes.lines if len(line.get_xdata()) > 2)
+    x, y = dashed.get_data()
+    inside = np.isfinite(solid.get_ydata())
+    for i in (40, 120, 200):
+        answer = predict(3.0, 0.1, pgv_m_s=float(x[i]), model=model, level=0.9)
+        assert y[i] == pytest.approx(answer.probability, rel=1e-12)
+        assert inside[i] == answer.in_domain
+        band = axes.collections[0].get_paths()[0].vertices
+        here = band[np.isclose(band[:, 0], x[i], rtol=1e-12)][:, 1]
+        assert (here.min(), here.max()) == pytest.approx((answer.ci_low, answer.ci_high))
+    assert y[-1] > 0.95
+    assert "360 critical blocks of 7 earthquakes" in axes.get_title()
+
+
+def test_other_measures_are_held(tmp_path, caught) -> None:
+    figures = caught(module)
+    plot_curve(straight_line_model("pga_tm"), 3.0, 0.1, tmp_path / "c.png", fixed={"tm_s": 0.5})
+    axes = figures[0].axes[0]
+    assert axes.get_xlabel() == "peak ground acceleration, PGA [g]"
+    assert "$T_m$ = 0.5 s" in axes.get_title()
+
+
+def test_a_missing_measure_is_named(tmp_path) -> None:
+    with pytest.raises(InputError, match="tm_s"):
+        plot_curve(straight_line_model("pga_tm"), 3.0, 0.1, tmp_path / "c.png")
+    assert not list(tmp_path.iterdir())

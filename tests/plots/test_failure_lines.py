@@ -1,0 +1,47 @@
+"""Lines of equal probability: the answers of predict, turned round."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.prediction import predict
+from rbfrag.plots.failure_lines import failure_line
+from tests.plots.critical_values import straight_line_model
+
+X = np.array([0.05, 0.3, 1.0])
+
+
+@pytest.mark.parametrize("probability", [0.02, 0.5, 0.9])
+@pytest.mark.parametrize(
+    ("term", "measures"),
+    [
+        ("pgv", lambda x: {"pgv_m_s": x}),
+        ("pga_tm", lambda x: {"pga_g": x * 2.0 * np.pi / (9.80665 * 0.4), "tm_s": 0.4}),
+        ("pgd_tm", lambda x: {"pgd_m": x * 0.7 / (2.0 * np.pi), "tm_s": 0.7}),
+    ],
+)
+def test_blocks_on_a_line_have_its_probability(term, measures, probability) -> None:
+    model = straight_line_model(term)
+    for x, y in zip(X, failure_line(model, X, probability), strict=True):
+        if np.isnan(y):
+            assert probability > 0.5  # the line of a straight-line model may run below zero
+            continue
+        for p2 in (0.2, 0.5):
+            answer = predict(p2, y * p2**0.5 / 9.80665, model=model, **measures(x))
+            assert answer.probability == pytest.approx(probability, rel=1e-9)
+
+
+def test_a_line_below_zero_is_none() -> None:
+    assert np.isnan(failure_line(straight_line_model(), np.array([1e-3]), 0.999)).all()
+
+
+def test_other_terms_are_refused() -> None:
+    from types import SimpleNamespace
+
+    model = SimpleNamespace(
+        name="m", term=SimpleNamespace(name="pgv_pga", inputs=("pgv_m_s", "pga_g"))
+    )
+    with pytest.raises(InputError, match="pgv_m_s and pga_g"):
+        failure_line(model, X, 0.5)  # type: ignore[arg-type]

@@ -1,0 +1,46 @@
+"""Critical strength over frequency: counts and lines."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.lobes import lobe_line
+from rbfrag.plots import sensitivity as module
+from rbfrag.plots.sensitivity import plot_sensitivity
+from tests.plots.critical_values import N, critical_values
+
+
+def test_every_critical_value_is_shown_and_counted(tmp_path, caught) -> None:
+    figures = caught(module)
+    table = critical_values()
+    plot_sensitivity(table, tmp_path / "s.png", data="made up")
+    axes = figures[0].axes[0]
+    assert int(axes.collections[0].get_array().sum()) == N * 9 // 10
+    assert "360 critical blocks" in axes.get_title()
+    assert "made up" in axes.get_title()
+    assert any("40 critical values" in text.get_text() for text in axes.texts)
+    x = 2.0 * np.pi / (table.tm_s * np.sqrt(table.p2))
+    found = table.status == "found"
+    legend = [text.get_text() for text in axes.get_legend().get_texts()]
+    for name, words in zip(("rectangular", "half-sine", "triangular"), legend, strict=True):
+        above = int(np.sum(table.kr_over_pga[found] > lobe_line(name, x[found])))
+        assert words.startswith(f"{name} lobe: {above} above")
+
+
+def test_nothing_covers_anything(tmp_path, caught, overlapping) -> None:
+    figures = caught(module)
+    plot_sensitivity(critical_values(), tmp_path / "s.png")
+    axes = figures[0].axes[0]
+    texts = [*axes.texts, *axes.get_legend().get_texts(), axes.title, axes.xaxis.label]
+    assert overlapping(figures[0], texts) == []
+
+
+def test_without_a_mean_period_there_is_nothing(tmp_path) -> None:
+    table = replace(critical_values(), tm_s=np.full(N, np.nan))
+    with pytest.raises(InputError, match="mean period"):
+        plot_sensitivity(table, tmp_path / "s.png")
+    assert not list(tmp_path.iterdir())
