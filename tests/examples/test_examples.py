@@ -1,0 +1,88 @@
+"""The example scripts, run as a reader would run them."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import rbfrag
+from rbfrag.cli.main import app
+from tests.conftest import ROOT
+from tests.synthetic import shaking, write_at2
+
+EXAMPLES = ROOT / "examples"
+
+
+@pytest.fixture(scope="module")
+def database(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small campaign on made-up records, with a model on PGV."""
+    folder = tmp_path_factory.mktemp("examples")
+    path = folder / "campaign.db"
+    suite = folder / "records"
+    suite.mkdir()
+    for seed in range(24):
+        # strengths that do not follow the periods
+        samples = (0.3 + 0.25 * (seed * 5 % 6)) * shaking(seed)
+        write_at2(suite / f"{seed}.AT2", samples, event=f"EVENT {seed // 2}", station=f"S{seed}")
+    for arguments in (
+        ("motions", "add", suite, "--db", path),
+        ("simulate", "--p2", "10,3,1", "--jobs", "1", "--db", path),
+        ("fit", "--term", "pgv", "--method", "lognormal", "--db", path),
+    ):
+        result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+        assert result.exit_code == 0, result.output
+    return path
+
+
+def run(script: str, *arguments: str | Path) -> str:
+    done = subprocess.run(
+        [sys.executable, EXAMPLES / script, *arguments],
+        capture_output=True, text=True, check=False, timeout=300,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_annual_loss(database: Path) -> None:
+    printed = run("annual_loss.py", database)
+    match = re.search(r"mean annual loss (\d+) EUR \(95 % interval (\d+) to (\d+)\)", printed)
+    assert match
+    loss, low, high = map(int, match.groups())
+    assert 0 < low < loss < high
+    rows = [line for line in printed.splitlines() if line.lstrip().startswith("km ")]
+    assert len(rows) == 4
+
+
+def test_refit_with_pandas(database: Path) -> None:
+    printed = run("refit_with_pandas.py", database)
+    match = re.search(r"ln y = (\S+) \+ (\S+) ln PGV .* scatter (\S+)", printed)
+    assert match
+    # strong shaking brings down strong blocks, about in proportion
+    assert 0.5 < float(match.group(2)) < 1.5
+    found = rbfrag.read_table("combination", db=str(database)).query("status == 'found'")
+    assert f"{len(found)} critical blocks of 12 earthquakes" in printed
+
+
+def test_pelicun(database: Path, tmp_path: Path) -> None:
+    python = os.environ.get("RBFRAG_TEST_PELICUN_PYTHON")
+    if not python:
+        pytest.skip("RBFRAG_TEST_PELICUN_PYTHON names no Python that has pelicun")
+    table = tmp_path / "block.csv"
+    arguments = ["export", "pelicun", "--p2", "3", "--kr", "0.1", "--out", str(table), "--db",
+                 str(database)]  # fmt: skip
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    for pgv in (0.5, 0.7, 0.9):
+        done = subprocess.run(
+            [python, EXAMPLES / "pelicun_damage.py", table, str(pgv)],
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        p = rbfrag.predict(3.0, 0.1, pgv_m_s=pgv, db=str(database)).probability
+        share = float(done.stdout.split()[-1])
+        assert share == pytest.approx(p, abs=4.0 * (p * (1 - p) / 20_000) ** 0.5 + 1e-3)
