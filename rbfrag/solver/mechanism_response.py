@@ -28,7 +28,7 @@ def mechanism_response(kind: str, mechanism: Mechanism, shaking: Shaking) -> Res
     turned = mechanism.rotates and not failed
     critical = mechanism.critical
     start = mechanism.first.pose(0.0).centroid_m
-    at_end = course.pose
+    at_end = None if failed else course.pose
     return Response(
         kind=kind,
         outcome=course.outcome,
@@ -43,10 +43,10 @@ def mechanism_response(kind: str, mechanism: Mechanism, shaking: Shaking) -> Res
         samples_total=int(np.count_nonzero(drive.interval_s)),
         warnings=_warnings(shaking, drive, course),
         history=_history(mechanism, drive, course.travel) if course.travel else None,
-        final_theta_rad=abs(at_end.turned_rad) if turned else None,
-        displacement_m=None if failed else at_end.displacement_m,
+        final_theta_rad=abs(at_end.turned_rad) if turned and at_end else None,
+        displacement_m=at_end.displacement_m if at_end else None,
         peak_displacement_m=None if failed else course.peak_displacement_m,
-        centroid_displacement_m=None if failed else math.dist(at_end.centroid_m, start),
+        centroid_displacement_m=math.dist(at_end.centroid_m, start) if at_end else None,
         stopped_s=course.ended_s,
         mode_changes=tuple(ModeChange(change.time_s, change.name) for change in course.changes),
     )

@@ -82,6 +82,17 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         )
 
     def rocks_back(exit: Exit) -> Phase:
+        standstill = exit.x
+
+        def after_rocking(exit: Exit) -> Ending:
+            if exit.reason == "upper":
+                return Ending(
+                    Outcome.CONTACT_LOST,
+                    f"at {exit.time_s:.3f} s the heel meets its plane again: the motion after it "
+                    "is not verified",
+                )
+            return _seated_with_a_gap(site, block, exit, standstill)
+
         return Phase(
             name="rocks back about its toe, the heel off its plane",
             forward=rocking,
@@ -92,15 +103,6 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
             lowest=0.0,
             highest=exit.x,
         )
-
-    def after_rocking(exit: Exit) -> Ending:
-        if exit.reason == "upper":
-            return Ending(
-                Outcome.CONTACT_LOST,
-                f"at {exit.time_s:.3f} s the heel meets its plane again: the motion after it is "
-                "not verified",
-            )
-        return _seated_with_a_gap(site, block, exit)
 
     confined = equation(site)
     return Mechanism(
@@ -174,7 +176,7 @@ def _fallen(exit: Exit) -> Ending:
     return Ending(Outcome.TOPPLED, f"at {exit.time_s:.3f} s the block lies on its front face")
 
 
-def _seated_with_a_gap(site: BlockOnPlanes, block: Block, exit: Exit) -> Ending:
+def _seated_with_a_gap(site: BlockOnPlanes, block: Block, exit: Exit, slipped_at: float) -> Ending:
     """Return what is known of a block that is back on its base with a gap at the heel."""
     beta, phi = site.beta_rad, site.phi_rad
     forward = math.tan(math.radians(block.alpha3_deg) - beta)
@@ -182,13 +184,19 @@ def _seated_with_a_gap(site: BlockOnPlanes, block: Block, exit: Exit) -> Ending:
         math.tan(max(math.radians(block.alpha1_deg) - beta, -1.57)),
         -math.tan(phi + beta) if phi + beta < 0.5 * math.pi else -math.inf,
     )
-    seated = f"at {exit.time_s:.3f} s the block is back on its base, its toe displaced"
+    seated = (
+        f"at {exit.time_s:.3f} s the block falls back on its base, its toe displaced by "
+        f"{toe_slip(block)(slipped_at):.3g} m; how far the impact pushes it back is not known"
+    )
     if exit.rest_max_q <= forward and exit.rest_min_q >= backward:
-        return Ending(Outcome.STABLE, f"{seated}; the rest of the record does not move it")
+        return Ending(
+            Outcome.STABLE, f"{seated}; the rest of the record does not move it", in_place=False
+        )
     return Ending(
         Outcome.CONTACT_LOST,
-        f"{seated} and a gap at the heel: its further motion, which the rest of the record drives, "
-        "is not verified",
+        f"{seated}, and its further motion with a gap at the heel, which the rest of the record "
+        "drives, is not verified",
+        in_place=False,
     )
 
 

@@ -125,10 +125,13 @@ class Ending:
     Args:
         outcome: how it ended.
         sentence: what happened and what was not followed; empty where there is nothing to say.
+        in_place: whether it is known where the block is; False where it ends in an impact
+            that the model does not describe.
     """
 
     outcome: Outcome
     sentence: str = ""
+    in_place: bool = True
 
 
 ExitReason = Literal["upper", "lower", "reverse"]
@@ -195,9 +198,15 @@ class Mechanism:
         rotates: whether x is a rotation [rad] rather than a displacement [m].
         critical: x at which the block stands without any strength; None where there is none.
         warnings: what the reader of the answer should know.
+        if_seated: the same where the block has come back to its lowest position in motion.
+        least_q: least k_h/(1 + k_v) that the model covers.
+        if_below: what the reader should know where the record goes below it.
     """
 
     first: Phase
     rotates: bool
     critical: float | None
     warnings: tuple[str, ...] = ()
+    if_seated: str = ""
+    least_q: float = -np.inf
+    if_below: str = ""

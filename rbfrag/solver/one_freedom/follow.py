@@ -78,7 +78,7 @@ class Course:
         x: position at the end.
         rate: rate at the end; not zero where the model ended in motion.
         peak_displacement_m: greatest displacement along the base [m].
-        pose: where the block is at the end.
+        pose: where the block is at the end; None where that is not known.
         started_s: first motion [s], or None.
         ended_s: time of the last standstill, or at which the model ended [s]; None if the
             block never moved.
@@ -97,7 +97,7 @@ class Course:
     x: float
     rate: float
     peak_displacement_m: float
-    pose: Pose
+    pose: Pose | None
     started_s: float | None
     ended_s: float | None
     certain_s: float | None
@@ -133,12 +133,12 @@ def follow(
     state = PhaseRun(
         code=-1, condition=0, node=0, tau=0.0, time_s=float(drive.time_s[0]), x=0.0, rate=0.0,
         peak=0.0, started_s=math.nan, stopped_s=math.nan, certain_s=math.nan, error_x=0.0,
-        error_rate=0.0, peak_error=0.0, steps=0, samples_moved=0, history_length=0,
+        error_rate=0.0, peak_error=0.0, steps=0, samples_moved=0, seatings=0, history_length=0,
     )  # fmt: skip
     phase = mechanism.first
     changes: list[Change] = []
     pieces: list[Travel] = []
-    steps = samples_moved = 0
+    steps = samples_moved = seatings = 0
     started = ended = math.nan
     peak, peak_error, slipped = 0.0, 0.0, 0.0
     while True:
@@ -146,6 +146,7 @@ def follow(
         found = _run(phase, drive, state, store, turn_max, order)
         steps += found.steps
         samples_moved += found.samples_moved
+        seatings += found.seatings
         started = found.started_s if math.isnan(started) else started
         ended = found.stopped_s if not math.isnan(found.stopped_s) else ended
         if found.peak > peak:
@@ -166,14 +167,20 @@ def follow(
         changes.append(Change(found.time_s, following.name))
         phase = following
         state = found
-    said = [*mechanism.warnings, *([following.sentence] if following.sentence else [])]
+    said = list(mechanism.warnings)
+    if seatings:
+        said.append(mechanism.if_seated)
+    if float(drive.q.min()) < mechanism.least_q:
+        said.append(mechanism.if_below)
+    if following.sentence:
+        said.append(following.sentence)
     return Course(
         outcome=following.outcome,
         peak=peak,
         x=found.x,
         rate=found.rate,
         peak_displacement_m=slipped,
-        pose=phase.pose(found.x),
+        pose=phase.pose(found.x) if following.in_place else None,
         started_s=_or_none(started),
         ended_s=_or_none(ended) if not math.isnan(started) or found.code == JUMPED else None,
         certain_s=_or_none(found.certain_s),

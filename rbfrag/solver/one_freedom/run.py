@@ -66,6 +66,7 @@ class PhaseRun(NamedTuple):
     peak_error: float
     steps: int
     samples_moved: int
+    seatings: int
     history_length: int
 
 
@@ -95,7 +96,7 @@ def run_phase(
     history: FloatArray,
 ) -> tuple[
     int, int, int, float, float, float, float, float, float, float, float, float, float, float,
-    int, int, int,
+    int, int, int, int,
 ]:  # fmt: skip
     """Run one phase; the fields of :class:`PhaseRun` in order.
 
@@ -139,6 +140,7 @@ def run_phase(
     certain_s = math.nan
     steps = 0
     moved = 0
+    seatings = 0
     counted = -1
     free_steps = 0
     free_s = 0.0  # time after the record at the start of the present free interval
@@ -147,7 +149,7 @@ def run_phase(
 
     moving = rate != 0.0 or not sticks
     sense = -1 if rate < 0.0 else 1
-    fresh = moving and rate == 0.0  # entered at the instant at which the acceleration is zero
+    fresh = False  # started where the acceleration is zero
     barred = 0  # sense in which the block has just come to a standstill: not resumed at once
     inspect = False  # accelerations have jumped: conditions must be looked at anew
     f_drive = f_resist = r_drive = r_resist = 0.0
@@ -409,6 +411,9 @@ def run_phase(
                     tau = at + part * end
                     rate = rate_at(u, 0, order, end) / step_s
                     x += travel_at(u, order, end)
+                    if x > peak:
+                        peak = x
+                        peak_error = error_x
                     break
                 c = c_end
                 s = s_end
@@ -433,6 +438,7 @@ def run_phase(
                 rate = 0.0
                 error_x = 0.0
                 standing = True
+                seatings += 1
                 barred = -1
                 break
             if event == 1:
@@ -491,5 +497,5 @@ def run_phase(
             moment_s = time_s[last] + interval_s[last] * w[last] / (w[last] - w[last + 1])
     return (
         code, condition, node, tau, moment_s, x, rate, peak, started_s, stopped_s, certain_s,
-        error_x, error_rate, peak_error, steps, moved, filled,
+        error_x, error_rate, peak_error, steps, moved, seatings, filled,
     )  # fmt: skip
