@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -29,7 +30,7 @@ class Condition:
     Args:
         per_k_h: factor of the driving acceleration.
         per_w: factor of the effective gravity 1 + k_v.
-        per_rate2: factor of x'^2.
+        per_rate2: factor of x'^2; it alone may hold a third harmonic.
         outcome: how the run ends where the condition fails.
         sentence: what has happened then.
     """
@@ -62,7 +63,7 @@ class Equation:
     braking: Harmonics = field(default_factory=lambda: constant(0.0))
     conditions: tuple[Condition, ...] = ()
 
-    @property
+    @cached_property
     def table(self) -> FloatArray:
         """The coefficients as the kernel reads them, shape (4 + 3 conditions, 7)."""
         rows = [self.inertia, self.drive, self.resistance, self.braking]
@@ -70,7 +71,7 @@ class Equation:
             rows += [condition.per_k_h, condition.per_w, condition.per_rate2]
         return np.array([row.coefficients for row in rows])
 
-    @property
+    @cached_property
     def uniform(self) -> bool:
         """Whether the equation is the same everywhere: x is then a cubic in each interval."""
         everywhere = (self.inertia, self.drive, self.resistance, self.braking)

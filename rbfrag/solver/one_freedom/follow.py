@@ -170,7 +170,7 @@ def follow(
     said = list(mechanism.warnings)
     if seatings:
         said.append(mechanism.if_seated)
-    if float(drive.q.min()) < mechanism.least_q:
+    if mechanism.least_q > -math.inf and float(drive.q.min()) < mechanism.least_q:
         said.append(mechanism.if_below)
     if following.sentence:
         said.append(following.sentence)

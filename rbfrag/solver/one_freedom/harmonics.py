@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,14 +59,23 @@ class Harmonics:
 
     def __call__(self, theta: float) -> float:
         """Return the value at a rotation [rad]."""
-        turns = np.exp(1j * theta * np.arange(-DEGREE, DEGREE + 1))
-        return float((self.spectrum @ turns).real)
+        numbers = self._numbers
+        value = numbers[0]
+        for n in range(1, DEGREE + 1):
+            if numbers[2 * n - 1] != 0.0 or numbers[2 * n] != 0.0:
+                value += numbers[2 * n - 1] * math.cos(n * theta)
+                value += numbers[2 * n] * math.sin(n * theta)
+        return value
 
     def derivative(self) -> Harmonics:
         """Return the derivative by θ."""
         return Harmonics(self.spectrum * 1j * np.arange(-DEGREE, DEGREE + 1))
 
-    @property
+    @cached_property
+    def _numbers(self) -> tuple[float, ...]:
+        return tuple(self.coefficients.tolist())
+
+    @cached_property
     def coefficients(self) -> FloatArray:
         """Factors of 1, cos θ, sin θ, cos 2θ, sin 2θ, cos 3θ and sin 3θ, shape (7,)."""
         numbers = np.zeros(SIZE)

@@ -43,6 +43,12 @@ EPSILON = 2.220446049250313e-16
 FREE_STEPS_MAX = 100_000
 """Steps after the record before a motion that does not end is given up."""
 
+TURN_OF_ORDER_5, TURN_OF_ORDER_6 = 0.012, 0.03
+"""Steps, in units of the block's own time, whose truncation at these orders is below rounding."""
+
+SLOW = 1e-4
+"""Size of the last two terms of a series, over its first three, at which a step is halved."""
+
 SPLITS_MAX = 40
 """Halvings of a step whose series does not converge."""
 
@@ -91,7 +97,7 @@ def run_phase(
     rate: float,
     error_x: float,
     error_rate: float,
-    order: int,
+    highest_order: int,
     turn_max: float,
     history: FloatArray,
 ) -> tuple[
@@ -120,7 +126,8 @@ def run_phase(
         rate: rate at the entry [1/s].
         error_x: error of the position at the entry.
         error_rate: error of the rate at the entry.
-        order: degree of a step; `UNIFORM_ORDER` where the equation is the same everywhere.
+        highest_order: degree of a step; `UNIFORM_ORDER` where the equation is the same everywhere.
+            Short steps, that need no more, take a lower one.
         turn_max: greatest step in units of the block's own time.
         history: shape (4, m) to be filled with time, x, x' and node (-1 for an event between
             nodes); (4, 0) for none.
@@ -129,9 +136,10 @@ def run_phase(
     last = min(n, jump_node) - 1
     room = history.shape[1]
     filled = 0
-    u = np.empty(order + 1)
-    work = np.empty((7, order + 1))
-    uniform = order == UNIFORM_ORDER
+    u = np.empty(highest_order + 1)
+    work = np.empty((7, highest_order + 1))
+    uniform = highest_order == UNIFORM_ORDER
+    order = highest_order
 
     peak = x
     peak_error = error_x
@@ -224,14 +232,16 @@ def run_phase(
                 node += 1
                 tau = 0.0
                 # rest costs one comparison a sample
-                while node < last:
-                    if f_drive * k_h[node] > f_resist * w[node]:
-                        break
-                    if f_drive * k_h[node + 1] > f_resist * w[node + 1]:
-                        break
-                    if may_reverse and r_drive * k_h[node + 1] < r_resist * w[node + 1]:
-                        break
-                    node += 1
+                if may_reverse:
+                    while node < last:
+                        if f_drive * k_h[node + 1] > f_resist * w[node + 1]:
+                            break
+                        if r_drive * k_h[node + 1] < r_resist * w[node + 1]:
+                            break
+                        node += 1
+                else:
+                    while node < last and f_drive * k_h[node + 1] <= f_resist * w[node + 1]:
+                        node += 1
                 continue
             tau = min(start, 1.0)
             table = forward if sense > 0 else reverse
@@ -260,11 +270,13 @@ def run_phase(
                 filled += 1
 
         table = forward if sense > 0 or not sticks else reverse
-        inertia = harmonic_sum(table, INERTIA, c, s)
-        own = math.sqrt(
-            (abs(harmonic_sum(table, DRIVE, c, s)) + abs(harmonic_sum(table, RESISTANCE, c, s)))
-            / max(abs(inertia), 1e-300)
-        )
+        inertia = table[INERTIA, 0]
+        own = 0.0
+        if not uniform:
+            inertia = harmonic_sum(table, INERTIA, c, s)
+            pull = abs(harmonic_sum(table, DRIVE, c, s))
+            hold = abs(harmonic_sum(table, RESISTANCE, c, s))
+            own = math.sqrt((pull + hold) / max(abs(inertia), 1e-300))
         if free:
             # any length will do: nothing drives the block any more
             h = turn_max / own if not uniform else 0.1
@@ -292,7 +304,13 @@ def run_phase(
 
         pieces = 1
         if not uniform:
-            pieces = max(1, math.ceil(max(own, 2.0 * abs(rate)) * left / turn_max))
+            turn = max(own, 2.0 * abs(rate)) * left
+            pieces = max(1, math.ceil(turn / turn_max))
+            order = highest_order
+            if turn < TURN_OF_ORDER_5:
+                order = min(order, 5)
+            elif turn < TURN_OF_ORDER_6:
+                order = min(order, 6)
         start_tau = tau
         part = (1.0 - tau) / pieces
         piece = 0
@@ -311,17 +329,19 @@ def run_phase(
             travel = travel_at(u, order, 1.0)
             truncation = 0.0
             if not uniform:
-                truncation = (abs(u[order]) + abs(u[order - 1])) / order
-                size = abs(travel) + abs(u[0]) + abs(u[1])
-                if truncation > 1e-9 * size and splits < SPLITS_MAX:
+                last_terms = abs(u[order]) + abs(u[order - 1])
+                if last_terms > SLOW * (abs(u[0]) + abs(u[1]) + abs(u[2])) and splits < SPLITS_MAX:
                     # the state changes faster than its own time says, near inertia = 0
                     splits += 1
                     start_tau = at
+                    order = highest_order
                     pieces = 2 * (pieces - piece)
                     piece = 0
                     part = (1.0 - start_tau) / pieces
                     continue
-                truncation *= 0.5
+                # the first two terms left out follow from these two as those did from earlier ones
+                ratio = 64.0 * (own * own + 4.0 * rate * rate) * step_s * step_s
+                truncation = min(1.0, ratio / (order * (order + 1))) * last_terms / order
 
             # leading zeros: the block starts from rest, or where the acceleration is zero too
             first = 0
@@ -389,6 +409,8 @@ def run_phase(
             if step_s > 0.0:
                 error_rate += order * truncation / step_s
                 error_rate += EPSILON * (2.0 * abs(rate) + 4.0 * own * own * span)
+                if uniform:
+                    error_rate += 4.0 * EPSILON * (abs(u[1]) + abs(u[2])) / step_s
 
             # conditions at the end of the stretch
             if end > 0.0:

@@ -32,13 +32,11 @@ INERTIA, DRIVE, RESISTANCE, BRAKING, CONDITIONS = 0, 1, 2, 3, 4
 
 @kernel
 def harmonic_sum(table: FloatArray, row: int, c: float, s: float) -> float:
-    """Value of one row of coefficients where cos x = c and sin x = s."""
+    """Value of one row of coefficients (up to the second harmonic) where cos x = c, sin x = s."""
     c2 = c * c - s * s
     s2 = 2.0 * c * s
     value: float = table[row, 0] + table[row, 1] * c + table[row, 2] * s
     value += table[row, 3] * c2 + table[row, 4] * s2
-    if table[row, 5] != 0.0 or table[row, 6] != 0.0:
-        value += table[row, 5] * (c * c2 - s * s2) + table[row, 6] * (s * c2 + c * s2)
     return value
 
 
@@ -238,17 +236,31 @@ def first_standstill(u: FloatArray, first: int, order: int) -> float:
 
 
 @kernel
+def _with_double(table: FloatArray, row: int, c: float, s: float, c2: float, s2: float) -> float:
+    """Value of one row that has no third harmonic."""
+    value: float = table[row, 0] + table[row, 1] * c + table[row, 2] * s
+    value += table[row, 3] * c2 + table[row, 4] * s2
+    return value
+
+
+@kernel
 def least_condition(
     table: FloatArray, c: float, s: float, rate: float, a: float, w: float
 ) -> tuple[float, int]:
     """Least of the inertia and the conditions at a state, and which it is (0: the inertia)."""
-    least = harmonic_sum(table, INERTIA, c, s)
+    c2 = c * c - s * s
+    s2 = 2.0 * c * s
+    c3 = c * c2 - s * s2
+    s3 = s * c2 + c * s2
+    least = _with_double(table, INERTIA, c, s, c2, s2)
     which = 0
     for n in range((table.shape[0] - CONDITIONS) // 3):
         row = CONDITIONS + 3 * n
-        value = harmonic_sum(table, row, c, s) * a + harmonic_sum(table, row + 1, c, s) * w
-        if rate != 0.0:
-            value += harmonic_sum(table, row + 2, c, s) * rate * rate
+        value = _with_double(table, row, c, s, c2, s2) * a
+        value += _with_double(table, row + 1, c, s, c2, s2) * w
+        third = _with_double(table, row + 2, c, s, c2, s2)
+        third += table[row + 2, 5] * c3 + table[row + 2, 6] * s3
+        value += third * rate * rate
         if value < least:
             least = value
             which = n + 1
