@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -20,8 +21,14 @@ FloatArray = NDArray[np.float64]
 CORRELATION = 0.733
 """Correlation of the residuals of ln PGA and ln PGV (Bradley 2012)."""
 
-_POINTS = (33, 5)
-"""Of the variable that PGV follows, and of PGA's own."""
+REACH = 4.0
+"""Standard deviations of the shaking that are integrated over, to both sides."""
+
+NOTHING = 1e-9
+"""Where even the strongest of these has a smaller probability, zero is answered."""
+
+_STEP = 0.2
+"""Greatest step in ln PGV: fragilities are wider."""
 
 _CHUNK = 400_000
 
@@ -95,44 +102,55 @@ def site_probability(
     chosen = find_model(model, ("p2", "kr", "pgv_m_s", "pga_g"), db)
     shares = np.full(p2.size, 1.0) if weight is None else weight
     shares = shares / shares.sum()
-    certain = std_ln_pgv is None and std_ln_pga is None and component.scatter == 0.0
-    first, second, both = _points(*((1, 1) if certain else _POINTS))
     sv = np.zeros(n) if std_ln_pgv is None else std_ln_pgv
     sa = np.zeros(n) if std_ln_pga is None else std_ln_pga
     # the component's scatter is common to both measures
-    var_v, var_a = sv**2 + component.scatter**2, sa**2 + component.scatter**2
     cov = CORRELATION * sv * sa + component.scatter**2
-    lv = np.sqrt(var_v)
+    lv = np.sqrt(sv**2 + component.scatter**2)
     with np.errstate(divide="ignore", invalid="ignore"):
         along = np.where(lv > 0.0, cov / lv, 0.0)
-    across = np.sqrt(np.maximum(var_a - along**2, 0.0))
+    across = np.sqrt(np.maximum(sa**2 + component.scatter**2 - along**2, 0.0))
+    mean = np.ones(1) if own_block else shares
+    widest = float(lv.max(initial=0.0))
 
-    probability, low, high = (np.empty(n) for _ in range(3))
-    known = np.empty(n, dtype=bool)
-    blocks = 1 if own_block else p2.size
-    step = max(1, _CHUNK // (blocks * both.size))
-    for start in range(0, n, step):
-        some = slice(start, start + step)
-        v = pgv_m_s[some, None] / component.ratio * np.exp(lv[some, None] * first)
-        a = along[some, None] * first + across[some, None] * second
-        a = pga_g[some, None] / component.ratio * np.exp(a)
-        # sites x blocks x points
+    def answers(sites: NDArray[np.intp], first: FloatArray, second: FloatArray) -> PredictionArray:
+        """Return answers of shape (sites, blocks, points)."""
+        v = pgv_m_s[sites, None] / component.ratio * np.exp(lv[sites, None] * first)
+        a = along[sites, None] * first + across[sites, None] * second
+        a = pga_g[sites, None] / component.ratio * np.exp(a)
         sizes, strengths = (
-            (values[some, None, None] if own_block else values[None, :, None])
+            (values[sites, None, None] if own_block else values[None, :, None])
             for values in (p2, kr)
         )
         shaking: dict[str, Any] = {"pgv_m_s": v[:, None, :], "pga_g": a[:, None, :]}
         found = predict(sizes, strengths, **shaking, model=chosen, level=level)
         assert isinstance(found, PredictionArray)
-        mean = np.ones(1) if own_block else shares
-        for target, values in (
-            (probability, found.probability),
-            (low, found.ci_low),
-            (high, found.ci_high),
-        ):
-            target[some] = (values @ both) @ mean
-        middle = found.in_domain[..., both.size // 2]
-        known[some] = middle.all(axis=1)
+        return found
+
+    probability, low, high = (np.zeros(n) for _ in range(3))
+    known = np.empty(n, dtype=bool)
+    own = 3 if std_ln_pga is not None else 1
+    blocks = 1 if own_block else p2.size
+    for sites in _pieces(np.arange(n), _CHUNK // (blocks * own)):
+        # the median answers for the domain, the strongest shaking for what can fail at all
+        median = answers(sites, np.zeros(1), np.zeros(1))
+        known[sites] = median.in_domain[:, :, 0].all(axis=1)
+        strongest = median
+        if widest > 0.0:
+            _, y, _ = _points(1, own)
+            strongest = answers(sites, np.full(own, REACH), y)
+        probability[sites] = np.nan_to_num(strongest.ci_high, nan=np.inf).max(axis=(1, 2))
+    alive = np.flatnonzero(probability > NOTHING)
+    probability[probability <= NOTHING] = 0.0
+    first, second, both = (np.zeros(1), np.zeros(1), np.ones(1))
+    if widest > 0.0:
+        count = 2 * math.ceil(REACH * widest / _STEP) + 1
+        first, second, both = _points(min(max(count, 9), 65), 5 if std_ln_pga is not None else 1)
+    for sites in _pieces(alive, _CHUNK // (blocks * both.size)):
+        found = answers(sites, first, second)
+        probability[sites] = (found.probability @ both) @ mean
+        low[sites] = (found.ci_low @ both) @ mean
+        high[sites] = (found.ci_high @ both) @ mean
     return SiteProbability(
         probability=probability,
         ci_low=low,
@@ -145,8 +163,12 @@ def site_probability(
     )
 
 
+def _pieces(places: NDArray[np.intp], size: int) -> list[NDArray[np.intp]]:
+    return [places[i : i + max(size, 1)] for i in range(0, places.size, max(size, 1))]
+
+
 def _points(first: int, second: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return points of two standard normal variables and their weights, shape (first·second,)."""
-    x, wx = normal_steps(first)
+    x, wx = normal_steps(first, REACH)
     y, wy = normal_steps(second, 3.0)
     return np.repeat(x, second), np.tile(y, first), np.repeat(wx, second) * np.tile(wy, first)
