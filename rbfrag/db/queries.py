@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from sqlalchemy import Connection, Select, and_, func, select
+from sqlalchemy import Connection, RowMapping, Select, and_, func, select
 
 from rbfrag.db.revision import SCHEMA_REVISION
 from rbfrag.db.rows import CombinationTable
@@ -22,6 +23,7 @@ from rbfrag.db.schema import (
 )
 from rbfrag.db.suite_store import require_suite
 from rbfrag.errors import InputError
+from rbfrag.motions.quality import PGD_IN_DOUBT
 from rbfrag.solver.results import NUMERICS_VERSION, SearchPoints
 
 Vertical = Literal["without", "with", "both"]
@@ -55,6 +57,7 @@ def combination_table(
     vertical: Vertical = "without",
     kind: str = "toppling",
     numerics_version: str = NUMERICS_VERSION,
+    doubtful_pgd: bool = False,
 ) -> CombinationTable:
     """Return the critical values of the non-linear model with their motions' intensity.
 
@@ -68,6 +71,8 @@ def combination_table(
         vertical: ``without`` vertical motion, ``with`` it, or ``both``.
         kind: response kind.
         numerics_version: of the solver.
+        doubtful_pgd: True to return the PGD of motions that are flagged for an implausible
+            final velocity or displacement; by default it is NaN, so that no fit reads it.
 
     Returns:
         Columns of equal length, sorted by natural key: equal databases give equal tables.
@@ -120,7 +125,9 @@ def combination_table(
         y_m_s=floats("y_m_s"),
         pga_g=floats("pga_g"),
         pgv_m_s=floats("pgv_m_s"),
-        pgd_m=floats("pgd_m"),
+        pgd_m=np.where([_pgd_in_doubt(row) for row in kept], np.nan, floats("pgd_m"))
+        if kept and not doubtful_pgd
+        else floats("pgd_m"),
         tm_s=floats("tm_s"),
         natural_key=objects("natural_key"),
     )
@@ -170,6 +177,10 @@ def database_info(connection: Connection) -> DatabaseInfo:
     )
 
 
+def _pgd_in_doubt(row: RowMapping) -> bool:
+    return not PGD_IN_DOUBT.isdisjoint(json.loads(row["flags"]))
+
+
 def _combination_query() -> Select[Any]:
     return select(
         combination.c.id,
@@ -187,6 +198,7 @@ def _combination_query() -> Select[Any]:
         motion.c.pgv_m_s,
         motion.c.pgd_m,
         motion.c.tm_s,
+        motion.c.flags,
         earthquake.c.event_id,
         earthquake.c.guessed,
     ).select_from(

@@ -71,7 +71,8 @@ class CombinationTable:
     """Critical values with the intensity of their motions: columns of equal length.
 
     What the fits read. `kr_over_pga`, `kr` and `y_m_s` are NaN unless `status` is ``found``;
-    `tm_s` is NaN where the mean period is not defined.
+    `tm_s` is NaN where the mean period is not defined, `pgd_m` where the baseline of the record
+    is in doubt, unless it was asked for.
     """
 
     combination_id: NDArray[np.int64]

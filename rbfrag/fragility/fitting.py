@@ -259,7 +259,7 @@ def _data_warnings(data: FitData) -> list[str]:
     if data.n_excluded:
         result.append(
             f"{data.n_excluded} critical values are left out because their intensity term is not "
-            "defined (no mean period, or no toppling spectrum stored)"
+            "defined (no mean period, a PGD in doubt, or no toppling spectrum stored)"
         )
     if data.n_outside_model:
         result.append(

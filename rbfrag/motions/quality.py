@@ -32,6 +32,10 @@ EDGE_SHARE = 0.1
 FEW_SAMPLES = 100
 
 
+PGD_IN_DOUBT = frozenset({"final_velocity", "final_displacement"})
+"""Flags of records whose displacement is that of a drifting baseline."""
+
+
 @dataclass(frozen=True)
 class QualityFlag:
     """One doubt about a motion.

@@ -172,6 +172,23 @@ class TestTables:
         assert table.event_guessed.sum() == 2
         assert table.p2.dtype == np.float64
 
+    def test_pgd_of_a_drifting_baseline_is_left_out(self, filled: Engine) -> None:
+        with filled.begin() as connection:
+            first = combination_table(connection).motion_id[0]
+            for flag in ("final_velocity", "final_displacement", "short_record"):
+                connection.execute(
+                    update(schema.motion)
+                    .where(schema.motion.c.id == int(first))
+                    .values(flags=f'["event_guessed", "{flag}"]')
+                )
+                table = combination_table(connection)
+                doubtful = (table.motion_id == first) & (flag != "short_record")
+                assert np.isnan(table.pgd_m[doubtful]).all()
+                assert np.isfinite(table.pgd_m[~doubtful]).all()
+                asked = combination_table(connection, doubtful_pgd=True)
+                assert np.isfinite(asked.pgd_m).all()
+                assert np.isfinite(table.pgv_m_s).all()
+
     def test_suite(self, filled: Engine) -> None:
         with filled.connect() as connection:
             assert len(combination_table(connection, suite="s").p2) == 4
