@@ -107,6 +107,7 @@ def add_motions(
     units: str | None = None,
     dt_s: float | None = None,
     raw: bool = False,
+    allow_partial: bool = False,
     high_pass: HighPass = DEFAULT_HIGH_PASS,
     on_file: Callable[[int, int], None] | None = None,
 ) -> AddReport:
@@ -124,6 +125,8 @@ def add_motions(
         units: unit of text files that do not state it.
         dt_s: sampling interval [s] of text files that hold accelerations only.
         raw: store every record as its file has it; uncorrected ones are flagged.
+        allow_partial: read files whose header states another number of samples than follow;
+            their motions are flagged `partial`.
         high_pass: what is applied to uncorrected records.
         on_file: called after each file with (files done, files in all).
 
@@ -149,7 +152,7 @@ def add_motions(
         engine: Engine | None = None
         for number, file in enumerate(files, 1):
             try:
-                traces = read_traces(file, stated, units, dt_s)
+                traces = read_traces(file, stated, units, dt_s, allow_partial)
                 if engine is None:
                     engine = stack.enter_context(opened_database(db, create=True))
                 with engine.begin() as connection:

@@ -35,7 +35,11 @@ class Trace:
 
 
 def read_traces(
-    file: Path, metadata: MotionMetadata | None, units: str | None, dt_s: float | None
+    file: Path,
+    metadata: MotionMetadata | None,
+    units: str | None,
+    dt_s: float | None,
+    allow_partial: bool = False,
 ) -> list[Trace]:
     """Return every trace of a file with its row of the metadata.
 
@@ -44,6 +48,7 @@ def read_traces(
         metadata: the table, or None.
         units: unit that the caller states; else that of the table is used.
         dt_s: sampling interval that the caller states [s]; likewise.
+        allow_partial: as for :func:`rbfrag.motions.recognise.read_motions`.
 
     Raises:
         MotionFileError: the file cannot be read, or the metadata contradict it or themselves.
@@ -53,7 +58,7 @@ def read_traces(
         _refuse_rows_apart(file, rows)
         units = units or _known_unit(rows[0].units)
         dt_s = dt_s or rows[0].dt_s
-    motions = read_motions(file, units=units, dt_s=dt_s)
+    motions = read_motions(file, units=units, dt_s=dt_s, allow_partial=allow_partial)
     by_index = {row.trace_index: row for row in rows}
     for index, row in by_index.items():
         if index >= len(motions):

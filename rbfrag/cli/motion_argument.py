@@ -10,7 +10,12 @@ if TYPE_CHECKING:
 
 
 def find_motion(
-    text: str, *, db: str | None, units: str | None = None, dt_s: float | None = None
+    text: str,
+    *,
+    db: str | None,
+    units: str | None = None,
+    dt_s: float | None = None,
+    allow_partial: bool = False,
 ) -> GroundMotion:
     """Return the motion that a MOTION argument means.
 
@@ -20,6 +25,7 @@ def find_motion(
         db: where ids are looked up.
         units: unit of a text file that does not state it.
         dt_s: sampling interval [s] of a text file without a time column.
+        allow_partial: read a file whose header states another number of samples than follow.
 
     Raises:
         InputError: no such file, trace or id.
@@ -32,7 +38,7 @@ def find_motion(
             return load_motion(connection, int(text))
     from rbfrag.motions.recognise import read_motion
 
-    return read_motion(text, units=units, dt_s=dt_s)
+    return read_motion(text, units=units, dt_s=dt_s, allow_partial=allow_partial)
 
 
 def find_vertical(

@@ -50,6 +50,7 @@ def add(
             "--raw", help="Store every record as its file has it; uncorrected ones are flagged."
         ),
     ] = False,
+    allow_partial: options.AllowPartial = False,
     units: options.Units = None,
     dt: options.Dt = None,
     db: options.Db = None,
@@ -80,6 +81,7 @@ def add(
         units=units,
         dt_s=dt,
         raw=raw,
+        allow_partial=allow_partial,
         on_file=show,
     )
     if json:
@@ -128,6 +130,7 @@ def list_motions(
 @app.command("show", epilog="Example:  rbfrag motions show record.AT2")
 def show(
     motion: options.Motion,
+    allow_partial: options.AllowPartial = False,
     units: options.Units = None,
     dt: options.Dt = None,
     db: options.Db = None,
@@ -136,7 +139,7 @@ def show(
     """Show one motion: a file, or a stored one by its id."""
     from rbfrag.motions.quality import quality_flags
 
-    ground = find_motion(motion, db=db, units=units, dt_s=dt)
+    ground = find_motion(motion, db=db, units=units, dt_s=dt, allow_partial=allow_partial)
     flags = quality_flags(ground)
     document: dict[str, Any] = {
         "name": ground.label,

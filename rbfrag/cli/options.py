@@ -132,6 +132,14 @@ Dt = Annotated[
     ),
 ]
 
+AllowPartial = Annotated[
+    bool,
+    typer.Option(
+        "--allow-partial",
+        help="Read a file whose header states another number of samples than follow, and flag it.",
+    ),
+]
+
 Suite = Annotated[
     str | None,
     typer.Option("--suite", help="Only the motions of this suite.", show_default=False),

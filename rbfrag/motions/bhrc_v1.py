@@ -19,7 +19,7 @@ from rbfrag.motions.header_field import (
     find_field,
     interval_of_duration,
     optional_field,
-    refuse_other_count,
+    other_count,
 )
 from rbfrag.motions.text_file import fixed_width_numbers, sample_count
 from rbfrag.motions.volume_1 import data_lines
@@ -44,7 +44,9 @@ def recognises(head: str) -> bool:
     return bool(_BLOCK.match(head))
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the components of a BHRC file in their order, with one recording id.
 
     Args:
@@ -52,19 +54,27 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit that the caller states; refused, as the file's own is g/10.
         dt_s: sampling interval that the caller states [s]; refused when the file has another.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.
     """
     lines = text.split("\n")
     return [
-        _component(path, lines, span, index, units, dt_s)
+        _component(path, lines, span, index, units, dt_s, allow_partial)
         for index, span in enumerate(blocks(path, lines, _BLOCK))
     ]
 
 
 def _component(
-    path: Path, lines: list[str], span: range, index: int, units: str | None, dt_s: float | None
+    path: Path,
+    lines: list[str],
+    span: range,
+    index: int,
+    units: str | None,
+    dt_s: float | None,
+    allow_partial: bool,
 ) -> GroundMotion:
     points = find_field(path, lines, span, _POINTS, "number of points")
     npts = sample_count(path, points.text, points.line, "number of points")
@@ -74,7 +84,11 @@ def _component(
     dt = agreed_dt(path, interval_of_duration(path, duration, npts), duration.line, dt_s)
     first, rows = data_lines(path, lines, span, unit.line)
     values = fixed_width_numbers(path, rows, first + 1, WIDTH, PER_LINE, "acceleration")
-    refuse_other_count(path, npts, values.size, points.line, f"component {index}")
+    remarks = other_count(
+        path, npts, values.size, points.line, f"component {index}", allow_partial=allow_partial
+    )
+    if remarks:
+        remarks += (f"dt = {dt:g} s is the duration over the number of points of the header",)
 
     component = find_field(path, lines, span, _COMPONENT, "line 'COMP'").text
     station = optional_field(lines, span, _STATION)
@@ -96,5 +110,7 @@ def _component(
         source_file=path.name,
         trace_index=index,
         file_format=FORMAT,
+        remarks=remarks,
+        is_partial=bool(remarks),
         is_corrected=False,
     )

@@ -22,7 +22,7 @@ from rbfrag.motions.header_field import (
     interval_of_duration,
     missing_channels,
     optional_field,
-    refuse_other_count,
+    other_count,
 )
 from rbfrag.motions.text_file import fixed_width_numbers, sample_count
 from rbfrag.motions.time_column import refuse_other_times
@@ -48,7 +48,9 @@ def recognises(head: str) -> bool:
     return bool(_BLOCK.match(head)) and bool(_POINTS.search(head))
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the channels of a V1 file in their order, with one recording id.
 
     A channel of zeros alone belongs to no sensor (the fourth channel of three-axis recorders);
@@ -59,13 +61,15 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit that the caller states; refused, as the file's own is g/10.
         dt_s: sampling interval that the caller states [s]; refused when the file states another.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.
     """
     lines = text.split("\n")
     spans = blocks(path, lines, _BLOCK)
-    channels = [_channel(path, lines, span, units, dt_s) for span in spans]
+    channels = [_channel(path, lines, span, units, dt_s, allow_partial) for span in spans]
     moving = [channel for channel in channels if channel.acceleration_g.any()]
     still = [channel.component for channel in channels if not channel.acceleration_g.any()]
     if not moving:
@@ -74,12 +78,18 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
     if still:
         remarks += (f"the channel {', '.join(still)} holds zeros only and is left out",)
     return [
-        replace(channel, trace_index=index, remarks=remarks) for index, channel in enumerate(moving)
+        replace(channel, trace_index=index, remarks=(*remarks, *channel.remarks))
+        for index, channel in enumerate(moving)
     ]
 
 
 def _channel(
-    path: Path, lines: list[str], span: range, units: str | None, dt_s: float | None
+    path: Path,
+    lines: list[str],
+    span: range,
+    units: str | None,
+    dt_s: float | None,
+    allow_partial: bool,
 ) -> GroundMotion:
     points = find_field(path, lines, span, _POINTS, "number of points")
     npts = sample_count(path, points.text, points.line, "number of points")
@@ -90,7 +100,7 @@ def _channel(
     first, rows = data_lines(path, lines, span, unit.line)
     numbers = fixed_width_numbers(path, rows, first + 1, WIDTH, PER_LINE, "time or acceleration")
     times, values = numbers[0::2], numbers[1::2]
-    refuse_other_count(path, npts, values.size, points.line)
+    remarks = other_count(path, npts, values.size, points.line, allow_partial=allow_partial)
     if times.size != values.size:
         raise MotionFileError(
             path, "the last time has no acceleration: the file is truncated", line=first + len(rows)
@@ -112,6 +122,8 @@ def _channel(
         recording=f"{event} {name}".strip(),
         source_file=path.name,
         file_format=FORMAT,
+        remarks=remarks,
+        is_partial=bool(remarks),
         is_corrected=False,
         start_time=first_sample_time(trigger.text) if trigger else None,
     )

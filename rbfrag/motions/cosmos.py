@@ -25,7 +25,7 @@ from rbfrag.motions.header_field import (
     blocks,
     find_field,
     optional_field,
-    refuse_other_count,
+    other_count,
 )
 from rbfrag.motions.text_file import (
     field_layout,
@@ -64,7 +64,9 @@ def recognises(head: str) -> bool:
     return bool(_BLOCK.match(head.split("\n", 1)[0]))
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the accelerations of a COSMOS file in their order.
 
     Args:
@@ -72,6 +74,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit that the caller states; refused when the file states another.
         dt_s: sampling interval that the caller states [s]; likewise.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.
@@ -85,7 +89,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         if quantity and not quantity[2].lower().startswith("accel"):
             others.append(quantity[2])
             continue
-        motions.append(_trace(path, lines, span, series, len(motions), units, dt_s))
+        motions.append(_trace(path, lines, span, series, len(motions), units, dt_s, allow_partial))
     if not motions:
         raise MotionFileError(
             path, f"the file holds {', '.join(others)}: the acceleration is needed"
@@ -101,6 +105,7 @@ def _trace(
     index: int,
     units: str | None,
     dt_s: float | None,
+    allow_partial: bool,
 ) -> GroundMotion:
     here = range(series.line - 1, series.line)
     points = find_field(path, lines, here, _POINTS, "number of points")
@@ -115,7 +120,7 @@ def _trace(
     end = next((at for at in span if at >= series.line and _END.match(lines[at])), span.stop)
     data = without_blank_end(lines[series.line : end])
     values = fixed_width_numbers(path, data, series.line + 1, width, per_line, "acceleration")
-    refuse_other_count(path, npts, values.size, series.line)
+    remarks = other_count(path, npts, values.size, series.line, allow_partial=allow_partial)
 
     channel = optional_field(lines, header, _CHANNEL)
     direction = channel.text if channel else ""
@@ -141,6 +146,8 @@ def _trace(
         source_file=path.name,
         trace_index=index,
         file_format=FORMAT,
+        remarks=remarks,
+        is_partial=bool(remarks),
         is_corrected=not lines[span.start].strip().lower().startswith("uncorrected"),
         start_time=first_sample_time(start.text) if start else None,
     )

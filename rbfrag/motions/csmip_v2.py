@@ -29,8 +29,8 @@ from rbfrag.motions.header_field import (
     find_field,
     missing_channels,
     optional_field,
+    other_count,
     positive_number,
-    refuse_other_count,
 )
 from rbfrag.motions.text_file import (
     field_layout,
@@ -64,7 +64,9 @@ def recognises(head: str) -> bool:
     return bool(_BLOCK.match(head)) and bool(_KIND.search(head))
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the channels of a V2 file in their order, with one recording id.
 
     Args:
@@ -72,6 +74,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit that the caller states; refused when the file states another.
         dt_s: sampling interval that the caller states [s]; likewise.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.
@@ -79,14 +83,21 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
     lines = text.split("\n")
     spans = blocks(path, lines, _BLOCK)
     remarks = missing_channels(lines, spans[0], len(spans))
-    return [
-        replace(_channel(path, lines, span, index, units, dt_s), remarks=remarks)
+    channels = [
+        _channel(path, lines, span, index, units, dt_s, allow_partial)
         for index, span in enumerate(spans)
     ]
+    return [replace(channel, remarks=(*remarks, *channel.remarks)) for channel in channels]
 
 
 def _channel(
-    path: Path, lines: list[str], span: range, index: int, units: str | None, dt_s: float | None
+    path: Path,
+    lines: list[str],
+    span: range,
+    index: int,
+    units: str | None,
+    dt_s: float | None,
+    allow_partial: bool,
 ) -> GroundMotion:
     points = find_field(
         path, lines, span, _POINTS, f"line 'points of accel data' in channel {index}"
@@ -99,7 +110,7 @@ def _channel(
         path, find_field(path, lines, here, _UNIT, "unit of acceleration"), units
     )
     per_line, width = field_layout(lines[points.line - 1], LAYOUT) or LAYOUT
-    if not any(lines[at].startswith(END) for at in span):
+    if not allow_partial and not any(lines[at].startswith(END) for at in span):
         raise MotionFileError(
             path,
             f"channel {index} does not end with a line {END}: the file is truncated; export the "
@@ -109,7 +120,9 @@ def _channel(
     end = next((at for at in span if at >= points.line and _SERIES_END.match(lines[at])), span.stop)
     data = without_blank_end(lines[points.line : end])
     values = fixed_width_numbers(path, data, points.line + 1, width, per_line, "acceleration")
-    refuse_other_count(path, npts, values.size, points.line, f"channel {index}")
+    remarks = other_count(
+        path, npts, values.size, points.line, f"channel {index}", allow_partial=allow_partial
+    )
 
     header = range(span.start, points.line - 1)
     channel = find_field(path, lines, header, _CHANNEL, f"line 'Chan' in channel {index}")
@@ -127,6 +140,8 @@ def _channel(
         source_file=path.name,
         trace_index=index,
         file_format=FORMAT,
+        remarks=remarks,
+        is_partial=bool(remarks),
         is_corrected=True,
         start_time=first_sample_time(start.text) if start else None,
     )

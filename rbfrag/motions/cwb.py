@@ -17,8 +17,8 @@ from rbfrag.motions.header_field import (
     NamedFields,
     agreed_dt,
     agreed_unit_in_g,
+    other_count,
     positive_number,
-    refuse_other_count,
 )
 from rbfrag.motions.text_file import field_layout, fixed_width_numbers, without_blank_end
 from rbfrag.motions.time_column import refuse_other_times
@@ -39,7 +39,9 @@ def recognises(head: str) -> bool:
     return bool(_HEAD.match(head))
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the components of a file in the order of its columns, with one recording id.
 
     Args:
@@ -47,6 +49,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit that the caller states; refused when the file states another.
         dt_s: sampling interval that the caller states [s]; likewise.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.
@@ -76,7 +80,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
     table = numbers.reshape(-1, per_line)
     length = fields["RecordLength(sec)"]
     stated = positive_number(path, length, "record length") * frequency_hz
-    refuse_other_count(path, stated, table.shape[0], length.line)
+    remarks = other_count(path, stated, table.shape[0], length.line, allow_partial=allow_partial)
     refuse_other_times(path, table[:, 0], dt, decimals, first + 1, 1)
     station = fields["StationCode"].text
     event = fields.text("Origin Time")
@@ -93,6 +97,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             source_file=path.name,
             trace_index=index,
             file_format=FORMAT,
+            remarks=remarks,
+            is_partial=bool(remarks),
             is_corrected=False,
         )
         for index, component in enumerate(components)

@@ -54,7 +54,14 @@ def recognises(head: str) -> bool:
     return all(map(_is_numeric, rows[: 1 if width <= 2 else 2]))
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path,
+    text: str,
+    *,
+    units: str | None,
+    dt_s: float | None,
+    allow_partial: bool = False,  # noqa: ARG001
+) -> list[GroundMotion]:
     """Return the one motion of a delimited text file.
 
     Args:
@@ -63,6 +70,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         units: unit of acceleration that the caller states; refused when the file states another.
         dt_s: sampling interval that the caller states [s]; needed where there is neither a time
             column nor an index beside the file, refused where it contradicts one.
+        allow_partial: makes no difference: such files state no number of samples.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.

@@ -13,8 +13,8 @@ from rbfrag.motions.header_field import (
     NamedFields,
     agreed_dt,
     agreed_unit_in_g,
+    other_count,
     positive_number,
-    refuse_other_count,
 )
 from rbfrag.motions.text_file import sample_count, table_numbers, without_blank_end
 
@@ -29,7 +29,9 @@ def recognises(head: str) -> bool:
     return bool(_HEAD.match(head))
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the one motion of a file.
 
     Args:
@@ -37,6 +39,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit that the caller states; refused when the file states another.
         dt_s: sampling interval that the caller states [s]; likewise.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.
@@ -58,7 +62,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
     npts = sample_count(path, stated.text, stated.line, "NDATA")
     rows = without_blank_end(lines[first:])
     values = table_numbers(path, rows, first + 1, 1, "acceleration")[:, 0]
-    refuse_other_count(path, npts, values.size, stated.line)
+    remarks = other_count(path, npts, values.size, stated.line, allow_partial=allow_partial)
     component = fields["STREAM"].text
     network = fields.text("NETWORK")
     station = f"{network}.{fields['STATION_CODE'].text}".lstrip(".")
@@ -75,6 +79,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             recording=f"{event} {station}".strip(),
             source_file=path.name,
             file_format=FORMAT,
+            remarks=remarks,
+            is_partial=bool(remarks),
             is_corrected=_is_corrected(fields.text("BASELINE_CORRECTION")),
             start_time=first_sample_time(fields.text("DATE_TIME_FIRST_SAMPLE_YYYYMMDD")),
         )

@@ -19,6 +19,7 @@ from rbfrag.motions.header_field import (
     agreed_unit_in_g,
     blocks,
     find_field,
+    other_count,
     positive_number,
 )
 from rbfrag.motions.text_file import fixed_width_numbers, sample_count, without_blank_end
@@ -34,6 +35,7 @@ SERIES = 3
 _BLOCK = re.compile(r"^Corrected accelerogram\s+(\S+)")
 _SITE = re.compile(r"^Site\s+(\S+)")
 _NPTS = re.compile(r"^Number of points\s+(\S+)")
+_DURATION = re.compile(r"^Number of points\s.*\bDuration\s+(\S+)\s*sec", re.IGNORECASE)
 _DT = re.compile(r"data at\s+(\S+)\s+sec intervals")
 _COMPONENT = re.compile(r"^Component\s+(\S+)")
 _PEAK = re.compile(r"^Acceleration:\s+peak\s+\S+\s+(\S+)")
@@ -44,7 +46,9 @@ def recognises(head: str) -> bool:
     return bool(_BLOCK.match(head)) and "Number of points" in head
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the components of a V2A file in their order, with one recording id.
 
     Args:
@@ -52,19 +56,27 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit that the caller states; refused when the file states another.
         dt_s: sampling interval that the caller states [s]; likewise.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.
     """
     lines = text.split("\n")
     return [
-        _component(path, lines, span, index, units, dt_s)
+        _component(path, lines, span, index, units, dt_s, allow_partial)
         for index, span in enumerate(blocks(path, lines, _BLOCK))
     ]
 
 
 def _component(
-    path: Path, lines: list[str], span: range, index: int, units: str | None, dt_s: float | None
+    path: Path,
+    lines: list[str],
+    span: range,
+    index: int,
+    units: str | None,
+    dt_s: float | None,
+    allow_partial: bool,
 ) -> GroundMotion:
     header = range(span.start, min(span.start + TEXT_LINES, span.stop))
 
@@ -83,7 +95,13 @@ def _component(
     first = span.start + TEXT_LINES + NUMERIC_LINES
     data = without_blank_end(lines[first : span.stop])
     rows = -(-npts // PER_LINE)
-    if len(data) != SERIES * rows:
+    # cut so short that no line lost among the accelerations can be the reason
+    is_cut = allow_partial and span.stop == len(lines) and len(data) < 2 * rows
+    cut_remark: tuple[str, ...] = ()
+    if is_cut:
+        _refuse_other_duration(path, lines, header, points, npts, dt)
+        cut_remark = (f"the file ends before component {index} does",)
+    elif len(data) != SERIES * rows:
         raise MotionFileError(
             path,
             f"the header of component {index} says {npts} points, which are {SERIES} x {rows} "
@@ -91,13 +109,8 @@ def _component(
             line=points.line,
         )
     values = fixed_width_numbers(path, data[:rows], first + 1, WIDTH, PER_LINE, "acceleration")
-    if values.size != npts:
-        raise MotionFileError(
-            path,
-            f"the header of component {index} says {npts} points, but {values.size} "
-            "accelerations follow",
-            line=points.line,
-        )
+    what = f"component {index}"
+    remarks = other_count(path, npts, values.size, points.line, what, allow_partial=is_cut)
     return GroundMotion(
         values * factor,
         dt,
@@ -111,5 +124,23 @@ def _component(
         source_file=path.name,
         trace_index=index,
         file_format=FORMAT,
+        remarks=(*remarks, *cut_remark),
+        is_partial=is_cut,
         is_corrected=True,
     )
+
+
+def _refuse_other_duration(
+    path: Path, lines: list[str], header: range, points: Field, npts: int, dt: float
+) -> None:
+    """Where lines are missing, a wrong count would take velocities for accelerations."""
+    duration = find_field(path, lines, header, _DURATION, "duration")
+    seconds = positive_number(path, duration, "duration")
+    if abs(seconds - npts * dt) > 2.0 * dt:
+        raise MotionFileError(
+            path,
+            f"{npts} points at dt = {dt:g} s last {npts * dt:g} s, but the header says "
+            f"{duration.text} s: the number of points is wrong, and where the accelerations end "
+            "is not known",
+            line=points.line,
+        )

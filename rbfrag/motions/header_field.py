@@ -174,8 +174,10 @@ def interval_of_duration(path: Path, duration: Field, npts: int) -> float:
     return seconds / npts
 
 
-def refuse_other_count(path: Path, stated: float, found: int, line: int, what: str = "") -> None:
-    """Refuse a file whose header states another number of samples than follow.
+def other_count(
+    path: Path, stated: float, found: int, line: int, what: str = "", *, allow_partial: bool
+) -> tuple[str, ...]:
+    """Refuse a file whose header states another number of samples than follow, or remark on it.
 
     Args:
         path: for messages.
@@ -183,14 +185,23 @@ def refuse_other_count(path: Path, stated: float, found: int, line: int, what: s
         found: samples that follow.
         line: 1-based line that states the number.
         what: whose samples, when the file holds several traces.
+        allow_partial: True to return a remark instead; a file without any sample is refused
+            all the same.
+
+    Returns:
+        Nothing where both agree, else one remark.
     """
-    if found == 0 or abs(stated - found) > ROUNDING * found:
-        raise MotionFileError(
-            path,
-            f"the header{f' of {what}' if what else ''} says {stated:.12g} samples, but {found} "
-            "follow: the file is truncated or its header is wrong; export the record again",
-            line=line,
-        )
+    if found and abs(stated - found) <= ROUNDING * found:
+        return ()
+    says = f"the header{f' of {what}' if what else ''} says {stated:.12g} samples, but {found} "
+    if found and allow_partial:
+        return (f"{says}follow: the record is partial, and which samples are missing is not told",)
+    raise MotionFileError(
+        path,
+        f"{says}follow: the file is truncated or its header is wrong; export the record again, or "
+        "read what there is with --allow-partial",
+        line=line,
+    )
 
 
 def blocks(path: Path, lines: Sequence[str], first: re.Pattern[str]) -> list[range]:

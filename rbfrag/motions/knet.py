@@ -21,8 +21,8 @@ from rbfrag.motions.header_field import (
     Field,
     agreed_dt,
     agreed_unit_in_g,
+    other_count,
     positive_number,
-    refuse_other_count,
 )
 from rbfrag.motions.text_file import free_numbers
 
@@ -53,7 +53,9 @@ def recognises(head: str) -> bool:
     return bool(_HEAD.match(head))
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the one motion of a file.
 
     Args:
@@ -61,6 +63,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit that the caller states; refused unless it is that of the scale factor.
         dt_s: sampling interval that the caller states [s]; refused when the file has another.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.
@@ -83,7 +87,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
     counts = free_numbers(path, lines[first:], first + 1, "count")
     duration = field("Duration Time(s)")
     stated = positive_number(path, duration, "duration") * frequency_hz
-    refuse_other_count(path, stated, counts.size, duration.line)
+    partial = other_count(path, stated, counts.size, duration.line, allow_partial=allow_partial)
     _refuse_large(path, lines, counts, first)
     offset = float(counts.mean())
 
@@ -111,7 +115,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             file_format=FORMAT,
             is_corrected=False,
             start_time=first_sample_time(recorded),
-            remarks=tuple(remarks),
+            remarks=(*remarks, *partial),
+            is_partial=bool(partial),
         )
     ]
 

@@ -14,8 +14,8 @@ from rbfrag.motions.header_field import (
     agreed_dt,
     agreed_unit_in_g,
     find_field,
+    other_count,
     positive_number,
-    refuse_other_count,
 )
 from rbfrag.motions.text_file import sample_count, table_numbers, without_blank_end
 
@@ -36,7 +36,9 @@ def recognises(head: str) -> bool:
     return bool(_HEAD.match(head))
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the components of a file in the order of its columns, with one recording id.
 
     Args:
@@ -44,6 +46,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit that the caller states; refused when the file states another.
         dt_s: sampling interval that the caller states [s]; likewise.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.
@@ -66,7 +70,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
     npts = sample_count(path, stated.text, stated.line, "number of data")
     rows = without_blank_end(lines[columns.line :])
     table = table_numbers(path, rows, columns.line + 1, len(components), "acceleration")
-    refuse_other_count(path, npts, table.shape[0], stated.line)
+    remarks = other_count(path, npts, table.shape[0], stated.line, allow_partial=allow_partial)
     station = fields["STATION ID"].text
     event = fields.text("EARTHQUAKE DATE")
     return [
@@ -82,6 +86,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             source_file=path.name,
             trace_index=index,
             file_format=FORMAT,
+            remarks=remarks,
+            is_partial=bool(remarks),
             is_corrected=False,
         )
         for index, component in enumerate(components)

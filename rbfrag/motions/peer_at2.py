@@ -17,6 +17,7 @@ from pathlib import Path
 from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.header_field import other_count
 from rbfrag.motions.text_file import finite_number, free_numbers, sample_count
 from rbfrag.motions.units import acceleration_unit, unit_in_g
 
@@ -40,7 +41,9 @@ def recognises(head: str) -> bool:
     return any(_NAMED.search(line) or _TRAILING.match(line) for line in lines)
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the one motion of an AT2 file.
 
     Args:
@@ -48,6 +51,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit that the caller states; refused when the file states another.
         dt_s: sampling interval that the caller states [s]; likewise.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.
@@ -65,13 +70,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         )
     factor = unit_in_g(_unit(path, lines[:at], units))
     values = free_numbers(path, lines[at + 1 :], at + 2, "acceleration")
-    if values.size != npts:
-        raise MotionFileError(
-            path,
-            f"the header says NPTS = {npts}, but {values.size} values follow: the file is "
-            "truncated or its header is wrong; export the record again",
-            line=number,
-        )
+    remarks = other_count(path, npts, values.size, number, allow_partial=allow_partial)
     event, station, component = _names(lines[1] if at >= 2 else "")
     return [
         GroundMotion(
@@ -86,6 +85,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             recording=f"{event} {station}" if event and station else "",
             source_file=path.name,
             file_format=FORMAT,
+            remarks=remarks,
+            is_partial=bool(remarks),
         )
     ]
 

@@ -77,6 +77,8 @@ def quality_flags(motion: GroundMotion) -> tuple[QualityFlag, ...]:
             f"PGV of {measures.pgv_m_s:.3g} m/s is above {LARGEST_PGV_M_S:g} m/s, more than was "
             "ever recorded: check unit, dt and baseline",
         )
+    if motion.is_partial:
+        doubt("partial", "the header states another number of samples than the file holds")
     if motion.dt_s is None:
         return tuple(found)
     if not SHORTEST_DT_S <= motion.dt_s <= LONGEST_DT_S:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -25,7 +26,7 @@ from rbfrag.motions import (
     usgs_smc,
 )
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text_file import read_text
+from rbfrag.motions.text_file import cut_number, read_text
 from rbfrag.motions.units import acceleration_unit
 
 READERS: tuple[ModuleType, ...] = (
@@ -51,7 +52,11 @@ HEAD_CHARACTERS = 4096
 
 
 def read_motions(
-    path: str | os.PathLike[str], *, units: str | None = None, dt_s: float | None = None
+    path: str | os.PathLike[str],
+    *,
+    units: str | None = None,
+    dt_s: float | None = None,
+    allow_partial: bool = False,
 ) -> list[GroundMotion]:
     """Return every acceleration trace of a file, as the file has it.
 
@@ -60,6 +65,9 @@ def read_motions(
         units: unit of acceleration, for text files that do not state it: ``g``, ``m/s2``,
             ``cm/s2`` or ``mm/s2``. Refused where the file states another.
         dt_s: sampling interval [s], for text files that hold accelerations only.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow, or that is cut off. Its motions have `is_partial` and a remark; a last line
+            that is cut short is left out.
 
     Raises:
         MotionFileError: the file cannot be read; the message names the line.
@@ -72,11 +80,40 @@ def read_motions(
     if dt_s is not None and not 0.0 < dt_s < float("inf"):
         raise InputError(f"--dt must be a positive number of seconds, not {dt_s:g}")
     text = read_text(file)
+    motions: list[GroundMotion]
+    try:
+        if word := cut_number(text):
+            raise MotionFileError(
+                file,
+                f"the file ends within the number {word!r}: it is truncated; export the record "
+                "again, or read what there is with --allow-partial",
+                line=text.count("\n") + 1,
+            )
+        motions = _reader(file, text).read(file, text, units=units, dt_s=dt_s)
+    except UnknownFormatError:
+        raise
+    except MotionFileError:
+        if not allow_partial:
+            raise
+    else:
+        return motions
+    remark = ""
+    whole, newline, cut = text.rpartition("\n")
+    if cut and newline and not cut.rstrip().endswith("}"):
+        # its last number may lack digits
+        text = whole + newline
+        remark = f"the file ends within a line, which is left out: {cut[:40].strip()!r}"
+    motions = _reader(file, text).read(file, text, units=units, dt_s=dt_s, allow_partial=True)
+    if remark:
+        motions[-1] = replace(motions[-1], is_partial=True, remarks=(*motions[-1].remarks, remark))
+    return motions
+
+
+def _reader(file: Path, text: str) -> ModuleType:
     head = text[:HEAD_CHARACTERS]
     for reader in READERS:
         if reader.recognises(head):
-            motions: list[GroundMotion] = reader.read(file, text, units=units, dt_s=dt_s)
-            return motions
+            return reader
     formats = ", ".join(reader.FORMAT for reader in READERS)
     raise UnknownFormatError(
         file, f"no known format of accelerogram: known are {formats}; convert the record to one"
@@ -84,7 +121,11 @@ def read_motions(
 
 
 def read_motion(
-    text: str | os.PathLike[str], *, units: str | None = None, dt_s: float | None = None
+    text: str | os.PathLike[str],
+    *,
+    units: str | None = None,
+    dt_s: float | None = None,
+    allow_partial: bool = False,
 ) -> GroundMotion:
     """Return one trace, named as ``FILE`` or ``FILE#trace_index``.
 
@@ -92,6 +133,7 @@ def read_motion(
         text: a path; for a file of several traces with ``#`` and the index, from 0.
         units: as for :func:`read_motions`.
         dt_s: as for :func:`read_motions`.
+        allow_partial: as for :func:`read_motions`.
 
     Raises:
         MotionFileError: the file cannot be read, has several traces and no index is given,
@@ -103,7 +145,7 @@ def read_motion(
     # int() refuses thousands of digits, and exists() names that are too long
     if mark and tail.isascii() and tail.isdigit() and len(tail) < 10 and not _is_file(name):
         name, index = stem, int(tail)
-    motions = read_motions(name, units=units, dt_s=dt_s)
+    motions = read_motions(name, units=units, dt_s=dt_s, allow_partial=allow_partial)
     if index is None and len(motions) == 1:
         return motions[0]
     if index is not None and index < len(motions):

@@ -17,7 +17,7 @@ import numpy as np
 
 from rbfrag.errors import MotionFileError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.header_field import agreed_dt, stated_unit_in_g
+from rbfrag.motions.header_field import agreed_dt, other_count, stated_unit_in_g
 
 FORMAT = "SimCenter event JSON"
 
@@ -31,7 +31,9 @@ def recognises(head: str) -> bool:
     return bool(_HEAD.match(head))
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the time series of all events in their order.
 
     Args:
@@ -39,6 +41,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit of acceleration, which the file does not state.
         dt_s: sampling interval that the caller states [s]; refused when the file has another.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: no unit is stated, the JSON is damaged, or ``numSteps`` is not the
@@ -65,7 +69,18 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         }
         for series in _list(path, event, "timeSeries", here):
             motions.append(
-                _trace(path, text, event, series, number, len(motions), patterns, factor, dt_s)
+                _trace(
+                    path,
+                    text,
+                    event,
+                    series,
+                    number,
+                    len(motions),
+                    patterns,
+                    factor,
+                    dt_s,
+                    allow_partial,
+                )
             )
     if not motions:
         raise MotionFileError(path, "the file holds no event with a time series")
@@ -82,6 +97,7 @@ def _trace(
     patterns: dict[Any, Any],
     factor: float,
     dt_s: float | None,
+    allow_partial: bool,
 ) -> GroundMotion:
     if not isinstance(series, dict):
         raise MotionFileError(path, f"time series {index} is no JSON object")
@@ -101,11 +117,16 @@ def _trace(
         )
     line = _line(text, "numSteps", number)
     steps = event.get("numSteps", len(data))
-    if isinstance(steps, bool) or not isinstance(steps, int) or steps != len(data):
+    counted = isinstance(steps, int) and not isinstance(steps, bool) and steps > 0
+    remarks: tuple[str, ...] = ()
+    if counted and steps != len(data) and allow_partial:
+        remarks = other_count(path, steps, len(data), line or 1, what, allow_partial=True)
+    elif not counted or steps != len(data):
         raise MotionFileError(
             path,
             f"numSteps says {str(steps)[:40]}, but {what} has {len(data)} values: the file is "
-            "truncated or numSteps is wrong; export the event again",
+            "truncated or numSteps is wrong; export the event again, or read what there is with "
+            "--allow-partial",
             line=line,
         )
     if not data:
@@ -130,6 +151,8 @@ def _trace(
         source_file=path.name,
         trace_index=index,
         file_format=FORMAT,
+        remarks=remarks,
+        is_partial=bool(remarks),
     )
 
 

@@ -19,6 +19,11 @@ MOST_SHOWN = 40
 
 _FORTRAN = re.compile(r"(?<!\d)(\d{1,3})[FE](\d{1,3})\.\d", re.IGNORECASE | re.ASCII)
 _OF_INTEGERS = frozenset("0123456789- \t")
+_BETWEEN_NUMBERS = re.compile(r"[\s,;]+")
+_DECIMALS = re.compile(r"[+-]?\d*\.(\d+)([eE][+-]?\d+)?", re.ASCII)
+_TAIL = 2000
+_COMPARED, _DISTINCT, _FEWEST_DECIMALS = 30, 10, 3
+"""So many numbers above the last, so many of them different, must agree in their decimals."""
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
@@ -58,6 +63,31 @@ def read_text(path: Path) -> str:
         # every byte has a meaning in Latin-1, which older networks write
         text = raw.decode("latin-1")
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def cut_number(text: str) -> str:
+    """Return the number within which a file ends, or an empty text.
+
+    A file that ends without a newline may have been cut. Its last number shows so if all those
+    before it are printed with one number of decimals, and it has fewer.
+
+    Args:
+        text: the text of a file.
+    """
+    if text.endswith("\n"):
+        return ""
+    words = _BETWEEN_NUMBERS.split(text[-_TAIL:])[1:]
+    *others, last = words[-_COMPARED - 1 :] or [""]
+    found = {_DECIMALS.fullmatch(word) for word in set(others)}
+    if len(others) < _COMPARED or len(found) < _DISTINCT or None in found:
+        return ""
+    shapes = {(len(word[1]), len(word[2] or "")) for word in found if word}
+    ((decimals, exponent),) = shapes if len(shapes) == 1 else {(0, 0)}
+    if decimals < _FEWEST_DECIMALS:
+        return ""
+    end = _DECIMALS.match(last)
+    whole = end is not None and len(end[1]) >= decimals and len(end[2] or "") >= exponent
+    return "" if whole else last
 
 
 def free_numbers(

@@ -14,8 +14,8 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.header_field import (
     Field,
     agreed_dt,
+    other_count,
     positive_number,
-    refuse_other_count,
     stated_unit_in_g,
 )
 from rbfrag.motions.text_file import free_numbers, sample_count
@@ -36,7 +36,9 @@ def recognises(head: str) -> bool:
     return bool(_HEAD.match(head))
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the one motion of a file.
 
     Args:
@@ -45,6 +47,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit of acceleration, which the file does not state.
         dt_s: sampling interval that the caller states [s]; refused when the file has another.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: no unit is stated, or a header or value cannot be used.
@@ -55,7 +59,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
     dt = agreed_dt(path, positive_number(path, Field(head["dt"], 2), "dt"), 2, dt_s)
     factor = stated_unit_in_g(path, units)
     values = free_numbers(path, text.split("\n")[2:], 3, "acceleration")
-    refuse_other_count(path, npts, values.size, 2)
+    remarks = other_count(path, npts, values.size, 2, allow_partial=allow_partial)
     return [
         GroundMotion(
             values * factor,
@@ -67,5 +71,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             recording=path.stem,
             source_file=path.name,
             file_format=FORMAT,
+            remarks=remarks,
+            is_partial=bool(remarks),
         )
     ]

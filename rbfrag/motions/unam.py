@@ -18,8 +18,8 @@ from rbfrag.motions.header_field import (
     NamedFields,
     agreed_dt,
     agreed_unit_in_g,
+    other_count,
     positive_number,
-    refuse_other_count,
 )
 from rbfrag.motions.text_file import (
     field_layout,
@@ -41,7 +41,9 @@ def recognises(head: str) -> bool:
     return bool(_HEAD.search(head))
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the channels of a file in the order of its columns, with one recording id.
 
     Args:
@@ -49,6 +51,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit that the caller states; refused when the file states another.
         dt_s: sampling interval that the caller states [s]; likewise.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.
@@ -91,7 +95,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             line=first + len(rows),
         )
     table = numbers.reshape(-1, channels)
-    refuse_other_count(path, npts, table.shape[0], stated.line)
+    remarks = other_count(path, npts, table.shape[0], stated.line, allow_partial=allow_partial)
     station = fields["CLAVE DE LA ESTACION"].text
     event = f"{fields.text('FECHA DEL SISMO')} {fields.text('HORA EPICENTRO')}".strip()
     # rumbo;orientacion: the azimuth, then the axis of the instrument
@@ -109,6 +113,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             source_file=path.name,
             trace_index=index,
             file_format=FORMAT,
+            remarks=remarks,
+            is_partial=bool(remarks),
             is_corrected=False,
         )
         for index, (component, name) in enumerate(zip(components, names, strict=True))

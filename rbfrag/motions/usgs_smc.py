@@ -19,8 +19,8 @@ from rbfrag.motions.header_field import (
     agreed_unit_in_g,
     find_field,
     optional_field,
+    other_count,
     positive_number,
-    refuse_other_count,
 )
 from rbfrag.motions.text_file import (
     MOST_DIGITS,
@@ -55,7 +55,9 @@ def recognises(head: str) -> bool:
     return bool(_HEAD.match(head))
 
 
-def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> list[GroundMotion]:
+def read(
+    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
+) -> list[GroundMotion]:
     """Return the one motion of a file.
 
     Args:
@@ -63,6 +65,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
         text: the file's text.
         units: unit that the caller states; refused unless it is cm/s2.
         dt_s: sampling interval that the caller states [s]; refused when the file has another.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
 
     Raises:
         MotionFileError: a header or value that cannot be used, with its line.
@@ -100,7 +104,7 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             )
     data = without_blank_end(lines[first:])
     values = fixed_width_numbers(path, data, first + 1, WIDTH, PER_LINE, "acceleration")
-    refuse_other_count(path, npts, values.size, stated.line)
+    remarks = other_count(path, npts, values.size, stated.line, allow_partial=allow_partial)
 
     header = range(top)
     component = find_field(path, lines, header, _COMPONENT, "line 'component ='").text
@@ -120,6 +124,8 @@ def read(path: Path, text: str, *, units: str | None, dt_s: float | None) -> lis
             recording=f"{earthquake} {name}".strip(),
             source_file=path.name,
             file_format=FORMAT,
+            remarks=remarks,
+            is_partial=bool(remarks),
             is_corrected=_is_corrected(lines[0]),
         )
     ]

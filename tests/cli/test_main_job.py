@@ -167,7 +167,7 @@ def test_bad_files_are_listed_and_good_ones_kept(shell: Shell, tmp_path: Path) -
     assert set(reasons) == {"empty.AT2", "binary.AT2", "short.AT2", "notes.txt"}
     assert "empty" in reasons["empty.AT2"]
     assert "binary" in reasons["binary.AT2"]
-    assert "NPTS = 600" in reasons["short.AT2"]
+    assert "truncated" in reasons["short.AT2"]
     assert result.stderr.count("left out:") == 4
 
 

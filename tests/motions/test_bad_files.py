@@ -81,8 +81,8 @@ def test_content_decides_not_the_name(tmp_path: Path) -> None:
 def test_at2_count_disagrees(tmp_path: Path, sampling: str, stated: int) -> None:
     error = refusal(written(tmp_path, at2(SAMPLES, 0.01, sampling=sampling, npts=stated)))
     assert error.line == 4
-    assert f"NPTS = {stated}" in error.reason
-    assert "12 values" in error.reason
+    assert f"{stated} samples" in error.reason
+    assert "12 follow" in error.reason
     assert "export" in error.reason
 
 
