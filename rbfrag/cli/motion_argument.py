@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from rbfrag.db.rows import MotionRow
+    from rbfrag.db.vertical_pairs import VerticalPair
     from rbfrag.motions.ground_motion import GroundMotion
 
 
@@ -30,7 +32,7 @@ def find_motion(
     Raises:
         InputError: no such file, trace or id.
     """
-    if text.isascii() and text.isdigit() and not Path(text).exists():
+    if _is_id(text):
         from rbfrag.db.engine import opened_database
         from rbfrag.db.motion_store import load_motion
 
@@ -39,6 +41,32 @@ def find_motion(
     from rbfrag.motions.recognise import read_motion
 
     return read_motion(text, units=units, dt_s=dt_s, allow_partial=allow_partial)
+
+
+def stored_row(text: str, *, db: str | None) -> tuple[MotionRow, VerticalPair | None] | None:
+    """Return what the database knows of the motion that a MOTION argument means by its id.
+
+    Args:
+        text: as for :func:`find_motion`.
+        db: where ids are looked up.
+
+    Returns:
+        The stored row and, for a horizontal motion, its vertical companion or why there is
+        none; None where the argument means a file.
+    """
+    if not _is_id(text):
+        return None
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.motion_store import motion_row
+    from rbfrag.db.vertical_pairs import vertical_pair
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        row = motion_row(connection, int(text))
+        return row, None if row.is_vertical else vertical_pair(connection, row.id)
+
+
+def _is_id(text: str) -> bool:
+    return text.isascii() and text.isdigit() and not Path(text).exists()
 
 
 def find_vertical(

@@ -9,14 +9,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rbfrag.cli import options
-from rbfrag.cli.motion_argument import find_motion
+from rbfrag.cli.motion_argument import find_motion, stored_row
 from rbfrag.cli.output import print_json, print_pairs, print_table, print_warnings
 
 if TYPE_CHECKING:
     from rbfrag.db.rows import MotionRow
 
+STORED_LABELS = (
+    "id", "event_id", "event_guessed", "magnitude", "is_vertical", "processing", "flags",
+)  # fmt: skip
+"""What the database knows of a motion better than its samples do."""
+
 app = typer.Typer(
-    help="Add, list and show accelerograms.",
+    help="Add, list, show and export accelerograms.",
     no_args_is_help=True,
     rich_markup_mode=None,
     epilog="Example:  rbfrag motions add records/ --metadata records/MANIFEST.csv",
@@ -136,7 +141,7 @@ def show(
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Show one motion: a file, or a stored one by its id."""
+    """Show one motion: a file as it is, or a stored one by its id."""
     from rbfrag.motions.quality import quality_flags
 
     ground = find_motion(motion, db=db, units=units, dt_s=dt, allow_partial=allow_partial)
@@ -148,21 +153,78 @@ def show(
         "component": ground.component,
         "orientation_deg": ground.orientation_deg,
         "is_vertical": ground.is_vertical,
+        "is_corrected": ground.is_corrected,
+        "recording": ground.recording,
         "source_file": ground.source_file,
         "trace_index": ground.trace_index,
         "format": ground.file_format,
+        "start_time": None if ground.start_time is None else ground.start_time.isoformat(),
         "dt_s": ground.dt_s,
         "npts": ground.npts,
         "duration_s": ground.duration_s,
         **asdict(ground.measures),
+        "processing_applied": ground.processing_applied,
         "sha256": ground.sha256,
+        "source_sha256": ground.source_sha256 or ground.sha256,
         "flags": [flag.code for flag in flags],
+        "remarks": list(ground.remarks),
     }
+    stored = stored_row(motion, db=db)
+    if stored is not None:
+        row, pair = stored
+        kept = _as_dict(row)
+        document = {**document, **{name: kept[name] for name in STORED_LABELS}}
+        document["vertical_id"] = None if pair is None else pair.vertical_id
     if json:
         print_json(document)
         return
-    print_pairs(document)
-    print_warnings([*ground.remarks, *(flag.sentence for flag in flags)])
+    remarks = document.pop("remarks")
+    print_pairs({name: value for name, value in document.items() if value is not None})
+    print_warnings([*remarks, *(flag.sentence for flag in flags)])
+    if stored is not None and stored[1] is not None:
+        print_warnings(filter(None, [stored[1].reason, stored[1].remark]))
+
+
+@app.command("export", epilog="Example:  rbfrag motions export 1 2 --out two.csv")
+def export(
+    motions: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="MOTION...",
+            help="Accelerograms: files, FILE#INDEX for one trace of several, or database ids.",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[
+        str, typer.Option("--out", metavar="FILE", help="File to write.", show_default=False)
+    ],
+    file_format: Annotated[
+        str | None,
+        typer.Option(
+            "--format",
+            help="csv (several motions, every label) or at2 (one motion). Default: what FILE ends "
+            "in.",
+            show_default=False,
+        ),
+    ] = None,
+    allow_partial: options.AllowPartial = False,
+    units: options.Units = None,
+    dt: options.Dt = None,
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Write motions into a file from which they are read back bit for bit."""
+    from rbfrag.motions.export import export_motions
+
+    found = [
+        find_motion(text, db=db, units=units, dt_s=dt, allow_partial=allow_partial)
+        for text in motions
+    ]
+    written = export_motions(found, out, file_format=file_format)
+    if json:
+        print_json({"file": out, "format": written, "sha256": [motion.sha256 for motion in found]})
+        return
+    print(out)
 
 
 def _as_dict(row: MotionRow) -> dict[str, Any]:

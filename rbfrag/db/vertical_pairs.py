@@ -63,8 +63,8 @@ def vertical_pairs(connection: Connection, *, suite: str | None = None) -> dict[
     return {row.id: _pair(row, verticals[recording_of[row.id]]) for row in horizontals}
 
 
-def load_vertical(connection: Connection, motion_id: int) -> GroundMotion | None:
-    """Return the solver's `vertical` for a stored horizontal motion, or None without one.
+def vertical_pair(connection: Connection, motion_id: int) -> VerticalPair:
+    """Return the vertical companion of one horizontal motion.
 
     Args:
         connection: the database.
@@ -76,17 +76,26 @@ def load_vertical(connection: Connection, motion_id: int) -> GroundMotion | None
     row = motion_row(connection, motion_id)
     if row.is_vertical:
         raise InputError(f"motion {motion_id} is a vertical component: name a horizontal one")
+    own = select(motion.c.recording_id).where(motion.c.id == motion_id).scalar_subquery()
     query = (
         select(motion.c.id)
-        .join(recording)
-        .where(
-            motion.c.is_vertical,
-            motion.c.recording_id
-            == select(motion.c.recording_id).where(motion.c.id == motion_id).scalar_subquery(),
-        )
+        .where(motion.c.is_vertical, motion.c.recording_id == own)
         .order_by(motion.c.id)
     )
-    pair = _pair(row, [motion_row(connection, found) for found in connection.scalars(query)])
+    return _pair(row, [motion_row(connection, found) for found in connection.scalars(query)])
+
+
+def load_vertical(connection: Connection, motion_id: int) -> GroundMotion | None:
+    """Return the solver's `vertical` for a stored horizontal motion, or None without one.
+
+    Args:
+        connection: the database.
+        motion_id: the horizontal motion.
+
+    Raises:
+        InputError: there is no motion of that id, or it is a vertical one.
+    """
+    pair = vertical_pair(connection, motion_id)
     return None if pair.vertical_id is None else load_motion(connection, pair.vertical_id)
 
 

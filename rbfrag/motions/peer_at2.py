@@ -12,6 +12,7 @@ has NPTS and DT in one of several spellings::
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from rbfrag.errors import InputError, MotionFileError
@@ -23,6 +24,8 @@ from rbfrag.motions.units import acceleration_unit, unit_in_g
 
 FORMAT = "PEER AT2"
 
+PER_LINE = 5
+
 HEADER_LINES = 8
 """How far down the NPTS line is looked for."""
 
@@ -32,6 +35,7 @@ _QUANTITY = re.compile(
     r"(ACCELERATION|VELOCITY|DISPLACEMENT)\s+TIME\s+(?:HISTORY|SERIES)", re.IGNORECASE
 )
 _UNIT = re.compile(r"UNITS\s+OF\s+([A-Za-z/0-9^*']+)", re.IGNORECASE)
+_NOT_IN_LABELS = re.compile(r"[^!-~]|[,=]")
 _REMARK = re.compile(r"\([^()]*\)\s*$")
 
 
@@ -89,6 +93,29 @@ def read(
             is_partial=bool(remarks),
         )
     ]
+
+
+def write(motion: GroundMotion) -> Iterator[str]:
+    """Yield the lines of an AT2 file, without newlines; its samples read back bit for bit.
+
+    Args:
+        motion: equally spaced samples. The labels that AT2 has are kept: event, station and
+            component, without commas and other than printable ASCII characters.
+
+    Raises:
+        InputError: a motion from nodes.
+    """
+    if motion.dt_s is None:
+        raise InputError(f"{motion.label}: only equally spaced samples can be written")
+    labels = (_NOT_IN_LABELS.sub(" ", text).split() for text in
+              (motion.event, motion.station, motion.component))  # fmt: skip
+    yield "PEER STRONG MOTION DATABASE RECORD. WRITTEN BY RBFRAG."
+    yield ", ".join(" ".join(words) or "UNKNOWN" for words in labels)
+    yield "ACCELERATION TIME HISTORY IN UNITS OF G"
+    yield f"NPTS= {motion.npts:6d}, DT= {motion.dt_s!r} SEC"
+    samples = motion.acceleration_g.tolist()
+    for at in range(0, len(samples), PER_LINE):
+        yield "".join(f"{value:25.16E}" for value in samples[at : at + PER_LINE])
 
 
 def _sampling(lines: list[str]) -> tuple[int, str, str]:

@@ -20,6 +20,7 @@ from rbfrag.motions import (
     knet,
     nsmn,
     peer_at2,
+    rbfrag_csv,
     simcenter_event,
     ucgmsim_text,
     unam,
@@ -30,6 +31,7 @@ from rbfrag.motions.text_file import cut_number, read_text
 from rbfrag.motions.units import acceleration_unit
 
 READERS: tuple[ModuleType, ...] = (
+    rbfrag_csv,
     peer_at2,
     geonet_v2a,
     csmip_v2,

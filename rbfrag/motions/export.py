@@ -1,0 +1,62 @@
+"""Motions as files: rbfrag's own CSV, which keeps every label, or PEER AT2."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from rbfrag.errors import InputError
+from rbfrag.motions import peer_at2, rbfrag_csv
+from rbfrag.motions.ground_motion import GroundMotion
+
+FORMATS = ("csv", "at2")
+"""What a motion can be written as."""
+
+
+def export_motions(
+    motions: Sequence[GroundMotion], path: str | os.PathLike[str], *, file_format: str | None = None
+) -> str:
+    """Write motions into one file, whole or not at all; their samples read back bit for bit.
+
+    Args:
+        motions: equally spaced motions; a CSV takes several, an AT2 file one.
+        path: the file to write.
+        file_format: ``csv`` or ``at2``; None for what the name ends in.
+
+    Returns:
+        The format written.
+
+    Raises:
+        InputError: no motion, an unknown format, several motions for an AT2 file, a motion from
+            nodes, or a file that cannot be written.
+    """
+    target = Path(path)
+    chosen = (file_format or target.suffix.lstrip(".")).lower()
+    if chosen not in FORMATS:
+        raise InputError(
+            f"{target.name}: the format {chosen!r} is none of {', '.join(FORMATS)}: end the name "
+            "with .csv or .at2, or give --format"
+        )
+    if not motions:
+        raise InputError("there is no motion to export: name at least one")
+    if chosen == "at2" and len(motions) > 1:
+        raise InputError(f"an AT2 file holds one motion, not {len(motions)}: export a CSV")
+    lines = peer_at2.write(motions[0]) if chosen == "at2" else rbfrag_csv.write(motions)
+    _write(target, lines)
+    return chosen
+
+
+def _write(target: Path, lines: Iterator[str]) -> None:
+    draft = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
+    try:
+        with draft.open("w", newline="\n", encoding="utf-8") as file:
+            file.writelines(f"{line}\n" for line in lines)
+        draft.replace(target)
+    except OSError as error:
+        raise InputError(
+            f"cannot write {target}: {error.strerror}; name a folder you may write"
+        ) from None
+    finally:
+        draft.unlink(missing_ok=True)
