@@ -25,6 +25,8 @@ LARGEST_ORDER = 8
 MOST_SAMPLES = 20_000_000
 """A padded record beyond this has a wrong dt."""
 
+LARGEST_PGA_G = 1e100
+
 _UNCORRECTED = re.compile(r"\b(?:uncorrected|unfiltered|unprocessed|raw)\b", re.IGNORECASE)
 
 
@@ -112,6 +114,10 @@ def processed(motion: GroundMotion, high_pass: HighPass = DEFAULT_HIGH_PASS) -> 
         raise InputError(
             f"{motion.label}: {high_pass.padding_s:g} s of zeros are {padding} samples at dt = "
             f"{motion.dt_s:g} s: check dt, or add the record as it is (--raw)"
+        )
+    if not motion.pga_g < LARGEST_PGA_G:
+        raise InputError(
+            f"{motion.label}: a PGA of {motion.pga_g:g} g cannot be filtered: check the unit"
         )
     samples = motion.acceleration_g - motion.acceleration_g.mean()
     samples = np.pad(samples * _taper(motion, high_pass.taper_s), padding)

@@ -108,9 +108,13 @@ def free_numbers(
         numbers = np.array([np.nan])
     # numpy also reads 'nan', 'inf' and '1_000', which no instrument writes
     if not np.isfinite(numbers).all() or any("_" in token for token in tokens):
-        for number, line in enumerate(lines, first_line):
-            for token in line.split():
+        return np.array(
+            [
                 finite_number(path, token, number, what)
+                for number, line in enumerate(lines, first_line)
+                for token in line.split()
+            ]
+        )
     return numbers
 
 
@@ -149,9 +153,14 @@ def fixed_width_numbers(
     except ValueError:
         numbers = np.array([np.nan])
     if not np.isfinite(numbers).all() or "_" in text:
-        for at, row in enumerate(rows):
-            for start in range(0, len(row), width):
+        # numpy knows fewer blanks than Python does: a field may be sound all the same
+        return np.array(
+            [
                 finite_number(path, row[start : start + width].strip(), first_line + at, what)
+                for at, row in enumerate(rows)
+                for start in range(0, len(row), width)
+            ]
+        )
     return numbers
 
 

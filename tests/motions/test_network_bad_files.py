@@ -189,3 +189,14 @@ def test_volume_1_without_samples(tmp_path: Path) -> None:
     text = written.bhrc_v1([("L1", ["0.1"] * 12)], 0.01)
     head = text[: text.index("UNITS ARE")] + "UNITS ARE SECONDS AND G/10\n"
     assert "no samples follow" in refusal(tmp_path, head).reason
+
+
+def test_a_blank_that_numpy_does_not_know(tmp_path: Path) -> None:
+    text = WRITTEN["COSMOS V1c/V2c"]()
+    path = tmp_path / "record"
+    path.write_text(text)
+    (whole,) = read_motions(path)
+    at = text.index("            1.0")
+    path.write_text(f"{text[:at]}\x1c{text[at + 1 :]}", encoding="latin-1")
+    (motion,) = read_motions(path, allow_partial=True)
+    assert motion.sha256 == whole.sha256

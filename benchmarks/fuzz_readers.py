@@ -1,0 +1,217 @@
+"""Readers under damage:  python -m benchmarks.fuzz_readers --inputs 100000
+
+Every input is a file of one of the formats after one to four random edits: bytes flipped, pieces
+put in or over, spans and lines dropped, doubled or swapped, numbers changed, ends cut off. A
+reader must refuse it in one sentence that names the file and a line of it, or return motions that
+are fit for use: finite samples, a positive interval, measures and flags that can be computed.
+Anything else is a failure and is printed with its number, from which it can be made again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import tempfile
+import time
+import warnings
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from random import Random
+
+import numpy as np
+
+from benchmarks.damage import damaged
+from rbfrag.errors import InputError, RbfragError
+from rbfrag.motions import rbfrag_csv
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.metadata import read_metadata
+from rbfrag.motions.processing import processed
+from rbfrag.motions.quality import quality_flags
+from rbfrag.motions.recognise import read_motions
+from tests.motions.test_network_round_trips import STATE_NO_UNIT, WRITTEN
+from tests.motions.written import AT2_SAMPLING, at2, two_columns, v2a
+from tests.synthetic import shaking
+
+SLOW_S = 2.0
+"""Processor time beyond which an input counts as a failure."""
+
+LARGEST_REAL_BYTES = 400_000
+"""Real files beyond this take too long for thousands of inputs."""
+
+FEW_SAMPLES = 1000
+"""Motions up to this size are filtered as well."""
+
+NEEDS: dict[str, tuple[str, float | None]] = {
+    **dict.fromkeys(STATE_NO_UNIT, ("g", None)),
+    "delimited text": ("g", 0.005),
+    "real: geer_chihshang_2022_acc": ("m/s2", None),
+    "real: fema_p695_far_field": ("g", 0.01),
+    "real: geonet_ucgmsim_text": ("g", None),
+}
+"""Unit and interval that must be stated for a format."""
+
+TOKENS = [f"{value:.5E}" for value in shaking(1, 60)]
+DECIMALS = [f"{100.0 * value:.3f}" for value in shaking(2, 40)]
+TIMES = [f"{0.005 * i:.3f}" for i in range(60)]
+
+
+@dataclass
+class Tally:
+    """What became of the inputs made from one kind of file."""
+
+    inputs: int = 0
+    refused: int = 0
+    partial: int = 0
+    slowest_s: float = 0.0
+    reasons: Counter[str] = field(default_factory=Counter)
+
+
+def bases(records: Path | None) -> dict[str, list[bytes]]:
+    """Return sound files by format: made-up ones, and small real ones where there are any."""
+    own = "\n".join(rbfrag_csv.write([GroundMotion(shaking(3, 40), 0.02, station="S")])) + "\n"
+    found = {name: [make().encode()] for name, make in WRITTEN.items()}
+    found["PEER AT2"] = [at2(TOKENS, 0.005, sampling=form).encode() for form in AT2_SAMPLING]
+    found["GeoNet V2A"] = [v2a([("N28W", DECIMALS), ("UP", DECIMALS)], 0.02).encode()]
+    found["delimited text"] = [
+        two_columns(TIMES, TOKENS, header="# T - S-1\n# Time (s),Acceleration (g)\n").encode(),
+        two_columns(TIMES, TOKENS, mark="  ").encode(),
+        ("\n".join(TOKENS) + "\n").encode(),
+    ]
+    found["rbfrag CSV"] = [own.encode()]
+    if records is not None:
+        for name, files in real_files(records).items():
+            found[f"real: {name}"] = files
+    return found
+
+
+def real_files(records: Path) -> dict[str, list[bytes]]:
+    """Return the smallest files of each set of a manifest."""
+    by_set: dict[str, set[Path]] = defaultdict(set)
+    for row in read_metadata(records / "MANIFEST.csv").rows:
+        by_set[row.file.split("/")[0]].add(records / row.file)
+    chosen = {}
+    for name, files in sorted(by_set.items()):
+        small = sorted(files, key=lambda file: (file.stat().st_size, file.name))[:2]
+        chosen[name] = [
+            file.read_bytes() for file in small if file.stat().st_size <= LARGEST_REAL_BYTES
+        ]
+    return {name: files for name, files in chosen.items() if files}
+
+
+def failure(name: str, path: Path, content: bytes, random: Random, tally: Tally) -> str:
+    """Return what is wrong with what a reader made of a file; empty when nothing is."""
+    # mostly what the format needs, so that most inputs get past it
+    units, dt_s = NEEDS.get(name, (None, None))
+    if random.random() < 0.1:
+        units, dt_s = random.choice(("g", "m/s2", None)), random.choice((None, 0.005, 1e-300))
+    allow_partial = random.random() < 0.5
+    path.write_bytes(content)
+    started = time.process_time()
+    try:
+        motions = read_motions(path, units=units, dt_s=dt_s, allow_partial=allow_partial)
+        wrong = next(filter(None, map(unfit, motions)), "" if motions else "no motion")
+        tally.partial += any(motion.is_partial for motion in motions)
+    except RbfragError as error:
+        tally.refused += 1
+        tally.reasons[type(error).__name__] += 1
+        wrong = unclear(error, path, content)
+    except Exception as error:  # noqa: BLE001  # whatever else is raised is what is looked for
+        wrong = f"{type(error).__name__}: {str(error)[:200]}"
+    took = time.process_time() - started
+    tally.slowest_s = max(tally.slowest_s, took)
+    if took > SLOW_S:
+        wrong = wrong or f"took {took:.1f} s"
+    return wrong
+
+
+def unfit(motion: GroundMotion) -> str:
+    """Return why a motion must not leave a reader; empty for a valid one."""
+    if motion.npts < 1 or not np.isfinite(motion.acceleration_g).all():
+        return "samples that are not finite"
+    if motion.dt_s is None or not 0.0 < motion.dt_s < math.inf:
+        return f"dt = {motion.dt_s}"
+    if motion.time_s.size != motion.acceleration_g.size:
+        return "another number of times than samples"
+    try:
+        measures = motion.measures
+    except InputError:
+        return ""  # absurd units are refused in words of their own when they are measured
+    if not all(math.isfinite(value) for value in vars(measures).values() if value is not None):
+        return f"measures that are not finite: {measures}"
+    quality_flags(motion)
+    if motion.npts < FEW_SAMPLES:
+        try:
+            made = processed(motion)
+        except InputError:
+            return ""
+        if not np.isfinite(made.acceleration_g).all():
+            return "samples that are not finite after processing"
+    return ""
+
+
+def unclear(error: RbfragError, path: Path, content: bytes) -> str:
+    """Return what a message lacks; empty for a clear one."""
+    text, line = str(error), getattr(error, "line", None)
+    last = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
+    if str(path) not in text:
+        return f"the message names no file: {text[:200]}"
+    if "\n" in text or len(text) > 1000:
+        return f"the message is not one sentence: {text[:200]!r}"
+    if line is not None and not 1 <= line <= last:
+        return f"the message names line {line} of {last}: {text[:200]}"
+    return ""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--inputs", type=int, default=100_000, help="damaged files in all")
+    options.add_argument("--seed", type=int, default=0)
+    options.add_argument("--records", type=Path, help="folder with MANIFEST.csv: real files too")
+    options.add_argument("--only", type=int, help="make this input alone, and keep its file")
+    chosen = options.parse_args(arguments)
+    found = bases(chosen.records)
+    names = list(found)
+    tallies = {name: Tally() for name in names}
+    failures = 0
+    warnings.simplefilter("error")
+    numbers = range(chosen.inputs) if chosen.only is None else [chosen.only]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "record"
+        for number in numbers:
+            random = Random(f"{chosen.seed} {number}")
+            name = names[number % len(names)]
+            content = damaged(random.choice(found[name]), random)
+            tallies[name].inputs += 1
+            wrong = failure(name, path, content, random, tallies[name])
+            if wrong:
+                failures += 1
+                print(f"input {number} ({name}): {wrong}", file=sys.stderr)
+            if chosen.only is not None:
+                kept = Path(f"fuzz-{chosen.seed}-{number}")
+                kept.write_bytes(content)
+                print(f"kept as {kept}")
+    print(table(tallies))
+    total = sum(tally.inputs for tally in tallies.values())
+    refused = sum(tally.refused for tally in tallies.values())
+    print(f"\n{total} inputs: {refused} refused, {total - refused - failures} read, ", end="")
+    print(f"{failures} failures (seed {chosen.seed})")
+    return 1 if failures else 0
+
+
+def table(tallies: dict[str, Tally]) -> str:
+    """Return what became of the inputs, a row a format."""
+    rows = ["| format | inputs | refused | read as partial | slowest [ms of processor] |",
+            "| --- | --- | --- | --- | --- |"]  # fmt: skip
+    rows += [
+        f"| {name} | {tally.inputs} | {tally.refused} | {tally.partial} "
+        f"| {1000.0 * tally.slowest_s:.0f} |"
+        for name, tally in tallies.items()
+    ]
+    return "\n".join(rows)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
