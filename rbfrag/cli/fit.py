@@ -46,6 +46,14 @@ def fit(
             help="Estimate the exponent M of y = k_r g/p^M instead of M = 1 (lognormal, logistic).",
         ),
     ] = False,
+    doubtful_pgd: Annotated[
+        bool,
+        typer.Option(
+            "--doubtful-pgd",
+            help="Let pgd_tm read the PGD of records flagged final_velocity or "
+            "final_displacement, which it leaves out otherwise.",
+        ),
+    ] = False,
     name: Annotated[
         str | None,
         typer.Option("--name", help="Name of the model. Default: method-term.", show_default=False),
@@ -78,6 +86,7 @@ def fit(
             name=name,
             seed=seed,
             estimate_m=free_m,
+            doubtful_pgd=doubtful_pgd,
         )
     with opened_database(db) as engine, engine.begin() as connection:
         row = save_model(connection, report.model.row, replace=replace)

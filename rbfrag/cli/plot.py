@@ -44,7 +44,11 @@ def plot_fit(
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         fitted = FragilityModel.from_row(load_model(connection, model))
         suite = fitted.row.diagnostics.get("suite")
-        table = combination_table(connection, suite=None if suite is None else str(suite))
+        table = combination_table(
+            connection,
+            suite=None if suite is None else str(suite),
+            doubtful_pgd=bool(fitted.row.diagnostics.get("doubtful_pgd")),
+        )
     draw(table, fitted, out, log=log)
     print(out)
     if fit_data(FitSource.of_table(table), fitted.term).fingerprint != fitted.row.data_fingerprint:

@@ -70,6 +70,7 @@ def fit(
     vertical: Vertical = "without",
     seed: int = 0,
     estimate_m: bool = False,
+    doubtful_pgd: bool = False,
 ) -> FitReport:
     """Fit a fragility model; nothing is stored.
 
@@ -87,6 +88,8 @@ def fit(
         seed: seed of the bootstrap by earthquake.
         estimate_m: estimate the exponent M of y = k_r g/p^M instead of M = 1 (``lognormal`` and
             ``logistic``).
+        doubtful_pgd: True to let ``pgd_tm`` read the PGD of records that are flagged for an
+            implausible final velocity or displacement (connection only).
 
     Returns:
         The report; ``report.model.row`` is what the database stores.
@@ -99,7 +102,7 @@ def fit(
     if isinstance(source, CombinationTable):
         source = FitSource.of_table(source)
     elif not isinstance(source, FitSource):
-        source = read_source(source, suite=suite, vertical=vertical)
+        source = read_source(source, suite=suite, vertical=vertical, doubtful_pgd=doubtful_pgd)
     return fit_source(
         source,
         chosen,
@@ -107,7 +110,7 @@ def fit(
         name=name,
         seed=seed,
         estimate_m=estimate_m,
-        selection={"suite": suite, "vertical": vertical},
+        selection={"suite": suite, "vertical": vertical, "doubtful_pgd": doubtful_pgd},
     ).report
 
 
@@ -157,6 +160,7 @@ def fit_source(
             "log_correlations": correlations,
             "term_rank": list(correlations),
             "suite": (selection or {}).get("suite"),
+            "doubtful_pgd": (selection or {}).get("doubtful_pgd", False),
             "vertical": with_vertical,
             **result.details,
         },

@@ -50,7 +50,11 @@ class FitSource:
 
 
 def read_source(
-    connection: Connection, *, suite: str | None = None, vertical: Vertical = "without"
+    connection: Connection,
+    *,
+    suite: str | None = None,
+    vertical: Vertical = "without",
+    doubtful_pgd: bool = False,
 ) -> FitSource:
     """Read critical values, spectra and outcomes from the database.
 
@@ -58,12 +62,13 @@ def read_source(
         connection: the database.
         suite: only motions of this suite.
         vertical: ``without`` vertical motion, ``with`` it, or ``both``.
+        doubtful_pgd: read the PGD of records with a doubtful baseline too.
     """
     from rbfrag.db.outcome_maps import outcome_maps
     from rbfrag.db.queries import combination_table
     from rbfrag.db.spectrum_store import spectrum_values
 
-    table = combination_table(connection, suite=suite, vertical=vertical)
+    table = combination_table(connection, suite=suite, vertical=vertical, doubtful_pgd=doubtful_pgd)
     spectra = spectrum_values(connection)
     keys = zip(table.motion_id.tolist(), table.polarity, table.p2.tolist(), strict=True)
     xp_m_s = np.array([spectra.get(key, np.nan) for key in keys], dtype=np.float64)

@@ -103,3 +103,27 @@ def test_vertical_must_fit(shell: Shell, refuses: Refuses, tmp_path: Path) -> No
     assert "turned" in turned["warnings"][0]
     assert turned["peak_theta_n"] == right["peak_theta_n"]
     assert "horizontal component 090" in shell.json(*run, horizontal)["warnings"][0]
+
+
+def test_pgd_of_a_drifting_record_is_left_out_of_fits(shell: Shell, tmp_path: Path) -> None:
+    folder = tmp_path / "records"
+    folder.mkdir()
+    for i in range(6):
+        write_at2(folder / f"record{i}.AT2", (0.4 + 0.3 * i) * shaking(i), station=f"S{i}")
+    drifting = shaking(3) + 0.0005
+    write_at2(folder / "drift.AT2", drifting, event="EVENT 0", station="S9")
+    rows = [f"record{i}.AT2,event-{i},uncorrected" for i in range(6)]
+    table = folder / "meta.csv"
+    table.write_text("\n".join(["file,event_id,processing", *rows, "drift.AT2,event-0,corrected"]))
+    shell("motions", "add", folder, "--metadata", table)
+    flagged = [row for row in shell.json("motions", "list") if "final_velocity" in row["flags"]]
+    assert [row["name"] for row in flagged] == ["S9 090"]
+    shell("simulate", "--p2", "10,1", "--jobs", "1")
+    without = shell.json("fit", "--term", "pgd_tm", "--name", "a")
+    with_it = shell.json("fit", "--term", "pgd_tm", "--doubtful-pgd", "--name", "b")
+    of_pgv = shell.json("fit", "--term", "pgv", "--name", "c")
+    assert with_it["n"] == of_pgv["n"]
+    assert without["n"] == with_it["n"] - 4
+    assert any("PGD in doubt" in warning for warning in without["warnings"])
+    for name in ("a", "b"):
+        assert shell("plot", "fit", "--model", name, "--out", f"{name}.png").stderr == ""
