@@ -65,7 +65,7 @@ def test_binary(tmp_path: Path, content: bytes) -> None:
 )
 def test_wrongly_labelled(tmp_path: Path, content: str) -> None:
     path = written(tmp_path, content)
-    with pytest.raises(UnknownFormatError, match="known are PEER AT2, GeoNet V2A"):
+    with pytest.raises(UnknownFormatError, match="known are rbfrag CSV, PEER AT2, GeoNet V2A"):
         read_motions(path, units="g", dt_s=0.01)
 
 
