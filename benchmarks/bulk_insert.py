@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections import defaultdict
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from sqlalchemy import select
@@ -35,18 +36,36 @@ def main() -> None:
     print(measure(Path(sys.argv[1])))
 
 
-def measure(finished: Path) -> dict[str, float]:
-    """Return rows, seconds of processor time of each way, and their ratios."""
+@dataclass(frozen=True)
+class Way:
+    """How long one way of writing took [s]."""
+
+    name: str
+    transactions: int
+    processor_s: float
+    wall_s: float
+
+
+@dataclass(frozen=True)
+class BulkInsert:
+    """The ways, rbfrag's first, then sqlite3's with the same transactions and with one."""
+
+    rows: int
+    ways: tuple[Way, Way, Way]
+
+
+def measure(finished: Path) -> BulkInsert:
+    """Write the results of a finished campaign again in each way."""
     records, rows = read(finished)
     with tempfile.TemporaryDirectory() as folder:
         empty = Path(folder) / "empty.db"
         make_empty(finished, empty)
         ways: dict[str, Callable[[Path], None]] = {
-            "rbfrag": lambda place: by_rbfrag(place, records),
-            "plain": lambda place: by_sqlite3(place, rows, list(rows)),
-            "plain, one transaction": lambda place: by_sqlite3(place, rows, None),
+            "rbfrag, a transaction a motion": lambda place: by_rbfrag(place, records),
+            "sqlite3.executemany, the same": lambda place: by_sqlite3(place, rows, list(rows)),
+            "sqlite3.executemany, all in one": lambda place: by_sqlite3(place, rows, None),
         }
-        best = {name: (float("inf"), float("inf")) for name in ways}
+        best = dict.fromkeys(ways, (float("inf"), float("inf")))
         for number in range(ROUNDS):
             for name, way in ways.items():
                 place = Path(folder) / f"{number}.db"
@@ -57,15 +76,12 @@ def measure(finished: Path) -> dict[str, float]:
                 best[name] = min(best[name], taken)
                 check(place, rows)
                 place.unlink()
+    transactions = (len(rows), len(rows), 1)
+    one, two, three = (
+        Way(name, number, *best[name]) for name, number in zip(ways, transactions, strict=True)
+    )
     count = sum(len(some) for by_table in rows.values() for some in by_table.values())
-    return {
-        "rows": count,
-        "transactions": len(rows),
-        **{f"{name}, processor [s]": taken[0] for name, taken in best.items()},
-        **{f"{name}, wall [s]": taken[1] for name, taken in best.items()},
-        "ratio": best["rbfrag"][0] / best["plain"][0],
-        "ratio to one transaction": best["rbfrag"][0] / best["plain, one transaction"][0],
-    }
+    return BulkInsert(count, (one, two, three))
 
 
 def read(finished: Path) -> tuple[dict[int, list[CombinationRecord]], dict[int, Rows]]:
