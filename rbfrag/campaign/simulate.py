@@ -16,7 +16,6 @@ from rbfrag.campaign.grid import checked_ratios, grid_of
 from rbfrag.campaign.local_executor import run_locally
 from rbfrag.campaign.made_on import made_on
 from rbfrag.campaign.plan import DEFAULT_P2, SETTINGS, CampaignPlan, plan_campaign
-from rbfrag.campaign.spectra import store_spectra
 from rbfrag.campaign.todo import MotionTasks, Todo, Wanted, still_to_do
 from rbfrag.campaign.worker import MotionResults, MotionWork
 from rbfrag.db.campaign_store import (
@@ -31,6 +30,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.motion_store import load_motion
 from rbfrag.db.queries import Vertical
 from rbfrag.db.response_store import insert_responses
+from rbfrag.db.spectrum_store import store_spectrum
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.solver.results import NUMERICS_VERSION
 
@@ -117,6 +117,8 @@ def simulate(
 ) -> CampaignSummary:
     """Find the critical block of every motion x vertical x polarity x p² and store it.
 
+    The toppling spectrum of each motion at these p² is stored with it.
+
     The toppling spectrum of every motion at these p² is stored with them. What is stored already
     is not computed again, and each combination is stored with all that belongs to it in one
     transaction: a run that was interrupted or killed is resumed by the
@@ -150,7 +152,7 @@ def simulate(
         with engine.connect() as connection:
             plan = plan_campaign(connection, suite=suite, p2=p2, vertical=vertical)
             todo = still_to_do(connection, plan, wanted)
-        with _executor(jobs, scheduler if todo.tasks else None) as execute:
+        with _executor(jobs, scheduler if todo.motions else None) as execute:
             settings = {
                 "suite": suite,
                 "p2": list(map(float, p2)),
@@ -162,7 +164,6 @@ def simulate(
             }
             with engine.begin() as connection:
                 campaign_id = start_campaign(connection, settings)
-            store_spectra(engine, [each.motion.id for each in plan.motions], p2)
             run = _Run(engine, campaign_id, plan, todo, started, on_progress)
             run.tell()
             for done in execute(_work(engine, todo), len(todo.motions)):
@@ -279,6 +280,7 @@ def _with_samples(engine: Engine, each: MotionTasks) -> MotionWork:
             motion=load_motion(connection, each.plan.motion.id),
             vertical=None if up is None else load_motion(connection, up),
             tasks=each.tasks,
+            spectrum=each.spectrum,
         )
 
 
@@ -301,3 +303,12 @@ def _store(engine: Engine, campaign_id: int, done: MotionResults) -> None:
         insert_combinations(connection, campaign_id, records)
         insert_points(connection, points)
         insert_responses(connection, responses)
+        for part in done.spectrum:
+            store_spectrum(
+                connection,
+                done.motion_id,
+                polarity=part.polarity,
+                p2=part.p2,
+                x_m_s=part.x_m_s,
+                numerics_version=done.numerics_version,
+            )

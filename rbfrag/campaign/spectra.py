@@ -1,48 +1,60 @@
-"""The toppling spectra that belong to a campaign: computed where they are missing, and stored."""
+"""The toppling spectra that belong to a campaign: which are missing, and their computation."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
 
-from sqlalchemy import Engine
-
-from rbfrag.db.motion_store import load_motion
-from rbfrag.db.spectrum_store import spectrum_values, store_spectrum
-from rbfrag.motions.polarity import POLARITIES
+from rbfrag.db.spectrum_store import SpectrumKey
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.polarity import POLARITIES, Polarity
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
+from rbfrag.solver.results import FloatArray
 
 
-def store_spectra(engine: Engine, motion_ids: Iterable[int], p2: Sequence[float]) -> int:
-    """Compute and store X(p) of motions, both polarities, where it is not stored yet.
-
-    One transaction a motion. The order of calls does not matter to what is stored.
+@dataclass(frozen=True, eq=False)
+class SpectrumPart:
+    """X(p) of one motion and polarity.
 
     Args:
-        engine: the database.
-        motion_ids: horizontal motions.
+        polarity: ``forward`` or ``reverse``.
         p2: frequency parameters [1/s²].
-
-    Returns:
-        How many values were new.
+        x_m_s: X(p) at each of them [m/s].
     """
-    with engine.connect() as connection:
-        known = spectrum_values(connection, p2=p2)
-    made = 0
-    for motion_id in motion_ids:
-        missing = {
-            polarity: [each for each in map(float, p2) if (motion_id, polarity, each) not in known]
-            for polarity in POLARITIES
-        }
-        if not any(missing.values()):
-            continue
-        with engine.begin() as connection:
-            motion = load_motion(connection, motion_id)
-            for polarity, sizes in missing.items():
-                made += store_spectrum(
-                    connection,
-                    motion_id,
-                    polarity=polarity,
-                    p2=sizes,
-                    x_m_s=toppling_spectrum(motion, sizes, polarity),
-                )
-    return made
+
+    polarity: Polarity
+    p2: tuple[float, ...]
+    x_m_s: FloatArray
+
+
+def missing_sizes(
+    known: Container[SpectrumKey], motion_id: int, p2: Sequence[float]
+) -> dict[Polarity, tuple[float, ...]]:
+    """Return the p² [1/s²] at which X(p) of a motion is not stored, by polarity.
+
+    Args:
+        known: what is stored.
+        motion_id: the motion.
+        p2: frequency parameters asked for [1/s²].
+    """
+    missing: dict[Polarity, tuple[float, ...]] = {}
+    for polarity in POLARITIES:
+        sizes = tuple(each for each in map(float, p2) if (motion_id, polarity, each) not in known)
+        if sizes:
+            missing[polarity] = sizes
+    return missing
+
+
+def spectrum_parts(
+    motion: GroundMotion, sizes: Mapping[Polarity, Sequence[float]]
+) -> tuple[SpectrumPart, ...]:
+    """Compute X(p) of one motion.
+
+    Args:
+        motion: the horizontal motion.
+        sizes: frequency parameters [1/s²] by polarity.
+    """
+    return tuple(
+        SpectrumPart(polarity, tuple(p2), toppling_spectrum(motion, list(p2), polarity))
+        for polarity, p2 in sizes.items()
+    )

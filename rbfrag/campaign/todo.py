@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from sqlalchemy import Connection
 
 from rbfrag.campaign.plan import CampaignPlan, Case, MotionPlan
+from rbfrag.campaign.spectra import missing_sizes
 from rbfrag.campaign.worker import Task
 from rbfrag.db.campaign_store import (
     KnownCombination,
@@ -16,6 +17,8 @@ from rbfrag.db.campaign_store import (
 )
 from rbfrag.db.natural_key import response_key
 from rbfrag.db.response_store import known_responses
+from rbfrag.db.spectrum_store import spectrum_values
+from rbfrag.motions.polarity import Polarity
 from rbfrag.solver.results import NUMERICS_VERSION
 
 
@@ -36,10 +39,17 @@ class Wanted:
 
 @dataclass(frozen=True)
 class MotionTasks:
-    """What is to do on one horizontal motion."""
+    """What is to do on one horizontal motion.
+
+    Args:
+        plan: the motion.
+        tasks: what its combinations lack.
+        spectrum: p² [1/s²] at which its toppling spectrum is missing, by polarity.
+    """
 
     plan: MotionPlan
     tasks: tuple[Task, ...]
+    spectrum: dict[Polarity, tuple[float, ...]]
 
 
 @dataclass(frozen=True)
@@ -80,12 +90,15 @@ def still_to_do(connection: Connection, plan: CampaignPlan, wanted: Wanted) -> T
         connection,
         (_key(motion, case, ratio) for motion, case, ratios in asked for ratio in ratios),
     )
+    sizes = list(dict.fromkeys(case.p2 for case in plan.cases))
+    spectra = spectrum_values(connection, p2=sizes)
     motions = []
     for motion in plan.motions:
         tasks = [_task(motion, case, known, gridded, stored, wanted) for case in motion.cases]
         left = tuple(task for task in tasks if task is not None)
-        if left:
-            motions.append(MotionTasks(motion, left))
+        spectrum = missing_sizes(spectra, motion.motion.id, sizes)
+        if left or spectrum:
+            motions.append(MotionTasks(motion, left, spectrum))
     return Todo(tuple(motions), known)
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rbfrag.campaign.grid import run_grid
 from rbfrag.campaign.plan import Case
+from rbfrag.campaign.spectra import SpectrumPart, spectrum_parts
 from rbfrag.db.natural_key import response_key
 from rbfrag.db.response_store import ResponseRecord
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.polarity import Polarity
 from rbfrag.solver.certified import MAP_DEPTH
 from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import excitation
@@ -65,12 +68,14 @@ class MotionWork:
         motion: the motion.
         vertical: the vertical one of its recording, if a task needs it.
         tasks: what to do.
+        spectrum: p² [1/s²] at which to compute its toppling spectrum, by polarity.
     """
 
     motion_id: int
     motion: GroundMotion
     vertical: GroundMotion | None
     tasks: tuple[Task, ...]
+    spectrum: Mapping[Polarity, Sequence[float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,13 +84,15 @@ class MotionResults:
 
     motion_id: int
     results: tuple[TaskResult, ...]
+    spectrum: tuple[SpectrumPart, ...]
     numerics_version: str
 
 
 def run_work(work: MotionWork) -> MotionResults:
     """Do everything that is asked of one motion."""
     results = tuple(_run_task(work, task) for task in work.tasks)
-    return MotionResults(work.motion_id, results, NUMERICS_VERSION)
+    spectrum = spectrum_parts(work.motion, work.spectrum)
+    return MotionResults(work.motion_id, results, spectrum, NUMERICS_VERSION)
 
 
 def _run_task(work: MotionWork, task: Task) -> TaskResult:

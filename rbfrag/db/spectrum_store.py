@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, select
 
-from rbfrag.db.insert import insert_if_new
+from rbfrag.db.insert import insert_rows
 from rbfrag.db.schema import toppling_spectrum
 from rbfrag.motions.polarity import Polarity
 from rbfrag.solver.results import NUMERICS_VERSION
+
+_COLUMNS = ("motion_id", "polarity", "p2", "numerics_version", "x_m_s")
 
 SpectrumKey = tuple[int, str, float]
 """Motion, polarity and p² [1/s²] that a value belongs to."""
@@ -39,20 +41,17 @@ def store_spectrum(
     Returns:
         How many were new.
     """
-    return sum(
-        insert_if_new(
-            connection,
-            toppling_spectrum,
-            {
-                "motion_id": motion_id,
-                "polarity": polarity,
-                "p2": float(size),
-                "numerics_version": numerics_version,
-                "x_m_s": float(velocity),
-            },
-        )
-        for size, velocity in zip(p2, x_m_s, strict=True)
+    there, _ = stored_spectrum(
+        connection, motion_id, polarity=polarity, numerics_version=numerics_version
     )
+    known = set(there.tolist())
+    rows: list[tuple[object, ...]] = [
+        (motion_id, polarity, float(size), numerics_version, float(velocity))
+        for size, velocity in zip(p2, x_m_s, strict=True)
+        if float(size) not in known
+    ]
+    insert_rows(connection, toppling_spectrum, _COLUMNS, rows)
+    return len(rows)
 
 
 def stored_spectrum(

@@ -120,4 +120,4 @@ def _work(motion: GroundMotion, number: int, cases: int) -> MotionWork:
         for polarity in POLARITIES
     ]
     tasks = tuple(Task(case) for case in planned[:cases])
-    return MotionWork(motion_id=number, motion=motion, vertical=None, tasks=tasks)
+    return MotionWork(motion_id=number, motion=motion, vertical=None, tasks=tasks, spectrum={})
