@@ -10,7 +10,8 @@
     │   ├── NotADatabaseError
     │   ├── SchemaVersionError      older or newer than this rbfrag
     │   ├── DatabaseReadOnlyError
-    │   ├── DatabaseBusyError       locked by another process
+    │   ├── DatabaseBusyError       locked by another process                     (exit 1)
+    │   ├── DatabaseFailedError     disk full, input or output error, server gone (exit 1)
     │   └── MergeConflictError      two databases that contradict each other
     ├── ModelError                                                                (exit 2)
     │   ├── UnknownModelError       no fitted model of that name
@@ -110,7 +111,15 @@ class DatabaseReadOnlyError(DatabaseError):
 
 
 class DatabaseBusyError(DatabaseError):
-    """Another process holds the database."""
+    """Another process holds the database; what was finished is kept."""
+
+    exit_status: ClassVar[int] = 1
+
+
+class DatabaseFailedError(DatabaseError):
+    """The disk is full or fails, or the server is gone; what was finished is kept."""
+
+    exit_status: ClassVar[int] = 1
 
 
 class MergeConflictError(DatabaseError):

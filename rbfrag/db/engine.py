@@ -34,6 +34,7 @@ from rbfrag.db.sqlite_file import (
 from rbfrag.errors import (
     DatabaseBusyError,
     DatabaseError,
+    DatabaseFailedError,
     DatabaseNotFoundError,
     DatabaseReadOnlyError,
     InputError,
@@ -186,8 +187,12 @@ def _sqlite_engine(
 def _server_engine(url: URL, read_only: bool) -> Engine:
     if importlib.util.find_spec("psycopg") is None:
         raise MissingExtraError("PostgreSQL databases need psycopg", "postgres")
-    engine = create_engine(url)
-    return engine.execution_options(postgresql_readonly=True) if read_only else engine
+    # A connection that the server closed between two transactions is replaced without a word.
+    engine = create_engine(url, pool_pre_ping=True)
+    if read_only:
+        # All queries of one transaction see the same moment, as SQLite's do.
+        return engine.execution_options(postgresql_readonly=True, isolation_level="REPEATABLE READ")
+    return engine
 
 
 def _url(place: Path | str) -> URL:
@@ -242,7 +247,13 @@ def _server_error_in_words(error: BaseException, label: str) -> DatabaseError | 
     if state in ("25006", "42501"):  # read_only_sql_transaction, insufficient_privilege
         return DatabaseReadOnlyError(f"{label} may not be written: {reason}")
     if state in ("55P03", "40P01", "40001"):  # lock_not_available, deadlock, serialization
-        return DatabaseBusyError(f"{label} is locked by another session: try again ({reason})")
+        return DatabaseBusyError(
+            f"{label} is locked by another session; what was finished is kept: run the same "
+            f"command again ({reason})"
+        )
     if state is not None and state[:2] in ("08", "53", "57", "58"):
-        return DatabaseError(f"{label}: the server gave up: {reason}")
+        return DatabaseFailedError(
+            f"{label}: the server gave up: {reason}; what was finished is kept: run the same "
+            "command again"
+        )
     return None

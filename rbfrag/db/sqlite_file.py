@@ -13,6 +13,7 @@ from rbfrag.db.revision import APPLICATION_ID, VERSION_TABLE, check_revision
 from rbfrag.errors import (
     DatabaseBusyError,
     DatabaseError,
+    DatabaseFailedError,
     DatabaseNotFoundError,
     DatabaseReadOnlyError,
     NotADatabaseError,
@@ -160,7 +161,8 @@ def sqlite_error_in_words(error: sqlite3.Error, path: Path | str) -> DatabaseErr
     code = _primary_code(error)
     if code in (_BUSY, _LOCKED):
         return DatabaseBusyError(
-            f"{path} is locked by another process: wait for it to finish and try again"
+            f"{path} is locked by another process; what was finished is kept: wait for the other "
+            "to end and run the same command again"
         )
     if code == _READONLY:
         return DatabaseReadOnlyError(
@@ -172,7 +174,10 @@ def sqlite_error_in_words(error: sqlite3.Error, path: Path | str) -> DatabaseErr
             f"{path} cannot be opened: its folder must be writable and hold the file ({error})"
         )
     if code == _FULL:
-        return DatabaseError(f"{path} cannot grow: the disk is full; what was finished is kept")
+        return DatabaseFailedError(
+            f"{path} cannot grow: the disk is full; what was finished is kept: make room and run "
+            "the same command again"
+        )
     if code == _NOTADB:
         return NotADatabaseError(f"{path} is no SQLite database: name another with --db")
     if code == _CORRUPT:
@@ -180,7 +185,10 @@ def sqlite_error_in_words(error: sqlite3.Error, path: Path | str) -> DatabaseErr
             f"{path} is damaged ({error}): run  rbfrag db check  and restore it from a copy"
         )
     if code == _IOERR:
-        return DatabaseError(f"{path} cannot be read or written: {error}; check the disk")
+        return DatabaseFailedError(
+            f"{path} cannot be read or written: {error}; what was finished is kept: check disk and "
+            "quota and run the same command again"
+        )
     return DatabaseError(f"{path}: the database refused: {error}")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -27,28 +26,6 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, SearchPoints
 
 NOBODY = 65534
-
-
-@pytest.fixture(params=["sqlite", "postgresql"])
-def place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
-    """Where a database is to be made: a path, or a schema of its own on a server."""
-    if request.param == "sqlite":
-        yield str(tmp_path / "test.db")
-        return
-    url = os.environ.get("RBFRAG_TEST_POSTGRES")
-    if not url:
-        pytest.skip("no server: set RBFRAG_TEST_POSTGRES to postgresql://user@host:port/name")
-    import psycopg
-    from psycopg import sql
-
-    name = sql.Identifier(schema := f"rbfrag_test_{secrets.token_hex(6)}")
-    with psycopg.connect(url, autocommit=True) as server:
-        server.execute(sql.SQL("CREATE SCHEMA {}").format(name))
-        try:
-            yield f"{url}?options=-csearch_path%3D{schema}"
-        finally:
-            server.execute("SET client_min_messages = warning")
-            server.execute(sql.SQL("DROP SCHEMA {} CASCADE").format(name))
 
 
 @pytest.fixture(scope="session")

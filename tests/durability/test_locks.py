@@ -1,0 +1,214 @@
+"""Locked databases, lost servers and two campaigns at once."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+import subprocess
+from pathlib import Path
+
+import pytest
+from sqlalchemy import text
+
+import rbfrag.db.engine
+from benchmarks.durability import campaign, digest, environment, stored
+from rbfrag.campaign.simulate import CampaignProgress, simulate
+from rbfrag.db.engine import opened_database
+from rbfrag.db.merge import merge_databases
+from rbfrag.errors import DatabaseBusyError, DatabaseFailedError
+from tests.cli.conftest import Refuses, Shell, refuses, shell
+from tests.durability.conftest import P2
+
+__all__ = ["refuses", "shell"]
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    defaults = rbfrag.db.engine.open_database.__kwdefaults__
+    monkeypatch.setitem(defaults, "busy_timeout_s", 0.05)
+
+
+def test_a_locked_database(
+    database: Path, impatient: None, shell: Shell, refuses: Refuses, untouched: bytes
+) -> None:
+    other = sqlite3.connect(database, isolation_level=None)
+    other.execute("BEGIN IMMEDIATE")
+    (Path.cwd() / "b.db").write_bytes(untouched)
+    try:
+        for words in (
+            ("simulate", "--jobs", "1", "--db", database),
+            ("db", "merge", "b.db", "--db", database),
+        ):
+            message = refuses(*words, status=1)
+            assert "is locked by another process; what was finished is kept" in message
+        # readers go on
+        assert shell.json("db", "info", "--db", database)["rows"]["combination"] == 0
+        assert shell.json("db", "check", "--db", database)["sound"]
+    finally:
+        other.close()
+    assert stored(str(database)) == 0
+
+
+def test_a_lock_half_way(database: Path, impatient: None, undisturbed: str) -> None:
+    other = sqlite3.connect(database, isolation_level=None)
+
+    def lock(progress: CampaignProgress) -> None:
+        if progress.done == 8:
+            other.execute("BEGIN IMMEDIATE")
+
+    with pytest.raises(DatabaseBusyError, match="run the same command again"):
+        simulate(database, p2=P2, jobs=1, on_progress=lock)
+    other.close()
+    assert stored(str(database)) == 8
+    simulate(database, p2=P2, jobs=1)
+    assert digest(str(database)) == undisturbed
+
+
+@pytest.fixture
+def on_server(place: str, tmp_path: Path, untouched: bytes) -> str:
+    """The motions on the server of the tests."""
+    if "://" not in place:
+        pytest.skip("of a server")
+    (tmp_path / "motions.db").write_bytes(untouched)
+    merge_databases(tmp_path / "motions.db", db=place)
+    return place
+
+
+def _end_sessions(place: str) -> None:
+    """Close every other session in this database that works in the same schema."""
+    with opened_database(place) as engine, engine.begin() as connection:
+        connection.execute(
+            text(
+                "SELECT pg_terminate_backend(a.pid) FROM pg_stat_activity a JOIN pg_locks l "
+                "ON l.pid = a.pid JOIN pg_class c ON c.oid = l.relation "
+                "WHERE c.relnamespace = current_schema()::regnamespace "
+                "AND a.pid <> pg_backend_pid()"
+            )
+        )
+
+
+def test_a_server_that_gives_up_half_way(
+    on_server: str, undisturbed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import rbfrag.campaign.simulate as module
+
+    insert = module.insert_combinations
+    calls = []
+
+    def interrupted(*arguments: object) -> int:
+        done = insert(*arguments)  # type: ignore[arg-type]
+        calls.append(done)
+        if len(calls) == 3:
+            _end_sessions(on_server)  # ours holds locks: it is in its transaction
+        return done
+
+    monkeypatch.setattr(module, "insert_combinations", interrupted)
+    with pytest.raises(DatabaseFailedError, match="what was finished is kept"):
+        simulate(on_server, p2=P2, jobs=1)
+    monkeypatch.undo()
+    assert stored(on_server) == 8
+    simulate(on_server, p2=P2, jobs=1)
+    assert digest(on_server) == undisturbed
+
+
+def test_two_campaigns_at_once(
+    place: str, tmp_path: Path, untouched: bytes, undisturbed: str
+) -> None:
+    (tmp_path / "motions.db").write_bytes(untouched)
+    merge_databases(tmp_path / "motions.db", db=place)
+    running = [
+        subprocess.Popen(
+            campaign(place, p2, 1), env=environment(), stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, text=True,
+        )
+        for p2 in ("10,1", "1,10")
+    ]  # fmt: skip
+    for process in running:
+        said = process.communicate(timeout=300)
+        assert process.returncode == 0, said
+    assert stored(place) == 24
+    assert digest(place) == undisturbed
+
+
+def test_what_another_campaign_stores_meanwhile_stays_its_own(
+    on_server: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The other one, of another processor, commits between the look and the insert of this one.
+
+    SQLite lets no other write between the two.
+    """
+    import rbfrag.db.campaign_store as store
+
+    look = store.known_keys
+    met = []
+    last_bits = "UPDATE outcome_interval SET k_lo = k_lo * :f, k_hi = k_hi * :f"
+
+    def overtaken(connection: object, keys: object) -> set[str]:
+        seen = look(connection, keys)  # type: ignore[arg-type]
+        if not met:
+            met.append("")
+            simulate(on_server, p2=P2, jobs=1)
+            with opened_database(on_server) as engine, engine.begin() as other:
+                other.execute(text(last_bits), {"f": 1.0 + 4e-16})
+            met[0] = digest(on_server)
+        return seen
+
+    monkeypatch.setattr(store, "known_keys", overtaken)
+    simulate(on_server, p2=P2, jobs=1)
+    assert [digest(on_server)] == met
+
+
+class TestUnusable:
+    def test_no_server(self, refuses: Refuses) -> None:
+        pytest.importorskip("psycopg")
+        for words in (
+            ("simulate",),
+            ("db", "check"),
+            ("db", "export", "--out", "out"),
+            ("db", "merge", "x.db"),
+        ):
+            Path("x.db").unlink(missing_ok=True)
+            if words[:2] == ("db", "merge"):
+                with opened_database("x.db", create=True):
+                    pass
+            message = refuses(*words, "--db", "postgresql://nobody:secret@127.0.0.1:1/none")
+            assert "cannot reach postgresql://nobody:***@127.0.0.1:1/none" in message
+            assert "secret" not in message
+
+    def test_a_schema_from_the_future(self, database: Path, refuses: Refuses) -> None:
+        raw = sqlite3.connect(database)
+        raw.execute("UPDATE rbfrag_revision SET version_num = '9999'")
+        raw.commit()
+        raw.close()
+        before = database.read_bytes()
+        for words in (
+            ("simulate",), ("motions", "list"), ("db", "check"), ("db", "upgrade"),
+            ("db", "export", "--out", "out"), ("fit", "--term", "pgv"),
+        ):  # fmt: skip
+            message = refuses(*words, "--db", database)
+            assert "schema 9999, newer than" in message
+            assert "install a newer rbfrag" in message
+        assert "install a newer rbfrag" in refuses("db", "merge", database, "--db", "new.db")
+        assert not Path("new.db").exists()
+        assert database.read_bytes() == before
+
+    @pytest.mark.skipif(os.name == "nt", reason="rights of POSIX")
+    def test_a_read_only_file(
+        self, database: Path, shell: Shell, refuses: Refuses, tmp_path: Path
+    ) -> None:
+        was_root = os.geteuid() == 0
+        database.chmod(0o444)
+        folders = [database.parent, *database.parent.parents][:3]
+        rights = [folder.stat().st_mode for folder in folders]
+        for folder in folders:
+            folder.chmod(0o555)
+        if was_root:
+            os.seteuid(65534)
+        try:
+            assert "cannot be written" in refuses("simulate", "--jobs", "1", "--db", database)
+            assert shell.json("db", "check", "--db", database)["sound"]
+        finally:
+            if was_root:
+                os.seteuid(0)
+            for folder, mode in zip(folders, rights, strict=True):
+                folder.chmod(mode)
