@@ -11,6 +11,7 @@ from rbfrag.db.check_combinations import check_combinations
 from rbfrag.db.check_motions import check_motions
 from rbfrag.db.check_numbers import check_numbers
 from rbfrag.db.check_responses import check_responses
+from rbfrag.db.check_spectra import check_spectra
 from rbfrag.db.finding import FIT_AGAIN, RESTORE, Finding
 from rbfrag.db.schema import earthquake, fragility_model, motion, recording
 
@@ -19,9 +20,9 @@ def check_database(connection: Connection) -> list[Finding]:
     """Return everything that is wrong with a database; an empty list is a clean bill.
 
     Looks at the file itself (SQLite), references, the samples against their sha256 and their
-    intensity measures, keys against what they are hashes of, brackets, y = kr·g/p, the map of
-    intervals, simulations against both, rows that nothing refers to, numbers that are not
-    finite, and the models. Makes no simulation.
+    intensity measures, toppling spectra, keys against what they are hashes of, brackets,
+    y = kr·g/p, the map of intervals, simulations against both, histories, rows that nothing
+    refers to, numbers that are not finite, and the models. Makes no simulation.
 
     Args:
         connection: the database, inside one transaction.
@@ -31,6 +32,7 @@ def check_database(connection: Connection) -> list[Finding]:
         found += _check_sqlite_file(connection)
     found += check_numbers(connection)
     found += check_motions(connection)
+    found += check_spectra(connection)
     found += _check_unused(connection)
     found += check_combinations(connection)
     found += check_responses(connection)

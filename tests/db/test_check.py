@@ -13,6 +13,8 @@ from rbfrag.db import schema
 from rbfrag.db.check import check_database
 from rbfrag.db.engine import opened_database
 from rbfrag.db.natural_key import response_key
+from rbfrag.db.spectrum_store import store_spectrum
+from rbfrag.motions.toppling_spectrum import toppling_spectrum as spectrum_of
 
 # The map of the first found combination of `filled`, whose critical kr/PGA is 0.1.
 MAP = (
@@ -221,6 +223,22 @@ def test_a_history_has_the_key_and_the_length_it_states(filled: Engine) -> None:
         connection.execute(update(response).values(theta_rad=b"0" * 16, kr=0.2))
         (finding,) = check_database(connection)
         assert finding.problem == "its natural key is not the hash of its inputs"
+
+
+def test_spectra_are_calculated_anew(filled: Engine, make_motion: Any) -> None:
+    table = schema.toppling_spectrum
+    with filled.begin() as connection:
+        motion_id = connection.scalar(select(func.min(schema.motion.c.id)))
+        for polarity in ("forward", "reverse"):
+            values = spectrum_of(make_motion(1), [3.0, 0.1], polarity)
+            store_spectrum(connection, motion_id, polarity=polarity, p2=[3.0, 0.1], x_m_s=values)
+        assert check_database(connection) == []
+        wrong = update(table).where(table.c.polarity == "reverse", table.c.p2 == 3.0)
+        connection.execute(wrong.values(x_m_s=table.c.x_m_s * 1.001))
+        (finding,) = check_database(connection)
+        assert finding.row == f"motion {motion_id}, reverse, p2 3"
+        connection.execute(update(table).values(numerics_version="0"))
+        assert check_database(connection) == []
 
 
 def test_numerics_of_the_campaign_agree(filled: Engine) -> None:

@@ -179,7 +179,7 @@ class TestTogether:
             )
             block_of_key: dict[str, Any] = {"polarity": "forward", "p2": 3.0}
             block = {"motion_id": motion_id, **block_of_key}
-            x = {**block, "numerics_version": "2", "x_m_s": 0.3}
+            x = {**block, "numerics_version": "0", "x_m_s": 0.3}
             connection.execute(insert(schema.toppling_spectrum).values(**x))
             for low, high, outcome in ((0.01, 0.1, "topples"), (0.1, 1.0, "safe")):
                 row = {"k_lo": low, "k_hi": high, "outcome": outcome}
