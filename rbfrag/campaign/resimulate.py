@@ -21,6 +21,7 @@ from rbfrag.db.stored_combination import (
 )
 from rbfrag.errors import RbfragError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.certified import MAP_DEPTH
 from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.respond import respond
@@ -110,6 +111,7 @@ def _compute(
         linear=values["linear"],
         search_limit=values["search_limit"],
         full_map=stored.intervals.k_lo.size > 0,
+        map_depth=stored.settings.get("map_depth", MAP_DEPTH),
     )
     searched = set(result.points.kr_over_pga.tolist())
     others = [k for k in stored.points.kr_over_pga.tolist() if k not in searched]

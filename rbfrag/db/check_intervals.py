@@ -50,10 +50,18 @@ def interval_problems(
 
 
 def _maps_all(settings: str) -> bool:
+    return _setting(settings, "map") == "full"
+
+
+def _states_depth(settings: str) -> bool:
+    return _setting(settings, "map_depth") is not None
+
+
+def _setting(settings: str, name: str) -> object:
     try:
-        return bool(json.loads(settings).get("map") == "full")
+        return json.loads(settings).get(name)
     except (ValueError, AttributeError):
-        return False
+        return None  # its own finding
 
 
 def _said(outcome: str) -> str:
@@ -62,11 +70,13 @@ def _said(outcome: str) -> str:
 
 def _cover_problems(row: RowMapping, intervals: Sequence[Row[Any]]) -> Iterator[str]:
     limit, bottom = row["search_limit"], intervals[0].k_lo
-    # below the bracket a search may be given up, after its budget: nothing is said there then
-    needed = row["lower"] if row["status"] == "found" and row["lower"] is not None else limit
+    needed = limit
+    if not _states_depth(row["settings"]) and row["status"] == "found" and row["lower"] is not None:
+        # earlier maps end where a search was given up, which may be anywhere below the bracket
+        needed = row["lower"]
     if bottom < limit * (1.0 - _ROUNDING):
         yield f"its map begins at kr/PGA {bottom!r}, below the search limit {limit!r}"
-    elif row["certified"] and bottom > needed * (1.0 + _CLEARANCE):
+    elif bottom > needed * (1.0 + _CLEARANCE):
         yield f"its map begins at kr/PGA {bottom!r}, above {needed!r}"
     for below, above in itertools.pairwise(intervals):
         if below.k_hi < above.k_lo:

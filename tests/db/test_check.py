@@ -111,6 +111,11 @@ class TestMaps:
         with filled.begin() as connection:
             _store_map(connection, MAP[2:])  # given up on the way down
             assert check_database(connection) == []
+            settings = '{"map":"full","map_depth":1e-6,"search_limit":0.01}'
+            connection.execute(update(schema.combination).values(settings=settings))
+            problems = [finding.problem for finding in check_database(connection)]
+            # whoever states a depth says "undecided" where the search was given up
+            assert f"its map begins at kr/PGA {MAP[2][0]!r}, above 0.01" in problems
 
     @pytest.mark.parametrize(
         ("intervals", "problem"),
