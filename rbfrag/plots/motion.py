@@ -59,13 +59,15 @@ def plot_motion(
         (1000.0, "mm") if largest < 0.01 else (100.0, "cm") if largest < 1.0 else (1.0, "m")
     )
     lower.plot(history.time_s, factor * history.displacement_m, color=BLOCK, lw=1.4)
-    lower.set_ylabel(f"displacement along the base [{unit}]", color=BLOCK)
+    lower.set_ylabel(f"displacement [{unit}]", color=BLOCK)
     lower.set_xlabel("time [s]")
+    least = float(history.displacement_m.min())
+    lower.set_ylim(*_around(factor * float(history.displacement_m.max()), factor * least))
     if response.peak_theta_rad is not None or np.any(history.theta_rad):
         right = lower.twinx()
         right.plot(history.time_s, np.degrees(history.theta_rad), color=ROTATION, lw=1.1, ls="--")
         right.set_ylabel("rotation [deg]", color=ROTATION)
-        right.set_ylim(bottom=0.0)
+        right.set_ylim(*_around(float(np.degrees(history.theta_rad).max()), 0.0))
     lower.set_xlim(*_window(history, response))
     for axes in (upper, lower):
         axes.grid(visible=True, lw=0.3, alpha=0.6)
@@ -79,7 +81,13 @@ def _window(history: ResponseHistory, response: Response) -> tuple[float, float]
     first, last = float(history.time_s[0]), float(history.time_s[-1])
     if response.started_s is None or response.stopped_s is None:
         return first, max(last, first + 1e-3)
-    return response.started_s - QUIET_BEFORE_S, response.stopped_s + QUIET_AFTER_S
+    return response.started_s - QUIET_BEFORE_S, min(response.stopped_s + QUIET_AFTER_S, last)
+
+
+def _around(largest: float, least: float) -> tuple[float, float]:
+    """Return limits that leave some air, and put zero at one height on both axes."""
+    span = max(largest, 1e-9)
+    return min(-0.06 * span, 1.1 * least), 1.12 * span
 
 
 def _verdict(response: Response) -> str:

@@ -38,7 +38,7 @@ class Outcome(StrEnum):
         member.advice = advice
         return member
 
-    STABLE = "stable", "The block came back to rest on its base."
+    STABLE = "stable", "The block came to rest again."
     TOPPLED = "toppled", "The block is past recovery, whatever the rest of the record does."
     UNDETERMINED = (
         "undetermined",

@@ -254,6 +254,8 @@ def least_condition(
     s3 = s * c2 + c * s2
     least = _with_double(table, INERTIA, c, s, c2, s2)
     which = 0
+    if least <= 0.0:
+        return least, which  # the conditions are those of forces times the inertia
     for n in range((table.shape[0] - CONDITIONS) // 3):
         row = CONDITIONS + 3 * n
         value = _with_double(table, row, c, s, c2, s2) * a

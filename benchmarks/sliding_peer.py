@@ -1,0 +1,79 @@
+"""Sliding displacements beside pyslammer's rigid analysis:  python -m benchmarks.sliding_peer
+
+pyslammer (GPL-3.0, extra `samples`) is run here, beside rbfrag, and imported nowhere else. It
+integrates at the samples: a slide starts and stops at a sample, and the last part of a step in
+which it stops is left out. The same records with straight lines between more and more samples show
+that this is all of the difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+
+import numpy as np
+
+from benchmarks.page import ROOT, parser, report
+from rbfrag.campaign.bench.cases import find_records
+from rbfrag.campaign.bench.tables import markdown
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.response import respond
+
+PAGE = ROOT / "docs" / "theory" / "sliding.md"
+
+YIELDS = (0.05, 0.1, 0.2, 0.4)
+"""Yield acceleration over PGA."""
+
+REFINED = (1, 4, 16)
+"""Samples that one of the record becomes."""
+
+LEAST_M = 1e-4
+"""Displacements below are not compared: they are a few samples long."""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    options = parser(__doc__)
+    options.add_argument("--most", type=int, default=18, help="records to compare")
+    chosen = options.parse_args(arguments)
+    found = find_records(chosen.records)
+    motions = [motion for motion in found.motions if motion.dt_s is not None][: chosen.most]
+    errors: dict[int, list[float]] = {fine: [] for fine in REFINED}
+    for motion in motions:
+        for share in YIELDS:
+            ky = share * motion.pga_g
+            ours = respond(motion, ky=ky).displacement_m
+            if ours is None or ours < LEAST_M:
+                continue
+            for fine in REFINED:
+                errors[fine].append(abs(peer(motion, ky, fine) / ours - 1.0))
+    cells = [
+        [
+            "as recorded" if fine == 1 else f"{fine} times as many",
+            str(len(of)),
+            *(f"{100.0 * value:.2g} %" for value in (np.median(of), np.max(of))),
+        ]
+        for fine, of in errors.items()
+    ]
+    headers = ["samples", "cases", "median difference", "greatest"]
+    text = markdown((headers, cells))
+    text += f"\n\n{len(motions)} records, k_y/PGA of {', '.join(map(str, YIELDS))}; {found.source}."
+    report("sliding-peer", text, write=chosen.write, page=PAGE)
+
+
+def peer(motion: GroundMotion, ky: float, fine: int) -> float:
+    """Return pyslammer's displacement [m] on the record with `fine` samples for one."""
+    pyslammer = import_module("pyslammer")
+    assert motion.dt_s is not None
+    n = (motion.npts - 1) * fine
+    time = np.arange(n + 1 + 100 * fine) * (motion.dt_s / fine)
+    samples = np.interp(time, motion.time_s, motion.acceleration_g, right=0.0)
+    if fine == 1:
+        samples = np.concatenate([motion.acceleration_g, np.zeros(100)])
+    analysis = pyslammer.RigidAnalysis(
+        ky=ky, ground_motion=pyslammer.GroundMotion(samples, motion.dt_s / fine)
+    )
+    return float(analysis.max_sliding_disp)
+
+
+if __name__ == "__main__":
+    main()
