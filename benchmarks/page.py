@@ -24,11 +24,12 @@ def parser(description: str | None) -> argparse.ArgumentParser:
     return made
 
 
-def report(name: str, text: str, *, write: bool, page: Path = PAGE) -> None:
+def report(name: str, text: str, *, write: bool, page: Path | None = None) -> None:
     """Print a table with its machine; put it into the page if asked to."""
     text = f"{text}\n\n{machine_sentence()}"
     print(f"\n{text}", flush=True)
     if write:
+        page = PAGE if page is None else page
         page.write_text(replaced(page.read_text(encoding="utf-8"), name, text), encoding="utf-8")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_table import pyarrow, table_path
+from rbfrag.exchange.batch_reading import csv_parts, parquet_parts
+from rbfrag.exchange.batch_writing import csv_writer, parquet_writer
+from rbfrag.exchange.block_table import table_path
 from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.model_lookup import find_model
@@ -27,8 +29,8 @@ MEASURE_COLUMNS = ("pgv_m_s", "pga_g", "tm_s", "pgd_m")
 ANSWERS = ("probability", "ci_low", "ci_high", "in_domain", "reason")
 """The columns that are appended; a table that has them gets new ones."""
 
-ROWS = 1 << 18
-"""Rows that are read, answered and written at a time."""
+NUMERIC = (*BLOCK_COLUMNS, *MEASURE_COLUMNS)
+"""Columns that hold numbers."""
 
 NOT_TOPPLING = "the block's mode is {mode}: the toppling model says nothing about it"
 
@@ -71,11 +73,13 @@ def predict_table(
     partial = goal.with_name(f".{goal.name}.{os.getpid()}.part")
     try:
         with ExitStack() as stack:
-            header, parts = (_csv_parts if suffix == ".csv" else _parquet_parts)(origin, stack)
+            opened = csv_parts if suffix == ".csv" else parquet_parts
+            header, parts = opened(origin, NUMERIC, stack)
             names = _columns(origin, header, measures)
             chosen = find_model(model, [*BLOCK_COLUMNS.values(), *names.values(), *measures], db)
-            writer = _csv_writer if goal.suffix.lower() == ".csv" else _parquet_writer
-            write = writer(partial, [name for name in header if name not in ANSWERS], stack)
+            writer = csv_writer if goal.suffix.lower() == ".csv" else parquet_writer
+            kept = [name for name in header if name not in ANSWERS]
+            write = writer(partial, kept, ANSWERS, NUMERIC, stack)
             counts = np.zeros(3, dtype=np.int64)
             for first_line, part in parts:
                 answer = _answer(origin, part, names, first_line, measures, chosen, level)
@@ -170,116 +174,3 @@ def _numbers(origin: Path, column: str, cells: Any, first_line: int) -> FloatArr
                     "number"
                 ) from None
         raise
-
-
-_Parts = Iterator[tuple[int, dict[str, Any]]]
-_Write = Callable[[dict[str, Any], dict[str, NDArray[Any]]], None]
-
-
-def _csv_parts(origin: Path, stack: ExitStack) -> tuple[list[str], _Parts]:
-    file = stack.enter_context(origin.open(newline="", encoding="utf-8-sig"))
-    reader = csv.reader(file)
-    header = [cell.strip() for cell in next(reader, [])]
-
-    def parts() -> _Parts:
-        rows: list[list[str]] = []
-        first = reader.line_num + 1
-        for row in reader:
-            if not row:
-                continue
-            if len(row) != len(header):
-                raise InputError(
-                    f"{origin}, line {reader.line_num}: {len(row)} cells under "
-                    f"{len(header)} columns"
-                )
-            rows.append(row)
-            if len(rows) == ROWS:
-                yield first, dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
-                rows, first = [], reader.line_num + 1
-        if rows:
-            yield first, dict(zip(header, map(list, zip(*rows, strict=True)), strict=True))
-
-    return header, parts()
-
-
-def _parquet_parts(origin: Path, stack: ExitStack) -> tuple[list[str], _Parts]:
-    arrow, parquet = pyarrow()
-    numeric = {*BLOCK_COLUMNS, *MEASURE_COLUMNS}
-    try:
-        file = stack.enter_context(parquet.ParquetFile(origin))
-    except arrow.ArrowException as error:
-        raise InputError(f"{origin}: not a Parquet file: {error}") from None
-    header = list(file.schema_arrow.names)
-
-    def parts() -> _Parts:
-        first = 1
-        for group in file.iter_batches(batch_size=ROWS):
-            part: dict[str, Any] = {}
-            for name, column in zip(header, group.columns, strict=True):
-                if name in numeric:
-                    try:
-                        column = column.cast(arrow.float64()).to_numpy(zero_copy_only=False)
-                    except arrow.ArrowException:
-                        raise InputError(f"{origin}: the column {name} holds no numbers") from None
-                    part[name] = np.array(column, dtype=np.float64)
-                elif name == "mode":
-                    part[name] = column.to_pylist()
-                else:
-                    part[name] = column
-            yield first, part
-            first += group.num_rows
-
-    return header, parts()
-
-
-def _csv_writer(partial: Path, header: list[str], stack: ExitStack) -> _Write:
-    file = stack.enter_context(partial.open("w", newline="", encoding="utf-8"))
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow([*header, *ANSWERS])
-
-    def write(part: dict[str, Any], answer: dict[str, NDArray[Any]]) -> None:
-        columns = [_cells(part[name]) for name in header]
-        columns += [_cells(answer[name]) for name in ANSWERS]
-        writer.writerows(zip(*columns, strict=True))
-
-    return write
-
-
-def _cells(column: Any) -> list[Any]:
-    if not isinstance(column, np.ndarray):
-        values: list[Any] = column if isinstance(column, list) else column.to_pylist()
-        return ["" if value is None else value for value in values]
-    if column.dtype.kind == "f":
-        return ["" if value != value else value for value in column.tolist()]
-    if column.dtype.kind == "b":
-        return ["true" if value else "false" for value in column.tolist()]
-    return list(column.tolist())
-
-
-def _parquet_writer(partial: Path, header: list[str], stack: ExitStack) -> _Write:
-    arrow, parquet = pyarrow()
-    open_file: list[Any] = []
-
-    def write(part: dict[str, Any], answer: dict[str, NDArray[Any]]) -> None:
-        numeric = {*BLOCK_COLUMNS, *MEASURE_COLUMNS}
-        columns: dict[str, Any] = {}
-        for name in header:
-            column = part[name]
-            if isinstance(column, list) and name in numeric:
-                column = np.array([float(c) if c.strip() else np.nan for c in column])
-            if isinstance(column, np.ndarray):
-                column = arrow.array(column, mask=np.isnan(column))
-            columns[name] = column
-        for name in ANSWERS:
-            values = answer[name]
-            if name == "reason":
-                columns[name] = arrow.array(values, type=arrow.string())
-            else:
-                missing = np.isnan(values) if values.dtype.kind == "f" else None
-                columns[name] = arrow.array(values, mask=missing)
-        table = arrow.table(columns)
-        if not open_file:
-            open_file.append(stack.enter_context(parquet.ParquetWriter(partial, table.schema)))
-        open_file[0].write_table(table.cast(open_file[0].schema))
-
-    return write

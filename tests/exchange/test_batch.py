@@ -1,0 +1,173 @@
+"""Tables of blocks in, the same tables with answers out."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rbfrag.db.engine import opened_database
+from rbfrag.db.model_store import save_model
+from rbfrag.errors import InputError, MissingExtraError
+from rbfrag.exchange import batch_reading, batch_writing
+from rbfrag.exchange.batch import predict_table
+from rbfrag.exchange.block_columns import read_columns, read_texts
+from rbfrag.exchange.block_table import write_block_table
+from rbfrag.fragility.prediction import predict
+from tests.fragility.conftest import model_row
+
+HEAD = "block_id,p2_1_s2,kr,pgv_m_s"
+TABLE = f'{HEAD}\n"A, upper",3,0.1,0.6\nB,10,0.3,\nC,3,-0.1,0.6\nD,3,0.1,0\n'
+
+Answer = Callable[..., dict[str, object]]
+
+
+@pytest.fixture(params=["with pyarrow", "without pyarrow"])
+def answer(
+    request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Answer:
+    """Answer a table by one stored model, with the fast and with the plain way to CSV."""
+    if request.param == "without pyarrow":
+
+        def missing() -> None:
+            raise MissingExtraError("Parquet files need pyarrow", "parquet")
+
+        monkeypatch.setattr(batch_reading, "pyarrow", missing)
+        monkeypatch.setattr(batch_writing, "pyarrow", missing)
+    database = tmp_path / "model.db"
+    with opened_database(str(database), create=True) as engine, engine.begin() as connection:
+        save_model(connection, model_row())
+
+    def run(source: Path, target: Path, **measures: float) -> dict[str, object]:
+        return predict_table(
+            source, target, measures=measures, model=None, level=0.95, db=str(database)
+        )
+
+    return run
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_rows_are_answered_or_say_why_not(answer: Answer, tmp_path: Path) -> None:
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    source.write_text(TABLE)
+    told = answer(source, target)
+    assert (told["rows"], told["answered"], told["without_answer"]) == (4, 3, 1)
+    first, second, third, fourth = rows_of(target)
+    assert first["block_id"] == "A, upper"
+    expected = predict(3.0, 0.1, pgv_m_s=0.6, db=str(tmp_path / "model.db"))
+    assert float(first["probability"]) == pytest.approx(expected.probability, rel=1e-12)
+    assert float(first["ci_low"]) == pytest.approx(expected.ci_low, rel=1e-12)
+    assert (first["in_domain"], first["reason"]) == ("true", "")
+    assert second["probability"] == ""
+    assert "pgv_m_s" in second["reason"]
+    assert (float(third["probability"]), third["reason"]) == (1.0, "unstable")
+    assert float(fourth["probability"]) == 0.0
+    assert "no shaking" in fourth["reason"]
+
+
+def test_parts_join_without_a_seam(
+    answer: Answer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(batch_reading, "ROWS", 7)
+    random = np.random.default_rng(3)
+    kr = random.uniform(0.02, 0.3, 40)
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    lines = [f"{i},3.0,{value!r},0.6" for i, value in enumerate(kr.tolist())]
+    source.write_text("\n".join([HEAD, *lines]))
+    answer(source, target)
+    found = rows_of(target)
+    assert [row["block_id"] for row in found] == [str(i) for i in range(40)]
+    expected = predict(3.0, kr, pgv_m_s=0.6, db=str(tmp_path / "model.db")).probability
+    assert [float(row["probability"]) for row in found] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_measure_for_all_rows(answer: Answer, tmp_path: Path) -> None:
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    source.write_text("p2_1_s2,kr\n3,0.1\n")
+    answer(source, target, pgv_m_s=0.6)
+    expected = predict(3.0, 0.1, pgv_m_s=0.6, db=str(tmp_path / "model.db")).probability
+    assert float(rows_of(target)[0]["probability"]) == pytest.approx(expected, rel=1e-12)
+
+
+def test_other_modes_are_not_answered(answer: Answer, tmp_path: Path) -> None:
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    source.write_text(f"mode,{HEAD}\nslide,A,3,0.1,0.6\ntopple,B,3,0.1,0.6\n")
+    answer(source, target)
+    first, second = rows_of(target)
+    assert first["probability"] == ""
+    assert "mode is slide" in first["reason"]
+    assert second["probability"] != ""
+
+
+def test_old_answers_are_replaced(answer: Answer, tmp_path: Path) -> None:
+    source, middle, target = (tmp_path / name for name in ("a.csv", "b.csv", "c.csv"))
+    source.write_text(TABLE)
+    answer(source, middle)
+    answer(middle, target)
+    assert middle.read_text() == target.read_text()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (TABLE.replace("B,10,0.3,", "B,ten,0.3,"), r"line 3: p2_1_s2 = 'ten' is not a number"),
+        (TABLE.replace("B,10,0.3,", "B,10,0.3"), r"line 3: 3 cells under 4 columns"),
+        (TABLE.replace("p2_1_s2", "p2"), "there is no column p2_1_s2"),
+        (TABLE.replace("block_id", "kr"), "the column kr is there twice"),
+        ("", "there is no column p2_1_s2; the columns are none"),
+    ],
+)
+def test_bad_tables_name_the_line(answer: Answer, tmp_path: Path, text: str, words: str) -> None:
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    source.write_text(text)
+    with pytest.raises(InputError, match=words):
+        answer(source, target)
+    assert list(tmp_path.glob("*b.csv*")) == []
+
+
+def test_a_bad_cell_far_down_names_its_line(answer: Answer, tmp_path: Path) -> None:
+    source = tmp_path / "a.csv"
+    good = [f"{i},3,0.1,0.6" for i in range(20_000)]
+    source.write_text("\n".join([HEAD, *good, "x,3,?,0.6"]))
+    with pytest.raises(InputError, match=r"line 20002: kr = '\?' is not a number"):
+        answer(source, tmp_path / "b.csv")
+
+
+def test_the_table_itself_is_not_overwritten(answer: Answer, tmp_path: Path) -> None:
+    source = tmp_path / "a.csv"
+    source.write_text(TABLE)
+    with pytest.raises(InputError, match="is the table itself"):
+        answer(source, source)
+    assert source.read_text() == TABLE
+
+
+@pytest.mark.parametrize("answer", ["with pyarrow"], indirect=True)
+def test_parquet(answer: Answer, tmp_path: Path) -> None:
+    random = np.random.default_rng(4)
+    columns = {
+        "block_id": np.array([f"b{i}" for i in range(50)], dtype=object),
+        "p2_1_s2": 10.0 ** random.uniform(-0.5, 1.2, 50),
+        "kr": random.uniform(0.02, 0.3, 50),
+        "pgv_m_s": np.where(np.arange(50) == 7, np.nan, random.uniform(0.1, 1.2, 50)),
+    }
+    source, target = tmp_path / "a.parquet", tmp_path / "b.parquet"
+    write_block_table(columns, source)
+    told = answer(source, target)
+    assert (told["rows"], told["without_answer"]) == (50, 1)
+    found = read_columns(target, ["probability", "kr"])
+    expected = predict(
+        columns["p2_1_s2"], columns["kr"], pgv_m_s=columns["pgv_m_s"],
+        db=str(tmp_path / "model.db"),
+    ).probability  # fmt: skip
+    assert np.array_equal(found["probability"], expected, equal_nan=True)
+    assert np.array_equal(found["kr"], columns["kr"])
+    assert read_texts(target, "block_id").tolist() == columns["block_id"].tolist()
+    answer(source, tmp_path / "c.csv")
+    assert len(rows_of(tmp_path / "c.csv")) == 50
