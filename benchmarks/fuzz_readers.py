@@ -33,6 +33,7 @@ from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.recognise import read_motions
 from tests.motions.test_network_round_trips import STATE_NO_UNIT, WRITTEN
 from tests.motions.written import AT2_SAMPLING, at2, two_columns, v2a
+from tests.motions.written_by_networks import knet
 from tests.synthetic import shaking
 
 SLOW_S = 2.0
@@ -73,6 +74,8 @@ def bases(records: Path | None) -> dict[str, list[bytes]]:
     """Return sound files by format: made-up ones, and small real ones where there are any."""
     own = "\n".join(rbfrag_csv.write([GroundMotion(shaking(3, 40), 0.02, station="S")])) + "\n"
     found = {name: [make().encode()] for name, make in WRITTEN.items()}
+    borehole = knet([int(1000.0 * value) for value in shaking(4, 200)], 100, direction="1")
+    found["K-NET/KiK-net ASCII"].append(borehole.encode())
     found["PEER AT2"] = [at2(TOKENS, 0.005, sampling=form).encode() for form in AT2_SAMPLING]
     found["GeoNet V2A"] = [v2a([("N28W", DECIMALS), ("UP", DECIMALS)], 0.02).encode()]
     found["delimited text"] = [

@@ -17,6 +17,9 @@ from rbfrag.motions import intensity
 
 FloatArray = NDArray[np.float64]
 
+LONGEST_S = 1e100
+"""Beyond this nothing can be integrated."""
+
 
 @dataclass(frozen=True, eq=False)
 class GroundMotion:
@@ -77,6 +80,11 @@ class GroundMotion:
                     f"the sampling interval dt must be a positive number of seconds: {self.dt_s}"
                 )
             object.__setattr__(self, "dt_s", float(self.dt_s))
+            if not samples.size * float(self.dt_s) < LONGEST_S:
+                raise InputError(
+                    f"{samples.size} samples at dt = {self.dt_s:g} s last longer than "
+                    f"{LONGEST_S:g} s: check dt"
+                )
             return
         if self.dt_s is not None:
             raise InputError("give either dt_s or node_time_s, not both")

@@ -91,7 +91,7 @@ def read_motions(
                 "again, or read what there is with --allow-partial",
                 line=text.count("\n") + 1,
             )
-        motions = _reader(file, text).read(file, text, units=units, dt_s=dt_s)
+        motions = _read(file, text, units, dt_s)
     except UnknownFormatError:
         raise
     except MotionFileError:
@@ -105,9 +105,25 @@ def read_motions(
         # its last number may lack digits
         text = whole + newline
         remark = f"the file ends within a line, which is left out: {cut[:40].strip()!r}"
-    motions = _reader(file, text).read(file, text, units=units, dt_s=dt_s, allow_partial=True)
+    motions = _read(file, text, units, dt_s, allow_partial=True)
     if remark:
         motions[-1] = replace(motions[-1], is_partial=True, remarks=(*motions[-1].remarks, remark))
+    return motions
+
+
+def _read(
+    file: Path, text: str, units: str | None, dt_s: float | None, *, allow_partial: bool = False
+) -> list[GroundMotion]:
+    reader = _reader(file, text)
+    try:
+        motions: list[GroundMotion] = reader.read(
+            file, text, units=units, dt_s=dt_s, allow_partial=allow_partial
+        )
+    except MotionFileError:
+        raise
+    except InputError as error:
+        # values that no motion can have, which the reader itself has no reason to doubt
+        raise MotionFileError(file, f"{error}; export the record again") from None
     return motions
 
 

@@ -201,3 +201,8 @@ def test_words_of_any_length_are_cut(tmp_path: Path) -> None:
         error = refusal(written(tmp_path, text), units="g")
         assert len(error.reason) < 500
         assert "999…" in error.reason
+
+
+def test_a_dt_that_nothing_can_be_integrated_with(tmp_path: Path) -> None:
+    path = written(tmp_path, at2(SAMPLES, 0.01).replace("DT=  .01000", "DT= 1.5E308"))
+    assert "12 samples at dt = 1.5e+308 s" in refusal(path).reason
