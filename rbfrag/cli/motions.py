@@ -175,14 +175,13 @@ def show(
         kept = _as_dict(row)
         document = {**document, **{name: kept[name] for name in STORED_LABELS}}
         document["vertical_id"] = None if pair is None else pair.vertical_id
+        document["vertical_remark"] = None if pair is None else pair.reason or pair.remark or None
     if json:
         print_json(document)
         return
     remarks = document.pop("remarks")
     print_pairs({name: value for name, value in document.items() if value is not None})
     print_warnings([*remarks, *(flag.sentence for flag in flags)])
-    if stored is not None and stored[1] is not None:
-        print_warnings(filter(None, [stored[1].reason, stored[1].remark]))
 
 
 @app.command("export", epilog="Example:  rbfrag motions export 1 2 --out two.csv")

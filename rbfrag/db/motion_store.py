@@ -196,6 +196,7 @@ def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
         trace_index=row["trace_index"],
         file_format=row["file_format"],
         remarks=tuple(json.loads(row["remarks"])),
+        is_corrected=_is_corrected(row),
         is_partial="partial" in json.loads(row["flags"]),
         start_time=_time(row["start_time"]),
         processing_applied=_parameters(row["processing_applied"]),
@@ -280,6 +281,12 @@ def _measured(motion: GroundMotion) -> dict[str, Any]:
         "samples_sha256": motion.sha256,
         "samples": motion.acceleration_g.astype("<f8").tobytes(),
     }
+
+
+def _is_corrected(row: RowMapping) -> bool | None:
+    if "uncorrected" in json.loads(row["flags"]):
+        return False
+    return True if "filter" in (_parameters(row["processing_applied"]) or {}) else None
 
 
 def _time(text: str | None) -> datetime | None:

@@ -80,6 +80,8 @@ def test_raw_leaves_them_and_says_so(tmp_path: Path, db: Path) -> None:
     assert row.sha256 == row.source_sha256 == read_motions(path)[0].sha256
     assert row.processing_applied is None
     assert "uncorrected" in row.flags
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        assert load_motion(connection, row.id).is_corrected is False
 
 
 def test_metadata_decide(tmp_path: Path, db: Path) -> None:

@@ -49,6 +49,7 @@ def test_show_of_a_stored_motion(shell: Shell, recording: Path) -> None:
     shell("motions", "add", recording)
     shown = shell.json("motions", "show", "1")
     assert shown["vertical_id"] == 2
+    assert shown["vertical_remark"] is None
     assert shown["flags"] == ["event_guessed"]
     assert shown["processing"] == "uncorrected"
     assert shown["source_sha256"] == read_motion(f"{recording}#0").sha256 != shown["sha256"]
