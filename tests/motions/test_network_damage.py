@@ -10,8 +10,22 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rbfrag.errors import RbfragError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.rbfrag_csv import write
 from rbfrag.motions.recognise import read_motions
-from tests.motions.test_network_round_trips import WRITTEN
+from tests.motions.test_network_round_trips import STATE_NO_UNIT, WRITTEN
+from tests.motions.written import at2, v2a
+from tests.synthetic import shaking
+
+SAMPLES = [f"{value:.3f}" for value in 10.0 * shaking(1, 40)]
+MADE = {
+    **WRITTEN,
+    "PEER AT2": lambda: at2(SAMPLES, 0.01),
+    "GeoNet V2A": lambda: v2a([("N28W", SAMPLES), ("UP", SAMPLES)], 0.02),
+    "rbfrag CSV": lambda: (
+        "\n".join(write([GroundMotion(shaking(2, 40), 0.02, station="S")])) + "\n"
+    ),
+}
 
 PIECES = [
     b"nan", b"-", b"+", b".", b"E", b"9", b"0", b" ", b"\n", b"\r", b",", b";", b"#", b":", b"/",
@@ -51,20 +65,24 @@ def damaged(content: bytes, data: st.DataObject) -> bytes:
     return bytes(text)
 
 
-@pytest.mark.parametrize("name", WRITTEN)
+@pytest.mark.parametrize("name", MADE)
 @settings(
-    max_examples=250,
+    max_examples=200,
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(data=st.data())
 def test_damaged(tmp_path: Path, name: str, data: st.DataObject) -> None:
     path = tmp_path / "damaged"
-    content = damaged(WRITTEN[name]().encode(), data)
+    content = damaged(MADE[name]().encode(), data)
     path.write_bytes(content)
     last = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
     try:
-        motions = read_motions(path, units=data.draw(st.sampled_from(["g", None])), dt_s=None)
+        motions = read_motions(
+            path,
+            units="g" if name in STATE_NO_UNIT else data.draw(st.sampled_from(["g", None, None])),
+            allow_partial=data.draw(st.booleans(), label="allow_partial"),
+        )
     except RbfragError as error:
         message, line, motions = str(error), getattr(error, "line", None), []
     else:
