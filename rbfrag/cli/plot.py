@@ -122,6 +122,55 @@ def plot_sensitivity(out: Out, suite: options.Suite = None, db: options.Db = Non
     print(out)
 
 
+@app.command("calibration", epilog="Example:  rbfrag plot calibration --out calibration.png")
+def plot_calibration(
+    out: Out,
+    model: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--model", help="Stored model; may be given up to four times. Default: the default."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the draws of earthquakes.")] = 0,
+    db: options.Db = None,
+) -> None:
+    """Draw predicted probabilities beside the shares that toppled, earthquakes left out in turn.
+
+    Each model is fitted again, once without each earthquake.
+    """
+    from rbfrag.db.engine import opened_database
+    from rbfrag.fragility.held_out import held_out_of
+    from rbfrag.plots.calibration import plot_calibration as draw
+    from rbfrag.plots.canvas import plot_path
+
+    plot_path(out)
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        names: list[str | None] = [*model] if model else [None]
+        answers = [held_out_of(connection, name, seed=seed) for name in names]
+    draw(
+        {each.name: each.bins for each in answers},
+        out,
+        scores={each.name: each.scores for each in answers},
+        data=answers[0].kind,
+    )
+    print(out)
+
+
+@app.command("vertical", epilog="Example:  rbfrag plot vertical --out vertical.png")
+def plot_vertical(out: Out, suite: options.Suite = None, db: options.Db = None) -> None:
+    """Draw critical strengths with vertical motion beside those without it."""
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.queries import combination_table
+    from rbfrag.fragility.claims_of_vertical import vertical_pairs
+    from rbfrag.plots.vertical import plot_vertical as draw
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        without = combination_table(connection, suite=suite)
+        with_it = combination_table(connection, suite=suite, vertical="with")
+    draw(vertical_pairs(without, with_it), out)
+    print(out)
+
+
 @app.command("spectrum", epilog="Example:  rbfrag plot spectrum 1 5 --polarity both --out x.png")
 def plot_spectrum(
     motions: options.Motions,

@@ -87,6 +87,9 @@ PARAMETERS = {
 }
 """The parameters of each formula, in their order; a model may have fewer from the end."""
 
+EXPONENTS = frozenset({"m_minus_1", "b_ln_p"})
+"""Parameters of models whose exponent M was estimated: P then depends on p beside y."""
+
 _ROOT_HALF = math.sqrt(0.5)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.formulas import EXPONENTS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.model_answers import model_answers
@@ -65,6 +66,11 @@ def _measures(model: FragilityModel, x_m_s: FloatArray) -> Mapping[str, FloatArr
         raise InputError(
             f"model {model.name!r} reads {' and '.join(model.term.inputs)}: this figure draws "
             f"models of one number, {', '.join(ONE_NUMBER_TERMS)}"
+        )
+    if not EXPONENTS.isdisjoint(model.row.coefficients):
+        raise InputError(
+            f"model {model.name!r} has an estimated exponent M: its probability depends on the "
+            "size of the block too; draw one fitted with M = 1"
         )
     tm = np.full(x_m_s.shape, _TM_S)
     if name == "pga_tm":

@@ -45,3 +45,12 @@ def test_other_terms_are_refused() -> None:
     )
     with pytest.raises(InputError, match="pgv_m_s and pga_g"):
         failure_line(model, X, 0.5)  # type: ignore[arg-type]
+
+
+def test_an_estimated_exponent_is_refused() -> None:
+    from dataclasses import replace
+
+    model = straight_line_model()
+    row = replace(model.row, coefficients={**model.row.coefficients, "m_minus_1": 0.1})
+    with pytest.raises(InputError, match="exponent"):
+        failure_line(replace(model, row=row), X, 0.5)

@@ -1,0 +1,89 @@
+"""Figure of calibration: what was predicted for unseen earthquakes, and what happened."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.calibration_bins import CalibrationBins
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+
+COLOURS = ("#1f4e79", "#d98c1f", "#4c9a6a", "#8c2d4f")
+MARKERS = ("o", "s", "^", "D")
+
+MOST_MODELS = len(COLOURS)
+
+
+def plot_calibration(
+    models: Mapping[str, CalibrationBins],
+    path: str | PathLike[str],
+    *,
+    scores: Mapping[str, Mapping[str, float]] | None = None,
+    data: str = "",
+) -> Path:
+    """Draw the share of blocks that toppled over the probability predicted for them.
+
+    Each earthquake was predicted by a fit without it. On the diagonal a model keeps its word.
+
+    Args:
+        models: bins by name of the model, at most four.
+        path: file to write: .png, .pdf or .svg.
+        scores: held-out scores by name of the model, for the legend.
+        data: what the outcomes are, for the title.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: no model or too many, or a path that cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    plot_path(path)
+    if not 1 <= len(models) <= MOST_MODELS:
+        raise InputError(f"{len(models)} models: a figure of calibration shows 1 to {MOST_MODELS}")
+    figure = new_figure(6.2, 7.2)
+    axes, below = figure.subplots(2, 1, sharex=True, height_ratios=[4.0, 1.0])
+    axes.plot([0.0, 1.0], [0.0, 1.0], color="black", lw=0.8, ls=":")
+    for number, (name, bins) in enumerate(models.items()):
+        colour = COLOURS[number]
+        # beside each other, so that their intervals can be told apart
+        x = bins.predicted + 0.006 * (number - 0.5 * (len(models) - 1))
+        axes.errorbar(
+            x,
+            bins.observed,
+            yerr=np.clip([bins.observed - bins.low, bins.high - bins.observed], 0.0, None),
+            fmt=MARKERS[number] + "-",
+            ms=4.5,
+            lw=1.0,
+            elinewidth=0.9,
+            capsize=2.0,
+            color=colour,
+            label=name + _scores((scores or {}).get(name, {})),
+        )
+        below.plot(bins.predicted, bins.blocks, MARKERS[number] + "-", ms=3.5, lw=0.9, color=colour)
+    axes.set_xlim(-0.02, 1.02)
+    axes.set_ylim(-0.02, 1.02)
+    axes.set_ylabel("share of blocks that toppled, 95 % interval")
+    axes.legend(loc="upper left", fontsize=8.5, frameon=False)
+    below.set_yscale("log")
+    below.set_ylabel("blocks per bin")
+    below.set_xlabel("probability predicted for an earthquake that was left out")
+    for each in (axes, below):
+        each.grid(visible=True, lw=0.3, alpha=0.6)
+    first = next(iter(models.values()))
+    axes.set_title(
+        f"{int(first.blocks.sum())} blocks under motions of {first.events} earthquakes"
+        + (f"\n{data}" if data else ""),
+        fontsize=10,
+    )
+    return save_figure(figure, path)
+
+
+def _scores(scores: Mapping[str, float]) -> str:
+    known = (("log loss", "log_loss_held_out"), ("Brier", "brier_held_out"))
+    words = [f"{name} {scores[key]:.3f}" for name, key in known if key in scores]
+    return f" ({', '.join(words)})" if words else ""
