@@ -173,7 +173,9 @@ def _scaled(acceleration_g: FloatArray) -> tuple[FloatArray, float]:
 
 def _ceil(x: float) -> float:
     # 1/(0.05*dt) and the band edges are whole numbers for usual dt, up to rounding.
-    nearest = round(x) if math.isfinite(x) else x
+    if not math.isfinite(x):
+        return x
+    nearest = round(x)
     if abs(x - nearest) <= _EDGE_TOLERANCE * max(1.0, abs(x)):
         return float(nearest)
     return float(math.ceil(x))

@@ -109,12 +109,13 @@ def processed(motion: GroundMotion, high_pass: HighPass = DEFAULT_HIGH_PASS) -> 
             f"{nyquist_hz:g} Hz that dt = {motion.dt_s:g} s resolves: check dt, or add the record "
             "as it is (--raw)"
         )
-    padding = math.ceil(high_pass.padding_s / motion.dt_s)
-    if motion.npts + 2 * padding > MOST_SAMPLES:
+    zeros = high_pass.padding_s / motion.dt_s
+    if not motion.npts + 2.0 * zeros <= MOST_SAMPLES:
         raise InputError(
-            f"{motion.label}: {high_pass.padding_s:g} s of zeros are {padding} samples at dt = "
+            f"{motion.label}: {high_pass.padding_s:g} s of zeros are {zeros:.0f} samples at dt = "
             f"{motion.dt_s:g} s: check dt, or add the record as it is (--raw)"
         )
+    padding = math.ceil(zeros)
     if not motion.pga_g < LARGEST_PGA_G:
         raise InputError(
             f"{motion.label}: a PGA of {motion.pga_g:g} g cannot be filtered: check the unit"

@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 from rbfrag.errors import InputError, MotionFileError
+from rbfrag.motions.clock import FIRST_YEAR
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.header_field import Field, agreed_dt, agreed_unit_in_g, other_count
 from rbfrag.motions.text_file import table_numbers, without_blank_end
@@ -220,4 +221,5 @@ def _time(text: str) -> datetime | None:
         found = datetime.fromisoformat(text)
     except ValueError:
         return None
-    return None if found.tzinfo else found
+    # far enough from the first year for zeros before the first sample
+    return None if found.tzinfo or found.year < FIRST_YEAR else found

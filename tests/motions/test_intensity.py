@@ -238,3 +238,7 @@ def test_one_sample_and_zero_record() -> None:
 def test_a_record_beyond_floating_point_is_refused_in_words() -> None:
     with pytest.raises(InputError, match=r"PGA 1e\+308 g lasting 200 s .*check units"):
         _ = GroundMotion([1e308, 1e308, 1e308], 100.0).measures
+
+
+def test_an_absurd_interval_has_no_mean_period() -> None:
+    assert mean_period(np.array([0.0, 1.0, -1.0, 0.0]), 1e-320) is None
