@@ -33,6 +33,16 @@ def critical(
             help="Map the toppling and safe intervals of k_r/PGA down to 0.01, borders to 1e-4.",
         ),
     ] = False,
+    plot: Annotated[
+        str | None,
+        typer.Option(
+            "--plot",
+            metavar="FILE",
+            help="Draw the map, peak rotations, bracket and upper bound (.png, .pdf, .svg). "
+            "Makes the whole map, as --map does.",
+            show_default=False,
+        ),
+    ] = None,
     units: options.Units = None,
     dt: options.Dt = None,
     db: options.Db = None,
@@ -42,6 +52,10 @@ def critical(
     from rbfrag.solver.critical import critical as search
     from rbfrag.solver.critical_report import as_dict, map_rows
 
+    if plot is not None:
+        from rbfrag.plots.canvas import plot_path
+
+        plot_path(plot)
     ground = find_motion(motion, db=db, units=units, dt_s=dt)
     upward, remarks = find_vertical(vertical, ground, db=db, units=units, dt_s=dt)
     result = search(
@@ -50,8 +64,12 @@ def critical(
         vertical=upward,
         polarity="reverse" if reverse else "forward",
         linear=linear,
-        full_map=full_map,
+        full_map=full_map or plot is not None,
     )
+    if plot is not None:
+        from rbfrag.plots.islands import plot_islands
+
+        plot_islands(ground, result, plot, vertical=upward, title=ground.label)
     answer = as_dict(result)
     answer["warnings"] = [*remarks, *answer["warnings"]]
     if full_map:

@@ -1,0 +1,210 @@
+"""The islands of one motion: which blocks topple, which stay, and how far those rotate."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.plots.canvas import new_figure, save_figure
+from rbfrag.solver.excitation import Excitation, excitation
+from rbfrag.solver.respond import runner
+from rbfrag.solver.results import CriticalResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+BANDS = {"topples": "#e8b4b0", "safe": "#dce9f5", "undecided": "#8c8c8c"}
+NAMES = {"topples": "all topple", "safe": "all stay", "undecided": "undecided"}
+ROTATION = "#1f4e79"
+CRITICAL = "#8b1a1a"
+BOUND = "#5b3a86"
+
+RUNS = 600
+"""Blocks run for the curve of one panel."""
+
+AROUND = 2.5
+"""Widths of the widest safe island shown on both sides of it."""
+
+LEAST_DRAWN = 3e-4
+"""Part of a panel's width below which an undecided interval is not drawn: a border."""
+
+NEAR_CRITICAL = 0.03
+"""Relative distance shown on both sides of the critical value where there is no island."""
+
+
+def plot_islands(
+    motion: GroundMotion,
+    result: CriticalResult,
+    path: str | os.PathLike[str],
+    *,
+    vertical: GroundMotion | None = None,
+    title: str = "",
+) -> None:
+    """Draw the map of outcomes over k_r/PGA with the peak rotations, and a part enlarged.
+
+    The bands are what the search proved for whole intervals; the curve is peak rotations of
+    single blocks, broken where they topple.
+
+    Args:
+        motion: the horizontal motion that was searched.
+        result: its critical search, made with ``full_map=True``.
+        path: .png, .pdf or .svg.
+        vertical: the vertical motion of that search.
+        title: name of the motion.
+
+    Raises:
+        InputError: a search without a map, an unknown suffix, a folder that cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    if not result.intervals.outcome:
+        why = f"no map of outcomes (status {result.status})"
+        raise InputError(f"nothing to draw: {why}; islands need a motion that lifts blocks")
+    drive = excitation(motion, vertical, result.polarity)
+    figure = new_figure(width_in=7.5, height_in=6.2)
+    whole, part = figure.subplots(2, 1)
+    bottom = float(result.intervals.k_lo[0])
+    known = result.k_up_over_pga or bottom
+    top = min(max(1.25 * known, 2.0 * bottom), float(result.intervals.k_hi[-1]))
+    low, high, what = enlarged_range(result)
+    _panel(whole, drive, result, bottom, top, logarithmic=True)
+    _panel(part, drive, result, low, high, logarithmic=False)
+    for edge in (low, high):
+        whole.axvline(edge, color="black", lw=0.8, ls=":")
+    whole.annotate(
+        "enlarged below", (np.sqrt(low * high), 1.0), xycoords=("data", "axes fraction"),
+        ha="center", va="bottom", fontsize=8, annotation_clip=False,
+    )  # fmt: skip
+    part.set_xlabel(f"$k_r$/PGA, {what}")
+    whole.set_xlabel("$k_r$/PGA")
+    _legend(whole, result)
+    name = f"{title}{', reversed' if result.polarity == 'reverse' else ''}"
+    name += ", with vertical motion" if vertical is not None else ""
+    figure.suptitle(f"{name}\n{_verdict(result)}", fontsize=10)
+    save_figure(figure, path)
+
+
+def enlarged_range(result: CriticalResult) -> tuple[float, float, str]:
+    """Return the range of k_r/PGA to enlarge, and what it shows.
+
+    Around the widest safe island below the critical value, or around that value itself.
+    """
+    bottom = float(result.intervals.k_lo[0])
+    top = float(result.intervals.k_hi[-1])
+    if result.lower is None:
+        return bottom, min(2.0 * bottom, top), "just above the search limit"
+    toppling = [w == "topples" for w in result.intervals.outcome]
+    first = toppling.index(True) if any(toppling) else len(toppling)
+    islands = [
+        (float(high - low), float(low), float(high))
+        for low, high, outcome in zip(
+            result.intervals.k_lo[first:],
+            result.intervals.k_hi[first:],
+            result.intervals.outcome[first:],
+            strict=True,
+        )
+        if outcome == "safe" and high < result.lower
+    ]
+    if not islands:
+        away = NEAR_CRITICAL * result.lower
+        return (
+            max(result.lower - away, bottom),
+            min(result.lower + away, top),
+            "at the critical value",
+        )
+    width, low, high = max(islands)
+    low, high = max(low - AROUND * width, bottom), min(high + AROUND * width, top)
+    return low, high, "around the widest safe island"
+
+
+def _panel(
+    axes: Axes,
+    drive: Excitation,
+    result: CriticalResult,
+    low: float,
+    high: float,
+    *,
+    logarithmic: bool,
+) -> None:
+    seen = result.intervals
+    for k_lo, k_hi, outcome in zip(seen.k_lo, seen.k_hi, seen.outcome, strict=True):
+        drawn = min(k_hi, high) - max(k_lo, low)
+        if drawn > (LEAST_DRAWN * (high - low) if outcome == "undecided" else 0.0):
+            axes.axvspan(k_lo, k_hi, color=BANDS[outcome], lw=0.0)
+    ratios, theta_n = rotations(drive, result, low, high, logarithmic=logarithmic)
+    axes.plot(ratios, theta_n, color=ROTATION, lw=1.0)
+    axes.axhline(1.0, color="black", lw=0.6, ls="--")
+    if result.k_up_over_pga is not None and low <= result.k_up_over_pga <= high:
+        axes.axvline(result.k_up_over_pga, color=BOUND, lw=1.4, ls="--")
+    if result.lower is not None and low <= result.lower <= high:
+        axes.axvline(result.lower, color=CRITICAL, lw=1.4)
+    if logarithmic:
+        from matplotlib.ticker import LogLocator, NullFormatter
+
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
+        axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlim(low, high)
+    axes.set_ylim(0.0, max(1.15, 1.08 * float(np.nanmax(theta_n, initial=0.0))))
+    axes.set_ylabel(r"peak rotation $\theta/\theta_c$")
+
+
+def rotations(
+    drive: Excitation, result: CriticalResult, low: float, high: float, *, logarithmic: bool
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Run blocks from `low` to `high` and at both sides of the borders between.
+
+    Returns:
+        k_r/PGA, rising, and peak rotations over the critical angle, NaN where blocks topple.
+    """
+    spread = np.geomspace(low, high, RUNS) if logarithmic else np.linspace(low, high, RUNS)
+    # closer and closer to each border, where rotations change steeply and islands are narrow
+    edges = np.concatenate([result.intervals.k_lo, result.intervals.k_hi])
+    edges = edges[(edges >= low) & (edges <= high)]
+    offsets = np.geomspace(1e-9, 1e-3, 7)
+    beside = np.concatenate(
+        [np.outer(edges, 1.0 - offsets).ravel(), np.outer(edges, 1.0 + offsets).ravel()]
+    )
+    ratios = np.sort(np.concatenate([spread, beside[(beside > low) & (beside < high)]]))
+    run = runner(drive, p2=result.p2, linear=result.linear)
+    kr = ratios * drive.pga_g
+    theta_c = kr if result.linear else np.arctan(kr)
+    return ratios, np.array([run(k).peak_rad for k in kr.tolist()]) / theta_c
+
+
+def _legend(axes: Axes, result: CriticalResult) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    handles: list[Line2D | Patch] = [
+        Patch(color=BANDS[outcome], label=NAMES[outcome])
+        for outcome in ("topples", "safe", "undecided")
+        if outcome != "undecided" or result.intervals.outcome[0] == "undecided"
+    ]
+    handles.append(Line2D([], [], color=ROTATION, lw=1.0, label="peak rotation"))
+    if result.lower is not None:
+        handles.append(Line2D([], [], color=CRITICAL, lw=1.4, label="critical value"))
+    if result.k_up_over_pga is not None:
+        handles.append(Line2D([], [], color=BOUND, lw=1.4, ls="--", label="$K_{up}$"))
+    axes.legend(
+        handles=handles, fontsize=8, ncols=len(handles), loc="lower center",
+        bbox_to_anchor=(0.5, 1.08), frameon=False,
+    )  # fmt: skip
+
+
+def _verdict(result: CriticalResult) -> str:
+    block = f"$p^2$ = {result.p2:g} s$^{{-2}}$"
+    if result.lower is None or result.upper is None:
+        return f"{block}: no block down to $k_r$/PGA = {result.search_limit:g} topples"
+    known = "certified" if result.certified else "not certified"
+    width = (result.upper - result.lower) / result.upper
+    upper = f", $K_{{up}}$ = {result.k_up_over_pga:.6g}" if result.k_up_over_pga else ""
+    return (
+        f"{block}: critical $k_r$/PGA = {result.lower:.6g} ({known}, bracket {width:.0e})"
+        f"{upper} PGA"
+    )
