@@ -1,6 +1,6 @@
 """The certificate and the accuracy of the solver, studied:  python -m benchmarks.certify
 
-Five parts, each a module with a `study`; `--only` picks some. Every draw is seeded.
+Six parts, each a module with a `study`; `--only` picks some. Every draw is seeded.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.certify import accuracy, borders, combinations, intervals, islands
+from benchmarks.certify import accuracy, borders, combinations, digits, intervals, islands
 from benchmarks.certify.recordings import Recording, choose, recordings
 from benchmarks.page import machine_sentence
 
-PARTS = ("combinations", "islands", "intervals", "borders", "accuracy")
+PARTS = ("combinations", "islands", "intervals", "borders", "accuracy", "digits")
 
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, Any]:
@@ -31,6 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, Any]:
     options.add_argument("--values", type=int, default=10_000, help="blocks run in each of them")
     options.add_argument("--intervals", type=int, default=50_000)
     options.add_argument("--borders", type=int, default=120, help="combinations")
+    options.add_argument("--digits", type=int, default=60, help="combinations")
     options.add_argument("--strengths", type=int, default=2, help="k_r of each record and p²")
     options.add_argument("--every", type=int, default=1, help="accuracy on each n-th record only")
     options.add_argument("--seed", type=int, default=1)
@@ -103,12 +104,19 @@ def _accuracy(
     return accuracy.study(known[:: chosen.every], chosen.strengths, rng)
 
 
+def _digits(
+    known: list[Recording], chosen: argparse.Namespace, rng: np.random.Generator
+) -> dict[str, Any]:
+    return digits.study(_mixed(known, rng, 10**6)[: chosen.digits])
+
+
 STUDIES: dict[str, Callable[..., dict[str, Any]]] = {
     "combinations": _combinations,
     "islands": _islands,
     "intervals": _intervals,
     "borders": _borders,
     "accuracy": _accuracy,
+    "digits": _digits,
 }
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.certify.recordings import Combination
+from benchmarks.certify.recordings import MAP_DEPTH, Combination
 from benchmarks.extended.toppling import truth
 from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import Excitation
@@ -65,7 +65,7 @@ def study(combinations: Sequence[Combination], rng: np.random.Generator) -> dict
     for one in combinations:
         result = critical(
             one.recording.motion, p2=one.p2, vertical=one.vertical, polarity=one.polarity,
-            full_map=True,
+            full_map=True, map_depth=MAP_DEPTH,
         )  # fmt: skip
         if result.status != "found" or result.lower is None or result.upper is None:
             continue

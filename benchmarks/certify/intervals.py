@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.certify.checking import Count, inner_values, verdict_on
 from benchmarks.certify.made_up import MAKERS, vertical_of
-from benchmarks.certify.recordings import Combination
+from benchmarks.certify.recordings import MAP_DEPTH, Combination
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import excitation
@@ -52,7 +52,13 @@ def study(
         if done >= wanted:
             break
         result = critical(
-            motion, p2=p2, vertical=up, polarity=polarity, search_limit=0.02, full_map=True
+            motion,
+            p2=p2,
+            vertical=up,
+            polarity=polarity,
+            search_limit=0.02,
+            full_map=True,
+            map_depth=MAP_DEPTH,
         )
         if result.status == "outside_model" or not result.intervals.outcome:
             continue

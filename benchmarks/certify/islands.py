@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.certify.recordings import Combination
+from benchmarks.certify.recordings import MAP_DEPTH, Combination
 from rbfrag.solver.critical import critical
 from rbfrag.solver.respond import runner
 from rbfrag.solver.results import CriticalResult
@@ -55,7 +55,7 @@ def study(combinations: Sequence[Combination], wanted: int, values: int) -> dict
         looked += 1
         result = critical(
             one.recording.motion, p2=one.p2, vertical=one.vertical, polarity=one.polarity,
-            full_map=True,
+            full_map=True, map_depth=MAP_DEPTH,
         )  # fmt: skip
         gaps = safe_islands(result)
         if not gaps:

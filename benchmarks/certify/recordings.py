@@ -18,6 +18,10 @@ from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.results import POLARITIES, Polarity
 
 
+MAP_DEPTH = 1e-9
+"""Width of k_r/PGA to which maps are made: as fine as the search goes, to be tried hardest."""
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """One horizontal trace as its file has it, and the vertical of the same recording."""

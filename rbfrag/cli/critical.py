@@ -12,6 +12,9 @@ from rbfrag.cli.output import print_json, print_pairs, print_warnings
 
 EXAMPLE = "Example:  rbfrag critical record.AT2 --p2 3 --json"
 
+FINE_ENOUGH_TO_DRAW = 1e-7
+"""Width of k_r/PGA to which the map of a figure is made, borders being thin lines."""
+
 STATUS = {
     "found": "the largest k_r/PGA that topples lies in [lower, upper]",
     "below_limit": "no block down to the search limit topples",
@@ -39,7 +42,7 @@ def critical(
             "--plot",
             metavar="FILE",
             help="Draw the map, peak rotations, bracket and upper bound (.png, .pdf, .svg). "
-            "Makes the whole map, as --map does.",
+            "Makes the whole map, as --map does, borders to 1e-7.",
             show_default=False,
         ),
     ] = None,
@@ -49,6 +52,7 @@ def critical(
     json: options.Json = False,
 ) -> None:
     """Find the largest k_r/PGA that one accelerogram topples, with its bracket."""
+    from rbfrag.solver.certified import MAP_DEPTH
     from rbfrag.solver.critical import critical as search
     from rbfrag.solver.critical_report import as_dict, map_rows
 
@@ -65,6 +69,7 @@ def critical(
         polarity="reverse" if reverse else "forward",
         linear=linear,
         full_map=full_map or plot is not None,
+        map_depth=MAP_DEPTH if plot is None else FINE_ENOUGH_TO_DRAW,
     )
     if plot is not None:
         from rbfrag.plots.islands import plot_islands

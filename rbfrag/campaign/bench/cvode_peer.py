@@ -1,6 +1,6 @@
 """SUNDIALS CVODE with events through Python callbacks: the dissertation's method.
 
-scikit-sundae is no part of rbfrag and of none of its extras; it is used where it is installed.
+scikit-sundae comes with the extra `bench` alone; it is used where it is installed.
 """
 
 from __future__ import annotations
