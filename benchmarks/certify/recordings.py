@@ -17,7 +17,6 @@ from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.results import POLARITIES, Polarity
 
-
 MAP_DEPTH = 1e-9
 """Width of k_r/PGA to which maps are made: as fine as the search goes, to be tried hardest."""
 

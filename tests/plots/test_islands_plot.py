@@ -33,7 +33,7 @@ WITH_ISLANDS, P2 = 17, 10.0
 @pytest.fixture(scope="module")
 def searched() -> tuple[GroundMotion, CriticalResult]:
     motion = shaking(WITH_ISLANDS)
-    result = critical(motion, p2=P2, full_map=True)
+    result = critical(motion, p2=P2, full_map=True, map_depth=1e-7)
     assert result.reentrant
     return motion, result
 

@@ -52,4 +52,6 @@ def test_a_map_that_is_given_up_says_from_where(monkeypatch: pytest.MonkeyPatch)
     assert part.intervals.outcome[0] == "undecided"
     given_up = part.intervals.k_hi[0]
     assert 0.01 < given_up < part.lower  # type: ignore[operator]
-    assert any(f"given up at {given_up:.6g} PGA" in sentence for sentence in part.warnings)
+    (said,) = (s for s in part.warnings if "given up at" in s)
+    # what it left undecided just above belongs to the same interval
+    assert float(said.split("given up at ")[1].split(" PGA")[0]) <= given_up * (1.0 + 1e-6)
