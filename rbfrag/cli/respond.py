@@ -89,6 +89,20 @@ def respond(
             show_default=False,
         ),
     ] = None,
+    animate: Annotated[
+        str | None,
+        typer.Option(
+            "--animate",
+            help="Film the block on its planes (.gif, .html); it must be given by its geometry.",
+            show_default=False,
+        ),
+    ] = None,
+    exaggerate: Annotated[
+        float,
+        typer.Option(
+            "--exaggerate", help="Factor on displacement and rotation in the film; 1 is true scale."
+        ),
+    ] = 1.0,
     units: options.Units = None,
     dt: options.Dt = None,
     db: options.Db = None,
@@ -110,6 +124,8 @@ def respond(
         {"beta_deg": beta, "phi_deg": phi, "phi_back_deg": phi_back},
         no_back,
     )
+    if animate is not None and shape is None:
+        raise InputError("--animate needs the shape of the block: give --block or its geometry")
     ground = find_motion(motion, db=db, units=units, dt_s=dt)
     upward, about = find_vertical(vertical, ground, db=db, units=units, dt_s=dt)
     try:
@@ -125,7 +141,7 @@ def respond(
             linear=linear,
             two_way=two_way,
             horizontal=horizontal,
-            history=csv is not None or plot is not None,
+            history=any(path is not None for path in (csv, plot, animate)),
             **planes,
         )
     except InputError as error:
@@ -135,6 +151,13 @@ def respond(
         write_history(response, csv)
     if plot is not None:
         _draw(response, plot, shape, p2, kr, linear=linear, title=ground.label, reverse=reverse)
+    if animate is not None and shape is not None:
+        from rbfrag.plots.film import film
+
+        film(
+            response, shape, animate, beta_deg=planes["beta_deg"], exaggerate=exaggerate,
+            back_fracture=planes.get("back_fracture", True), title=ground.label,
+        )  # fmt: skip
     answer = as_dict(response)
     if json:
         print_json(answer)

@@ -65,7 +65,7 @@ def _history(mechanism: Mechanism, drive: Excitation, travel: Travel) -> Respons
     time_s, rate = travel.time_s, travel.rate
     displacement = np.array([pose.displacement_m for pose in travel.poses])
     centroid = np.array([pose.centroid_m for pose in travel.poses])
-    turned = np.array([abs(pose.turned_rad) for pose in travel.poses])
+    turned = np.array([pose.turned_rad for pose in travel.poses])
     if drive.time_s[-1] > time_s[-1] and rate[-1] == 0.0:
         rest = drive.time_s
     else:
@@ -88,12 +88,13 @@ def _history(mechanism: Mechanism, drive: Excitation, travel: Travel) -> Respons
     nothing = np.zeros_like(speed)
     return ResponseHistory(
         time_s=at_s,
-        theta_rad=merged(turned, 0.0),
+        theta_rad=merged(np.abs(turned), 0.0),
         theta_dot_rad_s=speed if mechanism.rotates else nothing,
         k_h=np.interp(at_s, drive.time_s, drive.k_h, right=0.0),
         k_v=np.interp(at_s, drive.time_s, drive.w - 1.0, right=0.0),
         displacement_m=merged(displacement, 0.0),
         velocity_m_s=None if mechanism.rotates else speed,
         centroid_m=merged(centroid, start.centroid_m),
+        turned_rad=merged(turned, 0.0),
         strength_g=merged(travel.strength_g, mechanism.first.forward.threshold(0.0)),
     )

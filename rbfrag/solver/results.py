@@ -68,6 +68,8 @@ class ResponseHistory:
         velocity_m_s: rate of it [m/s], shape (n,), for sliding; None otherwise.
         centroid_m: position of the centroid in the base frame with the heel at rest as
             origin [m], shape (n, 2); None for toppling.
+        turned_rad: rotation of the block, counter-clockwise positive with the slope falling to
+            the right [rad], shape (n,); None for toppling, which turns by -theta_rad.
         strength_g: driving acceleration at which the block, where it is, neither speeds up nor
             slows down while 1 + k_v = 1 [g], shape (n,); None for toppling.
     """
@@ -80,6 +82,7 @@ class ResponseHistory:
     displacement_m: FloatArray | None = None
     velocity_m_s: FloatArray | None = None
     centroid_m: FloatArray | None = None
+    turned_rad: FloatArray | None = None
     strength_g: FloatArray | None = None
 
 

@@ -67,6 +67,7 @@ def test_sliding_by_its_yield_and_by_its_shape(shell: Shell, record: Path) -> No
         (("--ky", "0.1", *SLUMP), "--ky does not go with --alpha1"),
         (("--ky", "0.1", "--phi", "20"), "phi_deg does not go with ky"),
         (("--ky", "0.1", "--no-back"), "--no-back does not go with --ky"),
+        (("--ky", "0.1", "--animate", "a.gif"), "--animate needs the shape"),
         (("--ky", "-0.1"), "ky"),
         (("--ky", "1e9", "--beta", "80"), "friction angle"),
         (("--ky", "0.1", "--kind", "slumping"), "needs the shape"),

@@ -1,0 +1,225 @@
+"""A block that moves on its planes under a record, as a film."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rbfrag.errors import InputError
+from rbfrag.plots.canvas import new_figure
+from rbfrag.plots.response import BLOCK, GROUND, STRENGTH
+from rbfrag.solver.block import Block
+from rbfrag.solver.results import FloatArray, Response, ResponseHistory
+
+if TYPE_CHECKING:
+    from matplotlib.animation import AbstractMovieWriter
+    from matplotlib.axes import Axes
+
+SUFFIXES = (".gif", ".html")
+
+FRAMES_PER_S = 20
+
+FRAMES_MAX = 100
+"""Frames of a film; a longer motion is shown faster."""
+
+MARGIN_S = 0.5
+"""Rest shown before the first motion and after the last [s]."""
+
+ROCK = "#8a8378"
+
+
+def film(
+    response: Response,
+    block: Block,
+    path: str | os.PathLike[str],
+    *,
+    beta_deg: float,
+    back_fracture: bool = True,
+    exaggerate: float = 1.0,
+    title: str = "",
+) -> Path:
+    """Write a film of a block on its planes, as seen by somebody who moves with the ground.
+
+    Args:
+        response: a response asked for with its history.
+        block: the block.
+        path: .gif, or .html with buttons.
+        beta_deg: dip of the base, out of the slope positive [deg].
+        back_fracture: draw the back plane.
+        exaggerate: factor on displacement and rotation; 1 is true scale.
+        title: name of the motion.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: no history, a factor that is not positive, an unknown suffix, a folder that
+            cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    target = _film_path(path)
+    if not (math.isfinite(exaggerate) and exaggerate > 0.0):
+        raise InputError(f"exaggerate = {exaggerate:g}: give a factor above 0; 1 is true scale")
+    history = response.history
+    if history is None:
+        raise InputError("this response holds no history: ask for it with history=True")
+    figure = new_figure(width_in=6.4, height_in=6.0)
+    from matplotlib.animation import FuncAnimation, HTMLWriter, PillowWriter
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    FigureCanvasAgg(figure)
+    time_s, speed = _frame_times(response, history)
+    outlines = _outlines(block, history, time_s, exaggerate)
+    scene, trace = figure.subplots(2, 1, height_ratios=[2.6, 1.0])
+    shown = _to_slope(outlines, beta_deg)
+    _draw_scene(scene, block, shown, beta_deg, back_fracture)
+    (patch,) = scene.fill(*shown[0].T, color=BLOCK, alpha=0.35, lw=0, zorder=3)
+    (edge,) = scene.plot(*_closed(shown[0]).T, color=BLOCK, lw=1.6, zorder=4)
+    clock = scene.set_title("", fontsize=9)
+    cursor = _draw_trace(trace, history, time_s)
+    scale = "true scale" if exaggerate == 1.0 else f"displacements times {exaggerate:g}"
+    pace = "" if speed == 1.0 else f", {speed:.2g} times as fast as it was"
+    figure.suptitle(f"{title}\n{response.kind.replace('_', ' ')}, {scale}{pace}", fontsize=10)
+
+    def show(frame: int) -> tuple[Any, ...]:
+        patch.set_xy(_closed(shown[frame]))
+        edge.set_data(*_closed(shown[frame]).T)
+        clock.set_text(f"{time_s[frame]:.2f} s")
+        cursor.set_xdata([time_s[frame], time_s[frame]])
+        return patch, edge, clock, cursor
+
+    # the parts find their places once, and stay there
+    show(0)
+    figure.canvas.draw()
+    figure.set_layout_engine("none")
+    moving = FuncAnimation(figure, show, frames=time_s.size, interval=1000 // FRAMES_PER_S)
+    writer: AbstractMovieWriter = (
+        PillowWriter(fps=FRAMES_PER_S)
+        if target.suffix.lower() == ".gif"
+        else HTMLWriter(fps=FRAMES_PER_S, embed_frames=True, default_mode="loop")
+    )
+    try:
+        # the film appears whole or not at all
+        with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}-") as folder:
+            unfinished = Path(folder) / f"film{target.suffix.lower()}"
+            moving.save(str(unfinished), writer=writer, dpi=80)
+            unfinished.replace(target)
+    except OSError as error:
+        raise InputError(f"film {target} cannot be written: {error.strerror}") from error
+    return target
+
+
+def _film_path(path: str | os.PathLike[str]) -> Path:
+    target = Path(path)
+    if target.suffix.lower() not in SUFFIXES:
+        raise InputError(
+            f"film {target}: the suffix {target.suffix!r} is none of {', '.join(SUFFIXES)}"
+        )
+    if not target.parent.is_dir() or not os.access(target.parent, os.W_OK):
+        raise InputError(f"film {target}: the folder {target.parent} cannot be written")
+    return target
+
+
+def _frame_times(response: Response, history: ResponseHistory) -> tuple[FloatArray, float]:
+    """Return the times of the frames, and how much faster than the earthquake they pass."""
+    first, last = float(history.time_s[0]), float(history.time_s[-1])
+    if response.started_s is not None:
+        moving = np.flatnonzero(np.diff(history.theta_rad) != 0.0)
+        if history.displacement_m is not None:
+            slipping = np.flatnonzero(np.diff(history.displacement_m) != 0.0)
+            moving = np.union1d(moving, slipping)
+        end = float(history.time_s[moving[-1] + 1]) if moving.size else response.started_s
+        first = max(first, response.started_s - MARGIN_S)
+        last = min(last, end + MARGIN_S)
+    n = max(2, min(FRAMES_MAX, math.ceil((last - first) * FRAMES_PER_S)))
+    speed = max(1.0, (last - first) * FRAMES_PER_S / n)
+    return np.linspace(first, last, n), 1.0 if speed < 1.02 else speed
+
+
+def _outlines(
+    block: Block, history: ResponseHistory, time_s: FloatArray, exaggerate: float
+) -> FloatArray:
+    """Return the corners in the base frame for each frame, shape (frames, corners, 2)."""
+    start = np.array(block.centroid)
+    if history.turned_rad is None or history.centroid_m is None:
+        # toppling: the block turns about its toe
+        turned = -history.theta_rad
+        toe = np.array([block.base_m, 0.0])
+        centroid = toe + _rotated((start - toe)[None, :], turned)[:, 0]
+    else:
+        turned, centroid = history.turned_rad, history.centroid_m
+    angle = exaggerate * np.interp(time_s, history.time_s, turned)
+    places = np.stack(
+        [
+            start[axis]
+            + exaggerate * (np.interp(time_s, history.time_s, centroid[:, axis]) - start[axis])
+            for axis in (0, 1)
+        ],
+        axis=1,
+    )
+    arms = np.array(block.vertices_m) - start
+    corners: FloatArray = places[:, None, :] + _rotated(arms, angle)
+    return corners
+
+
+def _rotated(arms: FloatArray, angle: FloatArray) -> FloatArray:
+    """Return arms turned by each of several angles, shape (angles, arms, 2)."""
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    x, y = arms[:, 0], arms[:, 1]
+    return np.stack([x * c - y * s, x * s + y * c], axis=2)
+
+
+def _to_slope(points: FloatArray, beta_deg: float) -> FloatArray:
+    """Turn the base frame by the dip: x horizontal out of the slope, y up."""
+    c, s = math.cos(math.radians(beta_deg)), math.sin(math.radians(beta_deg))
+    x, y = points[..., 0], points[..., 1]
+    return np.stack([x * c + y * s, y * c - x * s], axis=-1)
+
+
+def _closed(outline: FloatArray) -> FloatArray:
+    return np.concatenate([outline, outline[:1]])
+
+
+def _draw_scene(
+    axes: Axes, block: Block, shown: FloatArray, beta_deg: float, back_fracture: bool
+) -> None:
+    """Draw the planes and the block at rest, and frame all places of the block."""
+    low, high = shown.min(axis=(0, 1)), shown.max(axis=(0, 1))
+    size = float((high - low).max())
+    gamma = math.radians(block.gamma_deg)
+    up = np.array([-math.cos(gamma), math.sin(gamma)])
+    root = np.array([0.0, 0.0])
+    base = _to_slope(np.array([root, [3.0 * size, 0.0]]), beta_deg)
+    axes.plot(*base.T, color=ROCK, lw=2.0, zorder=2)
+    behind = (
+        np.array([root, 3.0 * size * up]) if back_fracture else np.array([[-3.0 * size, 0.0], root])
+    )
+    axes.plot(*_to_slope(behind, beta_deg).T, color=ROCK, lw=2.0, zorder=2)
+    axes.plot(*_closed(shown[0]).T, color=ROCK, lw=1.0, ls="--", zorder=1)
+    margin = 0.12 * size
+    axes.set_xlim(low[0] - 2.0 * margin, high[0] + margin)
+    axes.set_ylim(low[1] - margin, high[1] + margin)
+    axes.set_aspect("equal")
+    axes.set_xlabel("out of the slope [m]")
+    axes.set_ylabel("up [m]")
+
+
+def _draw_trace(axes: Axes, history: ResponseHistory, time_s: FloatArray) -> Any:
+    """Draw the ground below the scene; return the line that marks the present."""
+    drive = history.k_h / (1.0 + history.k_v)
+    axes.plot(history.time_s, drive, color=GROUND, lw=0.7, label="ground: $k_h/(1+k_v)$")
+    if history.strength_g is not None:
+        axes.plot(history.time_s, history.strength_g, color=STRENGTH, lw=1.1, label="strength")
+    axes.legend(loc="upper right", fontsize=7, ncols=2)
+    axes.set_xlim(time_s[0], time_s[-1])
+    top = 1.1 * float(np.abs(drive).max())
+    axes.set_ylim(-top, 1.35 * top)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("[g]")
+    axes.grid(visible=True, lw=0.3, alpha=0.6)
+    return axes.axvline(time_s[0], color="black", lw=1.0)
