@@ -10,9 +10,8 @@ import os
 import sqlite3
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -41,6 +40,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser(__doc__)
     options.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
     options.add_argument("--motions", type=int, help="take only so many horizontal motions")
+    options.add_argument(
+        "--sizes",
+        type=int,
+        default=-(-COMBINATIONS // (2 * RECORDS[-1])),
+        help="number of p² in the dissertation-sized campaign",
+    )
     chosen = options.parse_args(arguments)
     root = chosen.records or os.environ.get(RECORDS_VARIABLE)
     if root is None:
@@ -48,10 +53,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         base = Path(folder) / "base.db"
         motions = prepare(Path(root), base, chosen.motions)
+        measures = {
+            "default": lambda: default(base, motions),
+            "memory": lambda: memory(base, motions),
+            "insert": lambda: insert(base, motions),
+            "dissertation": lambda: dissertation(base, motions, chosen.sizes),
+        }
         for part in PARTS:
             if part in chosen.parts:
-                rows = MEASURES[part](base, motions)
-                report(f"campaign-{part}", markdown(rows), write=chosen.write)
+                report(f"campaign-{part}", markdown(measures[part]()), write=chosen.write)
 
 
 def prepare(root: Path, base: Path, at_most: int | None) -> int:
@@ -147,9 +157,8 @@ def insert(base: Path, motions: int) -> tuple[list[str], list[list[str]]]:
     return headers, cells
 
 
-def dissertation(base: Path, motions: int) -> tuple[list[str], list[list[str]]]:
+def dissertation(base: Path, motions: int, sizes: int) -> tuple[list[str], list[list[str]]]:
     """As many combinations as the dissertation's, certified; and 23 plain runs of each."""
-    sizes = -(-COMBINATIONS // (2 * motions))
     p2 = np.geomspace(30.0, 0.1, sizes).tolist()
     place = copy(base)
     cells = []
@@ -193,14 +202,6 @@ def stored_rows(place: Path) -> int:
     found = sum(counts)
     raw.close()
     return found
-
-
-MEASURES: dict[str, Callable[[Path, int], Any]] = {
-    "default": default,
-    "memory": memory,
-    "insert": insert,
-    "dissertation": dissertation,
-}
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from sqlalchemy import Connection
@@ -63,11 +63,13 @@ class CampaignPlan:
 
     Args:
         motions: the longest records first, so that no worker is left with one at the end.
+        settings: what else decides an answer, as it went into the natural keys.
         without_vertical: horizontal motions that vertical shaking was asked for and have none.
         warnings: sentences about these.
     """
 
     motions: tuple[MotionPlan, ...]
+    settings: Mapping[str, object]
     without_vertical: int
     warnings: tuple[str, ...]
 
@@ -83,6 +85,7 @@ def plan_campaign(
     suite: str | None,
     p2: Sequence[float],
     vertical: Vertical = "without",
+    map_depth: float = MAP_DEPTH,
 ) -> CampaignPlan:
     """Return every search: horizontal motions x vertical or not x polarity x p².
 
@@ -91,6 +94,7 @@ def plan_campaign(
         suite: only the horizontal motions of this suite; their verticals need not be in it.
         p2: frequency parameters [1/s²].
         vertical: ``without`` vertical motion, ``with`` that of the same recording, or ``both``.
+        map_depth: width of k_r/PGA that the maps may leave undecided at a border.
 
     Raises:
         InputError: no such suite, no horizontal motion, none with a vertical one where it is
@@ -113,12 +117,13 @@ def plan_campaign(
             f"none of the {len(rows)} horizontal motions has a vertical one that fits: "
             f"{_first(lacking)}; add the vertical components, or leave --vertical out"
         )
+    settings = {**SETTINGS, "map_depth": positive(map_depth, "map_depth", "a width of k_r/PGA")}
     plans = [
         MotionPlan(
             motion=row,
             vertical=fitting.get(row.id),
             cases=tuple(
-                _case(row, up, polarity, value)
+                _case(row, up, polarity, value, settings)
                 for up in _excitations(vertical, fitting.get(row.id))
                 for value in sizes
                 for polarity in POLARITIES
@@ -139,6 +144,7 @@ def plan_campaign(
                 (plan for plan in plans if plan.cases), key=lambda p: (-p.motion.npts, p.motion.id)
             )
         ),
+        settings=settings,
         without_vertical=len(lacking),
         warnings=tuple(warnings),
     )
@@ -163,7 +169,13 @@ def _excitations(
         yield companion
 
 
-def _case(row: MotionRow, up: VerticalPair | None, polarity: Polarity, p2: float) -> Case:
+def _case(
+    row: MotionRow,
+    up: VerticalPair | None,
+    polarity: Polarity,
+    p2: float,
+    settings: Mapping[str, object],
+) -> Case:
     key = combination_key(
         motion_sha256=row.sha256,
         dt_s=row.dt_s,
@@ -171,7 +183,7 @@ def _case(row: MotionRow, up: VerticalPair | None, polarity: Polarity, p2: float
         polarity=polarity,
         kind="toppling",
         p2=p2,
-        settings=SETTINGS,
+        settings=settings,
         numerics_version=NUMERICS_VERSION,
     )
     return Case(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from typing import Literal
@@ -15,7 +15,7 @@ from rbfrag.campaign.dask_executor import connected, run_on_cluster
 from rbfrag.campaign.grid import checked_ratios, grid_of
 from rbfrag.campaign.local_executor import run_locally
 from rbfrag.campaign.made_on import made_on
-from rbfrag.campaign.plan import DEFAULT_P2, SETTINGS, CampaignPlan, plan_campaign
+from rbfrag.campaign.plan import DEFAULT_P2, CampaignPlan, plan_campaign
 from rbfrag.campaign.todo import MotionTasks, Todo, Wanted, still_to_do
 from rbfrag.campaign.worker import MotionResults, MotionWork
 from rbfrag.db.campaign_store import (
@@ -32,6 +32,7 @@ from rbfrag.db.queries import Vertical
 from rbfrag.db.response_store import insert_responses
 from rbfrag.db.spectrum_store import store_spectrum
 from rbfrag.errors import InputError, WorkFailedError
+from rbfrag.solver.certified import MAP_DEPTH
 from rbfrag.solver.results import NUMERICS_VERSION
 
 Executor = Callable[[Iterator[MotionWork], int], Iterator[MotionResults]]
@@ -113,6 +114,7 @@ def simulate(
     store_responses: Sequence[float | Literal["critical"]] = (),
     jobs: int | None = None,
     scheduler: str | None = None,
+    map_depth: float = MAP_DEPTH,
     on_progress: Callable[[CampaignProgress], None] | None = None,
 ) -> CampaignSummary:
     """Find the critical block of every motion x vertical x polarity x p² and store it.
@@ -135,6 +137,8 @@ def simulate(
             for the critical block of each combination.
         jobs: worker processes; None for one per processor, 1 for none (in this process).
         scheduler: address of a Dask scheduler whose workers take the place of local ones.
+        map_depth: width of k_r/PGA that the maps may leave undecided at a border; the critical
+            value does not depend on it. Another depth makes other combinations.
         on_progress: called after each motion.
 
     Raises:
@@ -150,7 +154,9 @@ def simulate(
     started = time.perf_counter()
     with opened_database(db) as engine:
         with engine.connect() as connection:
-            plan = plan_campaign(connection, suite=suite, p2=p2, vertical=vertical)
+            plan = plan_campaign(
+                connection, suite=suite, p2=p2, vertical=vertical, map_depth=map_depth
+            )
             todo = still_to_do(connection, plan, wanted)
         with _executor(jobs, scheduler if todo.motions else None) as execute:
             settings = {
@@ -160,13 +166,13 @@ def simulate(
                 "grid": list(wanted.grid),
                 "store_responses": list(map(str, store_responses)),
                 "made_on": made_on() if scheduler is None else CLUSTER,
-                **SETTINGS,
+                **plan.settings,
             }
             with engine.begin() as connection:
                 campaign_id = start_campaign(connection, settings)
             run = _Run(engine, campaign_id, plan, todo, started, on_progress)
             run.tell()
-            for done in execute(_work(engine, todo), len(todo.motions)):
+            for done in execute(_work(engine, todo, map_depth), len(todo.motions)):
                 run.take(done)
             with engine.begin() as connection:
                 finish_campaign(connection, campaign_id)
@@ -202,7 +208,7 @@ class _Run:
                 f"a worker computes with numerics version {done.numerics_version}, this rbfrag "
                 f"with {NUMERICS_VERSION}: install the same version on all machines"
             )
-        _store(self._engine, self._campaign_id, done)
+        _store(self._engine, self._campaign_id, self._plan.settings, done)
         for result in done.results:
             self._done += 1
             self._runs += result.runs
@@ -267,12 +273,12 @@ def _executor(jobs: int | None, scheduler: str | None) -> Iterator[Executor]:
         yield lambda work, _: run_on_cluster(client, work)
 
 
-def _work(engine: Engine, todo: Todo) -> Iterator[MotionWork]:
+def _work(engine: Engine, todo: Todo, map_depth: float) -> Iterator[MotionWork]:
     for each in todo.motions:
-        yield _with_samples(engine, each)
+        yield _with_samples(engine, each, map_depth)
 
 
-def _with_samples(engine: Engine, each: MotionTasks) -> MotionWork:
+def _with_samples(engine: Engine, each: MotionTasks, map_depth: float) -> MotionWork:
     up = next((t.case.vertical_id for t in each.tasks if t.case.vertical_id is not None), None)
     with engine.connect() as connection:
         return MotionWork(
@@ -281,17 +287,20 @@ def _with_samples(engine: Engine, each: MotionTasks) -> MotionWork:
             vertical=None if up is None else load_motion(connection, up),
             tasks=each.tasks,
             spectrum=each.spectrum,
+            map_depth=map_depth,
         )
 
 
-def _store(engine: Engine, campaign_id: int, done: MotionResults) -> None:
+def _store(
+    engine: Engine, campaign_id: int, settings: Mapping[str, object], done: MotionResults
+) -> None:
     records = [
         CombinationRecord(
             natural_key=each.case.natural_key,
             motion_id=done.motion_id,
             vertical_motion_id=each.case.vertical_id,
             result=each.search,
-            settings=SETTINGS,
+            settings=settings,
             numerics_version=done.numerics_version,
         )
         for each in done.results

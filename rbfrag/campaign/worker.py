@@ -69,6 +69,7 @@ class MotionWork:
         vertical: the vertical one of its recording, if a task needs it.
         tasks: what to do.
         spectrum: p² [1/s²] at which to compute its toppling spectrum, by polarity.
+        map_depth: width of k_r/PGA that the maps may leave undecided at a border.
     """
 
     motion_id: int
@@ -76,6 +77,7 @@ class MotionWork:
     vertical: GroundMotion | None
     tasks: tuple[Task, ...]
     spectrum: Mapping[Polarity, Sequence[float]]
+    map_depth: float = MAP_DEPTH
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +109,7 @@ def _run_task(work: MotionWork, task: Task) -> TaskResult:
             polarity=case.polarity,
             vertical=vertical,
             full_map=True,
-            map_depth=MAP_DEPTH,
+            map_depth=work.map_depth,
         )
         critical_kr_over_pga = search.kr_over_pga
     grid = None

@@ -29,7 +29,7 @@ class OutcomeMaps:
         combination_id: row ids, shape (n,), in the order that was asked for.
         start: where the intervals of each begin, shape (n + 1,): those of number i are
             ``start[i]:start[i + 1]``, by rising k_r/PGA.
-        k_lo: lower ends, k_r/PGA.
+        k_lo: lower ends, k_r/PGA. Where intervals leave a gap, nothing is known in it.
         k_hi: upper ends, k_r/PGA.
         outcome: 1 every block of the interval topples, 0 none does, NaN undecided.
         known_from: least k_r/PGA for which anything is known, shape (n,): the search limit, or
@@ -82,6 +82,8 @@ class OutcomeMaps:
             return
         at = np.searchsorted(low, k, side="right") - 1
         found = outcome[np.maximum(at, 0)]
+        # Between two intervals, where a map holds the decided ones alone, nothing is known.
+        found[k > high[np.maximum(at, 0)]] = np.nan
         # A shared end belongs to the decided one of its two neighbours.
         before = np.maximum(at - 1, 0)
         shared = np.isnan(found) & (at > 0) & (k == high[before])

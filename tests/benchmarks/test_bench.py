@@ -12,7 +12,15 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from benchmarks import critical_search, main_job, page, scaling, start_up, work_precision
+from benchmarks import (
+    campaign_scale,
+    critical_search,
+    main_job,
+    page,
+    scaling,
+    start_up,
+    work_precision,
+)
 from rbfrag.campaign.bench import cvode_peer, run
 from rbfrag.campaign.bench.cases import (
     RECORDS_VARIABLE,
@@ -186,6 +194,11 @@ def test_command_prints_tables_writes_files_and_json(
         ),
         (start_up.main, ["--repeat", "1", "--no-cold"], ["start-up"]),
         (main_job.main, ["--jobs", "1", "--term", "pgv"], ["main-job"]),
+        (
+            campaign_scale.main,
+            ["--motions", "2", "--sizes", "3"],
+            ["campaign-default", "campaign-memory", "campaign-insert", "campaign-dissertation"],
+        ),
     ],
     ids=lambda value: value.__module__ if callable(value) else "",
 )
@@ -213,6 +226,7 @@ def test_every_place_in_the_page_holds_a_table() -> None:
     text = published()
     for name in (
         "work-precision", "critical-search", "record-length", "workers", "main-job", "start-up",
+        "campaign-default", "campaign-memory", "campaign-insert", "campaign-dissertation",
     ):  # fmt: skip
         between = text.split(f"<!-- {name} -->")[1].split("<!-- end -->")[0]
         assert between.count("\n|") >= 4, name

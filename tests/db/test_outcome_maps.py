@@ -101,3 +101,23 @@ def test_the_search_limit_is_known_whatever_its_rounding(
     ids = _filled(engine, make_motion, make_result)
     just_below = np.nextafter(0.01, 0.0)
     np.testing.assert_array_equal(_maps(engine, [ids["mapped"]]).outcomes([just_below]), [[0]])
+
+
+def test_what_lies_between_decided_intervals_is_not_known(
+    engine: Engine, make_motion: Any, make_result: Any
+) -> None:
+    decided = [i for i, word in enumerate(MAP.outcome) if word != "undecided"]
+    alone = OutcomeIntervals(
+        MAP.k_lo[decided], MAP.k_hi[decided], tuple(MAP.outcome[i] for i in decided)
+    )
+    motion = make_motion()
+    with engine.begin() as connection:
+        motion_id, _ = add_motion(connection, motion, earthquake=QUAKE, is_vertical=False)
+        record = CombinationRecord(
+            "0" * 64, motion_id, None, make_result(motion.pga_g, intervals=alone), {}
+        )
+        insert_combinations(connection, start_campaign(connection, {}), [record])
+        (row_id,) = connection.scalars(select(schema.combination.c.id))
+    k = [0.005, 0.01, 0.2, 0.2000005, 0.200001, 0.4, 0.4000005, 0.400001, 1.0, 7.0]
+    told = _maps(engine, [row_id]).outcomes(k)
+    np.testing.assert_array_equal(told, [[NAN, 0, 0, NAN, 1, 1, NAN, 0, 0, 0]])

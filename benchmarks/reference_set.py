@@ -1,0 +1,242 @@
+"""The reference data set that is shipped:  python -m benchmarks.reference_set --records FOLDER
+
+Runs the default campaign with and without vertical motion over the collection of real records
+that the tests use, keeps what fits and predictions need, and writes rbfrag/reference/reference.db
+and the page of its provenance. No sample of any record is kept. An interrupted run is resumed: the
+full database stays in --work.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import hashlib
+import os
+import sqlite3
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+
+from sqlalchemy import Connection, bindparam, delete, select, update
+
+from benchmarks.page import ROOT
+from rbfrag.campaign.add_motions import AddReport, add_motions
+from rbfrag.campaign.bench.cases import RECORDS_VARIABLE
+from rbfrag.campaign.bench.tables import markdown
+from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
+from rbfrag.db import schema
+from rbfrag.db.check import check_database
+from rbfrag.db.content import content_digest
+from rbfrag.db.engine import opened_database
+from rbfrag.db.location import REFERENCE
+from rbfrag.db.natural_key import canonical_json, combination_key
+from rbfrag.db.stored_combination import stored_combination
+from rbfrag.solver.results import NUMERICS_VERSION
+from rbfrag.version import __version__
+
+MAP_DEPTH = 1e-3
+"""Width of kr/PGA that the shipped maps leave undecided at a border: finer ones are too large."""
+
+MOST_BYTES = 4_000_000
+
+PAGE = ROOT / "docs" / "reference" / "reference-data.md"
+
+SUITE = "reference"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--records", help="folder of records with MANIFEST.csv")
+    options.add_argument("--work", type=Path, required=True, help="folder for the full database")
+    options.add_argument("--jobs", type=int, help="worker processes")
+    options.add_argument("--out", type=Path, default=REFERENCE, help="the file that is shipped")
+    options.add_argument("--page", type=Path, default=PAGE, help="the page of its provenance")
+    chosen = options.parse_args(arguments)
+    root = chosen.records or os.environ.get(RECORDS_VARIABLE)
+    if root is None:
+        raise SystemExit("no records: name a folder with --records")
+    manifest = Path(root) / "MANIFEST.csv"
+    full = chosen.work / "reference-full.db"
+    added = add_motions([root], db=full, suite=SUITE, metadata=manifest)
+    summary = simulate(
+        full, suite=SUITE, vertical="both", map_depth=MAP_DEPTH, jobs=chosen.jobs,
+        on_progress=show,
+    )  # fmt: skip
+    made = chosen.work / "reference.db"
+    reduce(full, made)
+    examine(made)
+    chosen.out.parent.mkdir(parents=True, exist_ok=True)
+    # in place at once or not at all
+    beside = chosen.out.with_name(f"{chosen.out.name}.new")
+    beside.write_bytes(made.read_bytes())
+    beside.replace(chosen.out)
+    chosen.page.write_text(provenance(made, manifest, added, summary), encoding="utf-8")
+    print(f"{chosen.out}: {made.stat().st_size:,} bytes\n{chosen.page}")
+
+
+def show(progress: CampaignProgress) -> None:
+    print(f"{progress.done}/{progress.total} combinations", file=sys.stderr, flush=True)
+
+
+def reduce(full: Path, made: Path) -> None:
+    """Copy the full database without samples, and with no more of each combination than it needs.
+
+    Of the maps the decided intervals are kept; what lies between them is undecided. Of the
+    simulations the critical block stays.
+    """
+    made.unlink(missing_ok=True)
+    raw = sqlite3.connect(full)
+    raw.execute("VACUUM INTO ?", (str(made),))
+    raw.close()
+    with opened_database(made) as engine, engine.begin() as connection:
+        connection.execute(update(schema.motion).values(samples=None))
+        connection.execute(delete(schema.response))
+        interval, point = schema.outcome_interval, schema.simulation
+        connection.execute(delete(interval).where(interval.c.outcome == "undecided"))
+        critical = (
+            select(schema.combination.c.kr_over_pga)
+            .where(schema.combination.c.id == point.c.combination_id)
+            .scalar_subquery()
+        )
+        connection.execute(
+            delete(point).where((point.c.kr_over_pga != critical) | critical.is_(None))
+        )
+        rename(connection)
+    raw = sqlite3.connect(made, isolation_level=None)
+    raw.execute("PRAGMA journal_mode = DELETE")
+    raw.execute("VACUUM")
+    raw.close()
+
+
+def rename(connection: Connection) -> None:
+    """Give the reduced combinations the natural keys of what they are now."""
+    motions = {
+        row.id: row
+        for row in connection.execute(
+            select(schema.motion.c.id, schema.motion.c.samples_sha256, schema.motion.c.dt_s)
+        )
+    }
+    rows = []
+    for key in connection.scalars(select(schema.combination.c.natural_key)).all():
+        stored = stored_combination(connection, key)
+        settings = {**stored.settings, "map": "decided"}
+        up = stored.vertical_motion_id
+        rows.append(
+            {
+                "row": stored.id,
+                "text": canonical_json(settings),
+                "key": combination_key(
+                    motion_sha256=motions[stored.motion_id].samples_sha256,
+                    dt_s=motions[stored.motion_id].dt_s,
+                    vertical_sha256=None if up is None else motions[up].samples_sha256,
+                    polarity=stored.values["polarity"],
+                    kind=stored.values["kind"],
+                    p2=stored.values["p2"],
+                    settings=settings,
+                    numerics_version=stored.values["numerics_version"],
+                    linear=stored.values["linear"],
+                ),
+            }
+        )
+    statement = (
+        update(schema.combination)
+        .where(schema.combination.c.id == bindparam("row"))
+        .values(settings=bindparam("text"), natural_key=bindparam("key"))
+    )
+    connection.execute(statement, rows)
+
+
+def examine(made: Path) -> None:
+    """Refuse to ship a file that is damaged, too large, or holds samples."""
+    with opened_database(made, read_only=True) as engine, engine.connect() as connection:
+        findings = list(check_database(connection))
+        if findings:
+            raise SystemExit(f"the reduced database is damaged: {findings[0]}")
+        column = schema.motion.c.samples
+        if connection.execute(select(column).where(column.is_not(None))).first() is not None:
+            raise SystemExit("the reduced database holds samples")
+    if made.stat().st_size > MOST_BYTES:
+        raise SystemExit(f"{made} has {made.stat().st_size:,} bytes, more than {MOST_BYTES:,}")
+
+
+def provenance(made: Path, manifest: Path, added: AddReport, summary: CampaignSummary) -> str:
+    """Return the page that says where the shipped data come from."""
+    with manifest.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    sets: dict[str, list[dict[str, str]]] = defaultdict(list)
+    for row in rows:
+        sets[row["set"]].append(row)
+    cells = [
+        [
+            name,
+            some[0]["format"],
+            str(sum(not int(row["is_vertical"]) for row in some)),
+            str(sum(int(row["is_vertical"]) for row in some)),
+            str(len({row["event_id"] for row in some})),
+            ", ".join(sorted({row["source_repo"] for row in some})),
+        ]
+        for name, some in sorted(sets.items())
+    ]
+    headers = ["set", "format", "horizontal", "vertical", "earthquakes", "source repository"]
+    with opened_database(made, read_only=True) as engine, engine.connect() as connection:
+        digest = content_digest(connection)
+        status = Counter(connection.scalars(select(schema.combination.c.status)))
+        intervals = len(connection.execute(select(schema.outcome_interval.c.k_lo)).all())
+        vertical = schema.combination.c.vertical_motion_id.is_not(None)
+        shaken = len(connection.execute(select(schema.combination.c.id).where(vertical)).all())
+    counts = ", ".join(f"{number:,} {name}" for name, number in sorted(status.items()))
+    return f"""# The reference data set
+
+`rbfrag/reference/reference.db` is shipped with rbfrag: a read-only SQLite database with the
+results of the default campaign over a collection of recorded earthquakes. Where there is no
+database of your own, `rbfrag predict` answers from it. It holds **no samples of any record**, only
+what was computed from them: intensity measures, toppling spectra, critical values with their
+brackets, and maps of outcomes.
+
+```sh
+python -m benchmarks.reference_set --records FOLDER --work FOLDER
+```
+
+builds the file and this page from the records.
+
+## What it holds
+
+- {summary.combinations:,} combinations ({counts}), {shaken:,} of them with vertical motion:
+  every horizontal motion, with and without the vertical motion of its recording, in both
+  polarities, for $p^2$ = 30, 10, 3, 1, 0.3 and 0.1 1/s². {summary.certified:,} are certified.
+- {intervals:,} intervals of their maps: toppling and safe ones. What lies between two of them is
+  undecided, and so is what lies below the lowest; borders were closed in on to {MAP_DEPTH:g} of
+  $k_r/\\mathrm{{PGA}}$, the critical value itself as everywhere. The setting `map` is `decided`,
+  and the natural keys say so too.
+- Of the simulations the critical block of each combination; the search itself was made with all.
+- {len(added.added) + len(added.known)} motions with their intensity measures, the hash of their
+  samples, their earthquake, and what was done to them: uncorrected records were filtered as
+  `rbfrag motions add` does it.
+
+## Where the records come from
+
+{markdown((headers, cells))}
+
+The earthquakes are those of the metadata of the collection, one name for each. The records
+themselves belong to the networks that made them and are not passed on here.
+
+## Identity
+
+| | |
+| --- | --- |
+| rbfrag | {__version__} |
+| numerics version | {NUMERICS_VERSION} |
+| combinations | {summary.combinations:,} |
+| content digest | `{digest}` |
+| sha256 of the file | `{hashlib.sha256(made.read_bytes()).hexdigest()}` |
+| size | {made.stat().st_size:,} bytes |
+
+The content digest is that of [equal databases](../howto/keep-a-database.md): it is the same for a
+file that was built elsewhere from the same records with the same numerics, as far as processors
+agree in the last bit.
+"""
+
+
+if __name__ == "__main__":
+    main()
