@@ -61,7 +61,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         }
         for part in PARTS:
             if part in chosen.parts:
-                report(f"campaign-{part}", markdown(measures[part]()), write=chosen.write)
+                table = markdown(measures[part]())
+                text = f"{table}\n\n{motions} horizontal motions."
+                report(f"campaign-{part}", text, write=chosen.write)
 
 
 def prepare(root: Path, base: Path, at_most: int | None) -> int:
@@ -76,10 +78,17 @@ def prepare(root: Path, base: Path, at_most: int | None) -> int:
         rows.sort(key=lambda row: (-row.npts, row.sha256))
         rows[1:] = sorted(rows[1:], key=lambda row: row.sha256)
         rows = rows[:at_most]
-        for size in {*RECORDS, len(rows)}:
+        for size in sizes_up_to(len(rows)):
             for row in rows[:size]:
                 add_to_suite(connection, f"first {size}", row.id)
     return len(rows)
+
+
+def sizes_up_to(motions: int) -> list[int]:
+    """Return the numbers of records to compare; of a smaller collection the same shares."""
+    if motions >= RECORDS[-1]:
+        return [*RECORDS[:-1], motions]
+    return sorted({-(-size * motions // RECORDS[-1]) for size in RECORDS})
 
 
 def default(base: Path, motions: int) -> tuple[list[str], list[list[str]]]:
@@ -117,7 +126,7 @@ def default(base: Path, motions: int) -> tuple[list[str], list[list[str]]]:
 def memory(base: Path, motions: int) -> tuple[list[str], list[list[str]]]:
     """Peak memory against the number of records, one p² each."""
     cells = []
-    for size in (*(size for size in RECORDS if size < motions), motions):
+    for size in sizes_up_to(motions):
         place = copy(base)
         done = run_campaign(place, jobs=2, suite=f"first {size}", p2=[3.0])
         cells.append(
