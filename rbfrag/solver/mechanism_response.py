@@ -86,12 +86,19 @@ def _history(mechanism: Mechanism, drive: Excitation, travel: Travel) -> Respons
     at_s = np.concatenate([time_s, rest])[order]
     speed = np.concatenate([rate, np.zeros(rest.size)])[order]
     nothing = np.zeros_like(speed)
+    k_h = np.interp(at_s, drive.time_s, drive.k_h, right=0.0)
+    k_v = np.interp(at_s, drive.time_s, drive.w - 1.0, right=0.0)
+    # of a jump, the first entry at its time shows what was before
+    for jump in np.flatnonzero(drive.interval_s == 0.0):
+        first = int(np.searchsorted(at_s, drive.time_s[jump]))
+        if first + 1 < at_s.size and at_s[first] == at_s[first + 1] == drive.time_s[jump]:
+            k_h[first], k_v[first] = drive.k_h[jump], drive.w[jump] - 1.0
     return ResponseHistory(
         time_s=at_s,
         theta_rad=merged(np.abs(turned), 0.0),
         theta_dot_rad_s=speed if mechanism.rotates else nothing,
-        k_h=np.interp(at_s, drive.time_s, drive.k_h, right=0.0),
-        k_v=np.interp(at_s, drive.time_s, drive.w - 1.0, right=0.0),
+        k_h=k_h,
+        k_v=k_v,
         displacement_m=merged(displacement, 0.0),
         velocity_m_s=None if mechanism.rotates else speed,
         centroid_m=merged(centroid, start.centroid_m),

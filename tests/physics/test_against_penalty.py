@@ -145,6 +145,33 @@ def test_confined(name: str) -> None:
     assert landed == pytest.approx(back_s, abs=2e-3)
 
 
+def test_motion_that_goes_on_after_the_record() -> None:
+    # the same pulse, whether or not rest follows it in the record
+    block = CONFINED["vertical"].block
+    nodes = ([0.0, 0.0, 0.2, 0.2], [0.0, 0.9, 0.9, 0.0])
+    short, long = (
+        respond(
+            GroundMotion.from_nodes([*nodes[0], *more], [*nodes[1], *(0.0 for _ in more)]),
+            block=block,
+            beta_deg=5.0,
+            phi_deg=30.0,
+            history=True,
+        )
+        for more in ((), (0.3, 0.5, 3.0))
+    )
+    assert len(short.mode_changes) == len(long.mode_changes) == 1
+    assert short.mode_changes[0].time_s == pytest.approx(long.mode_changes[0].time_s, rel=1e-11)
+    assert short.mode_changes[0].time_s > 0.2
+    assert short.stopped_s == pytest.approx(long.stopped_s, rel=1e-11)
+    assert short.peak_theta_rad == pytest.approx(long.peak_theta_rad, rel=1e-11)
+    assert short.history is not None
+    at = short.history.time_s
+    assert np.all(np.diff(at) >= 0.0)
+    # of the jump, both sides
+    before, after = short.history.k_h[at == 0.2]
+    assert (before, after) == (0.9, 0.0)
+
+
 def test_confined_to_free_toppling() -> None:
     case = Case(-30, 20, 1, 0, 35, 35, ((0.1, 0.5, 1.0),), until=1.0)
     answer, free = both(case, half_sines(case.lobes), DT_S)

@@ -131,7 +131,8 @@ def follow(
     """
     _refuse_endless(mechanism, drive, turn_max)
     state = PhaseRun(
-        code=-1, condition=0, node=0, tau=0.0, time_s=float(drive.time_s[0]), x=0.0, rate=0.0,
+        code=-1, condition=0, node=0, tau=0.0, free_s=0.0, time_s=float(drive.time_s[0]),
+        x=0.0, rate=0.0,
         peak=0.0, started_s=math.nan, stopped_s=math.nan, certain_s=math.nan, error_x=0.0,
         error_rate=0.0, peak_error=0.0, steps=0, samples_moved=0, seatings=0, history_length=0,
     )  # fmt: skip
@@ -223,6 +224,7 @@ def _run(
             phase.seats,
             state.node,
             state.tau,
+            state.free_s,
             state.x,
             state.rate,
             state.error_x,

@@ -60,6 +60,7 @@ class PhaseRun(NamedTuple):
     condition: int
     node: int
     tau: float
+    free_s: float
     time_s: float
     x: float
     rate: float
@@ -93,6 +94,7 @@ def run_phase(
     seats: bool,
     node: int,
     tau: float,
+    free_s: float,
     x: float,
     rate: float,
     error_x: float,
@@ -102,7 +104,7 @@ def run_phase(
     history: FloatArray,
 ) -> tuple[
     int, int, int, float, float, float, float, float, float, float, float, float, float, float,
-    int, int, int, int,
+    float, int, int, int, int,
 ]:  # fmt: skip
     """Run one phase; the fields of :class:`PhaseRun` in order.
 
@@ -122,6 +124,7 @@ def run_phase(
         seats: whether the block comes to rest at `lowest` instead of leaving the phase.
         node: interval that the phase is entered in.
         tau: position inside that interval, 0 to 1.
+        free_s: time after the record at the entry [s].
         x: position at the entry.
         rate: rate at the entry [1/s].
         error_x: error of the position at the entry.
@@ -151,7 +154,6 @@ def run_phase(
     seatings = 0
     counted = -1
     free_steps = 0
-    free_s = 0.0  # time after the record at the start of the present free interval
     code = -1
     condition = 0
 
@@ -288,6 +290,12 @@ def run_phase(
         if left <= 0.0:
             if sticks and rate == 0.0:
                 moving = False
+            elif filled < room:
+                history[0, filled] = base_s
+                history[1, filled] = x
+                history[2, filled] = rate
+                history[3, filled] = node
+                filled += 1
             node += 1
             tau = 0.0
             inspect = True
@@ -513,11 +521,15 @@ def run_phase(
             certain_s = math.nan
 
     moment_s = base_s + tau * h
+    if node >= last and code != JUMPED:
+        # a free interval has no length of its own that another phase could go on in
+        free_s += tau * h
+        tau = 0.0
     if code == JUMPED:
         moment_s = time_s[0]
         if last >= 0:
             moment_s = time_s[last] + interval_s[last] * w[last] / (w[last] - w[last + 1])
     return (
-        code, condition, node, tau, moment_s, x, rate, peak, started_s, stopped_s, certain_s,
-        error_x, error_rate, peak_error, steps, moved, seatings, filled,
+        code, condition, node, tau, free_s, moment_s, x, rate, peak, started_s, stopped_s,
+        certain_s, error_x, error_rate, peak_error, steps, moved, seatings, filled,
     )  # fmt: skip
