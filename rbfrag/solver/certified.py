@@ -8,16 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.solver.all_topple import all_topple_below
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.march import ORDERLESS, SAFE, TO_BOTTOM, TO_BRACKET, TOPPLES, march
+from rbfrag.solver.ground import Ground, ground_of
+from rbfrag.solver.march import ORDERLESS, SAFE, TO_BOTTOM, TO_BRACKET, TO_ISLAND, TOPPLES, march
 from rbfrag.solver.results import RESOLUTION
-from rbfrag.solver.taylor import PH_MAX
-from rbfrag.solver.upper_bound import AT_THE_TOP, NOTHING_FAILS, linear_drive, upper_bound
+from rbfrag.solver.upper_bound import AT_THE_TOP, NOTHING_FAILS, upper_bound
 
 FloatArray = NDArray[np.float64]
 
 MARGIN = 1e-10
 """Relative margin on k_r of the enclosing motions: above the error of their steps."""
+
+MAP_MARGIN = 1e-6
+"""The same in a map of a depth from 100 times as much on, where spans are longer: above the error
+of those."""
+
+MAP_SPAN_PH = 0.04
+"""Greatest p·T of a span there."""
 
 DEPTH = 1e-9
 """Relative width of an interval that is left undecided."""
@@ -93,6 +101,20 @@ def keeps_order(drive: Excitation, linear: bool) -> bool:
     return bool((highest * -drive.q).max() <= 1.0)
 
 
+def surely_topples_below(ground: Ground, drive: Excitation, bottom: float, top: float) -> float:
+    """Return a k_r below which every block topples, `bottom` where none is known.
+
+    Args:
+        ground: the ground under the blocks.
+        drive: the excitation.
+        bottom: least k_r of interest.
+        top: greatest k_r of interest.
+    """
+    if ground.linear or not keeps_order(drive, False):
+        return bottom
+    return float(all_topple_below(ground, bottom, top, MARGIN)[0])
+
+
 def certified_map(
     drive: Excitation,
     *,
@@ -113,41 +135,46 @@ def certified_map(
         map_depth: width of k_r/PGA that may be left undecided below the first toppling interval
             as wide as RESOLUTION.
     """
-    p = math.sqrt(p2)
     n = drive.q.size
     check = not keeps_order(drive, linear)
-    still = np.empty(n)
-    u, us, uc = np.empty(9), np.empty(9), np.empty(9)
-    record = (
-        drive.interval_s,
-        drive.k_h,
-        drive.w,
-        drive.q,
-        drive.tail_min_q,
-        drive.block_max_q,
-        p,
-        PH_MAX,
-        linear,
-    )
+    ground = ground_of(drive, p2=p2, linear=linear)
     code, _, k_up, runs, steps = upper_bound(
-        drive.time_s, *record, bottom, drive.max_q, MARGIN, 0.1 * DEPTH, check,
-        np.empty((4, n), dtype=np.int64), u, us, uc,
-    )  # fmt: skip
+        ground, bottom, drive.max_q, MARGIN, 0.1 * DEPTH, check, np.empty((4, n), dtype=np.int64)
+    )
     if code == AT_THE_TOP:
         k_up = drive.max_q
     if code == NOTHING_FAILS:
         nothing = np.empty(0)
         none = np.empty(0, dtype=np.int64)
         return CertifiedMap(bottom, nothing, nothing, none, nothing, bottom, True, runs, steps)
-    linear_drive(drive.interval_s, drive.k_h, p, still)
     low, high, point = (np.empty(MAX_INTERVALS) for _ in range(3))
     verdict = np.empty(MAX_INTERVALS, dtype=np.int64)
-    goal = TO_BOTTOM if full else TO_BRACKET
     count, reached, made_runs, made_steps = march(
-        drive.time_s, *record, k_up, bottom, MARGIN, DEPTH, ORDERLESS_DEPTH, still, FIRST_STEP,
-        check, goal, RESOLUTION * drive.pga_g, map_depth * drive.pga_g, STEP_BUDGET,
-        MAP_STEPS, low, high, verdict, point,
+        ground, k_up, bottom, MARGIN, DEPTH, 0.0, ORDERLESS_DEPTH, FIRST_STEP, check,
+        TO_ISLAND if full else TO_BRACKET, RESOLUTION * drive.pga_g, False, STEP_BUDGET,
+        low, high, verdict, point,
     )  # fmt: skip
+    runs += made_runs
+    steps += made_steps
+    if full and reached > bottom and made_steps < STEP_BUDGET:
+        floor = surely_topples_below(ground, drive, bottom, reached)
+        if floor < reached:
+            margin = MARGIN
+            if map_depth >= 100.0 * MAP_MARGIN:
+                margin = MAP_MARGIN
+                ground = ground_of(drive, p2=p2, linear=linear, span_ph=MAP_SPAN_PH)
+            more, reached, made_runs, made_steps = march(
+                ground, reached, floor, margin, DEPTH, map_depth * drive.pga_g,
+                ORDERLESS_DEPTH, FIRST_STEP, check, TO_BOTTOM, 0.0, True, MAP_STEPS,
+                low[count:], high[count:], verdict[count:], point[count:],
+            )  # fmt: skip
+            count += more
+            runs += made_runs
+            steps += made_steps
+        if bottom < floor >= reached:
+            low[count], high[count] = bottom, reached
+            verdict[count], point[count] = TOPPLES, math.nan
+            count, reached = count + 1, bottom
     done = full or not bool(((verdict[:count] == TOPPLES) | np.isfinite(point[:count])).any())
     return CertifiedMap(
         k_up=k_up,
@@ -157,8 +184,8 @@ def certified_map(
         point=point[:count].copy(),
         reached=reached,
         complete=not done or reached <= bottom,
-        runs=runs + made_runs,
-        steps=steps + made_steps,
+        runs=runs,
+        steps=steps,
     )
 
 

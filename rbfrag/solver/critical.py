@@ -14,8 +14,16 @@ import math
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.certified import MAP_DEPTH, CertifiedMap, bracket_of, certified_map
+from rbfrag.solver.certified import (
+    MAP_DEPTH,
+    MAP_SPAN_PH,
+    CertifiedMap,
+    bracket_of,
+    certified_map,
+    surely_topples_below,
+)
 from rbfrag.solver.excitation import Excitation, excitation
+from rbfrag.solver.ground import ground_of
 from rbfrag.solver.islands import islands_by_blocks, islands_of_map, outcome_intervals
 from rbfrag.solver.respond import positive, refuse_endless
 from rbfrag.solver.results import (
@@ -180,7 +188,10 @@ class _Search:
         if full_map and found.complete:
             islands = islands_of_map(found, scan, lower, resolution)
         else:
-            islands = islands_by_blocks(scan, lower, bottom, resolution)
+            ground = ground_of(drive, p2=self.p2, linear=self.linear, span_ph=MAP_SPAN_PH)
+            floor = surely_topples_below(ground, drive, bottom, lower)
+            islands, made = islands_by_blocks(ground, lower, floor, bottom, resolution)
+            self.n_runs += made
         self.island_width = islands.width / pga
         self.resolved = None if islands.resolved is None else islands.resolved / pga
         self.reentrant = islands.reentrant
@@ -197,7 +208,7 @@ class _Search:
         """
         pga = self.drive.pga_g
         self.lower, self.upper = bracket[0] / pga, bracket[1] / pga
-        for step in (0.0, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8):
+        for step in (0.0, 1e-10, 1e-9, 5e-9):
             ratio = max(self.lower - step * self.upper, self.limit)
             if self._scan.outcome_at(ratio) == TOPPLED:
                 self.lower = ratio

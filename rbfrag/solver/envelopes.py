@@ -26,6 +26,7 @@ from rbfrag.solver.flight import (
     fly,
     rest_state,
 )
+from rbfrag.solver.ground import Ground
 from rbfrag.solver.renewal import last_failing_end, last_rest
 from rbfrag.solver.rises import APART, TURNED_BACK, common_start, next_start, restart_floor
 from rbfrag.solver.taylor import bracketed_root
@@ -38,15 +39,7 @@ ALL_SAFE, ALL_TOPPLE, SPLIT, NO_ORDER = 0, 1, 2, 3
 
 @kernel
 def decide(
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    p: float,
-    ph_max: float,
-    linear: bool,
+    g: Ground,
     k1: float,
     k2: float,
     margin: float,
@@ -54,14 +47,11 @@ def decide(
     stretches: IntArray,
     n_stretches: int,
     at_rest: int,
-    u: FloatArray,
-    us: FloatArray,
-    uc: FloatArray,
 ) -> tuple[int, float, int, int]:
     """Decide whether all blocks with k_r in [k1, k2] topple, or none, if that can be told.
 
     Args:
-        interval_s: as in :func:`rbfrag.solver.flight.fly`; likewise up to `linear`.
+        g: the ground under a block.
         k1: smallest k_r.
         k2: greatest k_r.
         margin: the enclosing motions are flown with k1 (1 - margin) and k2 (1 + margin).
@@ -69,13 +59,19 @@ def decide(
         stretches: fresh starts at a k_r <= k1 (:func:`rbfrag.solver.renewal.fresh_starts`).
         n_stretches: their number.
         at_rest: node at which all blocks are at rest, and from which on the stretches count.
-        u: work of `fly`.
-        us: work of `fly`.
-        uc: work of `fly`.
 
     Returns:
         Verdict, a k_r to split at (NaN for anywhere), flights, steps.
     """
+    interval_s = g.interval_s
+    k_h = g.k_h
+    w = g.w
+    q = g.q
+    block_max_q = g.block_max_q
+    p = g.p
+    ph_max = g.ph_max
+    linear = g.linear
+    u = g.u
     n = q.size
     steps = 0
     flights = 0
@@ -132,9 +128,21 @@ def decide(
                     il = i
                     tl = tau
                     event, i, tau, theta, rate, s, c, made = fly(
-                        interval_s, k_h, w, tail_min_q, p, ph_max, linear, kb, i, tau,
-                        theta, rate, s, c, False, i + 1, 0.0, False, 0, 0.0, u, us, uc,
-                    )  # fmt: skip
+                        g,
+                        kb,
+                        i,
+                        tau,
+                        theta,
+                        rate,
+                        s,
+                        c,
+                        False,
+                        i + 1,
+                        0.0,
+                        False,
+                        0,
+                        0.0,
+                    )
                     steps += made
                     if rate >= 0.0:
                         mixed = True
@@ -152,14 +160,38 @@ def decide(
             if mixed:
                 # ahead of those that have not re-seated since, and of those that have
                 event, _, _, theta, rate, s, c, made = fly(
-                    interval_s, k_h, w, tail_min_q, p, ph_max, linear, ka, ixb, txb,
-                    0.0, 0.0, sa0, ca0, True, il, tl, True, 0, 0.0, u, us, uc,
-                )  # fmt: skip
+                    g,
+                    ka,
+                    ixb,
+                    txb,
+                    0.0,
+                    0.0,
+                    sa0,
+                    ca0,
+                    True,
+                    il,
+                    tl,
+                    True,
+                    0,
+                    0.0,
+                )
                 steps += made
                 event, ixa, txa, theta_a, rate_a, s_a, c_a, made = fly(
-                    interval_s, k_h, w, tail_min_q, p, ph_max, linear, ka, ixb, txb,
-                    theta_a, rate_a, s_a, c_a, False, il, tl, False, 0, 0.0, u, us, uc,
-                )  # fmt: skip
+                    g,
+                    ka,
+                    ixb,
+                    txb,
+                    theta_a,
+                    rate_a,
+                    s_a,
+                    c_a,
+                    False,
+                    il,
+                    tl,
+                    False,
+                    0,
+                    0.0,
+                )
                 steps += made
                 if event != STOPPED:
                     return SPLIT, math.nan, flights, steps
@@ -182,9 +214,21 @@ def decide(
                     continue
                 # rule F: what starts in this stretch is behind the motion ahead from e
                 event, i, tau, _, _, _, _, made = fly(
-                    interval_s, k_h, w, tail_min_q, p, ph_max, linear, ka, ie, te,
-                    0.0, 0.0, sa0, ca0, True, n - 1, 0.0, True, 1 if check else 0, kb, u, us, uc,
-                )  # fmt: skip
+                    g,
+                    ka,
+                    ie,
+                    te,
+                    0.0,
+                    0.0,
+                    sa0,
+                    ca0,
+                    True,
+                    n - 1,
+                    0.0,
+                    True,
+                    1 if check else 0,
+                    kb,
+                )
                 steps += made
                 flights += 1
                 if event == ORDER_LOST:
@@ -218,9 +262,21 @@ def decide(
             rate_b = 0.0
         else:
             event, ixb, txb, _, rate_b, _, _, made = fly(
-                interval_s, k_h, w, tail_min_q, p, ph_max, linear, kb, il, tl,
-                0.0, 0.0, sb0, cb0, True, n - 1, 0.0, True, 2 if check else 0, 0.0, u, us, uc,
-            )  # fmt: skip
+                g,
+                kb,
+                il,
+                tl,
+                0.0,
+                0.0,
+                sb0,
+                cb0,
+                True,
+                n - 1,
+                0.0,
+                True,
+                2 if check else 0,
+                0.0,
+            )
             steps += made
             flights += 1
             if event == ORDER_LOST:
@@ -230,9 +286,21 @@ def decide(
         check_ahead = 1 if check else 0
         if event == IN_AIR:
             event, _, _, _, _, _, _, made = fly(
-                interval_s, k_h, w, tail_min_q, p, ph_max, linear, ka, ixa, txa,
-                theta_a, rate_a, s_a, c_a, True, n - 1, 0.0, True, check_ahead, kb, u, us, uc,
-            )  # fmt: skip
+                g,
+                ka,
+                ixa,
+                txa,
+                theta_a,
+                rate_a,
+                s_a,
+                c_a,
+                True,
+                n - 1,
+                0.0,
+                True,
+                check_ahead,
+                kb,
+            )
             steps += made
             flights += 1
             if event == ORDER_LOST:
@@ -240,9 +308,21 @@ def decide(
             return (ALL_SAFE if event == IN_AIR else SPLIT), math.nan, flights, steps
         # the motion behind has re-seated; bring the motion ahead there
         event, ixa, txa, theta_a, rate_a, s_a, c_a, made = fly(
-            interval_s, k_h, w, tail_min_q, p, ph_max, linear, ka, ixa, txa,
-            theta_a, rate_a, s_a, c_a, True, ixb, txb, True, check_ahead, kb, u, us, uc,
-        )  # fmt: skip
+            g,
+            ka,
+            ixa,
+            txa,
+            theta_a,
+            rate_a,
+            s_a,
+            c_a,
+            True,
+            ixb,
+            txb,
+            True,
+            check_ahead,
+            kb,
+        )
         steps += made
         flights += 1
         if event == ORDER_LOST:
@@ -255,9 +335,21 @@ def decide(
         at /= w[ixb] + (w[ixb + 1] - w[ixb]) * txb
         lifting = rate_a >= 0.0 and at >= k1
         event, ia, ta, _, _, _, _, made = fly(
-            interval_s, k_h, w, tail_min_q, p, ph_max, linear, ka, ixa, txa,
-            theta_a, rate_a, s_a, c_a, lifting, n - 1, 0.0, True, check_ahead, kb, u, us, uc,
-        )  # fmt: skip
+            g,
+            ka,
+            ixa,
+            txa,
+            theta_a,
+            rate_a,
+            s_a,
+            c_a,
+            lifting,
+            n - 1,
+            0.0,
+            True,
+            check_ahead,
+            kb,
+        )
         steps += made
         if event == ORDER_LOST:
             return NO_ORDER, math.nan, flights, steps

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -29,6 +29,7 @@ class Excitation:
         w: effective gravity 1 + k_v [-], shape (n,).
         pga_g: PGA of the horizontal motion, over both signs [g].
         warnings: sentences about how the two components were brought together.
+        span_tables: tables of `rbfrag.solver.spans` by length, kept for the next search.
     """
 
     time_s: FloatArray
@@ -37,6 +38,7 @@ class Excitation:
     w: FloatArray
     pga_g: float
     warnings: tuple[str, ...] = ()
+    span_tables: dict[int, FloatArray] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def jump_node(self) -> int:

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.solver.compiled import kernel
+from rbfrag.solver.ground import Ground
+from rbfrag.solver.spans import span_step
 from rbfrag.solver.taylor import bracketed_root, fill_coefficients, lean_step, rotation, turn, value
 
 FloatArray = NDArray[np.float64]
@@ -97,13 +99,7 @@ def order_lost(
 
 @kernel
 def fly(
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    tail_min_q: FloatArray,
-    p: float,
-    ph_max: float,
-    linear: bool,
+    g: Ground,
     kr: float,
     i: int,
     tau: float,
@@ -117,9 +113,6 @@ def fly(
     touch: bool,
     check: int,
     kr_other: float,
-    u: FloatArray,
-    us: FloatArray,
-    uc: FloatArray,
 ) -> tuple[int, int, float, float, float, float, float, int]:
     """Fly a block from (i, tau) until it re-seats, topples, or the stop or the end is reached.
 
@@ -147,19 +140,56 @@ def fly(
             way between this motion and a block with `kr_other` at rest; 2 between this motion
             and the border of the irrecoverable states.
         kr_other: see `check`.
-        u: work, shape (9,).
-        us: work, shape (9,), linear model only.
-        uc: work, shape (9,), linear model only.
 
     Returns:
         Event, interval, fraction, theta, theta'/p, s, c there, and the steps taken.
     """
+    interval_s = g.interval_s
+    k_h = g.k_h
+    w = g.w
+    tail_min_q = g.tail_min_q
+    p = g.p
+    ph_max = g.ph_max
+    linear = g.linear
+    u = g.u
+    us = g.us
+    uc = g.uc
     last = k_h.size - 1
     steps = 0
     ph_now = -1.0
     per_ph = 0.0
     u_now = 0.0
+    use_spans = touch and check == 0 and g.span_length.size > 0
     while i < last and (i < stop_i or (i == stop_i and tau < stop_tau)):
+        if use_spans and tau == 0.0 and i % g.span_length[g.span_length.size - 1] == 0:
+            spanned = False
+            for level in range(g.span_length.size):
+                length = g.span_length[level]
+                if i % length != 0 or i + length > stop_i:
+                    continue
+                row = g.span_row[level] + i // length
+                ph = p * g.spans[row, 0]
+                if not 0.0 < ph <= g.span_ph:
+                    continue
+                # |theta''| <= p² (|a| + w): the block cannot touch down in this span
+                if theta + min(ph * rate, 0.0) - 0.5 * ph * ph * g.spans[row, 1] <= 0.0:
+                    continue
+                turned, u_end = span_step(g.spans, row, ph * rate, ph, s, c)
+                steps += 1
+                theta += turned
+                s_change, c_change = turn(s, c, turned)
+                s += s_change
+                c += c_change
+                rate = u_end / ph
+                lifting = False
+                ph_now = -1.0
+                i += length
+                spanned = True
+                break
+            if spanned:
+                if rate > 0.0 and s < 0.0 and s < c * tail_min_q[i]:
+                    return TOPPLED, i, 0.0, theta, rate, s, c, steps
+                continue
         end = 1.0
         if i == stop_i and stop_tau < 1.0:
             end = stop_tau

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rbfrag.solver.compiled import kernel
 from rbfrag.solver.flight import RESEATED, TOPPLED, fly, rest_state
+from rbfrag.solver.ground import Ground
 from rbfrag.solver.rises import next_start
 
 FloatArray = NDArray[np.float64]
@@ -16,11 +17,7 @@ FloatArray = NDArray[np.float64]
 
 @kernel
 def linear_distance(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    still: FloatArray,
-    p: float,
-    linear: bool,
+    g: Ground,
     start_i: int,
     start_tau: float,
     i: int,
@@ -36,6 +33,11 @@ def linear_distance(
     of the drive; referred back to its start, that is a distance in k_r. Good for a secant;
     nothing is concluded from its size.
     """
+    time_s = g.time_s
+    interval_s = g.interval_s
+    still = g.still
+    p = g.p
+    linear = g.linear
     x = s if linear else math.atan2(s, c)
     end_s = time_s[i]
     to_come = still[i]
@@ -53,37 +55,24 @@ def linear_distance(
 
 @kernel
 def follow(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    still: FloatArray,
-    p: float,
-    ph_max: float,
-    linear: bool,
+    g: Ground,
     kr: float,
     node: int,
     failing_end: int,
-    u: FloatArray,
-    us: FloatArray,
-    uc: FloatArray,
 ) -> tuple[float, int]:
     """Follow a block at rest at a node; return its distance from toppling and the steps taken.
 
     Args:
-        time_s: node times [s], shape (n,).
-        interval_s: as in :func:`rbfrag.solver.flight.fly`; likewise up to `linear`.
-        still: of :func:`rbfrag.solver.upper_bound.linear_drive`.
+        g: the ground under a block.
         kr: rocking acceleration coefficient.
         node: node of rest.
         failing_end: node after which no start topples.
-        u: work of `fly`.
-        us: work of `fly`.
-        uc: work of `fly`.
     """
+    k_h = g.k_h
+    w = g.w
+    q = g.q
+    block_max_q = g.block_max_q
+    linear = g.linear
     n = q.size
     s0, c0 = rest_state(kr, linear)
     best = -kr
@@ -95,14 +84,23 @@ def follow(
         if i >= n or i >= failing_end:
             break
         event, at, fraction, _, rate, s, c, made = fly(
-            interval_s, k_h, w, tail_min_q, p, ph_max, linear, kr, i, tau,
-            0.0, 0.0, s0, c0, True, n - 1, 0.0, True, 0, 0.0, u, us, uc,
-        )  # fmt: skip
+            g,
+            kr,
+            i,
+            tau,
+            0.0,
+            0.0,
+            s0,
+            c0,
+            True,
+            n - 1,
+            0.0,
+            True,
+            0,
+            0.0,
+        )
         steps += made
-        distance = linear_distance(
-            time_s, interval_s, still, p, linear, i, tau, at, fraction, rate, s, c,
-            event == TOPPLED,
-        )  # fmt: skip
+        distance = linear_distance(g, i, tau, at, fraction, rate, s, c, event == TOPPLED)
         if event == TOPPLED:
             return distance, steps
         best = max(best, distance)
@@ -111,3 +109,22 @@ def follow(
         i = at
         tau = fraction
     return best, steps
+
+
+@kernel
+def first_turn(g: Ground, kr: FloatArray, first: int, topples: bool) -> int:
+    """Return the number of the first block from `first` on that does not do as said.
+
+    Args:
+        g: the ground under a block.
+        kr: rocking acceleration coefficients of blocks at rest when the record begins, shape (m,).
+        first: number of the first block to look at.
+        topples: what is said.
+
+    Returns:
+        The number, m where there is none.
+    """
+    for j in range(first, kr.size):
+        if (follow(g, kr[j], 0, g.q.size)[0] > 0.0) != topples:
+            return j
+    return kr.size

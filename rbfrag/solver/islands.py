@@ -8,14 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.solver.certified import CertifiedMap
-from rbfrag.solver.march import SAFE, TOPPLES
+from rbfrag.solver.follow import first_turn
+from rbfrag.solver.ground import Ground
+from rbfrag.solver.march import SAFE, TOPPLES, border
 from rbfrag.solver.results import OutcomeIntervals
 from rbfrag.solver.scan import BlockScan
 
 FloatArray = NDArray[np.float64]
 
-PROBES = 160
+PROBES = 12
 """Single blocks looked at below the critical one, equally spaced in ln k_r."""
+
+BORDER = 1e-9
+"""Relative width to which the floor of an island is closed in on."""
 
 WORDS = {SAFE: "safe", TOPPLES: "topples"}
 
@@ -119,47 +124,56 @@ def islands_of_map(
     return Islands(width, resolved, reentrant)
 
 
-def islands_by_blocks(scan: BlockScan, lower: float, bottom: float, resolution: float) -> Islands:
+def islands_by_blocks(
+    ground: Ground, lower: float, floor: float, bottom: float, resolution: float
+) -> tuple[Islands, int]:
     """Look for islands below the critical value by single blocks: a finding, not a proof.
 
     Args:
-        scan: the blocks.
+        ground: the ground under the blocks.
         lower: greatest k_r that topples.
+        floor: least k_r to look at; every one below it topples, or is below `bottom`.
         bottom: least k_r of interest.
         resolution: width of k_r below which islands are ignored.
+
+    Returns:
+        What was found, and the number of blocks.
     """
-    if lower <= bottom:
-        return Islands(0.0, lower, False)
-    kr = np.geomspace(lower, bottom, PROBES)
-    kr[0] = lower
-    kr[-1] = bottom
+    if lower <= floor:
+        return Islands(lower - bottom, lower, False), 0
+    kr = np.geomspace(lower, floor, PROBES)
     # the island of the critical value itself may be narrower than the spacing
-    near = lower - resolution * np.array([0.0, 0.25, 1.0])
-    kr = np.concatenate([near[near > kr[1]], kr[1:]])
-    width: float | None = None
+    near = lower - resolution * np.array([0.25, 1.0])
+    kr = np.concatenate([[lower], near[near > kr[1]], kr[1:]])
+    runs = 0
+    at = 1
+    inside = True  # of an island
+    edges = [lower]  # tops and floors of islands in turn
     resolved: float | None = None
     reentrant = False
-    top = lower
-    start = 0
-    while start < kr.size and (resolved is None or not reentrant):
-        stays = scan.first(kr[start:], topples=False)
-        floor = bottom
-        if stays is not None:
-            stays += start
-            floor, _ = scan.border(float(kr[stays - 1]), float(kr[stays]))
-        if width is None:
-            width = lower - floor
-        if resolved is None and top - floor >= resolution:
-            resolved = top
-        if stays is None:
+    while resolved is None or not reentrant:
+        turn = int(first_turn(ground, kr, at, inside))
+        runs += min(turn, kr.size - 1) - at + 1
+        if turn == kr.size:
+            edge = bottom
+            if not inside:
+                break
+        else:
+            low_side, high_side, made, _ = border(
+                ground, float(kr[turn]), -1.0 if inside else 1.0, float(kr[turn - 1]), BORDER,
+                0, ground.q.size,
+            )  # fmt: skip
+            runs += made
+            edge = high_side if inside else low_side
+        if inside and resolved is None and edges[-1] - edge >= resolution:
+            resolved = edges[-1]
+        if not inside:
+            reentrant = reentrant or edges[-1] - edge > resolution
+        edges.append(edge)
+        if turn == kr.size:
             break
-        again = scan.first(kr[stays:], topples=True)
-        safe_from = bottom
-        if again is not None:
-            again += stays
-            top, safe_from = scan.border(float(kr[again]), float(kr[again - 1]))
-        reentrant = reentrant or floor - safe_from > resolution
-        if again is None:
-            break
-        start = again
-    return Islands(lower - bottom if width is None else width, resolved, reentrant)
+        if inside and resolved is not None and floor > bottom and edge - kr[turn] > resolution:
+            reentrant = True  # the lowest block is known to topple
+        inside = not inside
+        at = turn + 1
+    return Islands(lower - edges[1], resolved, reentrant), runs

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rbfrag.solver.compiled import kernel
 from rbfrag.solver.envelopes import ALL_SAFE, ALL_TOPPLE, NO_ORDER, SPLIT, decide
 from rbfrag.solver.follow import follow
+from rbfrag.solver.ground import Ground
 from rbfrag.solver.renewal import fresh_starts, last_failing_end, last_rest
 from rbfrag.solver.upper_bound import between
 
@@ -18,34 +19,21 @@ IntArray = NDArray[np.int64]
 
 SAFE, TOPPLES, UNKNOWN, ORDERLESS = 0, 1, 2, 3
 
-BORDER = 1e-12
+BORDER = 1e-11
 """Relative width to which a border between two single blocks is closed in on."""
 
-TO_BRACKET, TO_ISLANDS, TO_BOTTOM = 0, 1, 2
+TO_BRACKET, TO_ISLAND, TO_BOTTOM = 0, 1, 2
 
 
 @kernel
 def border(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    still: FloatArray,
-    p: float,
-    ph_max: float,
-    linear: bool,
+    g: Ground,
     lo: float,
     at_lo: float,
     hi: float,
     width: float,
     rest: int,
     failing_end: int,
-    u: FloatArray,
-    us: FloatArray,
-    uc: FloatArray,
 ) -> tuple[float, float, int, int]:
     """Close in on a border between two k_r of which one topples and the other does not.
 
@@ -63,10 +51,7 @@ def border(
     side = 0
     while hi - lo > width * hi:
         k = between(lo, hi, at_lo, at_hi, side, 0.25 * width * hi, slow)
-        far, made = follow(
-            time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear, k,
-            rest, failing_end, u, us, uc,
-        )  # fmt: skip
+        far, made = follow(g, k, rest, failing_end)
         runs += 1
         steps += made
         if (far > 0.0) == low_topples:
@@ -92,29 +77,19 @@ def border(
 
 @kernel
 def march(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    p: float,
-    ph_max: float,
-    linear: bool,
+    g: Ground,
     top: float,
     bottom: float,
     margin: float,
     depth: float,
+    least: float,
     order_depth: float,
-    still: FloatArray,
     first_step: float,
     check: bool,
     goal: int,
     resolution: float,
-    map_depth: float,
+    inside: bool,
     max_steps: int,
-    map_steps: int,
     low: FloatArray,
     high: FloatArray,
     verdict: IntArray,
@@ -123,22 +98,20 @@ def march(
     """Give verdicts from `top` downwards until the goal or `bottom` is reached.
 
     Args:
-        time_s: node times [s], shape (n,).
-        interval_s: as in :func:`rbfrag.solver.flight.fly`; likewise up to `linear`.
+        g: the ground under a block.
         top: k_r to start from.
         bottom: k_r to stop at.
         margin: relative margin on k_r of the enclosing motions.
         depth: relative width below which an interval is left undecided.
-        order_depth: the same where the order of motions is lost.
-        still: of :func:`rbfrag.solver.upper_bound.linear_drive`.
+        least: the same, as a width of k_r itself.
+        order_depth: the relative one where the order of motions is lost.
         first_step: relative width of the first interval.
         check: check D >= 0 on the way.
-        goal: TO_BRACKET, TO_ISLANDS or TO_BOTTOM.
-        resolution: width of k_r of the islands that count for TO_ISLANDS.
-        map_depth: width of k_r below which an interval is left undecided once a toppling
-            interval as wide as the resolution has been met.
+        goal: TO_BRACKET, TO_ISLAND (to the end of the first interval that is proven to topple
+            and as wide as the resolution) or TO_BOTTOM.
+        resolution: width of k_r of the islands that count for TO_ISLAND.
+        inside: blocks below `top` topple, it is not K_up.
         max_steps: integration steps after which the march is given up.
-        map_steps: the same for those taken after the first toppling interval.
         low: filled with the lower ends of the intervals, falling.
         high: filled with their upper ends.
         verdict: filled with SAFE, TOPPLES, UNKNOWN or ORDERLESS.
@@ -147,10 +120,8 @@ def march(
     Returns:
         Number of intervals, k_r reached, runs, steps.
     """
+    q = g.q
     n = q.size
-    u = np.empty(9)
-    us = np.empty(9)
-    uc = np.empty(9)
     # fresh starts over the whole record at one k_r, and over the part of it that they leave
     # open at a greater one
     coarse = np.empty((4, n), dtype=np.int64)
@@ -166,40 +137,28 @@ def march(
     runs = 0
     steps = 0
     count = 0
-    found = False
+    found = inside
     island = 0.0  # width of the toppling interval being passed
-    wide_island = False
-    gap = 0.0  # width of the safe interval being passed below a toppling one
-    wide_gap = False
-    until = map_steps
     hi = top
     width = first_step * top
     steady = width  # width of the last interval that got a verdict
-    side = SAFE
+    side = TOPPLES if inside else SAFE
     share = 0.6
     patience = 2.0
     edge_high = top  # a border known by two blocks: one of `side` above, one of the other below
     edge_low = top
     edge_point = top
-    far, made = follow(
-        time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear,
-        top * (1.0 - depth), 0, n, u, us, uc,
-    )  # fmt: skip
-    runs += 1
-    steps += made
-    if far > 0.0:
-        edge_point, _, made_runs, made = border(
-            time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear,
-            top * (1.0 - depth), far, top, BORDER, 0, n, u, us, uc,
+    if not inside:
+        far, made = follow(
+            g,
+            top * (1.0 - depth), 0, n,
         )  # fmt: skip
-        runs += made_runs
+        runs += 1
         steps += made
-        edge_low = edge_point - max(0.25 * depth, 2.0 * margin) * top
+        if far > 0.0:  # K_up itself is the border
+            edge_point = top * (1.0 - depth)
+            edge_low = edge_point - max(0.25 * depth, 2.0 * margin) * top
     while hi > bottom and steps < max_steps and count < low.size - 1:
-        if not wide_island:
-            until = steps + map_steps
-        elif steps >= until:
-            break
         if hi == edge_high and edge_low < hi:
             high[count] = hi
             low[count] = edge_low
@@ -214,7 +173,7 @@ def march(
                 if goal == TO_BRACKET:
                     break
             continue
-        finest = max(depth * hi, map_depth) if wide_island else depth * hi
+        finest = max(depth * hi, least)
         clear = max(0.25 * finest, 2.0 * margin * hi)  # of the margins of the enclosing motions
         lo = max(hi - width, bottom)
         if lo < bottom + 0.1 * finest:
@@ -228,8 +187,8 @@ def march(
             coarse_k = max(bottom, lo - 0.5 * (hi - lo) - 0.1 * hi)
             coarse_other = hi * (1.0 + margin)
             n_coarse, _, made = fresh_starts(
-                interval_s, k_h, w, q, tail_min_q, block_max_q, p, ph_max, linear, coarse_k,
-                coarse_k * (1.0 - margin), coarse_other, check, 0, n, coarse, u, us, uc,
+                g, coarse_k,
+                coarse_k * (1.0 - margin), coarse_other, check, 0, n, coarse,
             )  # fmt: skip
             runs += n_coarse
             steps += made
@@ -237,15 +196,9 @@ def march(
             window, _ = last_rest(coarse, n_coarse, 0, 0, 0)
             window_end = last_failing_end(coarse, n_coarse)
         if lo >= fine_k:
-            what, peak, made_runs, made = decide(
-                interval_s, k_h, w, q, tail_min_q, block_max_q, p, ph_max, linear, lo, hi, margin,
-                check, fine, n_fine, window, u, us, uc,
-            )  # fmt: skip
+            what, peak, made_runs, made = decide(g, lo, hi, margin, check, fine, n_fine, window)
         else:
-            what, peak, made_runs, made = decide(
-                interval_s, k_h, w, q, tail_min_q, block_max_q, p, ph_max, linear, lo, hi, margin,
-                check, coarse, n_coarse, 0, u, us, uc,
-            )  # fmt: skip
+            what, peak, made_runs, made = decide(g, lo, hi, margin, check, coarse, n_coarse, 0)
         runs += made_runs
         steps += made
         scanned = fine_k if lo >= fine_k else coarse_k
@@ -253,8 +206,8 @@ def march(
             before = n_fine + n * n_failing
             fine_k = max(lo - 0.5 * (hi - lo), coarse_k)
             n_fine, n_failing, made = fresh_starts(
-                interval_s, k_h, w, q, tail_min_q, block_max_q, p, ph_max, linear, fine_k,
-                fine_k * (1.0 - margin), coarse_other, check, window, window_end, fine, u, us, uc,
+                g, fine_k,
+                fine_k * (1.0 - margin), coarse_other, check, window, window_end, fine,
             )  # fmt: skip
             runs += n_fine
             steps += made
@@ -274,17 +227,13 @@ def march(
         elif hi - lo > (max(order_depth * hi, finest) if what == NO_ORDER else finest):
             if what == SPLIT and not (lo <= edge_high < hi):
                 # is a border the reason? then verdicts can go as far as that
-                far, made = follow(
-                    time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max,
-                    linear, lo, window, window_end, u, us, uc,
-                )  # fmt: skip
+                far, made = follow(g, lo, window, window_end)
                 runs += 1
                 steps += made
                 if (far > 0.0) == (side == SAFE):
                     edge_point, edge_high, made_runs, made = border(
-                        time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max,
-                        linear, lo, far, hi, max(BORDER, 0.1 * finest / hi if wide_island else 0.0),
-                        window, window_end, u, us, uc,
+                        g, lo, far, hi, max(BORDER, 0.1 * least / hi),
+                        window, window_end,
                     )  # fmt: skip
                     runs += made_runs
                     steps += made
@@ -300,10 +249,7 @@ def march(
             answer = ORDERLESS if what == NO_ORDER else UNKNOWN
             width = hi - lo
             if not found:
-                far, made = follow(
-                    time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max,
-                    linear, lo, window, window_end, u, us, uc,
-                )  # fmt: skip
+                far, made = follow(g, lo, window, window_end)
                 runs += 1
                 steps += made
                 if far > 0.0:
@@ -319,15 +265,10 @@ def march(
         if answer == TOPPLES:
             found = True
             island = island + hi - lo
-            wide_island = wide_island or island > resolution
-            gap = 0.0
         elif answer == SAFE:
             island = 0.0
-            if found:
-                gap = gap + hi - lo
-                wide_gap = wide_gap or gap > resolution
         found = found or topples_at == lo
         hi = lo
-        if found and (goal == TO_BRACKET or (goal == TO_ISLANDS and wide_island and wide_gap)):
+        if found and (goal == TO_BRACKET or (goal == TO_ISLAND and island > resolution)):
             break
     return count, hi, runs, steps

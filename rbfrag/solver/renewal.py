@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from rbfrag.solver.compiled import kernel
 from rbfrag.solver.flight import IN_AIR, RESEATED, fly, rest_state
+from rbfrag.solver.ground import Ground
 from rbfrag.solver.rises import next_start
 from rbfrag.solver.toppling import next_lifting_node
 
@@ -18,15 +19,7 @@ FIRST, END, COVER, FAILS = 0, 1, 2, 3
 
 @kernel
 def fresh_starts(
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    p: float,
-    ph_max: float,
-    linear: bool,
+    g: Ground,
     kr: float,
     k_ahead: float,
     kr_other: float,
@@ -34,9 +27,6 @@ def fresh_starts(
     first: int,
     stop: int,
     stretches: IntArray,
-    u: FloatArray,
-    us: FloatArray,
-    uc: FloatArray,
 ) -> tuple[int, int, int]:
     """Fly one excursion from the start of every stretch of q > kr.
 
@@ -44,7 +34,7 @@ def fresh_starts(
     behind the fresh one, so it is over when that is, and topples only if that does.
 
     Args:
-        interval_s: as in :func:`rbfrag.solver.flight.fly`; likewise up to `linear`.
+        g: the ground under a block.
         kr: the stretches are those of q > kr.
         k_ahead: k_r that the excursions are flown with, <= kr.
         kr_other: the largest k_r that conclusions are drawn for.
@@ -53,13 +43,15 @@ def fresh_starts(
         stop: ... that begin before this one.
         stretches: filled with first node, node after the last, first node at which the
             excursion is over (n for never), and whether it fails; shape (4, m).
-        u: work of `fly`.
-        us: work of `fly`.
-        uc: work of `fly`.
 
     Returns:
         Number of stretches, of those that fail, steps taken.
     """
+    k_h = g.k_h
+    w = g.w
+    q = g.q
+    block_max_q = g.block_max_q
+    linear = g.linear
     n = q.size
     count = 0
     failing = 0
@@ -75,9 +67,21 @@ def fresh_starts(
         fails = False
         if i < n:
             event, at, fraction, _, _, _, _, made = fly(
-                interval_s, k_h, w, tail_min_q, p, ph_max, linear, k_ahead, i, tau,
-                0.0, 0.0, s0, c0, True, n - 1, 0.0, True, 1 if check else 0, kr_other, u, us, uc,
-            )  # fmt: skip
+                g,
+                k_ahead,
+                i,
+                tau,
+                0.0,
+                0.0,
+                s0,
+                c0,
+                True,
+                n - 1,
+                0.0,
+                True,
+                1 if check else 0,
+                kr_other,
+            )
             steps += made
             if event == RESEATED:
                 cover = at + 1 if fraction > 0.0 else at

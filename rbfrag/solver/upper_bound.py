@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rbfrag.solver.compiled import kernel
 from rbfrag.solver.flight import TOPPLED, fly, rest_state
 from rbfrag.solver.follow import linear_distance
+from rbfrag.solver.ground import Ground
 from rbfrag.solver.renewal import END, FAILS, FIRST, fresh_starts
 from rbfrag.solver.rises import next_start
 from rbfrag.solver.toppling import next_lifting_node
@@ -21,71 +22,23 @@ NOTHING_FAILS, FOUND, AT_THE_TOP = 0, 1, 2
 
 
 @kernel
-def linear_drive(
-    interval_s: FloatArray, k_h: FloatArray, p: float, still: FloatArray
-) -> tuple[float, int]:
-    """Fill what of the drive is still to come; return its maximum and the node after it.
-
-    `still` at a node is G(t) = p integral_t^inf k_h(s) exp(-p (s - t)) ds, by G' = p (G - k_h)
-    from the end backwards. In the linear model without vertical motion a block topples from
-    (theta, theta') if theta'/p + G > theta_c - theta; the maximum of G, which may lie inside
-    an interval where G = k_h, is the largest critical angle over all fresh starts.
-    """
-    g = 0.0
-    greatest = 0.0
-    where = 0
-    h = -1.0
-    decay = 0.0
-    still[k_h.size - 1] = 0.0
-    for i in range(interval_s.size - 1, -1, -1):
-        if interval_s[i] != h:
-            h = interval_s[i]
-            decay = math.exp(-p * h)
-        if h > 0.0:
-            slope = (k_h[i + 1] - k_h[i]) / h
-            rest = g - k_h[i + 1] - slope / p  # times exp(-p (t_end - t))
-            # G turns where slope + p rest exp(-p (t_end - t)) = 0
-            if slope > 0.0 and rest < 0.0:
-                faded = -slope / (p * rest)
-                if decay < faded <= 1.0:
-                    turn = k_h[i + 1] + slope * math.log(faded) / p
-                    if turn > greatest:
-                        greatest = turn
-                        where = i + 1
-            g = k_h[i] + slope / p + rest * decay
-        still[i] = g
-        if g > greatest:
-            greatest = g
-            where = i
-    return greatest, where
-
-
-@kernel
 def fresh_margin(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    still: FloatArray,
-    p: float,
-    ph_max: float,
-    linear: bool,
+    g: Ground,
     kr: float,
     k_ahead: float,
     first: int,
     stop: int,
-    block_max_q: FloatArray,
-    u: FloatArray,
-    us: FloatArray,
-    uc: FloatArray,
 ) -> tuple[float, int, int]:
     """How far the fresh excursions that begin in [first, stop) are from toppling.
 
     Positive if one topples. The size is the linear model's estimate of the distance in k_r:
     good for a secant, and nothing is concluded from it.
     """
+    k_h = g.k_h
+    w = g.w
+    q = g.q
+    block_max_q = g.block_max_q
+    linear = g.linear
     n = q.size
     s0, c0 = rest_state(k_ahead, linear)
     best = -math.inf
@@ -99,15 +52,24 @@ def fresh_margin(
         if i >= n:
             break
         event, at, fraction, _, rate, s, c, made = fly(
-            interval_s, k_h, w, tail_min_q, p, ph_max, linear, k_ahead, i, tau,
-            0.0, 0.0, s0, c0, True, n - 1, 0.0, True, 0, 0.0, u, us, uc,
-        )  # fmt: skip
+            g,
+            k_ahead,
+            i,
+            tau,
+            0.0,
+            0.0,
+            s0,
+            c0,
+            True,
+            n - 1,
+            0.0,
+            True,
+            0,
+            0.0,
+        )
         steps += made
         flights += 1
-        distance = linear_distance(
-            time_s, interval_s, still, p, linear, i, tau, at, fraction, rate, s, c,
-            event == TOPPLED,
-        )  # fmt: skip
+        distance = linear_distance(g, i, tau, at, fraction, rate, s, c, event == TOPPLED)
         best = max(best, distance)
         while node < n and q[node] > kr:
             node += 1
@@ -134,17 +96,7 @@ def between(
 
 @kernel
 def border_of(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    still: FloatArray,
-    p: float,
-    ph_max: float,
-    linear: bool,
+    g: Ground,
     bottom: float,
     guess: float,
     top: float,
@@ -152,9 +104,6 @@ def border_of(
     stop: int,
     margin: float,
     width: float,
-    u: FloatArray,
-    us: FloatArray,
-    uc: FloatArray,
 ) -> tuple[float, float, bool, int, int]:
     """Bracket the k_r below which a fresh excursion that begins in [first, stop) topples.
 
@@ -176,8 +125,8 @@ def border_of(
     k = guess
     while high - low > width * high:
         distance, made_flights, made = fresh_margin(
-            time_s, interval_s, k_h, w, q, tail_min_q, still, p, ph_max, linear, k,
-            k * (1.0 - margin), first, stop, block_max_q, u, us, uc,
+            g, k,
+            k * (1.0 - margin), first, stop,
         )  # fmt: skip
         flights += made_flights
         steps += made
@@ -220,53 +169,38 @@ def border_of(
 
 @kernel
 def upper_bound(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    p: float,
-    ph_max: float,
-    linear: bool,
+    g: Ground,
     bottom: float,
     top: float,
     margin: float,
     width: float,
     check: bool,
     stretches: IntArray,
-    u: FloatArray,
-    us: FloatArray,
-    uc: FloatArray,
 ) -> tuple[int, float, float, int, int]:
     """Find K_up between two k_r.
 
     Args:
-        time_s: node times [s], shape (n,).
-        interval_s: as in :func:`rbfrag.solver.flight.fly`; likewise up to `linear`.
+        g: the ground under a block.
         bottom: least k_r of interest.
         top: greatest q of the record.
         margin: the excursions are flown with k_r (1 - margin).
         width: relative width to which K_up is bisected.
         check: check D >= 0; where it fails the answer is `top`.
         stretches: work, shape (4, n).
-        u: work of `fly`.
-        us: work of `fly`.
-        uc: work of `fly`.
 
     Returns:
         NOTHING_FAILS (no fresh excursion at `bottom` topples), FOUND or AT_THE_TOP;
         a k_r with a failing fresh excursion and K_up; flights; steps.
     """
+    q = g.q
     n = q.size
-    still = np.empty(n)
-    guess, node = linear_drive(interval_s, k_h, p, still)
+    guess = g.still_max
+    node = g.still_node
     flights = 0
     steps = 0
     count, failing, made = fresh_starts(
-        interval_s, k_h, w, q, tail_min_q, block_max_q, p, ph_max, linear, top,
-        top * (1.0 - margin), top, check, 0, n, stretches, u, us, uc,
+        g, top,
+        top * (1.0 - margin), top, check, 0, n, stretches,
     )  # fmt: skip
     steps += made
     flights += count
@@ -284,8 +218,8 @@ def upper_bound(
         while stop < n and q[stop] > bottom:
             stop += 1
         low, high, known, made_flights, made = border_of(
-            time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear,
-            bottom, min(guess, top), top, first, stop, margin, width, u, us, uc,
+            g,
+            bottom, min(guess, top), top, first, stop, margin, width,
         )  # fmt: skip
         flights += made_flights
         steps += made
@@ -295,8 +229,8 @@ def upper_bound(
     while True:
         # no other stretch may fail at `high`
         count, failing, made = fresh_starts(
-            interval_s, k_h, w, q, tail_min_q, block_max_q, p, ph_max, linear, high,
-            high * (1.0 - margin), top, check, 0, n, stretches, u, us, uc,
+            g, high,
+            high * (1.0 - margin), top, check, 0, n, stretches,
         )  # fmt: skip
         flights += count
         steps += made
@@ -313,9 +247,15 @@ def upper_bound(
                 stop = max(stop, stretches[END, m])
         before = high
         low, high, _, made_flights, made = border_of(
-            time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, still, p, ph_max, linear,
-            high, high * 1.001, top, first, stop, margin, width, u, us, uc,
-        )  # fmt: skip
+            g,
+            high,
+            high * 1.001,
+            top,
+            first,
+            stop,
+            margin,
+            width,
+        )
         flights += made_flights
         steps += made
         if high <= before:  # it is the order of motions that is lost

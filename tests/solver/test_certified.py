@@ -14,10 +14,10 @@ from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.certified import MAP_DEPTH, certified_map, keeps_order
 from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import Excitation, excitation
+from rbfrag.solver.linear_drive import linear_drive
 from rbfrag.solver.respond import simulate
 from rbfrag.solver.results import CriticalResult
 from rbfrag.solver.toppling import STABLE, TOPPLED
-from rbfrag.solver.upper_bound import linear_drive
 
 
 def noise(seed: int, npts: int = 900, dt_s: float = 0.01, pga_g: float = 0.6) -> GroundMotion:
