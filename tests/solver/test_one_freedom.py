@@ -188,6 +188,29 @@ def test_painleve() -> None:
     assert calm.started_s is None
 
 
+def test_an_end_nearer_to_the_limit_than_the_error_is_open() -> None:
+    # a pulse and a limit that the block reaches but for rounding, a little more, a little less
+    equation = Equation(inertia=constant(1.0), drive=constant(3.0), resistance=constant(0.7))
+    drive = excitation(
+        GroundMotion.from_nodes([0.0, 0.0, 0.3, 0.3, 9.0], [0.0, 0.6, 0.6, 0.0, 0.0])
+    )
+    reach = 0.5 * 1.1 * 0.3**2 + (1.1 * 0.3) ** 2 / (2.0 * 0.7)
+
+    def run(limit: float) -> Outcome:
+        phase = Phase(
+            name="moves",
+            forward=equation,
+            pose=lambda x: Pose(0.0, (x, 0.0), x),
+            after=lambda exit: Ending(Outcome.TOPPLED),
+            highest=limit,
+        )
+        return follow(Mechanism(first=phase, rotates=False, critical=None), drive).outcome
+
+    assert run(reach * (1.0 + 1e-9)) is Outcome.STABLE
+    assert run(reach * (1.0 - 1e-9)) is Outcome.TOPPLED
+    assert run(reach) is Outcome.UNDETERMINED
+
+
 FIFTH = '''
 """A block on a belt: a model of a test."""
 from rbfrag.solver.one_freedom.equation import Ending, Equation, Mechanism, Phase, Pose

@@ -161,6 +161,7 @@ def follow(
         else:
             following, ended = _end(phase, found, ended)
         if isinstance(following, Ending):
+            following = _doubted(following, phase, found)
             break
         if len(changes) >= PHASES_MAX:
             following = Ending(Outcome.UNDETERMINED, "the motion changes without end")
@@ -234,6 +235,21 @@ def _run(
             store,
         )
     )
+
+
+def _doubted(ending: Ending, phase: Phase, found: PhaseRun) -> Ending:
+    """Return the ending, or that it is open, where the limit is nearer than the error."""
+    falls_short = found.code == AT_REST and phase.highest - found.peak <= found.peak_error
+    just_arrives = False
+    if found.code == UPPER:
+        # how far it would have gone on, against what the position may be wrong by
+        strength = phase.forward.resistance(found.x) / phase.forward.inertia(found.x)
+        just_arrives = found.rate <= found.error_rate + math.sqrt(
+            2.0 * abs(strength) * found.error_x
+        )
+    if not (falls_short or just_arrives):
+        return ending
+    return Ending(Outcome.UNDETERMINED, Outcome.UNDETERMINED.advice)
 
 
 def _end(phase: Phase, found: PhaseRun, ended: float) -> tuple[Ending, float]:
