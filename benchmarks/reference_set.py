@@ -18,7 +18,7 @@ from collections import Counter, defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 
-from sqlalchemy import Connection, bindparam, delete, select, update
+from sqlalchemy import Connection, ScalarSelect, Table, bindparam, delete, select, update
 
 from benchmarks.page import ROOT
 from rbfrag.campaign.add_motions import AddReport, add_motions
@@ -37,6 +37,9 @@ from rbfrag.version import __version__
 
 MAP_DEPTH = 1e-3
 """Width of kr/PGA that the shipped maps leave undecided at a border: finer ones are too large."""
+
+CLEARANCE = 1e-6
+"""The critical island ends no further than this share above the critical value."""
 
 MOST_BYTES = 4_000_000
 
@@ -82,8 +85,9 @@ def show(progress: CampaignProgress) -> None:
 def reduce(full: Path, made: Path) -> None:
     """Copy the full database without samples, and with no more of each combination than it needs.
 
-    Of the maps the decided intervals are kept; what lies between them is undecided. Of the
-    simulations the critical block stays.
+    Of the maps the decided intervals are kept, below the critical value those that are no
+    narrower than MAP_DEPTH; what lies between them is undecided. Of the simulations the critical
+    block stays.
     """
     made.unlink(missing_ok=True)
     raw = sqlite3.connect(full)
@@ -93,15 +97,20 @@ def reduce(full: Path, made: Path) -> None:
         connection.execute(update(schema.motion).values(samples=None))
         connection.execute(delete(schema.response))
         interval, point = schema.outcome_interval, schema.simulation
-        connection.execute(delete(interval).where(interval.c.outcome == "undecided"))
-        critical = (
-            select(schema.combination.c.kr_over_pga)
-            .where(schema.combination.c.id == point.c.combination_id)
-            .scalar_subquery()
-        )
-        connection.execute(
-            delete(point).where((point.c.kr_over_pga != critical) | critical.is_(None))
-        )
+
+        def critical(row: Table) -> ScalarSelect[float]:
+            return (
+                select(schema.combination.c.kr_over_pga)
+                .where(schema.combination.c.id == row.c.combination_id)
+                .scalar_subquery()
+            )
+
+        narrow = interval.c.k_hi - interval.c.k_lo < MAP_DEPTH
+        below = interval.c.k_hi < (1.0 - CLEARANCE) * critical(interval)
+        undecided = interval.c.outcome == "undecided"
+        connection.execute(delete(interval).where(undecided | (narrow & below)))
+        here = critical(point)
+        connection.execute(delete(point).where((point.c.kr_over_pga != here) | here.is_(None)))
         rename(connection)
     raw = sqlite3.connect(made, isolation_level=None)
     raw.execute("PRAGMA journal_mode = DELETE")
@@ -206,9 +215,10 @@ builds the file and this page from the records.
   every horizontal motion, with and without the vertical motion of its recording, in both
   polarities, for $p^2$ = 30, 10, 3, 1, 0.3 and 0.1 1/s². {summary.certified:,} are certified.
 - {intervals:,} intervals of their maps: toppling and safe ones. What lies between two of them is
-  undecided, and so is what lies below the lowest; borders were closed in on to {MAP_DEPTH:g} of
-  $k_r/\\mathrm{{PGA}}$, the critical value itself as everywhere. The setting `map` is `decided`,
-  and the natural keys say so too.
+  undecided, and so is what lies below the lowest. Borders below the critical value were closed in
+  on to {MAP_DEPTH:g} of $k_r/\\mathrm{{PGA}}$, and intervals narrower than that are left out; the
+  critical value itself is as exact as everywhere. The setting `map` is `decided`, and the natural
+  keys say so too.
 - Of the simulations the critical block of each combination; the search itself was made with all.
 - {len(added.added) + len(added.known)} motions with their intensity measures, the hash of their
   samples, their earthquake, and what was done to them: uncorrected records were filtered as
