@@ -83,3 +83,25 @@ def set_default_model(name: Name, db: options.Db = None) -> None:
     with opened_database(db) as engine, engine.begin() as connection:
         set_default(connection, name)
     print(f"{name} is the default model now")
+
+
+@app.command("check", epilog="Example:  rbfrag models check")
+def check(db: options.Db = None, json: options.Json = False) -> None:
+    """Say whether the data of each model have changed since it was fitted.
+
+    The exit status is 1 if any have, or if a model cannot be read.
+    """
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.model_store import model_rows
+    from rbfrag.fragility.model_check import check_models
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        found = check_models(connection, model_rows(connection))
+    if json:
+        print_json([each.as_dict() for each in found])
+    else:
+        print_table(
+            ("model", "data", "remark"), [(each.name, each.state, each.remark) for each in found]
+        )
+    if any(each.state in ("changed", "unreadable") for each in found):
+        raise typer.Exit(1)

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.fragility.binomial import cr3
+
 FloatArray = NDArray[np.float64]
 
 TOLERANCE = 1e-10
@@ -77,7 +79,7 @@ def clustered_covariance(data: CensoredData, parameters: FloatArray) -> FloatArr
     """Return the covariance of (beta, ln sigma), clustered by earthquake.
 
     The sandwich of observed information and scores summed by earthquake, with the correction
-    G/(G-1)·(n-1)/(n-k) of :func:`rbfrag.fragility.binomial.clustered_covariance`.
+    CR1, G/(G-1)·(n-1)/(n-k), as :func:`rbfrag.fragility.binomial.fit_by_statsmodels`.
     """
     theta = _to_olsen(parameters)
     scores, information = _derivatives(theta, data, np.ones(data.y.size))
@@ -85,23 +87,42 @@ def clustered_covariance(data: CensoredData, parameters: FloatArray) -> FloatArr
     g, n, k = int(np.unique(data.event).size), data.y.size, theta.size
     bread = np.linalg.inv(information)
     middle = bread @ (summed.T @ summed) @ bread
+    jacobian = _to_natural(theta)
+    factor = g / (g - 1.0) * (n - 1.0) / (n - k)
+    return np.asarray(factor * jacobian @ middle @ jacobian.T)
+
+
+def jackknife_covariance(data: CensoredData, parameters: FloatArray) -> FloatArray:
+    """Return the covariance of (beta, ln sigma) from leaving out each earthquake (CR3).
+
+    As :func:`rbfrag.fragility.binomial.jackknife_covariance`, with the observed information.
+    """
+    theta = _to_olsen(parameters)
+    ones = np.ones(data.y.size)
+    _, information = _derivatives(theta, data, ones)
+    steps = []
+    for event in np.unique(data.event):
+        own = data.event == event
+        scores, part = _derivatives(theta, data.only(own), ones[own])
+        steps.append(np.linalg.lstsq(information - part, scores.sum(axis=0), rcond=None)[0])
+    jacobian = _to_natural(theta)
+    return np.asarray(jacobian @ cr3(np.array(steps)) @ jacobian.T)
+
+
+def _to_natural(theta: FloatArray) -> FloatArray:
+    k = theta.size
     jacobian = np.zeros((k, k))
     jacobian[:-1, :-1] = np.eye(k - 1) / theta[-1]
     jacobian[:-1, -1] = -theta[:-1] / theta[-1] ** 2
     jacobian[-1, -1] = -1.0 / theta[-1]
-    factor = g / (g - 1.0) * (n - 1.0) / (n - k)
-    return np.asarray(factor * jacobian @ middle @ jacobian.T)
+    return jacobian
 
 
 def naive_covariance(data: CensoredData, parameters: FloatArray) -> FloatArray:
     """Return the inverse of the observed information in (beta, ln sigma)."""
     theta = _to_olsen(parameters)
     _, information = _derivatives(theta, data, np.ones(data.y.size))
-    k = theta.size
-    jacobian = np.zeros((k, k))
-    jacobian[:-1, :-1] = np.eye(k - 1) / theta[-1]
-    jacobian[:-1, -1] = -theta[:-1] / theta[-1] ** 2
-    jacobian[-1, -1] = -1.0 / theta[-1]
+    jacobian = _to_natural(theta)
     return np.asarray(jacobian @ np.linalg.inv(information) @ jacobian.T)
 
 

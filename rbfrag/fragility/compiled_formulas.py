@@ -20,9 +20,9 @@ _PARTS = (
     "bound",
     "features",
     "score",
-    "probability",
     "standard_error",
     "least_width",
+    "interval",
     "answer",
     "is_plain",
 )
@@ -41,7 +41,7 @@ _parts = _compiled_parts()
 _bound = _parts["bound"]
 _features = _parts["features"]
 _score = _parts["score"]
-_probability = _parts["probability"]
+_interval = _parts["interval"]
 _answer = _parts["answer"]
 _is_plain = _parts["is_plain"]
 
@@ -100,7 +100,8 @@ def probabilities(
         if _bound(shape, y[i], p[i], x[i], pga_g[i]) != 0:
             out[i] = 0.0
         else:
-            out[i] = _probability(link, _score(shape, b, y[i], p[i], x[i], pga_g[i], tm_s[i])[0])
+            eta = _score(shape, b, y[i], p[i], x[i], pga_g[i], tm_s[i])[0]
+            out[i] = _interval(link, eta, 0.0)[0]
 
 
 @kernel

@@ -91,6 +91,7 @@ EXPONENTS = frozenset({"m_minus_1", "b_ln_p"})
 """Parameters of models whose exponent M was estimated: P then depends on p beside y."""
 
 _ROOT_HALF = math.sqrt(0.5)
+_FAR = 700.0  # beyond it exp leaves the range of numbers
 
 
 def bound(shape: int, y: float, p: float, x: float, pga_g: float) -> int:
@@ -179,20 +180,6 @@ def score(
     return eta, f0, f1, f2, f3, f4, f5
 
 
-def probability(link: int, eta: float) -> float:
-    """Return P = F(eta): normal, logistic, exp(-exp(-eta)) or 1 - exp(-eta)."""
-    if link == NORMAL:
-        return 0.5 * math.erfc(-eta * _ROOT_HALF)
-    if link == LOGIT:
-        if eta >= 0.0:
-            return 1.0 / (1.0 + math.exp(-eta if eta < 700.0 else -700.0))
-        odds = math.exp(eta if eta > -700.0 else -700.0)
-        return odds / (1.0 + odds)
-    if link == LOGLOG:
-        return math.exp(-math.exp(-eta if eta > -700.0 else 700.0))
-    return -math.expm1(-eta) if eta > 0.0 else 0.0
-
-
 def standard_error(
     v: Sequence[float], f0: float, f1: float, f2: float, f3: float, f4: float, f5: float
 ) -> float:
@@ -219,7 +206,14 @@ def standard_error(
 
 
 def least_width(floor: Sequence[float], eta: float) -> float:
-    """Return the least width of the interval over its quantile at eta, linear between nodes."""
+    """Return the least width of an interval over its quantile, linear between nodes.
+
+    Args:
+        floor: its values at the nodes; empty for none.
+        eta: where.
+    """
+    if len(floor) == 0:
+        return 0.0
     place = (eta - FLOOR_FROM) / FLOOR_STEP
     if not place > 0.0:
         return floor[0]
@@ -227,6 +221,32 @@ def least_width(floor: Sequence[float], eta: float) -> float:
         return floor[FLOOR_NODES - 1]
     node = int(place)
     return floor[node] + (place - node) * (floor[node + 1] - floor[node])
+
+
+def interval(link: int, eta: float, reach: float) -> tuple[float, float, float]:
+    """Return F(eta), F(eta - reach) and F(eta + reach), reach >= 0.
+
+    F is the normal distribution function, the logistic function, exp(-exp(-eta)) or
+    1 - exp(-eta).
+    """
+    if link == NORMAL:
+        return (
+            0.5 * math.erfc(-eta * _ROOT_HALF),
+            0.5 * math.erfc((reach - eta) * _ROOT_HALF),
+            0.5 * math.erfc((-eta - reach) * _ROOT_HALF),
+        )
+    if link == COMPLEMENT:
+        low, high = eta - reach, eta + reach
+        return (
+            -math.expm1(-eta) if eta > 0.0 else 0.0,
+            -math.expm1(-low) if low > 0.0 else 0.0,
+            -math.expm1(-high) if high > 0.0 else 0.0,
+        )
+    falling = math.exp(-min(max(eta, -_FAR), _FAR))
+    spread = math.exp(min(reach, _FAR))
+    if link == LOGIT:
+        return 1.0 / (1.0 + falling), 1.0 / (1.0 + falling * spread), 1.0 / (1.0 + falling / spread)
+    return math.exp(-falling), math.exp(-falling * spread), math.exp(-falling / spread)
 
 
 def answer(
@@ -249,7 +269,7 @@ def answer(
         link: one of NORMAL … COMPLEMENT.
         b: six parameters.
         v: their covariance as for :func:`standard_error`.
-        floor: least widths as for :func:`least_width`; empty for none.
+        floor: least widths as for :func:`least_width`.
         half_width: quantile of the confidence level.
         y: toppling velocity of the block [m/s], > 0.
         p: its frequency parameter [1/s].
@@ -261,17 +281,16 @@ def answer(
         return 0.0, 0.0, 0.0
     eta, f0, f1, f2, f3, f4, f5 = score(shape, b, y, p, x, pga_g, tm_s)
     reach = half_width * standard_error(v, f0, f1, f2, f3, f4, f5)
-    middle = probability(link, eta)
-    low, high = probability(link, eta - reach), probability(link, eta + reach)
-    if len(floor) > 0:
-        lacking = half_width * least_width(floor, eta) - (high - low)
-        if lacking > 0.0:
-            low, high = low - 0.5 * lacking, high + 0.5 * lacking
-            if low < 0.0:
-                low, high = 0.0, high - low
-            elif high > 1.0:
-                low, high = low - (high - 1.0), 1.0
-            low, high = max(low, 0.0), min(high, 1.0)
+    middle, low, high = interval(link, eta, reach)
+    lacking = half_width * least_width(floor, eta) - (high - low)
+    if lacking > 0.0:
+        # in proportion to the room on either side, which keeps within 0 and 1
+        low, high = low - lacking * middle, high + lacking * (1.0 - middle)
+        if low < 0.0:
+            low, high = 0.0, high - low
+        elif high > 1.0:
+            low, high = low - (high - 1.0), 1.0
+        low, high = max(low, 0.0), min(high, 1.0)
     return middle, low, high
 
 

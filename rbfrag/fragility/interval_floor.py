@@ -154,4 +154,4 @@ def _table(eta: FloatArray, width: FloatArray) -> list[float]:
     by_cell = np.zeros(formulas.FLOOR_NODES + 1)
     np.maximum.at(by_cell, cell, width[known])
     # A line between nodes is nowhere below a cell whose two ends are not.
-    return [float(width) for width in np.maximum(by_cell[:-1], by_cell[1:])]
+    return [float(each) for each in np.maximum(by_cell[:-1], by_cell[1:])]

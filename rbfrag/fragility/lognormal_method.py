@@ -10,6 +10,7 @@ from rbfrag.errors import FitError
 from rbfrag.fragility.censored_normal import (
     CensoredData,
     clustered_covariance,
+    jackknife_covariance,
     log_density,
     maximise,
     naive_covariance,
@@ -58,7 +59,8 @@ def fit_lognormal(
         )
     order = [0, 1, 3, 2] if estimate_m else [0, 1, 2]  # ln sigma stands before M - 1
     names = ["ln_median", "slope", "ln_sigma", "m_minus_1"][: parameters.size]
-    covariance = clustered_covariance(points, parameters)[np.ix_(order, order)]
+    covariance = jackknife_covariance(points, parameters)[np.ix_(order, order)]
+    cr1 = np.sqrt(np.diag(clustered_covariance(points, parameters)))[order]
     naive = np.sqrt(np.diag(naive_covariance(points, parameters)))[order]
     samples = _bootstrap(points, parameters, seed)[:, order]
     errors = np.sqrt(np.diag(covariance))
@@ -92,8 +94,9 @@ def fit_lognormal(
             "sigma_ln": float(np.exp(parameters[-1])),
             "exponent_m_estimated": estimate_m,
             "standard_error_kinds": dict.fromkeys(
-                names, "clustered by earthquake, CR1: G/(G-1) (n-1)/(n-k)"
+                names, "clustered by earthquake, CR3 (each earthquake left out in turn)"
             ),
+            "cr1_standard_errors": dict(zip(names, cr1.tolist(), strict=True)),
             "naive_standard_errors": dict(zip(names, naive.tolist(), strict=True)),
             "bootstrap": {
                 "standard_errors": dict(

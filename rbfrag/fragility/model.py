@@ -31,8 +31,11 @@ MEANINGS: Mapping[str, str] = {
 }
 """What the probability of each method is a probability of."""
 
-METHODS_BEST_FIRST = ("record", "power", "bounded", "weibull", "logistic", "lognormal", "wls")
+METHODS_BEST_FIRST = ("record", "bounded", "weibull", "power", "logistic", "lognormal", "wls")
 """The methods by falling skill on held-out earthquakes (docs/theory/model-choice.md)."""
+
+BEST_ON_PGV = ("weibull", "bounded", "logistic", "lognormal", "wls")
+"""The same for PGV alone, where the third parameter of `bounded` gains nothing."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class FragilityModel:
         parameters: values of the coefficients, without those that the model does not have.
         padded: the six parameters of the formula.
         packed_covariance: the 21 numbers of :func:`rbfrag.fragility.formulas.standard_error`.
-        floor: least widths of the interval, or empty.
+        floor: least widths of the interval over its quantile, or empty.
         limits: edges of the fitted ranges for :func:`rbfrag.fragility.formulas.is_plain`.
         limits_with_both: the same where PGV and PGA are both given, with the range of PGV/PGA
             that earthquakes have.
@@ -101,7 +104,7 @@ class FragilityModel:
             )
         floor = row.diagnostics.get("interval_floor") or ()
         if not isinstance(floor, list | tuple) or len(floor) not in (0, formulas.FLOOR_NODES):
-            raise ModelError(f"model {row.name!r} holds a torn table of widths: fit it again")
+            raise ModelError(f"model {row.name!r} holds a torn table of least widths: fit it again")
         limits = tuple(
             edge
             for variable in ("p2", "intensity_m_s", "y_m_s", "tm_s", "pgv_over_pga_s")

@@ -12,7 +12,7 @@ from rbfrag.db.location import locate, reference_file
 from rbfrag.db.model_record import unknown_model
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.fragility.model import METHODS_BEST_FIRST, FragilityModel
+from rbfrag.fragility.model import BEST_ON_PGV, METHODS_BEST_FIRST, FragilityModel
 from rbfrag.fragility.terms import TERMS, terms_from
 
 _BLOCK = ("p2", "kr")
@@ -117,7 +117,8 @@ _ASKED = ("pgv", "pga_tm", "pgd_tm")
 
 
 def _merit(model: FragilityModel) -> tuple[bool, int]:
-    return model.row.is_default, -METHODS_BEST_FIRST.index(model.row.method)
+    order = BEST_ON_PGV if model.term.name == "pgv" else METHODS_BEST_FIRST
+    return model.row.is_default, -order.index(model.row.method)
 
 
 def _measures(given: Collection[str]) -> list[str]:

@@ -17,8 +17,8 @@ from rbfrag.errors import FitError
 from rbfrag.fragility import formulas
 from rbfrag.fragility.binomial import (
     BinomialData,
-    clustered_covariance,
     fit_by_statsmodels,
+    jackknife_covariance,
     maximum_likelihood,
     newton,
 )
@@ -33,7 +33,8 @@ FloatArray = NDArray[np.float64]
 
 REPLICATES = 200
 FEWEST_FAILURES = 20
-_LINKS = {link.code: link for link in (LOGIT, LOGLOG, COMPLEMENT)}
+LINKS_BY_CODE = {link.code: link for link in (LOGIT, LOGLOG, COMPLEMENT)}
+"""The links by their numbers in the formulas."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,7 @@ def fit_outcomes(
             f"method {method} fits what blocks did, and no outcomes are stored: run  rbfrag "
             "simulate  again, which adds the maps of outcomes, or fit --method wls or lognormal"
         )
-    shape, link = formulas.SHAPES[method, term.name], _LINKS[formulas.LINKS[method]]
+    shape, link = formulas.SHAPES[method, term.name], LINKS_BY_CODE[formulas.LINKS[method]]
     names = formulas.PARAMETERS[shape][: None if shape != formulas.RATIO or estimate_m else 2]
     rows = outcome_rows(data, shape, len(names))
     toppled = int((rows.data.outcome > 0.5).sum())
@@ -83,9 +84,10 @@ def fit_outcomes(
             f"{toppled} outcomes on the grid toppled; a fit needs {FEWEST_FAILURES}: add stronger "
             "motions or more block sizes (p²)"
         )
-    parameters, covariance, naive = fit_by_statsmodels(rows.data, link)
+    parameters, cr1, naive = fit_by_statsmodels(rows.data, link)
+    covariance = jackknife_covariance(rows.data, link, parameters)
     in_sample = _on_grid(rows, link, parameters, data.topples.shape)
-    held_out, left_out = _held_out(rows, link, parameters, data.topples.shape)
+    held_out = _held_out(rows, link, parameters, data.topples.shape)
     samples = _bootstrap(rows.data, link, parameters, seed)
     seen = outcomes_of(data)
     errors = np.sqrt(np.diag(covariance))
@@ -95,7 +97,6 @@ def fit_outcomes(
     scatter = nested_scatter(
         residual[usable], data.event[data.found][usable], data.motion[data.found][usable]
     )
-    jackknife = _jackknife(left_out, parameters)
     return MethodResult(
         coefficients=dict(zip(names, parameters.tolist(), strict=True)),
         covariance=tuple(tuple(line) for line in covariance.tolist()),
@@ -110,12 +111,12 @@ def fit_outcomes(
             "n_bounded": int(rows.bounded.sum()),
             "n_bounded_toppled": rows.bounded_toppled,
             "standard_error_kinds": dict.fromkeys(
-                names, "clustered by earthquake, CR1: G/(G-1) (n-1)/(n-k)"
+                names, "clustered by earthquake, CR3 (each earthquake left out in turn)"
             ),
+            "cr1_standard_errors": dict(zip(names, np.sqrt(np.diag(cr1)).tolist(), strict=True)),
             "naive_standard_errors": dict(
                 zip(names, np.sqrt(np.diag(naive)).tolist(), strict=True)
             ),
-            "jackknife_standard_errors": dict(zip(names, jackknife.tolist(), strict=True)),
             "bootstrap": {
                 "standard_errors": dict(
                     zip(names, samples.std(axis=0, ddof=1).tolist(), strict=True)
@@ -141,11 +142,11 @@ def fit_parameters(
     """
     if not data.has_outcomes:
         raise FitError("no outcomes are stored")
-    shape, link = formulas.SHAPES[method, term.name], _LINKS[formulas.LINKS[method]]
+    shape, link = formulas.SHAPES[method, term.name], LINKS_BY_CODE[formulas.LINKS[method]]
     names = formulas.PARAMETERS[shape]
     rows = outcome_rows(data, shape, len(names))
     parameters = maximum_likelihood(rows.data, link)
-    return names, parameters, clustered_covariance(rows.data, link, parameters)
+    return names, parameters, jackknife_covariance(rows.data, link, parameters)
 
 
 def outcome_rows(data: FitData, shape: int, k: int) -> OutcomeRows:
@@ -243,19 +244,13 @@ def _on_grid(
 
 def _held_out(
     rows: OutcomeRows, link: Link, parameters: FloatArray, shape: tuple[int, ...]
-) -> tuple[FloatArray, FloatArray]:
-    grid, fits = np.zeros(shape), []
+) -> FloatArray:
+    grid = np.zeros(shape)
     for event in np.unique(rows.data.event):
         own = rows.data.event == event
         b, _ = newton(rows.data.only(~own), link, parameters, tolerance=1e-9)
         grid.flat[rows.place[own]] = link.probability(rows.data.columns[own] @ b)
-        fits.append(b)
-    return grid, np.array(fits)
-
-
-def _jackknife(left_out: FloatArray, parameters: FloatArray) -> FloatArray:
-    g = left_out.shape[0]
-    return np.asarray(np.sqrt((g - 1.0) / g * ((left_out - parameters) ** 2).sum(axis=0)))
+    return grid
 
 
 def _bootstrap(data: BinomialData, link: Link, parameters: FloatArray, seed: int) -> FloatArray:

@@ -1,0 +1,132 @@
+"""How fast `predict` answers:  python -m benchmarks.predict_speed --db DATABASE
+
+Shell: median of paired runs of `rbfrag predict` and `python -c "import typer"`, in turn.
+Python: a scalar call with the model in hand, and with the database's path, in CPU time.
+Arrays: ten million rows, against one pass of `scipy.special.ndtr` over the same array.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from statistics import median
+
+import numpy as np
+from scipy.special import ndtr
+
+from benchmarks.page import ROOT, parser, report
+from rbfrag.campaign.bench.tables import markdown
+from rbfrag.fragility.model_lookup import suited_models
+from rbfrag.fragility.prediction import predict
+
+BLOCK = {"p2": 3.0, "kr": 0.1}
+KNOWN: tuple[dict[str, float], ...] = (
+    {"pgv_m_s": 0.6},
+    {"pgv_m_s": 0.6, "pga_g": 0.5},
+    {"pgv_m_s": 0.6, "pga_g": 0.5, "tm_s": 0.6},
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure and report."""
+    options = parser(__doc__)
+    options.add_argument("--db", required=True, help="database with fitted models")
+    options.add_argument("--rows", type=int, default=10_000_000)
+    options.add_argument("--repeat", type=int, default=21)
+    chosen = options.parse_args(arguments)
+    cells = [shell(chosen.db, chosen.repeat)]
+    for known in KNOWN:
+        cells += scalar(chosen.db, known)
+        cells.append(array(chosen.db, known, chosen.rows))
+    head = ["what", "time", "compared with", "time", "ratio"]
+    report("predict-speed", markdown((head, cells)), write=chosen.write)
+
+
+def shell(db: str, repeat: int) -> list[str]:
+    """Return the row of the shell."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    ask = "import sys; sys.argv[0] = 'rbfrag'; from rbfrag.cli.start import run; run()"
+    options = ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--db", db]
+    commands = (
+        [sys.executable, "-c", ask, "predict", *options],
+        [sys.executable, "-c", "import typer"],
+    )
+    times: tuple[list[float], list[float]] = ([], [])
+    for _ in range(repeat + 1):
+        for command, found in zip(commands, times, strict=True):
+            before = time.perf_counter()
+            subprocess.run(command, check=True, env=environment, capture_output=True)
+            found.append(time.perf_counter() - before)
+    ours, typer = (median(found[1:]) for found in times)
+    return [
+        "`rbfrag predict` from the shell, median wall time",
+        f"{1e3 * ours:.0f} ms",
+        '`python -c "import typer"`',
+        f"{1e3 * typer:.0f} ms",
+        f"{ours / typer:.2f}",
+    ]
+
+
+def scalar(db: str, known: dict[str, float]) -> list[list[str]]:
+    """Return the rows of a call with single numbers."""
+    model = suited_models({**BLOCK, **known}, db)[0]
+    words = f"{model.name}"
+    rows = []
+    for name, call in (
+        ("model in hand", lambda: predict(3.0, 0.1, **known, model=model)),
+        ("database by path", lambda: predict(3.0, 0.1, **known, db=db)),
+    ):
+        rows.append(
+            [f"one block, {words}, {name}", f"{1e6 * least(call, 2000):.1f} µs", "", "", ""]
+        )
+    return rows
+
+
+def array(db: str, known: dict[str, float], rows: int) -> list[str]:
+    """Return the row of an array."""
+    random = np.random.default_rng(0)
+    model = suited_models({**BLOCK, **known}, db)[0]
+    p2 = np.exp(random.uniform(np.log(0.1), np.log(30.0), rows))
+    columns = {
+        name: value * np.exp(random.uniform(-0.4, 0.4, rows)) for name, value in known.items()
+    }
+    kr = columns["pgv_m_s"] * np.sqrt(p2) / 9.80665 * np.exp(random.uniform(-1.5, 0.3, rows))
+    kr = np.minimum(kr, 0.99 * columns["pga_g"]) if "pga_g" in columns else kr
+    predict(p2[:100], kr[:100], **{n: v[:100] for n, v in columns.items()}, model=model)
+    wall, cpu, ndtr_wall, ndtr_cpu = [], [], [], []
+    for _ in range(3):
+        start, used = time.perf_counter(), time.process_time()
+        predict(p2, kr, **columns, model=model)
+        wall.append(time.perf_counter() - start)
+        cpu.append(time.process_time() - used)
+        start, used = time.perf_counter(), time.process_time()
+        ndtr(np.log(kr))
+        ndtr_wall.append(time.perf_counter() - start)
+        ndtr_cpu.append(time.process_time() - used)
+    ratio = median(a / b for a, b in zip(wall, ndtr_wall, strict=True))
+    of_cpu = median(a / b for a, b in zip(cpu, ndtr_cpu, strict=True))
+    return [
+        f"{rows:,} blocks, {model.name}, wall (processor)",
+        f"{median(wall):.2f} s ({median(cpu):.2f} s)",
+        "`scipy.special.ndtr` of as many",
+        f"{median(ndtr_wall):.2f} s",
+        f"{ratio:.2f} ({of_cpu:.2f})",
+    ]
+
+
+def least(call: Callable[[], object], count: int) -> float:
+    """Return the least mean processor time of five series of calls [s]."""
+    found = []
+    for _ in range(5):
+        before = time.process_time()
+        for _ in range(count):
+            call()
+        found.append((time.process_time() - before) / count)
+    return min(found)
+
+
+if __name__ == "__main__":
+    main()

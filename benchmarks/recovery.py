@@ -1,0 +1,115 @@
+"""Whether fits find the truth and say how sure they are:  python -m benchmarks.recovery
+
+Outcomes and critical values are drawn from known models, with scatter that earthquakes share,
+for as many earthquakes as the reference set has (47). Each method is fitted to each draw. The
+table counts how often the 95 % intervals (Student's t with 46 degrees of freedom times the
+clustered standard error) hold the truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.page import parser, report
+from rbfrag.campaign.bench.tables import markdown
+from rbfrag.fragility import formulas, outcome_method
+from rbfrag.fragility.censored_normal import CensoredData, jackknife_covariance, maximise
+from rbfrag.fragility.fit_data import fit_data
+from rbfrag.fragility.quantiles import student_half_width
+from rbfrag.fragility.terms import TERMS
+from rbfrag.fragility.variance import Bins
+from rbfrag.fragility.wls import clustered_line, iterate
+from tests.fragility.conftest import critical_values
+from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
+
+EVENTS = 47
+SHARED = 0.1
+
+FloatArray = NDArray[np.float64]
+
+
+def outcomes(method: str, term: str, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return estimate, standard errors and truth of one draw of outcomes."""
+    truth = np.array(TRUTH[method, term])
+    source = drawn_outcomes(
+        method, term, TRUTH[method, term], events=EVENTS, motions=2, shared=SHARED, seed=seed
+    )
+    data = fit_data(source, TERMS[term])
+    shape = formulas.SHAPES[method, term]
+    rows = outcome_method.outcome_rows(data, shape, truth.size)
+    link = outcome_method.LINKS_BY_CODE[formulas.LINKS[method]]
+    b = outcome_method.maximum_likelihood(rows.data, link)
+    covariance = outcome_method.jackknife_covariance(rows.data, link, b)
+    return b, np.sqrt(np.diag(covariance)), truth
+
+
+def lognormal(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return estimate, standard errors and truth of one censored lognormal draw."""
+    random = np.random.default_rng(seed)
+    truth = np.array([-0.4, 0.95, np.log(0.29)])
+    event = np.repeat(np.arange(EVENTS), 24)
+    x = random.normal(-1.5, 1.0, event.size)
+    noise = np.sqrt(0.2) * random.normal(size=EVENTS)[event]
+    noise += np.sqrt(0.8) * random.normal(size=event.size)
+    y = truth[0] + truth[1] * x + np.exp(truth[2]) * noise
+    limit = truth[0] + truth[1] * x - 0.4
+    found = y > limit
+    points = CensoredData(
+        np.column_stack([np.ones(x.size), x]),
+        np.where(found, y, limit),
+        found,
+        event.astype(np.intp),
+    )
+    b = maximise(points)
+    return b, np.sqrt(np.diag(jackknife_covariance(points, b))), truth
+
+
+def straight_line(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return estimate, standard errors and truth of the line of one heteroscedastic draw."""
+    table = critical_values(events=EVENTS, motions=2, event_share=0.3, seed=seed)
+    order = np.argsort(table.pgv_m_s)
+    x, y = table.pgv_m_s[order], table.y_m_s[order]
+    events = np.unique(table.event_id[order].astype(str), return_inverse=True)[1].astype(np.intp)
+    fit = iterate(Bins.equal_count(x), y, np.ones(x.size), 1)
+    weights = 1.0 / (fit.parameters[2] + fit.parameters[3] * x)
+    line, covariance, _ = clustered_line(x, y, weights, events)
+    return line, np.sqrt(np.diag(covariance)), np.array([0.002, 0.72])
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Count and report."""
+    options = parser(__doc__)
+    options.add_argument("--replications", type=int, default=500)
+    chosen = options.parse_args(arguments)
+    half_width = student_half_width(0.95, EVENTS - 1)
+    draws = {f"{method}-{term}": (method, term) for method, term in TRUTH}
+    cells = []
+    for name in ("wls-pgv", "lognormal", *draws):
+        found = []
+        for seed in range(chosen.replications):
+            if name in draws:
+                b, error, truth = outcomes(*draws[name], seed)
+            else:
+                b, error, truth = (straight_line if name == "wls-pgv" else lognormal)(seed)
+            found.append((b - truth) / error)
+        z = np.array(found)
+        covered = (np.abs(z) <= half_width).mean(axis=0)
+        cells.append([
+            name,
+            str(chosen.replications),
+            ", ".join(f"{100 * share:.1f} %" for share in covered),
+            ", ".join(f"{mean:+.2f}" for mean in z.mean(axis=0)),
+            f"{np.abs(z).max():.1f}",
+            f"{100 * (np.abs(z) > 3).mean():.2f} %",
+        ])  # fmt: skip
+        print(cells[-1], flush=True)
+    head = ["method", "draws", "95 % intervals that hold the truth, by parameter",
+            "mean error in standard errors", "worst", "beyond 3"]  # fmt: skip
+    report("recovery", markdown((head, cells)), write=chosen.write)
+
+
+if __name__ == "__main__":
+    main()

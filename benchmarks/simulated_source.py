@@ -1,0 +1,108 @@
+"""Critical values, spectra and outcomes of all motions of a database, simulated directly.
+
+A campaign with maps gives the same; here every block of the grid is run for itself, those below
+the search limit too, and nothing is stored but a file of arrays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from rbfrag.campaign.plan import DEFAULT_P2
+from rbfrag.db.engine import opened_database
+from rbfrag.db.motion_store import load_motion, motion_rows
+from rbfrag.db.rows import CombinationTable
+from rbfrag.db.vertical_pairs import load_vertical
+from rbfrag.fragility.scores import GRID_OF_Y0_OVER_PGV
+from rbfrag.fragility.source import FitSource
+from rbfrag.motions.polarity import Polarity
+from rbfrag.motions.toppling_spectrum import toppling_spectrum
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.critical import critical
+from rbfrag.solver.excitation import excitation
+from rbfrag.solver.respond import runner
+from rbfrag.solver.toppling import TOPPLED
+
+POLARITIES: tuple[Polarity, ...] = ("forward", "reverse")
+
+
+def simulated_source(database: str, *, vertical: bool, cache: Path | None = None) -> FitSource:
+    """Return the source of every horizontal motion, both polarities and the usual six p².
+
+    Args:
+        database: database with motions and their samples.
+        vertical: with the vertical motion of the recording; motions without one are left out.
+        cache: file that keeps the answer from one run of a study to the next.
+    """
+    if cache is not None and cache.exists():
+        return _from_file(cache)
+    columns: dict[str, list[object]] = {field.name: [] for field in fields(CombinationTable)}
+    spectra, outcomes = [], []
+    with opened_database(database, read_only=True) as engine, engine.connect() as connection:
+        for row in motion_rows(connection):
+            if row.is_vertical:
+                continue
+            motion = load_motion(connection, row.id)
+            upward = load_vertical(connection, row.id) if vertical else None
+            if vertical and upward is None:
+                continue
+            for polarity in POLARITIES:
+                drive = excitation(motion, upward, polarity)
+                for p2 in DEFAULT_P2:
+                    found = critical(motion, p2=p2, vertical=upward, polarity=polarity)
+                    y0 = row.pgv_m_s * GRID_OF_Y0_OVER_PGV
+                    run = runner(drive, p2=p2, linear=False)
+                    outcomes.append([
+                        float(run(float(y) * p2**0.5 / STANDARD_GRAVITY_M_S2).outcome == TOPPLED)
+                        for y in y0
+                    ])  # fmt: skip
+                    spectra.append(toppling_spectrum(motion, p2, polarity))
+                    values = {
+                        "combination_id": len(spectra),
+                        "motion_id": row.id,
+                        "event_id": row.event_id,
+                        "event_guessed": row.event_guessed,
+                        "polarity": polarity,
+                        "p2": p2,
+                        "status": found.status,
+                        "search_limit": found.search_limit,
+                        "kr_over_pga": found.kr_over_pga,
+                        "kr": found.kr,
+                        "y_m_s": found.y_m_s,
+                        "pga_g": row.pga_g,
+                        "pgv_m_s": row.pgv_m_s,
+                        "pgd_m": row.pgd_m,
+                        "tm_s": row.tm_s,
+                        "natural_key": f"{row.sha256} {polarity} {p2:g} {vertical}",
+                    }
+                    for name, value in values.items():
+                        columns[name].append(value)
+    texts = ("event_id", "polarity", "status", "natural_key")
+    kinds = {"combination_id": np.int64, "motion_id": np.int64, "event_guessed": np.bool_}
+    arrays = {
+        name: np.array(
+            [np.nan if v is None else v for v in column],
+            dtype=object if name in texts else kinds.get(name, np.float64),
+        )
+        for name, column in columns.items()
+    }
+    source = FitSource(
+        CombinationTable(**arrays),
+        np.array(spectra, dtype=np.float64),
+        np.array(outcomes, dtype=np.float64).reshape(-1, GRID_OF_Y0_OVER_PGV.size),
+    )
+    if cache is not None:
+        flat = {name: a.astype(str) if a.dtype == object else a for name, a in arrays.items()}
+        np.savez_compressed(cache, xp_m_s=source.xp_m_s, topples=source.topples, **flat)  # type: ignore[arg-type]
+    return source
+
+
+def _from_file(cache: Path) -> FitSource:
+    with np.load(cache) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    xp_m_s, topples = arrays.pop("xp_m_s"), arrays.pop("topples")
+    table = {n: a.astype(object) if a.dtype.kind == "U" else a for n, a in arrays.items()}
+    return FitSource(CombinationTable(**table), xp_m_s, topples)

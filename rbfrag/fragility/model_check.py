@@ -1,0 +1,69 @@
+"""Whether the data that a model was fitted on are still those of the database."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, cast
+
+from rbfrag.db.rows import ModelRow
+from rbfrag.errors import FitError, InputError, ModelError
+from rbfrag.fragility.fit_data import fit_data
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.source import FitSource, read_source
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection
+
+    from rbfrag.db.queries import Vertical
+
+State = Literal["unchanged", "changed", "no data", "unreadable"]
+
+
+@dataclass(frozen=True)
+class ModelCheck:
+    """What became of one model's data.
+
+    Args:
+        name: the model.
+        state: ``unchanged``; ``changed`` (fit it again); ``no data`` (the database holds models
+            without the data they came from, as a reference does); ``unreadable``.
+        remark: what changed or why it cannot be told; empty if unchanged.
+    """
+
+    name: str
+    state: State
+    remark: str
+
+    def as_dict(self) -> dict[str, str]:
+        """Return the fields by name."""
+        return {"name": self.name, "state": self.state, "remark": self.remark}
+
+
+def check_models(connection: Connection, rows: list[ModelRow]) -> list[ModelCheck]:
+    """Compare the fingerprint of each model with that of the data its fit would read today."""
+    sources: dict[tuple[str | None, str], FitSource] = {}
+    return [_check(connection, row, sources) for row in rows]
+
+
+def _check(
+    connection: Connection, row: ModelRow, sources: dict[tuple[str | None, str], FitSource]
+) -> ModelCheck:
+    try:
+        model = FragilityModel.from_row(row)
+    except ModelError as error:
+        return ModelCheck(row.name, "unreadable", str(error))
+    suite = cast("str | None", row.diagnostics.get("suite"))
+    vertical = str(row.diagnostics.get("vertical", "without"))
+    key = (suite, vertical)
+    try:
+        if key not in sources:
+            kind = cast("Vertical", vertical)
+            sources[key] = read_source(connection, suite=suite, vertical=kind)
+        data = fit_data(sources[key], model.term)
+    except (FitError, InputError) as error:
+        return ModelCheck(row.name, "no data", str(error))
+    if data.fingerprint == row.data_fingerprint:
+        return ModelCheck(row.name, "unchanged", "")
+    then, now = row.diagnostics.get("n"), int(data.found.sum())
+    counts = f"fitted to {then} critical values, {now} today" if then != now else "other values"
+    return ModelCheck(row.name, "changed", f"{counts}: fit it again with  rbfrag fit --replace")

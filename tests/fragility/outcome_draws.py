@@ -1,0 +1,100 @@
+"""Outcomes drawn from known models, with what earthquakes share."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rbfrag.db.rows import CombinationTable
+from rbfrag.fragility import formulas
+from rbfrag.fragility.scores import GRID_OF_Y0_OVER_PGV
+from rbfrag.fragility.source import FitSource
+
+G = 9.80665
+P2 = (30.0, 3.0, 0.3)
+
+
+def drawn_outcomes(
+    method: str,
+    term: str,
+    parameters: tuple[float, ...],
+    *,
+    events: int = 47,
+    motions: int = 3,
+    shared: float = 0.0,
+    seed: int = 1,
+) -> FitSource:
+    """Draw outcomes on the grid with P = F(eta) of a model, one uniform number a block.
+
+    Args:
+        method: method of the model that is true.
+        term: its term.
+        parameters: its parameters.
+        events: number of earthquakes.
+        motions: motions of each.
+        shared: part of the variance of a block's normal number that its earthquake shares; the
+            probability of each block stays that of the model.
+        seed: of the random numbers.
+    """
+    random = np.random.default_rng(seed)
+    count = events * motions
+    motion = np.repeat(np.arange(count), len(P2))
+    event = motion // motions
+    pgv = np.exp(random.uniform(np.log(0.03), np.log(1.2), count))[motion]
+    ratio = np.exp(random.normal(np.log(0.1), 0.4, count))[motion]
+    tm = 2.0 * np.pi * ratio * np.exp(random.normal(0.0, 0.2, count))[motion]
+    pga = pgv / (ratio * G)
+    p2 = np.tile(P2, count)
+    p = np.sqrt(p2)
+    # a spectrum that bends towards PGA as those of records do
+    xp = pgv * np.exp(random.normal(-0.2, 0.2, motion.size))
+    xp = xp / (1.0 + p * xp / (pga * G))
+    x = {"pgv": pgv, "pgv_pga": pgv, "pgv_pga_tm": pgv, "xp": xp}[term]
+    shape, link = formulas.SHAPES[method, term], formulas.LINKS[method]
+    b = parameters + (0.0,) * (6 - len(parameters))
+    y0 = pgv[:, None] * GRID_OF_Y0_OVER_PGV
+    probability = np.zeros(y0.shape)
+    for i, j in np.ndindex(*y0.shape):
+        known = (y0[i, j], p[i], x[i], pga[i])
+        if formulas.bound(shape, *known) == formulas.FREE:
+            eta = formulas.score(shape, b, *known, tm[i])[0]
+            probability[i, j] = formulas.interval(link, eta, 0.0)[0]
+    from scipy.special import ndtr
+
+    common = random.normal(size=events)[event][:, None]
+    own = random.normal(size=y0.shape)
+    uniform = ndtr(np.sqrt(shared) * common + np.sqrt(1.0 - shared) * own)
+    topples = (uniform < probability).astype(float)
+    n = motion.size
+    y = np.where(topples.any(axis=1), np.where(topples > 0.5, y0, 0.0).max(axis=1), np.nan)
+    found = np.isfinite(y)
+    table = CombinationTable(
+        combination_id=np.arange(1, n + 1),
+        motion_id=motion + 1,
+        event_id=np.array([f"event-{i}" for i in event], dtype=object),
+        event_guessed=np.zeros(n, dtype=bool),
+        polarity=np.full(n, "forward", dtype=object),
+        p2=p2,
+        status=np.where(found, "found", "below_limit").astype(object),
+        search_limit=np.full(n, 0.01),
+        kr_over_pga=y * p / (G * pga),
+        kr=y * p / G,
+        y_m_s=y,
+        pga_g=pga,
+        pgv_m_s=pgv,
+        pgd_m=pgv * tm / (2.0 * np.pi),
+        tm_s=tm,
+        natural_key=np.array([f"key-{i:06d}" for i in range(n)], dtype=object),
+    )
+    return FitSource(table, xp, topples)
+
+
+TRUTH = {
+    ("logistic", "pgv"): (-2.0, 4.8),
+    ("weibull", "pgv"): (-1.0, 2.4),
+    ("weibull", "pgv_pga"): (0.7, 3.3, 3.8),
+    ("weibull", "pgv_pga_tm"): (0.96, 3.4, 2.8, 1.06),
+    ("bounded", "pgv_pga"): (3.1, 1.9, 4.7, 2.7, 2.5),
+    ("record", "xp"): (4.1, 3.2, 1.3),
+    ("power", "xp"): (1.0, 2.5),
+}
+"""Parameters near those of the recorded motions."""
