@@ -117,7 +117,7 @@ def maximum_likelihood(data: BinomialData, link: Link) -> FloatArray:
         FitError: the outcomes are all alike, or the features separate them.
     """
     refuse_one_class(data.outcome)
-    parameters, settled = newton(data, link, _start(data, link))
+    parameters, settled = newton(data, link, _start(data, link), tolerance=1e-14)
     refuse_separation(data, parameters, settled)
     return parameters
 

@@ -25,7 +25,7 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 FloatArray = NDArray[np.float64]
 
 LEVEL = 0.95
-MARGIN = 1.02
+MARGIN = 1.05
 """For what lies between the sampled points."""
 
 RICHER = {
@@ -82,9 +82,12 @@ def of_sizes(source: FitSource, *, seed: int = 0) -> Sample:
     table = source.table
     random = np.random.default_rng(seed)
     usable = np.isfinite(table.tm_s) & (table.pgv_m_s > 0.0) & (table.pga_g > 0.0)
-    numbers = np.repeat(np.flatnonzero(usable), _BLOCKS.size // 2)
+    each = _BLOCKS.size
+    numbers = np.repeat(np.flatnonzero(usable), each)
     ends = 0.5 * np.log([table.p2.min(), table.p2.max()])
     p = np.exp(random.uniform(ends[0], ends[1], numbers.size))
+    own = np.arange(numbers.size) % 2 == 0  # half the blocks at the sizes that were fitted
+    p[own] = np.sqrt(table.p2[numbers[own]])
     pgv, pga, tm = table.pgv_m_s[numbers], table.pga_g[numbers], table.tm_s[numbers]
     y = pgv * np.exp(random.uniform(np.log(_BLOCKS[0]), np.log(_BLOCKS[-1]), numbers.size))
     return Sample(y, p, pga, tm, _intensities(pgv, pga, tm))

@@ -30,9 +30,7 @@ def drawn(seed=1, events=40, each=20, cut=-0.3):
 def log_likelihood(b, data):
     mean = data.columns @ b[:-1]
     sigma = np.exp(b[-1])
-    return np.where(
-        data.found, norm.logpdf(data.y, mean, sigma), norm.logcdf(data.y, mean, sigma)
-    )
+    return np.where(data.found, norm.logpdf(data.y, mean, sigma), norm.logcdf(data.y, mean, sigma))
 
 
 def test_the_maximum_is_that_of_an_independent_likelihood():
@@ -63,9 +61,7 @@ def test_errors_equal_an_independent_matrix_computation():
         for a in steps
     ])  # fmt: skip
     bread = np.linalg.inv(-hessian)
-    meat = sum(
-        np.outer(*(2 * [scores[data.event == e].sum(axis=0)])) for e in range(40)
-    )
+    meat = sum(np.outer(*(2 * [scores[data.event == e].sum(axis=0)])) for e in range(40))
     expected = bread @ meat @ bread * 40 / 39 * 799 / 797
     assert clustered_covariance(data, b) == pytest.approx(expected, rel=1e-4)
     assert naive_covariance(data, b) == pytest.approx(bread, rel=1e-4)

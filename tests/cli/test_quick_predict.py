@@ -1,0 +1,90 @@
+"""The quick way of `predict` and the full command line say the same."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+import typer
+
+from rbfrag.cli.main import app
+from rbfrag.cli.quick_predict import NAMES, NUMBERS, plain_options, quick_predict
+from rbfrag.db.engine import opened_database
+from rbfrag.db.model_store import save_model
+from tests.cli.conftest import Shell
+from tests.fragility.conftest import model_row
+
+PLAIN = [
+    ["--p2", "3", "--kr", "0.1", "--pgv", "0.6"],
+    ["--p2=3", "--kr=.1", "--pgv=6e-1", "--json"],
+    ["--json", "--pga", "0.5", "--tm", "0.5", "--kr", "0.1", "--p2", "3", "--pgv", "0.6"],
+    ["--p2", "3", "--kr", "0.1", "--pgv", "60", "--level", "0.5"],
+    ["--p2", "3", "--kr", "0.1", "--pgv", "-0.6"],
+    ["--p2", "3", "--kr", "0.1"],
+    ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--model", "nobody"],
+    ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--level", "95"],
+    ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--db", "none.db"],
+]
+
+
+@pytest.fixture
+def database(tmp_path, shell):
+    with opened_database("rbfrag.db", create=True) as engine, engine.begin() as connection:
+        for term in ("pgv", "pga_tm"):
+            save_model(connection, model_row(term))
+
+
+@pytest.mark.parametrize("arguments", PLAIN, ids=" ".join)
+@pytest.mark.usefixtures("database")
+def test_the_same_answers_and_errors(arguments, shell: Shell, capsys):
+    status = quick_predict(arguments)
+    quick = capsys.readouterr()
+    assert status is not None
+    full = shell("predict", *arguments, expect=status)
+    assert quick.out == full.stdout
+    assert quick.err == full.stderr
+    assert quick.out or quick.err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--help"],
+        [],
+        ["--p2", "3"],
+        ["--p2", "three", "--kr", "0.1"],
+        ["--p2", "3", "--kr", "0.1", "--pgv"],
+        ["--p2", "3", "--kr", "0.1", "--pgx", "0.6"],
+        ["--p2", "3", "--kr", "0.1", "extra"],
+        ["--p2", "nan", "--kr", "0.1"],
+        ["--p2", "3", "--kr", "0.1", "--motion", "a.AT2"],
+        ["--batch", "a.csv", "--out", "b.csv"],
+        ["--p2", "3", "--kr", "0.1", "--db", ""],
+    ],
+)
+def test_all_else_is_left_to_the_full_command(arguments):
+    assert plain_options(arguments) is None
+
+
+def test_every_quick_option_is_one_of_the_command():
+    command = typer.main.get_command(app).commands["predict"]  # type: ignore[attr-defined]
+    known = {name for parameter in command.params for name in parameter.opts}
+    assert {*NUMBERS, *NAMES, "--json"} <= known
+
+
+@pytest.mark.usefixtures("database")
+def test_a_plain_question_loads_no_command_line_library(tmp_path):
+    program = (
+        "import sys; sys.argv = ['rbfrag', 'predict', '--p2', '3', '--kr', '0.1', '--pgv', '0.6']\n"
+        "from rbfrag.cli.start import run\n"
+        "try:\n    run()\nfinally:\n"
+        "    heavy = {'typer', 'pydantic', 'numpy', 'scipy', 'numba', 'sqlalchemy', 'pandas'}\n"
+        "    print(sorted(heavy & set(sys.modules)))\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True, text=True, cwd=tmp_path, env=environment, check=True,
+    )  # fmt: skip
+    assert done.stdout.splitlines()[0].startswith("probability")
+    assert done.stdout.splitlines()[-1] == "[]"

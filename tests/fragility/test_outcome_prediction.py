@@ -1,0 +1,250 @@
+"""Answers of the outcome models: monotone, bounded, the same for one and many, never narrower
+for knowing less."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rbfrag.db.rows import ModelRow
+from rbfrag.errors import InputError
+from rbfrag.fragility import outcome_method, prediction_array
+from rbfrag.fragility.answers import MotionPrediction
+from rbfrag.fragility.fitting import fit
+from rbfrag.fragility.formulas import FLOOR_FROM, FLOOR_NODES, FLOOR_STEP, PARAMETERS, SHAPES
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.prediction import answer_given, predict
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.toppling_spectrum import toppling_spectrum
+from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
+
+G = 9.80665
+COEFFICIENTS = {
+    **TRUTH,
+    ("logistic", "pga_tm"): (-1.1, 4.5),
+    ("logistic", "pgd_tm"): (-3.5, 1.9),
+    ("logistic", "xp"): (-0.9, 5.9),
+    ("lognormal", "pgv"): (-0.41, 0.95, -1.25),
+    ("lognormal", "pga_tm"): (-0.21, 0.98, -1.16, -0.1),
+    ("bounded", "pgv"): (-1.1, 2.4, 2.2),
+    ("bounded", "pgv_pga_tm"): (3.6, 1.9, 4.8, 3.0, 1.4, 1.2),
+}
+
+
+def model_of(method, term, **diagnostics):
+    values = COEFFICIENTS[method, term]
+    names = PARAMETERS[SHAPES[method, term]][: len(values)]
+    size = len(values)
+    covariance = 1e-3 * (0.7 * np.eye(size) + 0.3)
+    return FragilityModel.from_row(
+        ModelRow(
+            name=f"{method}-{term}",
+            term=term,
+            method=method,
+            coefficients=dict(zip(names, values, strict=True)),
+            covariance=tuple(map(tuple, covariance.tolist())),
+            domain={"p2": (0.1, 30.0), "intensity_m_s": (0.01, 2.0), "tm_s": (0.05, 2.0)},
+            data_fingerprint="",
+            diagnostics=diagnostics,
+        )
+    )
+
+
+MODELS = {f"{m}-{t}": model_of(m, t) for m, t in COEFFICIENTS}
+
+
+def measures(model, pgv, pga, tm, xp):
+    every = {"pgv_m_s": pgv, "pga_g": pga, "tm_s": tm, "pgd_m": pgv * tm / 6, "xp_m_s": xp}
+    return {name: every[name] for name in model.term.inputs}
+
+
+@pytest.mark.parametrize("name", MODELS)
+@given(
+    p2=st.floats(0.1, 30.0),
+    kr=st.floats(1e-5, 3.0),
+    pgv=st.floats(1e-3, 4.0),
+    ratio=st.floats(0.02, 0.5),
+    tm=st.floats(0.05, 2.0),
+    factor=st.floats(1.0, 4.0),
+)
+def test_stronger_shaking_and_weaker_blocks_topple_no_less(name, p2, kr, pgv, ratio, tm, factor):
+    model = MODELS[name]
+    pga = pgv / (ratio * G)
+    base = predict_known(model, p2, kr, measures(model, pgv, pga, tm, 0.8 * pgv))
+    assert 0.0 <= base.ci_low <= base.probability <= base.ci_high <= 1.0
+    stronger_block = predict_known(model, p2, kr * factor, measures(model, pgv, pga, tm, 0.8 * pgv))
+    assert stronger_block.probability <= base.probability + 1e-15
+    shaken = measures(model, pgv * factor, pga, tm, 0.8 * pgv * factor)
+    if "pga_g" in shaken and model.term.name == "pga_tm":
+        shaken["pga_g"] = pga * factor
+    harder = predict_known(model, p2, kr, shaken)
+    assert harder.probability >= base.probability - 1e-15
+
+
+def predict_known(model, p2, kr, known):
+    if "xp_m_s" not in known:
+        return predict(p2, kr, **known, model=model)
+    return answer_given(model, {"p2": p2, "kr": kr, **known}, 0.95)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_limits(name):
+    model = MODELS[name]
+    known = measures(model, 0.5, 0.5, 0.5, 0.4)
+    assert predict_known(model, 3.0, 1e-9, known).probability == pytest.approx(1.0, abs=1e-6)
+    assert predict_known(model, 3.0, 100.0, known).probability < 1e-3
+    nothing = predict_known(model, 3.0, 0.1, {key: 0.0 if key != "tm_s" else 0.5 for key in known})
+    assert (nothing.probability, nothing.ci_high) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "kr", "words"),
+    [
+        ("weibull-pgv_pga", 0.6, "not below PGA"),
+        ("logistic-pga_tm", 0.6, "not below PGA"),
+        ("weibull-pgv", 0.19, "not below 2 PGV"),
+        ("record-xp", 0.15, "not below the toppling spectrum"),
+    ],
+)
+def test_mechanics_is_stated(name, kr, words):
+    model = MODELS[name]
+    known = measures(model, 0.5, 0.5, 0.5, 0.8)
+    answer = predict_known(model, 3.0, kr * (10 if name == "weibull-pgv" else 1), known)
+    if name == "record-xp":
+        answer = predict_known(model, 3.0, 0.2, known)
+    assert (answer.probability, answer.ci_low, answer.ci_high) == (0.0, 0.0, 0.0)
+    assert words in answer.warnings[0]
+    assert answer.in_domain
+
+
+def test_the_gate_does_not_act_with_vertical_motion():
+    with_vertical = model_of("logistic", "pgv", vertical="with")
+    known = {"pgv_m_s": 2.0, "pga_g": 0.2}
+    assert predict(30.0, 0.25, **known, model=with_vertical).probability > 0.1
+    assert predict(30.0, 0.25, **known, model=MODELS["logistic-pgv"]).probability == 0.0
+
+
+@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("compiled", [False, True])
+def test_arrays_have_the_bits_of_scalars(name, compiled, monkeypatch):
+    model = MODELS[name]
+    monkeypatch.setattr(prediction_array, "COMPILED_FROM", 1 if compiled else 10**9)
+    if not compiled:
+        monkeypatch.setattr(prediction_array, "_COMPILED", "none of this name")
+    random = np.random.default_rng(4)
+    n = 300
+    pgv = np.exp(random.uniform(-6, 1.5, n))
+    known = measures(
+        model,
+        pgv,
+        pgv / np.exp(random.normal(0, 1, n)),
+        np.exp(random.uniform(-3, 1, n)),
+        pgv * random.uniform(0.3, 1.0, n),
+    )
+    columns = {"p2": np.exp(random.uniform(-4, 5, n)), "kr": np.exp(random.uniform(-9, 1, n))}
+    columns = {**columns, **known}
+    many = answer_given(model, columns, 0.9)
+    for i in range(n):
+        one = answer_given(model, {key: float(c[i]) for key, c in columns.items()}, 0.9)
+        assert one.probability == many.probability[i]
+        assert (one.ci_low, one.ci_high) == (many.ci_low[i], many.ci_high[i])
+        assert one.in_domain == many.in_domain[i]
+        assert (one.y_m_s, one.intensity_m_s) == (many.y_m_s[i], many.intensity_m_s[i])
+        assert len(one.warnings) == len([r for r in many.reason[i].split("; ") if r])
+
+
+def test_many_chunks_are_one_answer(monkeypatch):
+    model = MODELS["weibull-pgv_pga"]
+    random = np.random.default_rng(0)
+    kr = np.exp(random.uniform(-4, 0, 1000))
+    whole = predict(3.0, kr, pgv_m_s=0.5, pga_g=0.4, model=model)
+    monkeypatch.setattr(prediction_array, "CHUNK", 64)
+    parts = predict(3.0, kr.reshape(20, 50), pgv_m_s=0.5, pga_g=0.4, model=model)
+    assert parts.probability.ravel().tolist() == whole.probability.tolist()
+    assert parts.reason.ravel().tolist() == whole.reason.tolist()
+    kr[-1] = np.nan
+    with pytest.raises(InputError, match=r"element \(19, 49\): kr = nan"):
+        predict(3.0, kr.reshape(20, 50), pgv_m_s=0.5, pga_g=0.4, model=model, nan="raise")
+
+
+def test_the_least_width_is_kept_inside_zero_and_one():
+    floor = [0.2] * FLOOR_NODES
+    wide = model_of("logistic", "pgv", interval_floor=floor)
+    for kr in np.geomspace(1e-3, 1.0, 40):
+        answer = predict(3.0, float(kr), pgv_m_s=0.5, model=wide)
+        assert 0.0 <= answer.ci_low <= answer.probability <= answer.ci_high <= 1.0
+        width = answer.ci_high - answer.ci_low
+        assert width >= 0.2 * 1.959963 - 1e-12
+    assert FLOOR_FROM + FLOOR_STEP * (FLOOR_NODES - 1) == 10.0
+
+
+def test_knowing_less_is_never_narrower(monkeypatch):
+    monkeypatch.setattr(outcome_method, "REPLICATES", 2)
+    source = drawn_outcomes(
+        "bounded", "pgv_pga_tm", COEFFICIENTS["bounded", "pgv_pga_tm"], shared=0.2, motions=1
+    )
+    models = [
+        fit(source, term=term, method=method).model
+        for method, term in (
+            ("weibull", "pgv"), ("bounded", "pgv_pga"), ("bounded", "pgv_pga_tm"), ("record", "xp")
+        )
+    ]  # fmt: skip
+    table = source.table
+    narrower = 0
+    for i in range(0, table.p2.size, 7):
+        for share in (0.15, 0.4, 0.6, 0.9, 1.3):
+            y = share * float(table.pgv_m_s[i])
+            p2 = float(table.p2[i])
+            widths = []
+            for model in models:
+                known = measures(
+                    model,
+                    float(table.pgv_m_s[i]),
+                    float(table.pga_g[i]),
+                    float(table.tm_s[i]),
+                    float(source.xp_m_s[i]),
+                )
+                answer = predict_known(model, p2, y * math.sqrt(p2) / G, known)
+                widths.append(answer.ci_high - answer.ci_low)
+            narrower += any(a < b - 1e-12 for a, b in pairwise(widths))
+    assert narrower == 0
+
+
+def shaking(n=800, dt=0.01):
+    time = np.arange(n) * dt
+    envelope = np.exp(-(((time - 3.0) / 1.5) ** 2))
+    return GroundMotion(0.4 * envelope * np.sin(2 * np.pi * 1.3 * time + 0.4 * time**2), dt)
+
+
+def test_a_motion_is_answered_by_its_spectrum():
+    model, motion = MODELS["record-xp"], shaking()
+    both = predict(3.0, 0.05, motion=motion, model=model)
+    assert isinstance(both, MotionPrediction)
+    for name, one in (("forward", both.forward), ("reverse", both.reverse)):
+        x = toppling_spectrum(motion, 3.0, name)
+        assert one.intensity_m_s == x
+        eta = 4.1 + 3.2 * math.log(x / one.y_m_s)
+        eta += 1.3 * math.log(math.sqrt(3.0) * x / (motion.pga_g * G))
+        assert one.probability == pytest.approx(1 / (1 + math.exp(-eta)), rel=1e-9)
+        assert predict(3.0, 0.05, motion=motion, polarity=name, model=model) == one
+    assert both.probability == 0.5 * (both.forward.probability + both.reverse.probability)
+    assert set(both.as_dict()["polarities"]) == {"forward", "reverse"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"pgv_m_s": 0.3}, "pgv_m_s given beside a motion"),
+        ({"polarity": "up"}, "polarity = 'up'"),
+        ({"p2": [3.0, 1.0]}, "single numbers with a motion"),
+        ({"p2": -3.0}, "p2 = -3 1/s² is not above zero"),
+        ({"kr": math.nan}, "kr = nan"),
+    ],
+)
+def test_motions_that_cannot_be_answered(changes, words):
+    arguments = {"p2": 3.0, "kr": 0.05, "motion": shaking(), **changes}
+    with pytest.raises(InputError, match=words):
+        predict(**arguments, model=MODELS["record-xp"])
