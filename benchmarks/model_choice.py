@@ -200,18 +200,17 @@ def coefficient_table(models: dict[str, Judged]) -> str:
 
 
 def m_table(source: FitSource) -> str:
-    """Return the exponent M of the power law by range of p²."""
-    from rbfrag.fragility.log_relations import power_law
-
+    """Return M of y = k_r g/p^M against PGV, by range of p²."""
     cells = []
     for words, chosen in (
         ("p² ≤ 1", source.table.p2 <= 1.0),
         ("p² ≥ 3", source.table.p2 >= 3.0),
         ("all", source.table.p2 > 0.0),
     ):
-        law = power_law(source.only(chosen).table)
-        if law is not None:
-            cells.append([words, f"{law.exponent_m:.3f}", f"{law.exponent_m_se:.3f}", str(law.n)])
+        one = judged(source.only(chosen), "lognormal", "pgv", "without", free_m=True)
+        told = one.fitted.report
+        m, error = told.coefficients["m_minus_1"], told.standard_errors["m_minus_1"]
+        cells.append([words, f"{1.0 + m:.3f}", f"{error:.3f}", str(told.n)])
     return markdown((["blocks", "M", "clustered error", "critical values"], cells))
 
 
