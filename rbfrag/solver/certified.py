@@ -39,11 +39,12 @@ MAP_DEPTH = 1e-4
 FIRST_STEP = 1e-3
 """Relative width of the first interval below K_up."""
 
-STEP_BUDGET = 40_000_000
-"""Integration steps after which a search is given up: about three seconds."""
+STEP_BUDGET = 12_000_000
+"""Integration steps after which a search is given up: some tenths of a second."""
 
-MAP_STEPS = 8_000_000
-"""Integration steps of a map below the deciding island, after which the rest of it is undecided."""
+MAP_STEPS = 1_500_000
+"""Integration steps of a map after which it no longer waits for a wide island, and after which it
+is given up: the rest of it is undecided."""
 
 MAX_INTERVALS = 20_000
 
@@ -151,12 +152,19 @@ def certified_map(
     verdict = np.empty(MAX_INTERVALS, dtype=np.int64)
     count, reached, made_runs, made_steps = march(
         ground, k_up, bottom, MARGIN, DEPTH, 0.0, ORDERLESS_DEPTH, FIRST_STEP, check,
-        TO_ISLAND if full else TO_BRACKET, RESOLUTION * drive.pga_g, False, STEP_BUDGET,
-        low, high, verdict, point,
+        TO_BRACKET, 0.0, False, STEP_BUDGET, low, high, verdict, point,
     )  # fmt: skip
     runs += made_runs
     steps += made_steps
     if full and reached > bottom and made_steps < STEP_BUDGET:
+        more, reached, made_runs, made_steps = march(
+            ground, reached, bottom, MARGIN, DEPTH, 0.0, ORDERLESS_DEPTH, FIRST_STEP, check,
+            TO_ISLAND, RESOLUTION * drive.pga_g, True, MAP_STEPS,
+            low[count:], high[count:], verdict[count:], point[count:],
+        )  # fmt: skip
+        count += more
+        runs += made_runs
+        steps += made_steps
         floor = surely_topples_below(ground, drive, bottom, reached)
         if floor < reached:
             margin = MARGIN

@@ -18,6 +18,7 @@ from benchmarks import (
     main_job,
     page,
     scaling,
+    search_times,
     start_up,
     work_precision,
 )
@@ -194,6 +195,7 @@ def test_command_prints_tables_writes_files_and_json(
         ),
         (start_up.main, ["--repeat", "1", "--no-cold"], ["start-up"]),
         (main_job.main, ["--jobs", "1", "--term", "pgv"], ["main-job"]),
+        (search_times.main, ["--every", "9"], ["search-times"]),
         (
             campaign_scale.main,
             ["--motions", "2", "--sizes", "3"],
