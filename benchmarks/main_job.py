@@ -84,10 +84,11 @@ def processor_time() -> float:
 def fit_words(fitted: dict) -> str:
     """Return slope and intercept with standard errors, power law, correlation."""
     value, error, power = fitted["coefficients"], fitted["standard_errors"], fitted["power_law"]
+    correlation = fitted["log_correlations"].get(fitted["term"])  # none among very few motions
     return (
         f"slope {value['c1']:.3f} ± {error['c1']:.3f}, intercept {value['c0']:.4f} m/s, "
         f"M = {power['exponent_m']:.3f} ± {power['exponent_m_se']:.3f}, "
-        f"correlation of logarithms {fitted['log_correlations'][fitted['term']]:.3f}"
+        f"correlation of logarithms {'-' if correlation is None else f'{correlation:.3f}'}"
     )
 
 
