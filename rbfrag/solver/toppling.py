@@ -150,6 +150,7 @@ def run_toppling(
     rate = 0.0  # theta'/p
     error = 0.0  # bound on |error of theta| + |error of theta'/p|
     drift = 0.0  # closer bound on the error of theta alone, which times a re-seat
+    lost = False  # whether a re-seat may as well have been a fall: the error hid the difference
 
     while i < last:
         g0 = k_h[i] - w[i] * kr
@@ -313,6 +314,7 @@ def run_toppling(
                 # a graze: whether it touches at all is below the error, and if it does not it
                 # keeps its speed
                 error += impact + math.sqrt(2.0 * push * drift)
+                lost = lost or error > 0.25 * theta_c
             elif g > 0.0:
                 # motion restarts at once; only the error of its starting time is left
                 late = 2.0 * drift / impact
@@ -377,6 +379,8 @@ def run_toppling(
         if last >= 0:
             verdict_s = time_s[last] + interval_s[last] * w[last] / (w[last] - w[last + 1])
         return JUMP, math.nan, started_s, verdict_s, error, steps, moved, filled
+    if lost:
+        return UNDETERMINED, math.nan, started_s, math.nan, error, steps, moved, filled
     if not moving:
         return STABLE, peak, started_s, math.nan, peak_error, steps, moved, filled
 

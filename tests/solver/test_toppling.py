@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.respond import OUTCOMES, respond
 from rbfrag.solver.results import Outcome
@@ -261,3 +263,16 @@ def test_a_block_too_small_to_be_meant_is_refused() -> None:
     motion = GroundMotion(np.array([0.0, 0.3, 0.0]), 0.1)
     with pytest.raises(InputError, match="p2 = 1e\\+30"):
         respond(motion, p2=1e30, kr=0.1)
+
+
+def test_a_run_whose_error_outgrew_the_block_says_so(records_dir: Path) -> None:
+    # The block hovers at its balance point until the bound on its error exceeds the critical
+    # angle, and only then comes back: it may as well have fallen. The certified map says that
+    # every block of this interval topples.
+    path = next(records_dir.rglob("*HSES_20.V2A"))
+    motion = read_motions(path)[1]
+    kr = 0.04831733532494291 * motion.pga_g
+    found = respond(motion, p2=0.3, kr=kr, polarity="reverse")
+    assert found.error_estimate > math.atan(kr)
+    assert found.outcome is Outcome.UNDETERMINED
+    assert found.peak_theta_n is None
