@@ -30,8 +30,11 @@ from rbfrag.db.check import check_database
 from rbfrag.db.content import content_digest
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
+from rbfrag.db.model_store import save_model
 from rbfrag.db.natural_key import canonical_json, combination_key
 from rbfrag.db.stored_combination import stored_combination
+from rbfrag.fragility.fitting import fit
+from rbfrag.fragility.report import FitReport
 from rbfrag.solver.results import NUMERICS_VERSION
 from rbfrag.version import __version__
 
@@ -47,6 +50,18 @@ PAGE = ROOT / "docs" / "reference" / "reference-data.md"
 
 SUITE = "reference"
 
+MODELS = (
+    ("bounded", "pgv_pga"),
+    ("bounded", "pgv_pga_tm"),
+    ("record", "xp"),
+    ("weibull", "pgv"),
+    ("lognormal", "pgv"),
+    ("wls", "pgv"),
+    ("logistic", "pga_tm"),
+    ("logistic", "pgd_tm"),
+)
+"""Method and term of the models that are shipped; the first one is the default."""
+
 
 def main(arguments: Sequence[str] | None = None) -> None:
     options = argparse.ArgumentParser(description=__doc__)
@@ -55,6 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options.add_argument("--jobs", type=int, help="worker processes")
     options.add_argument("--out", type=Path, default=REFERENCE, help="the file that is shipped")
     options.add_argument("--page", type=Path, default=PAGE, help="the page of its provenance")
+    options.add_argument("--without-models", action="store_true", help="results alone")
     chosen = options.parse_args(arguments)
     root = chosen.records or os.environ.get(RECORDS_VARIABLE)
     if root is None:
@@ -68,13 +84,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )  # fmt: skip
     made = chosen.work / "reference.db"
     reduce(full, made)
+    models = [] if chosen.without_models else add_models(made)
     examine(made)
     chosen.out.parent.mkdir(parents=True, exist_ok=True)
     # in place at once or not at all
     beside = chosen.out.with_name(f"{chosen.out.name}.new")
     beside.write_bytes(made.read_bytes())
     beside.replace(chosen.out)
-    chosen.page.write_text(provenance(made, manifest, added, summary), encoding="utf-8")
+    chosen.page.write_text(provenance(made, manifest, added, summary, models), encoding="utf-8")
     print(f"{chosen.out}: {made.stat().st_size:,} bytes\n{chosen.page}")
 
 
@@ -116,6 +133,22 @@ def reduce(full: Path, made: Path) -> None:
     raw.execute("PRAGMA journal_mode = DELETE")
     raw.execute("VACUUM")
     raw.close()
+
+
+def add_models(made: Path) -> list[FitReport]:
+    """Fit the models that are shipped to what is shipped, without vertical motion."""
+    reports = []
+    for method, term in MODELS:
+        with opened_database(made, read_only=True) as engine, engine.connect() as connection:
+            reports.append(fit(connection, term=term, method=method))
+        with opened_database(made) as engine, engine.begin() as connection:
+            save_model(connection, reports[-1].model.row)
+        print(f"fitted {reports[-1].name}", file=sys.stderr, flush=True)
+    raw = sqlite3.connect(made, isolation_level=None)
+    raw.execute("PRAGMA journal_mode = DELETE")
+    raw.execute("VACUUM")
+    raw.close()
+    return reports
 
 
 def rename(connection: Connection) -> None:
@@ -169,7 +202,13 @@ def examine(made: Path) -> None:
         raise SystemExit(f"{made} has {made.stat().st_size:,} bytes, more than {MOST_BYTES:,}")
 
 
-def provenance(made: Path, manifest: Path, added: AddReport, summary: CampaignSummary) -> str:
+def provenance(
+    made: Path,
+    manifest: Path,
+    added: AddReport,
+    summary: CampaignSummary,
+    models: Sequence[FitReport],
+) -> str:
     """Return the page that says where the shipped data come from."""
     with manifest.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -224,7 +263,7 @@ builds the file and this page from the records.
   samples, their earthquake, and what was done to them: uncorrected records were filtered as
   `rbfrag motions add` does it.
 
-## Where the records come from
+{model_section(models)}## Where the records come from
 
 {markdown((headers, cells))}
 
@@ -245,6 +284,33 @@ themselves belong to the networks that made them and are not passed on here.
 The content digest is that of [equal databases](../howto/keep-a-database.md): it is the same for a
 file that was built elsewhere from the same records with the same numerics, as far as processors
 agree in the last bit.
+"""
+
+
+def model_section(models: Sequence[FitReport]) -> str:
+    """Return the part of the page on the models, empty without any."""
+    if not models:
+        return ""
+    rows = [
+        [
+            f"`{report.name}`",
+            ", ".join(
+                f"{name} = {value:.4g} ± {report.standard_errors[name]:.2g}"
+                for name, value in report.coefficients.items()
+            ),
+            str(report.n),
+            str(report.events),
+        ]
+        for report in models
+    ]
+    columns = ["model", "coefficients ± standard error", "critical values", "earthquakes"]
+    return f"""## Models
+
+Fitted to what is shipped, without vertical motion ([how](../theory/fragility.md),
+[how well](../theory/model-choice.md)); `{models[0].name}` is the default.
+
+{markdown((columns, rows))}
+
 """
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +10,9 @@ from numpy.typing import NDArray
 from rbfrag.solver.certified import MARGIN, keeps_order
 from rbfrag.solver.envelopes import ALL_SAFE, ALL_TOPPLE, decide
 from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.ground import ground_of
 from rbfrag.solver.renewal import fresh_starts
 from rbfrag.solver.respond import runner
-from rbfrag.solver.taylor import PH_MAX
 from rbfrag.solver.toppling import STABLE, TOPPLED
 
 FloatArray = NDArray[np.float64]
@@ -64,16 +63,11 @@ def inner_values(
 def verdict_on(drive: Excitation, p2: float, low: float, high: float) -> bool | None:
     """Ask the rules of the search for one interval of k_r: all topple, none does, or None."""
     n = drive.q.size
-    u, us, uc = np.empty(9), np.empty(9), np.empty(9)
     check = not keeps_order(drive, False)
     stretches = np.empty((4, n), dtype=np.int64)
-    record = (
-        drive.interval_s, drive.k_h, drive.w, drive.q, drive.tail_min_q, drive.block_max_q,
-        math.sqrt(p2), PH_MAX, False,
-    )  # fmt: skip
+    ground = ground_of(drive, p2=p2, linear=False)
     count, _, _ = fresh_starts(
-        *record, low, low * (1.0 - MARGIN), high * (1.0 + MARGIN), check, 0, n, stretches,
-        u, us, uc,
-    )  # fmt: skip
-    what, *_ = decide(*record, low, high, MARGIN, check, stretches, count, 0, u, us, uc)
+        ground, low, low * (1.0 - MARGIN), high * (1.0 + MARGIN), check, 0, n, stretches
+    )
+    what, *_ = decide(ground, low, high, MARGIN, check, stretches, count, 0)
     return {ALL_SAFE: False, ALL_TOPPLE: True}.get(what)

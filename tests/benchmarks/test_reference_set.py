@@ -47,7 +47,8 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
         table.writeheader()
         table.writerows(rows)
     out = ("--out", str(home / "out" / "reference.db"), "--page", str(home / "page.md"))
-    reference_set.main(["--records", str(records), "--work", str(home), "--jobs", "1", *out])
+    reference_set.main(["--records", str(records), "--work", str(home), "--jobs", "1",
+                        "--without-models", *out])  # fmt: skip
     return home
 
 

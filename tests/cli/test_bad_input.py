@@ -59,10 +59,20 @@ def test_no_database(refuses: Refuses, tmp_path: Path) -> None:
         ("db", "info"),
         ("db", "check"),
         ("db", "upgrade"),
-        ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6"),
     ):
         assert "rbfrag.db" in refuses(*command)
+    asked = ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
+    assert "none.db" in refuses(*asked, "--db", "none.db")
     assert not list(tmp_path.glob("*.db"))
+
+
+def test_without_a_database_the_reference_answers_and_says_so(shell: Shell) -> None:
+    found = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
+    assert any("reference model" in text for text in found["warnings"])
+    assert 0.0 < found["ci_low"] < found["probability"] < found["ci_high"] < 1.0
+    assert found["in_domain"]
+    more = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--pga", "0.5")
+    assert (found["term"], more["term"]) == ("pgv", "pgv_pga")
 
 
 def test_file_that_is_no_database(refuses: Refuses, tmp_path: Path) -> None:

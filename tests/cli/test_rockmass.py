@@ -165,7 +165,7 @@ def test_a_block_is_drawn(shell: Shell) -> None:
         (("mass.toml", "--out", "none/a.csv"), "there is no folder none"),
         (("mass.toml", "--plot", "a.gif"), "none of .png"),
         (("none.toml",), "no such file"),
-        (("steep.toml", "--pgv", "1"), "rbfrag.db"),
+        (("steep.toml", "--pgv", "1", "--db", "none.db"), "none.db"),
     ],
 )
 def test_refusals(

@@ -324,7 +324,7 @@ STATE_NO_UNIT = {"SimCenter event JSON", "GeoNet text (.000/.090/.ver)"}
 
 
 def test_every_reader_has_a_writer() -> None:
-    elsewhere = {"PEER AT2", "GeoNet V2A", "delimited text"}
+    elsewhere = {"PEER AT2", "GeoNet V2A", "delimited text", "rbfrag CSV"}
     assert {reader.FORMAT for reader in READERS} == set(WRITTEN) | elsewhere
 
 

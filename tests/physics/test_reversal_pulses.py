@@ -41,8 +41,8 @@ def found(motion: GroundMotion, p2: float, *, linear: bool = False) -> CriticalR
 def boundary_peak(r: float) -> float:
     """Peak over the critical angle of the weakest block that stays."""
     result = found(reversal(r), 2.0)
-    assert result.kr is not None
-    run = respond(reversal(r), p2=2.0, kr=result.kr * (1.0 + 1e-10))
+    assert result.upper is not None
+    run = respond(reversal(r), p2=2.0, kr=result.upper * result.pga_g * (1.0 + 1e-12))
     assert run.outcome is Outcome.STABLE
     assert run.peak_theta_n is not None
     return run.peak_theta_n

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.ground import ground_of
 from rbfrag.solver.renewal import fresh_starts
-from rbfrag.solver.taylor import PH_MAX
 
 
 def fails(drive: Excitation, p2: float, linear: bool, kr: float) -> bool:
     """Whether a block that starts from rest at any rise of the drive above k_r topples."""
     n = drive.q.size
-    u, us, uc = np.empty(9), np.empty(9), np.empty(9)
-    _, failing, _ = fresh_starts(
-        drive.interval_s, drive.k_h, drive.w, drive.q, drive.tail_min_q, drive.block_max_q,
-        math.sqrt(p2), PH_MAX, linear, kr, kr, kr, False, 0, n,
-        np.empty((4, n), dtype=np.int64), u, us, uc,
-    )  # fmt: skip
+    ground = ground_of(drive, p2=p2, linear=linear)
+    stretches = np.empty((4, n), dtype=np.int64)
+    _, failing, _ = fresh_starts(ground, kr, kr, kr, False, 0, n, stretches)
     return failing > 0
 
 
