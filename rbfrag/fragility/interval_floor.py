@@ -5,6 +5,10 @@ few parameters, so that its interval may come out narrower than that of a model 
 more of the motion, though the answer is vaguer. To keep the order, every model carries a
 table: the widest interval that any model which knows more gives, at level 0.95, for a block
 and a motion at which the model itself has that eta. Its own intervals are never narrower.
+
+With few earthquakes the widest is noise: a richer model that is hardly determined may know
+nothing at all of some block, which says little of the others. The table then holds what nine in
+ten of the intervals do not exceed.
 """
 
 from __future__ import annotations
@@ -27,6 +31,11 @@ FloatArray = NDArray[np.float64]
 LEVEL = 0.95
 MARGIN = 1.05
 """For what lies between the sampled points."""
+
+FEW_EARTHQUAKES = 30
+SHARE_OF_FEW = 0.9
+"""Share of blocks and motions with the same eta for which the interval is no narrower, if the fit
+has fewer earthquakes than that; all of them otherwise."""
 
 RICHER = {
     "pgv": ("pgv_pga", "pgv_pga_tm"),
@@ -107,6 +116,8 @@ def interval_floor(
 ) -> list[float]:
     """Return the least width of the model's interval over its quantile, at each node of eta.
 
+    With fewer than `FEW_EARTHQUAKES` it is the `SHARE_OF_FEW` quantile of a cell's widths.
+
     Args:
         model: the model that knows less.
         richer: models that know more, with their own tables.
@@ -147,14 +158,21 @@ def interval_floor(
             high,
         )
         widest = np.fmax(widest, (high - low) / half_width)
-    return _table(eta, widest * MARGIN)
+    few = min(other.degrees_of_freedom for other in richer) < FEW_EARTHQUAKES - 1
+    return _table(eta, widest * MARGIN, SHARE_OF_FEW if few else 1.0)
 
 
-def _table(eta: FloatArray, width: FloatArray) -> list[float]:
+def _table(eta: FloatArray, width: FloatArray, share: float) -> list[float]:
     known = np.isfinite(eta)
     cell = np.floor((eta[known] - formulas.FLOOR_FROM) / formulas.FLOOR_STEP).astype(np.int64)
     cell = np.clip(cell, -1, formulas.FLOOR_NODES - 1) + 1  # the first and last have no end
-    by_cell = np.zeros(formulas.FLOOR_NODES + 1)
-    np.maximum.at(by_cell, cell, width[known])
+    order = np.argsort(cell, kind="stable")
+    cell, width = cell[order], width[known][order]
+    cells = np.arange(formulas.FLOOR_NODES + 1)
+    starts, ends = np.searchsorted(cell, cells), np.searchsorted(cell, cells, side="right")
+    by_cell = np.zeros(cells.size)
+    for i, (start, end) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
+        if end > start:
+            by_cell[i] = np.quantile(width[start:end], share)
     # A line between nodes is nowhere below a cell whose two ends are not.
     return [float(each) for each in np.maximum(by_cell[:-1], by_cell[1:])]
