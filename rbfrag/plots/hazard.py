@@ -71,13 +71,8 @@ def plot_contribution(curve: HazardCurve, found: HazardAnswer, path: str | PathL
             top.set_ylim(0.5 * rates.min(), 2.0 * rates.max())
     beyond = 100.0 * found.above[0] / max(found.annual_rate[0], np.finfo(float).tiny)
     if beyond >= 0.05:
-        bottom.annotate(
-            f"{beyond:.2g} % from beyond\nthe end of the curve",
-            (0.02, 0.95),
-            xycoords="axes fraction",
-            ha="left",
-            va="top",
-            fontsize=9,
+        bottom.set_title(
+            f"{beyond:.2g} % more from beyond the end of the curve", fontsize=9, loc="right"
         )
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 

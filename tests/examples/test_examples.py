@@ -70,6 +70,18 @@ def test_refit_with_pandas(database: Path) -> None:
     assert f"{len(found)} critical blocks of 12 earthquakes" in printed
 
 
+def test_canterbury(records_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # no database here: the reference answers
+    monkeypatch.delenv("RBFRAG_DB", raising=False)
+    printed = run("canterbury.py", records_dir, "--out", "a.png")
+    rows = [line.split() for line in printed.splitlines() if re.match(r" *(HVSC|PARS|DFHS)", line)]
+    assert len(rows) == 6
+    for row in rows:
+        simulated, by_record = float(row[5]), float(row[6])
+        assert by_record == pytest.approx(simulated, rel=0.2)
+    assert Path("a.png").stat().st_size > 10_000
+
+
 def test_pelicun(database: Path, tmp_path: Path) -> None:
     python = os.environ.get("RBFRAG_TEST_PELICUN_PYTHON")
     if not python:

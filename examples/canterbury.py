@@ -1,0 +1,111 @@
+"""A fractured face under recorded motions of the Canterbury earthquakes.
+
+    python examples/canterbury.py RECORDS --out FIGURE
+
+RECORDS is a folder with horizontal records of the stations HVSC, PARS and DFHS (public, GeoNet).
+For every toppling block of canterbury-face.toml and every record the outcome is simulated in both
+polarities and predicted three ways: from the record itself (its toppling spectrum), from PGV, PGA
+and mean period, and from PGV alone, by the reference models that rbfrag ships.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import rbfrag
+from rbfrag.fragility.rockmass_file import read_rock_mass
+from rbfrag.fragility.rockmass_table import toppling_blocks
+from rbfrag.solver.batch import simulate_many
+from rbfrag.solver.excitation import excitation
+from rbfrag.solver.toppling import TOPPLED
+
+HERE = Path(__file__).parent
+FILES = ("*HVSC*.0[09]0", "*PARS*.0[09]0", "*DFHS*.0[09]0")
+ANSWERS = ("simulated", "from the record", "from PGV, PGA, Tm", "from PGV")
+
+
+def shares(motion: rbfrag.GroundMotion, p2: np.ndarray, kr: np.ndarray) -> dict[str, float]:
+    """Return the mean share of blocks that topple, simulated and by three predictions."""
+    toppled = [
+        simulate_many(excitation(motion, polarity=way), p2=p2, kr=kr).outcome == TOPPLED
+        for way in ("forward", "reverse")
+    ]
+    known = {"pgv_m_s": motion.pgv_m_s}
+    more = {**known, "pga_g": motion.pga_g, "tm_s": motion.tm_s}
+    by_record = [rbfrag.predict(a, b, motion=motion).probability
+                 for a, b in zip(p2.tolist(), kr.tolist(), strict=True)]  # fmt: skip
+    found = {"simulated": float(np.mean(toppled)), "from the record": float(np.mean(by_record))}
+    for name, given in (("from PGV, PGA, Tm", more), ("from PGV", known)):
+        answer = rbfrag.predict(p2, kr, **given)
+        found[name] = float(answer.probability.mean())
+        found[f"{name}, low"] = float(answer.ci_low.mean())
+        found[f"{name}, high"] = float(answer.ci_high.mean())
+    return found
+
+
+def study(records: Path) -> pd.DataFrame:
+    """Return one row a record."""
+    p2, kr, share = toppling_blocks(read_rock_mass(HERE / "canterbury-face.toml").realise())
+    print(f"{p2.size} stable toppling blocks, {100 * share:.3g} % of the face; "
+          f"p² {np.quantile(p2, 0.05):.3g} to {np.quantile(p2, 0.95):.3g} 1/s², "
+          f"k_r {np.quantile(kr, 0.05):.2g} to {np.quantile(kr, 0.95):.2g}")  # fmt: skip
+    rows = []
+    for pattern in FILES:
+        for path in sorted(records.rglob(pattern)):
+            motion = rbfrag.read_motions(path, units="g")[0]
+            rows.append(
+                {
+                    "station": pattern.strip("*").split("*")[0],
+                    "component": path.suffix[1:],
+                    "pga_g": motion.pga_g,
+                    "pgv_m_s": motion.pgv_m_s,
+                    "tm_s": motion.tm_s,
+                    **shares(motion, p2, kr),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def draw(table: pd.DataFrame, path: str) -> None:
+    """Draw the shares beside each other, with the intervals of the models."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 4.2), layout="constrained")
+    axes = figure.add_subplot()
+    place = np.arange(len(table))
+    colours = ("#333333", "#b2182b", "#2166ac", "#92c5de")
+    for i, (name, colour) in enumerate(zip(ANSWERS, colours, strict=True)):
+        errors = None
+        if f"{name}, low" in table:
+            errors = np.array([table[name] - table[f"{name}, low"],
+                               table[f"{name}, high"] - table[name]]) * 100.0  # fmt: skip
+        axes.bar(place + 0.2 * (i - 1.5), 100.0 * table[name], width=0.19, color=colour, label=name,
+                 yerr=errors, capsize=2.5, error_kw={"lw": 1.0})  # fmt: skip
+    axes.set_xticks(place, [f"{r.station} {r.component}\nPGV {r.pgv_m_s:.2f} m/s"
+                            for r in table.itertuples()], fontsize=9)  # fmt: skip
+    axes.set_ylabel("blocks that topple [%]")
+    figure.legend(loc="outside upper center", fontsize=9, frameon=False, ncols=4)
+    axes.grid(True, axis="y", color="#dddddd", lw=0.6)
+    axes.set_axisbelow(True)
+    figure.savefig(path, dpi=160)
+
+
+def main() -> None:
+    """Print the table; draw it if asked to."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("records", type=Path)
+    parser.add_argument("--out", help="figure to write (.png, .svg)")
+    given = parser.parse_args()
+    table = study(given.records)
+    shown = ["station", "component", "pga_g", "pgv_m_s", "tm_s", *ANSWERS]
+    print(table[shown].to_string(index=False, float_format=lambda value: f"{value:.3f}"))
+    if given.out:
+        draw(table, given.out)
+
+
+if __name__ == "__main__":
+    main()
