@@ -161,6 +161,8 @@ def hazard(
         print_pairs(document)
         if document["annual_rate"] > 0.0:
             print(f"once in {1.0 / document['annual_rate']:.4g} years on average")
+            print()
+            print_table(["from", "to", "share_%"], _shares(found[0], curves[0].imt))
     else:
         if json:
             print_json({**shared, "answers": [_plain(row) for row in rows], "warnings": warnings})
@@ -226,6 +228,23 @@ def _parts(found: Any) -> list[dict[str, float]]:
             strict=True,
         )
     ]
+
+
+def _shares(found: Any, imt: str) -> list[list[object]]:
+    """Return which shaking the rate comes from, between the levels of the curve."""
+    unit = {"pgv_m_s": "m/s"}.get(found.measure, "g")
+    bins = 8  # of each interval between two levels
+    parts = found.contribution[0].reshape(-1, bins).sum(axis=1) / found.annual_rate[0]
+    levels = found.edges[::bins]
+    rows: list[list[object]] = [
+        [f"{imt} {low:.3g}", f"{high:.3g} {unit}", round(100.0 * share, 1)]
+        for low, high, share in zip(levels[:-1], levels[1:], parts.tolist(), strict=True)
+        if share >= 5e-4
+    ]
+    beyond = found.above[0] / found.annual_rate[0]
+    if beyond >= 5e-4:
+        rows.append([f"{imt} {levels[-1]:.3g}", "beyond", round(100.0 * float(beyond), 1)])
+    return rows
 
 
 def _plain(row: dict[str, Any]) -> dict[str, Any]:

@@ -94,6 +94,16 @@ def plot_curve(
         typer.Option("--model", help="Name of the model. Default: the best for what is given."),
     ] = None,
     level: options.Level = 0.95,
+    beside: Annotated[
+        str | None,
+        typer.Option(
+            "--beside",
+            metavar="FILE",
+            help="Fragilities of the same measure to compare with: NRML 0.4 or 0.5 (.xml), or a "
+            "pelicun table (.csv).",
+            show_default=False,
+        ),
+    ] = None,
     db: options.Db = None,
 ) -> None:
     """Draw the fragility curve of one block over PGV, with its confidence band.
@@ -105,7 +115,13 @@ def plot_curve(
 
     held = {name: value for name, value in (("pga_g", pga), ("tm_s", tm)) if value is not None}
     varied = ["pgv_m_s"] if model is None else ["pgv_m_s", "pga_g", "pgd_m", "xp_m_s"]
-    draw(find_model(model, [*varied, *held], db), p2, kr, out, fixed=held, level=level)
+    chosen = find_model(model, [*varied, *held], db)
+    others = {}
+    if beside is not None:
+        from rbfrag.exchange.other_fragilities import of_measure
+
+        others = of_measure(beside, chosen.term.inputs[0])
+    draw(chosen, p2, kr, out, fixed=held, level=level, beside=others)
     print(out)
 
 

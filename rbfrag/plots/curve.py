@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
 from rbfrag.plots.model_answers import model_answers
+
+FloatArray = NDArray[np.float64]
 
 AXIS = {
     "pgv_m_s": "peak ground velocity, PGV [m/s]",
@@ -24,6 +27,7 @@ AXIS = {
 
 FIXED = {"pga_g": "PGA = {:g} g", "tm_s": "$T_m$ = {:g} s"}
 
+_COLOURS = ("#b2182b", "#4d9221", "#e08214", "#762a83", "#636363")
 _POINTS = 241
 _START = 1e-6
 
@@ -36,6 +40,7 @@ def plot_curve(
     *,
     fixed: Mapping[str, float] | None = None,
     level: float = 0.95,
+    beside: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
 ) -> Path:
     """Draw the fragility curve of one block with its confidence band.
 
@@ -48,6 +53,8 @@ def plot_curve(
         path: file to write: .png, .pdf or .svg.
         fixed: the other measures that the term reads, by name, held at one value.
         level: confidence level of the band.
+        beside: other fragilities of the same measure to be drawn for comparison, by name:
+            probabilities at levels of it.
 
     Returns:
         The path.
@@ -86,6 +93,10 @@ def plot_curve(
         x, np.where(known, answer.probability, np.nan), color="#1f4e79", lw=2.0,
         label="probability of toppling",
     )  # fmt: skip
+    for i, (name, other) in enumerate((beside or {}).items()):
+        style = ("-", "--", "-.", ":")[i // len(_COLOURS) % 4]
+        colour = _COLOURS[i % len(_COLOURS)]
+        axes.plot(x, other(x), style, color=colour, lw=1.4, label=name)
     axes.set_xlim(0.0, end)
     axes.set_ylim(0.0, 1.0)
     axes.set_xlabel(AXIS[varied])

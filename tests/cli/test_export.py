@@ -52,6 +52,19 @@ def test_pelicun_of_one_block_in_pga(shell: Shell) -> None:
 
 
 @pytest.mark.usefixtures("database")
+def test_an_exported_curve_is_drawn_beside_its_origin(
+    shell: Shell, refuses: Callable[..., str]
+) -> None:
+    block = ("--p2", "3", "--kr", "0.1")
+    shell("export", "nrml", *block, "--name", "boulder", "--out", "a.xml")
+    shell("plot", "curve", *block, "--beside", "a.xml", "--out", "a.svg")
+    assert "boulder, toppled" in Path("a.svg").read_text()
+    shell("export", "pelicun", *block, "--imt", "PGA", "--tm", "0.5", "--out", "a.csv")
+    message = refuses("plot", "curve", *block, "--beside", "a.csv", "--out", "b.svg")
+    assert "no fragility over pgv_m_s; there are PGA" in message
+
+
+@pytest.mark.usefixtures("database")
 def test_a_rock_mass_is_the_mean_of_its_toppling_blocks(shell: Shell) -> None:
     Path("mass.toml").write_text(
         "realisations = 300\nseed = 2\n[base]\ndip_deg = 5.0\n"

@@ -38,6 +38,13 @@ def test_one_block(shell: Shell, curve: Path) -> None:
     assert found["annual_rate"] == pytest.approx(1e-3 * (0.566 / 0.72) ** -2, rel=0.05)
 
 
+def test_shares_are_printed_between_the_levels(shell: Shell, curve: Path) -> None:
+    printed = shell("hazard", curve, "--p2", "3", "--kr", "0.1", "--component", "single").stdout
+    lines = printed.split("share_%")[1].strip().splitlines()
+    assert sum(float(line.split()[-1]) for line in lines) == pytest.approx(100.0, abs=0.5)
+    assert all(line.startswith("PGV ") for line in lines)
+
+
 def test_what_the_component_means(shell: Shell, curve: Path) -> None:
     block = ("--p2", "3", "--kr", "0.1")
     unsaid = shell.json("hazard", curve, *block)

@@ -1,0 +1,51 @@
+"""Fragilities of other tools, to be drawn beside ours."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.exchange.nrml_read import read_nrml
+from rbfrag.exchange.pelicun_table import read_pelicun
+
+FloatArray = NDArray[np.float64]
+
+MOST = 12
+"""More curves than these cannot be told apart."""
+
+
+def of_measure(
+    path: str | os.PathLike[str], measure: str
+) -> dict[str, Callable[[FloatArray], FloatArray]]:
+    """Return the fragilities of one measure by asset and limit state.
+
+    Args:
+        path: NRML (.xml) or a pelicun table (.csv).
+        measure: ``pgv_m_s`` or ``pga_g``.
+
+    Raises:
+        InputError: the file cannot be used, holds none of this measure, or too many.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".xml", ".csv"):
+        raise InputError(f"{path}: fragilities are read from .xml (NRML) and .csv (pelicun)")
+    functions = read_nrml(path) if suffix == ".xml" else read_pelicun(path).functions
+    found: dict[str, Callable[[FloatArray], FloatArray]] = {
+        f"{function.name}, {function.limit_state}": function.at
+        for function in functions
+        if function.kind.measure == measure
+    }
+    if not found:
+        have = ", ".join(sorted({function.kind.imt for function in functions})) or "none of ground"
+        raise InputError(f"{path}: there is no fragility over {measure}; there are {have}")
+    if len(found) > MOST:
+        raise InputError(
+            f"{path}: {len(found)} fragilities are too many for one figure (at most {MOST}): make "
+            "a file of those to compare"
+        )
+    return found
