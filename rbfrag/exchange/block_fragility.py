@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import FragilityFunction
@@ -43,7 +43,7 @@ def block_functions(
 ) -> tuple[list[FragilityFunction], tuple[str, ...]]:
     """Return the fragility of each block over one measure, and the model that answered.
 
-    A fragility that is lognormal to 1e-9 in its normal score is returned as such, every other
+    A fragility that is lognormal to 1e-9 is returned as such, every other
     on a grid of levels with equal ratios between `SMALLEST` and one minus it, together with the
     largest error of linear interpolation on that grid.
 
@@ -152,12 +152,11 @@ def _function(
         raise InputError(
             f"block {name!r} has no fragility: p2 and kr must be above zero and finite"
         )
-    # A normal score straight in ln x is a lognormal function.
-    middle = (p > 1e-9) & (p < 1.0 - 1e-9)
+    # A normal score straight in ln x is a lognormal function; near 1 scores have few digits.
+    middle = (p > 1e-9) & (p < 1.0 - 1e-5)
     if middle.sum() > 2:
-        z, u = ndtri(p[middle]), np.log(x[middle])
-        slope, intercept = np.polyfit(u, z, 1)
-        if slope > 0.0 and np.abs(intercept + slope * u - z).max() < _STRAIGHT * max(slope, 1.0):
+        slope, intercept = np.polyfit(np.log(x[middle]), ndtri(p[middle]), 1)
+        if slope > 0.0 and np.abs(ndtr(intercept + slope * np.log(x)) - p).max() < _STRAIGHT:
             return FragilityFunction(
                 name, LIMIT_STATE, kind,
                 median=float(np.exp(-intercept / slope)), beta=float(1.0 / slope),

@@ -64,6 +64,20 @@ def test_an_exported_curve_is_drawn_beside_its_origin(
     assert "no fragility over pgv_m_s; there are PGA" in message
 
 
+def test_a_lognormal_model_is_written_as_such(shell: Shell) -> None:
+    # the reference that is shipped holds one
+    options = ("--p2", "3", "--kr", "0.1", "--model", "lognormal-pgv")
+    for kind, file in (("nrml", "a.xml"), ("pelicun", "a.csv")):
+        told = shell.json("export", kind, *options, "--out", file)
+        assert (told["lognormal"], told["largest_grid_error"]) == (1, 0.0)
+    (nrml,), (pelicun,) = read_nrml("a.xml"), read_pelicun("a.csv").functions
+    x = np.geomspace(0.1, 5.0, 200)
+    expected = rbfrag.predict(3.0, 0.1, pgv_m_s=x, model="lognormal-pgv").probability
+    for found in (nrml, pelicun):
+        assert found.is_lognormal
+        assert np.abs(found.at(x) - expected).max() < 2e-9
+
+
 @pytest.mark.usefixtures("database")
 def test_a_rock_mass_is_the_mean_of_its_toppling_blocks(shell: Shell) -> None:
     Path("mass.toml").write_text(
