@@ -22,7 +22,19 @@ TOLERANCE = 1e-10
 
 _BINS = 8
 _MOST_HALVINGS = 40
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
+
+
+def _lobatto(n: int) -> tuple[FloatArray, FloatArray]:
+    """Return nodes and weights of the Gauss-Lobatto rule on [-1, 1].
+
+    Both ends are nodes, so that a fragility that sets in just before one is not overlooked.
+    """
+    last = np.polynomial.legendre.Legendre.basis(n - 1)
+    nodes = np.concatenate([[-1.0], np.sort(last.deriv().roots().real), [1.0]])
+    return nodes, 2.0 / (n * (n - 1) * last(nodes) ** 2)
+
+
+_POINTS, _WEIGHTS = _lobatto(11)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,9 +63,10 @@ def failure_rate(curve: HazardCurve, fragility: Fragility) -> FailureRate:
     """Return the annual rate of failure, the integral of P(failure | x) over -dλ(x).
 
     Between the levels of the curve λ is a power of x (a straight line in log-log), which makes
-    -dλ = b λ d(ln x) with b the slope. Every interval is halved until two Gauss rules of 10
-    points agree to `TOLERANCE` of the whole. Shaking beyond the last level counts with the
-    probability at that level, the least it can be; below the first level nothing is counted.
+    -dλ = b λ d(ln x) with b the slope. Every interval is halved until Gauss-Lobatto rules of
+    11 points on it and on its halves agree to `TOLERANCE` of the whole. Shaking beyond the last
+    level counts with the probability at that level, the least it can be; below the first level
+    nothing is counted.
 
     Args:
         curve: the hazard curve.
