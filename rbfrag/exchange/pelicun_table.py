@@ -80,7 +80,8 @@ def pelicun_text(functions: Sequence[FragilityFunction]) -> str:
                 f"{function.name}: pelicun has no demand for {function.kind.imt}: export PGV or PGA"
             )
         demand, unit = _DEMANDS[function.kind.measure]
-        row: list[object] = [function.name, 0, demand, unit, 0, 0]
+        # directional: else pelicun multiplies the demand by 1.2, as for the larger of two
+        row: list[object] = [function.name, 0, demand, unit, 0, 1]
         if function.is_lognormal:
             row += ["lognormal", _text(function.median), _text(function.beta), ""]
         else:

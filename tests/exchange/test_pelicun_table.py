@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,9 @@ def test_there_and_back(tmp_path: Path) -> None:
     smooth = lognormal_function("smooth", "toppled", PGV, 0.4321, 0.3, "test")
     path = tmp_path / "a.csv"
     path.write_text(pelicun_text([curved, smooth]))
+    rows = list(csv.DictReader(path.open()))
+    # a non-directional demand would be multiplied by 1.2
+    assert [row["Demand-Directional"] for row in rows] == ["1", "1"]
     back = {f.name: f for f in read_pelicun(path).functions}
     inside = np.linspace(0.1, 2.0, 500)
     assert np.abs(back["smooth"].at(inside) - smooth.at(inside)).max() < 1e-9
