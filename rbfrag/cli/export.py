@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any
 
 import typer
@@ -152,7 +151,10 @@ def _functions(
         )
         return [mean], about, warnings
     if blocks is not None:
-        names, p2s, krs = _table(blocks)
+        from rbfrag.exchange.waiting_blocks import waiting_blocks
+
+        table = waiting_blocks(blocks)
+        names, p2s, krs = table["block_id"].tolist(), table["p2_1_s2"], table["kr"]
     else:
         one_p2, one_kr, remarks = toppling_block(p2, kr, block)
         names, p2s, krs = [name], np.array([one_p2]), np.array([one_kr])
@@ -161,22 +163,6 @@ def _functions(
         names, p2s, krs, measure, tm_s=tm, levels=levels, model=model, db=db
     )
     return made, about, warnings
-
-
-def _table(path: str) -> tuple[list[str], Any, Any]:
-    from rbfrag.exchange.block_columns import read_columns, read_texts
-
-    columns = read_columns(path, ["p2_1_s2", "kr"])
-    names = read_texts(path, "block_id").tolist()
-    if not names:
-        raise InputError(f"{path}: there is no block in the table")
-    for name, a, b in zip(names, columns["p2_1_s2"].tolist(), columns["kr"].tolist(), strict=True):
-        if not (a > 0.0 and b > 0.0 and math.isfinite(a) and math.isfinite(b)):
-            raise InputError(
-                f"{path}: block {name} has p2_1_s2 = {a:g} and kr = {b:g}: only stable toppling "
-                "blocks, both above zero, have a fragility"
-            )
-    return names, columns["p2_1_s2"], columns["kr"]
 
 
 def _sentence(about: tuple[str, ...], tm: float | None) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any
 
 import typer
@@ -162,7 +161,7 @@ def hazard(
         if document["annual_rate"] > 0.0:
             print(f"once in {1.0 / document['annual_rate']:.4g} years on average")
             print()
-            print_table(["from", "to", "share_%"], _shares(found[0], curves[0].imt))
+            print_table(["from", "to", "share_%"], _shares(found[0], curves[0]))
     else:
         if json:
             print_json({**shared, "answers": [_plain(row) for row in rows], "warnings": warnings})
@@ -199,22 +198,10 @@ def _blocks(
         return {"block_id": [None], "p2_1_s2": [p2], "kr": [kr]}, remarks
     if p2 is not None or kr is not None or block is not None:
         raise InputError("--blocks does not go with --p2, --kr or --block: the table has them")
-    from rbfrag.exchange.block_columns import read_columns, read_names, read_texts
+    from rbfrag.exchange.waiting_blocks import waiting_blocks
 
-    columns = read_columns(blocks, ["p2_1_s2", "kr"])
-    size = len(columns["kr"])
-    if size == 0:
-        raise InputError(f"{blocks}: there is no block in the table")
-    names = [str(i + 1) for i in range(size)]
-    if "block_id" in read_names(blocks):
-        names = read_texts(blocks, "block_id").tolist()
-    for name, a, b in zip(names, columns["p2_1_s2"].tolist(), columns["kr"].tolist(), strict=True):
-        if not (a > 0.0 and b > 0.0 and math.isfinite(a) and math.isfinite(b)):
-            raise InputError(
-                f"{blocks}: block {name} has p2_1_s2 = {a:g} and kr = {b:g}: a block that waits "
-                "for an earthquake has both above zero (an unstable one has already failed)"
-            )
-    return {"block_id": names, **columns}, ()
+    table = waiting_blocks(blocks)
+    return {**table, "block_id": table["block_id"].tolist()}, ()
 
 
 def _parts(found: Any) -> list[dict[str, float]]:
@@ -230,12 +217,11 @@ def _parts(found: Any) -> list[dict[str, float]]:
     ]
 
 
-def _shares(found: Any, imt: str) -> list[list[object]]:
+def _shares(found: Any, curve: Any) -> list[list[object]]:
     """Return which shaking the rate comes from, between the levels of the curve."""
     unit = {"pgv_m_s": "m/s"}.get(found.measure, "g")
-    bins = 8  # of each interval between two levels
-    parts = found.contribution[0].reshape(-1, bins).sum(axis=1) / found.annual_rate[0]
-    levels = found.edges[::bins]
+    levels, imt = curve.levels, curve.imt
+    parts = found.contribution[0].reshape(levels.size - 1, -1).sum(axis=1) / found.annual_rate[0]
     rows: list[list[object]] = [
         [f"{imt} {low:.3g}", f"{high:.3g} {unit}", round(100.0 * share, 1)]
         for low, high, share in zip(levels[:-1], levels[1:], parts.tolist(), strict=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any
 
 import typer
@@ -242,65 +241,11 @@ def _blocks(
             f"{100.0 * share:.3g} % of the rock mass; the others have no part in it"
         ]
     if blocks is not None:
-        return _table(blocks), []
+        from rbfrag.exchange.waiting_blocks import waiting_blocks
+
+        return waiting_blocks(blocks), []
     one_p2, one_kr, remarks = toppling_block(p2, kr, block)
     return {"p2_1_s2": np.array([one_p2]), "kr": np.array([one_kr])}, list(remarks)
-
-
-def _table(path: str) -> dict[str, Any]:
-    import numpy as np
-
-    from rbfrag.exchange.geojson import SUFFIXES as GEOJSON
-    from rbfrag.exchange.geojson import read_points
-
-    if path.lower().endswith(GEOJSON):
-        points = read_points(path)
-        found: dict[str, Any] = {
-            "lon": np.array([lon for lon, _, _ in points]),
-            "lat": np.array([lat for _, lat, _ in points]),
-            "block_id": np.array(
-                [str(p.get("block_id", i + 1)) for i, (_, _, p) in enumerate(points)], dtype=object
-            ),
-        }
-        for name in ("p2_1_s2", "kr"):
-            values = [p.get(name) for _, _, p in points]
-            for i, value in enumerate(values):
-                if isinstance(value, bool) or not isinstance(value, int | float):
-                    raise InputError(f"{path}, features[{i}]: {name} = {value!r} is not a number")
-            found[name] = np.array(values, dtype=np.float64)
-    else:
-        from rbfrag.exchange.block_columns import read_columns, read_names, read_texts
-
-        names = read_names(path)
-        wanted = ["p2_1_s2", "kr", *(x for x in ("lon", "lat", "weight") if x in names)]
-        found = dict(read_columns(path, wanted))
-        if ("lon" in found) != ("lat" in found):
-            raise InputError(f"{path}: lon and lat go together: give both columns, or neither")
-        size = found["kr"].size
-        found["block_id"] = (
-            read_texts(path, "block_id")
-            if "block_id" in names
-            else np.array([str(i + 1) for i in range(size)], dtype=object)
-        )
-    if found["kr"].size == 0:
-        raise InputError(f"{path}: there is no block in the file")
-    for i in range(found["kr"].size):
-        a, b = float(found["p2_1_s2"][i]), float(found["kr"][i])
-        if not (a > 0.0 and b > 0.0 and math.isfinite(a) and math.isfinite(b)):
-            raise InputError(
-                f"{path}: block {found['block_id'][i]} has p2_1_s2 = {a:g} and kr = {b:g}: only "
-                "stable toppling blocks, both above zero, have a fragility"
-            )
-        if "lon" in found and not (abs(found["lon"][i]) <= 180.0 and abs(found["lat"][i]) <= 90.0):
-            raise InputError(
-                f"{path}: block {found['block_id'][i]} at lon = {found['lon'][i]:g}, lat = "
-                f"{found['lat'][i]:g} lies off the map"
-            )
-        if "weight" in found and not (found["weight"][i] >= 0.0):
-            raise InputError(f"{path}: block {found['block_id'][i]} has a weight below zero")
-    if "weight" in found and not found["weight"].sum() > 0.0:
-        raise InputError(f"{path}: the weights of the blocks sum to zero")
-    return found
 
 
 def _write(columns: dict[str, Any], about: dict[str, Any], target: Any) -> None:
