@@ -62,6 +62,17 @@ class TestCheck:
         assert any(problem in finding.problem for finding in findings)
         assert all(finding.advice for finding in findings)
 
+    def test_a_run_that_cannot_tell_is_no_damage(self, filled: Engine) -> None:
+        # beside a very sensitive border the certificate decides, not the run
+        point, combination = schema.simulation, schema.combination
+        critical = select(combination.c.kr_over_pga).where(
+            combination.c.id == point.c.combination_id
+        )
+        unsure = update(point).values(outcome="undetermined", theta_n=None)
+        with filled.begin() as connection:
+            connection.execute(unsure.where(point.c.kr_over_pga == critical.scalar_subquery()))
+            assert check_database(connection) == []
+
     def test_rows_that_nothing_refers_to(self, filled: Engine) -> None:
         with filled.begin() as connection:
             values = {"event_id": "lost", "guessed": True, "name": ""}

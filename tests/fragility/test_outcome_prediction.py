@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError
-from rbfrag.fragility import outcome_method, prediction_array
+from rbfrag.fragility import interval_floor, outcome_method, prediction_array
 from rbfrag.fragility.answers import MotionPrediction
 from rbfrag.fragility.fitting import fit
 from rbfrag.fragility.formulas import FLOOR_FROM, FLOOR_NODES, FLOOR_STEP, PARAMETERS, SHAPES
@@ -211,6 +211,18 @@ def test_knowing_less_is_never_narrower(monkeypatch):
                 widths.append(answer.ci_high - answer.ci_low)
             narrower += any(a < b - 1e-12 for a, b in pairwise(widths))
     assert narrower == 0
+
+
+def test_few_earthquakes_do_not_widen_to_the_widest():
+    random = np.random.default_rng(2)
+    eta = np.full(1000, FLOOR_FROM + 2.3 * FLOOR_STEP)
+    width = random.uniform(0.0, 1.0, eta.size)
+    widest, nine_in_ten = (interval_floor._table(eta, width, share) for share in (1.0, 0.9))
+    # the two nodes of the cell, and no other
+    assert [i for i, value in enumerate(widest) if value > 0.0] == [2, 3]
+    assert widest[2] == width.max()
+    assert nine_in_ten[2] == np.quantile(width, 0.9)
+    assert 0.85 < nine_in_ten[2] < 0.95 < widest[2]
 
 
 def shaking(n=800, dt=0.01):

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from rbfrag.fragility.component import COMPONENTS, component
+from rbfrag.fragility import site_probability as site_module
+from rbfrag.fragility.component import component
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import predict
 from rbfrag.fragility.site_probability import site_probability
+
+FloatArray = NDArray[np.float64]
 
 PGV = np.array([0.0, 0.3, 0.7, 1.2])
 PGA = np.array([0.0, 0.3, 0.5, 0.9])
@@ -31,8 +35,22 @@ def test_own_blocks(model: FragilityModel) -> None:
     assert found.probability == pytest.approx(predict(p2, kr, pgv_m_s=PGV, model=model).probability)
 
 
-def test_the_larger_component_is_more_than_one(model: FragilityModel) -> None:
-    assert COMPONENTS["larger"].ratio == 1.1
+def test_only_sites_where_nothing_can_fail_are_left_out(
+    model: FragilityModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def answer() -> FloatArray:
+        return site_probability(
+            np.geomspace(0.01, 1.0, 40), np.full(40, 0.5), np.array([3.0, 1.0]),
+            np.array([0.1, 0.05]), component=component("larger"), model=model,
+        ).probability  # fmt: skip
+
+    some = answer()
+    monkeypatch.setattr(site_module, "NOTHING", -1.0)
+    every = answer()
+    left_out = some == 0.0
+    assert 0 < left_out.sum() < 40
+    assert (every[left_out] <= 1e-9).all()
+    assert np.array_equal(some[~left_out], every[~left_out])
 
 
 @pytest.mark.parametrize("name", ["single", "rotd50", "larger"])
