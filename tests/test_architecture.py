@@ -117,6 +117,8 @@ def test_every_folder_is_a_known_room() -> None:
         ("pyarrow", {"exchange"}),
         ("pyogrio", {"exchange"}),
         ("typer", {"cli"}),
+        ("fastapi", {"service"}),
+        ("uvicorn", {"service"}),
         ("pyslammer", set()),
     ],
 )
@@ -147,7 +149,7 @@ def test_room_packages_import_nothing() -> None:
 def test_every_imported_library_is_declared() -> None:
     with (ROOT / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)["project"]
-    runtime = ("plot", "postgres", "parquet", "gis", "dask")
+    runtime = ("plot", "postgres", "parquet", "gis", "dask", "service")
     declared = [*project["dependencies"]]
     for extra in runtime:
         declared += project["optional-dependencies"][extra]

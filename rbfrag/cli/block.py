@@ -62,14 +62,13 @@ def block(
 
     Angles in degrees, lengths in m, accelerations in g, p2 in 1/s2.
     """
+    from rbfrag.solver.described_block import described
     from rbfrag.solver.stability import stability
     from rbfrag.solver.stability_report import as_dict
 
-    shape, conditions = described_block.described(
+    shape, conditions = described(
         {"alpha1": alpha1, "alpha3": alpha3, "r3": r3},
         {"s1": s1, "s2": s2, "gamma": gamma},
-        "--polygon",
-        polygon,
         {
             "beta_deg": beta,
             "phi_deg": phi,
@@ -79,6 +78,8 @@ def block(
             "kv": kv,
         },
         no_back,
+        file_option="--polygon",
+        path=polygon,
     )
     found = stability(shape, **conditions)
     if plot is not None:

@@ -18,6 +18,7 @@ from rbfrag.cli import critical, database, demo, fit, models, motions, plot, pre
 from rbfrag.cli import export as export_command
 from rbfrag.cli import hazard as hazard_command
 from rbfrag.cli import rockmass as rockmass_command
+from rbfrag.cli import serve as serve_command
 from rbfrag.cli import shakemap as shakemap_command
 from rbfrag.cli import simulate as simulate_command
 from rbfrag.cli import spectrum as spectrum_command
@@ -83,6 +84,7 @@ app.add_typer(export_command.app, name="export")
 app.add_typer(models.app, name="models")
 app.add_typer(plot.app, name="plot")
 app.add_typer(database.app, name="db")
+app.command("serve", epilog=serve_command.EXAMPLE)(serve_command.serve)
 app.command("bench", epilog=bench_command.EXAMPLE)(bench_command.bench)
 app.command("demo", epilog=demo.EXAMPLE)(demo.demo)
 

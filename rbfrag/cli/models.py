@@ -24,39 +24,17 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
     """List the fitted models; the default answers when none is named."""
     from rbfrag.db.engine import opened_database
     from rbfrag.db.model_store import model_rows
+    from rbfrag.fragility.model_list import model_list
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         rows = model_rows(connection)
+    listed = model_list(rows)
     if json:
-        print_json(
-            [
-                {
-                    "name": row.name,
-                    "term": row.term,
-                    "method": row.method,
-                    "is_default": row.is_default,
-                    "n": row.diagnostics.get("n"),
-                    "events": row.diagnostics.get("events"),
-                    "created": row.created,
-                }
-                for row in rows
-            ]
-        )
+        print_json(listed)
         return
     print_table(
         ("name", "term", "method", "default", "n", "earthquakes", "fitted"),
-        [
-            (
-                row.name,
-                row.term,
-                row.method,
-                row.is_default,
-                row.diagnostics.get("n"),
-                row.diagnostics.get("events"),
-                row.created,
-            )
-            for row in rows
-        ],
+        [tuple(each.values()) for each in listed],
     )
 
 

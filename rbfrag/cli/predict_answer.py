@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rbfrag.cli.block_argument import toppling_block
 from rbfrag.cli.output import print_json, print_pairs, print_table, print_warnings
-
-if TYPE_CHECKING:
-    from rbfrag.fragility.answers import Prediction
 
 
 def answer_one(
@@ -26,52 +23,26 @@ def answer_one(
     db: str | None,
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the JSON document and the warnings of one block."""
-    from rbfrag.fragility.prediction import answer_given
-    from rbfrag.fragility.prediction import predict as run
+    from rbfrag.fragility.prediction_document import prediction_document
 
-    answer: Any = run
     p2, kr, remarks = toppling_block(p2, kr, block)
-    others: list[Prediction] = []
+    found = None
     if motion is not None:
         from rbfrag.cli.motion_argument import find_motion
 
-        prediction: Any = answer(
-            p2,
-            kr,
-            **measures,
-            motion=find_motion(motion, db=db, units=units, dt_s=dt),
-            polarity=polarity,
-            model=model,
-            level=level,
-            db=db,
-        )
-        others = [prediction]
-    elif model is not None:
-        prediction = answer(p2, kr, **measures, model=model, level=level, db=db)
-        others = [prediction]
-    else:
-        from rbfrag.fragility.model_lookup import suited_models
-
-        values = {"p2": p2, "kr": kr, **measures}
-        others = [answer_given(each, values, level) for each in suited_models(values, db)]  # type: ignore[misc]
-        prediction = others[0]
-    document = prediction.as_dict()
-    warnings = [*remarks, *prediction.warnings]
-    document["warnings"] = warnings
-    document["answers"] = [
-        {
-            "model": each.model,
-            "term": each.term,
-            "method": each.method,
-            "probability": each.probability,
-            "ci_low": each.ci_low,
-            "ci_high": each.ci_high,
-            "in_domain": each.in_domain,
-            "recommended": each is prediction,
-        }
-        for each in others
-    ]
-    return document, warnings
+        found = find_motion(motion, db=db, units=units, dt_s=dt)
+    document = prediction_document(
+        p2,
+        kr,
+        measures,
+        motion=found,
+        polarity=polarity,
+        model=model,
+        level=level,
+        db=db,
+        remarks=remarks,
+    )
+    return document, document["warnings"]
 
 
 def show(document: dict[str, Any], warnings: list[str], *, json: bool) -> None:

@@ -188,8 +188,10 @@ def _block(
             f"{by_number[0]} does not go with {by_shape[0]}: the block is described once"
         )
     if by_shape:
-        block, conditions = described_block.described(
-            angles, fractures, "--block", file, planes, no_back
+        from rbfrag.solver.described_block import described
+
+        block, conditions = described(
+            angles, fractures, planes, no_back, file_option="--block", path=file
         )
         if conditions.pop("kv", 0.0) != 0.0:
             raise InputError(

@@ -166,17 +166,37 @@ def _named(name: str, db: str | PathLike[str] | None) -> FragilityModel:
     raise UnknownModelError(unknown_model(name, sorted(m.name for m in stored), place))
 
 
+def stored_rows(db: str | PathLike[str] | None = None) -> list[ModelRow]:
+    """Return the models of a database as they are stored, sorted by name.
+
+    Args:
+        db: database, as for :func:`find_model`.
+
+    Raises:
+        DatabaseError: the database cannot be read.
+    """
+    place, _ = _place(db)
+    if isinstance(place, Path):
+        from rbfrag.db.model_file import read_models
+
+        return read_models(place)
+    return _stored_on_server(place)[0]
+
+
 def _stored(db: str | PathLike[str] | None) -> tuple[list[FragilityModel], str]:
     place, shipped = _place(db)
     if isinstance(place, Path):
         return _stored_in_file(place, shipped), str(place)
+    rows, label = _stored_on_server(place)
+    return [_of_row(row) for row in rows], label
+
+
+def _stored_on_server(url: str) -> tuple[list[ModelRow], str]:
     from rbfrag.db.engine import opened_database
     from rbfrag.db.model_store import model_rows
 
-    with opened_database(place, read_only=True) as engine, engine.connect() as connection:
-        rows = model_rows(connection)
-        label = str(engine.url)
-    return [_of_row(row) for row in rows], label
+    with opened_database(url, read_only=True) as engine, engine.connect() as connection:
+        return model_rows(connection), str(engine.url)
 
 
 def _stored_in_file(path: Path, shipped: bool) -> list[FragilityModel]:

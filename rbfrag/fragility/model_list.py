@@ -1,0 +1,28 @@
+"""The list of fitted models as scripts read it. Loads no library."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from rbfrag.db.rows import ModelRow
+
+
+def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
+    """Return what `rbfrag models list` says of each model.
+
+    Args:
+        rows: the models as they are stored.
+    """
+    return [
+        {
+            "name": row.name,
+            "term": row.term,
+            "method": row.method,
+            "is_default": row.is_default,
+            "n": row.diagnostics.get("n"),
+            "events": row.diagnostics.get("events"),
+            "created": row.created,
+        }
+        for row in rows
+    ]

@@ -1,0 +1,127 @@
+"""The answers as OpenAPI describes them. They are written by other rooms, and only named here."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict
+
+
+class _Document(BaseModel):
+    model_config = ConfigDict(extra="forbid", protected_namespaces=())
+
+
+class Problem(_Document):
+    """Problem details (RFC 9457)."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+
+
+class ModelAnswer(_Document):
+    """The answer of one model that the measures suffice for."""
+
+    model: str
+    term: str
+    method: str
+    probability: float
+    ci_low: float
+    ci_high: float
+    in_domain: bool
+    recommended: bool
+
+
+class PredictAnswer(_Document):
+    """Probability that one block topples: what `rbfrag predict --json` prints."""
+
+    probability: float
+    ci_low: float
+    ci_high: float
+    level: float
+    model: str
+    term: str
+    method: str
+    y_m_s: float
+    intensity_m_s: float
+    in_domain: bool
+    warnings: list[str]
+    pgv_over_pga_s: float | None
+    answers: list[ModelAnswer]
+
+
+class PredictArrays(_Document):
+    """Probabilities of many blocks or motions; null where the input cannot be used."""
+
+    probability: list[float | None]
+    ci_low: list[float | None]
+    ci_high: list[float | None]
+    in_domain: list[bool]
+    reason: list[str]
+    level: float
+    model: str
+    term: str
+    method: str
+    warnings: list[str]
+
+
+class Margin(_Document):
+    """By how much an angle may change before another mode governs."""
+
+    variable: str
+    change_deg: float
+    mode: str
+
+
+class Cohesion(_Document):
+    """What cohesion of the base adds."""
+
+    ratio: float
+    ky: float | None
+    phi_equivalent_deg: float | None
+    ky_equivalent: float | None
+
+
+class BlockAnswer(_Document):
+    """How a block fails: what `rbfrag block --json` prints; null where it does not apply."""
+
+    mode: str
+    state: str
+    p2: float
+    kr: float | None
+    ky: float | None
+    ks: float | None
+    kct: float | None
+    yield_acceleration: float | None
+    alpha1_deg: float | None
+    alpha3_deg: float | None
+    gamma_deg: float | None
+    r1_m: float | None
+    r2_m: float | None
+    r3_m: float | None
+    s1_m: float | None
+    s2_m: float | None
+    area_m2: float
+    shape_factor: float
+    delta_deg: float | None
+    margins: list[Margin]
+    cohesion: Cohesion | None
+    warnings: list[str]
+
+
+class ModelListed(_Document):
+    """A stored model: what `rbfrag models list --json` prints."""
+
+    name: str
+    term: str
+    method: str
+    is_default: bool
+    n: int | None
+    events: int | None
+    created: str
+
+
+class Health(_Document):
+    """The service answers."""
+
+    status: str
+    version: str

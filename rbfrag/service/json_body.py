@@ -1,0 +1,44 @@
+"""JSON in and out: no number that JSON has no name for, no depth without end."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, NoReturn
+
+from fastapi import Response
+
+from rbfrag.errors import InputError
+
+
+class MalformedError(InputError):
+    """A body that is not what its type says."""
+
+
+def json_answer(document: object, status: int = 200) -> Response:
+    """Return a document as the answer to a request."""
+    text = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return Response(text.encode("utf-8"), status, media_type="application/json")
+
+
+def read_json(body: bytes) -> Any:
+    """Return what a body says.
+
+    Raises:
+        MalformedError: it is not JSON, is nested without end, or holds NaN or Infinity.
+    """
+    try:
+        return json.loads(body.decode("utf-8-sig"), parse_constant=_refuse)
+    except UnicodeDecodeError as error:
+        raise MalformedError(f"byte {error.start} of the body is not UTF-8 text") from None
+    except json.JSONDecodeError as error:
+        raise MalformedError(
+            f"the body is not JSON: line {error.lineno}, column {error.colno}: {error.msg}"
+        ) from None
+    except RecursionError:
+        raise MalformedError("the body is nested too deeply") from None
+    except ValueError as error:  # a number of thousands of digits
+        raise MalformedError(f"the body is not JSON: {error}") from None
+
+
+def _refuse(word: str) -> NoReturn:
+    raise MalformedError(f"{word} is no JSON number: give a finite one, or null for a missing one")

@@ -1,0 +1,32 @@
+"""`/v1/models`: the fitted models that can answer."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, Response
+
+from rbfrag.fragility.model_list import model_list
+from rbfrag.fragility.model_lookup import stored_rows
+from rbfrag.service.documents import ModelListed
+from rbfrag.service.json_body import json_answer
+from rbfrag.service.operation import operation
+from rbfrag.service.settings import Settings
+
+
+def router(settings: Settings) -> APIRouter:
+    """Return the operation on `/v1/models`."""
+    routes = APIRouter()
+
+    @routes.get(
+        "/v1/models",
+        **operation(
+            "The fitted models",
+            list[ModelListed],
+            description="What `rbfrag models list --json` prints; where the service was given no "
+            "database and there is none, the models that are shipped with rbfrag.",
+            problems=(401, 503),
+        ),
+    )
+    async def models() -> Response:
+        return json_answer(model_list(stored_rows(settings.db)))
+
+    return routes

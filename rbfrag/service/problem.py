@@ -1,0 +1,79 @@
+"""What went wrong, as problem details (RFC 9457)."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Mapping
+from http import HTTPStatus
+
+from fastapi import Response
+
+from rbfrag.db.location import locate, reference_file
+from rbfrag.errors import DatabaseError, RbfragError, UnknownModelError
+from rbfrag.service.json_body import MalformedError
+from rbfrag.service.settings import Settings
+
+MEDIA_TYPE = "application/problem+json"
+
+_OPTION = re.compile(r"(?<![\w-])--([a-z][a-z0-9]*(?:-[a-z0-9]+)*)")
+
+
+def problem(
+    status: int, kind: str, detail: str, headers: Mapping[str, str] | None = None
+) -> Response:
+    """Return an answer that says what was wrong.
+
+    Args:
+        status: HTTP status.
+        kind: what kind of trouble, for programs: ``input``, ``unknown-model``.
+        detail: one paragraph for a person.
+        headers: further headers.
+    """
+    document = {
+        "type": f"urn:rbfrag:problem:{kind}",
+        "title": HTTPStatus(status).phrase,
+        "status": status,
+        "detail": detail,
+    }
+    body = json.dumps(document, ensure_ascii=False).encode("utf-8", "replace")
+    return Response(body, status, dict(headers or {}), MEDIA_TYPE)
+
+
+def refused(error: RbfragError, settings: Settings) -> Response:
+    """Return the answer to a request that raised an error on purpose.
+
+    Args:
+        error: what was raised.
+        settings: those of the service; the place of its database is left out of the words.
+    """
+    detail = in_parameters(str(error), settings)
+    if isinstance(error, MalformedError):
+        return problem(400, "malformed", detail)
+    if isinstance(error, UnknownModelError):
+        return problem(422, "unknown-model", detail)
+    if isinstance(error, DatabaseError):
+        return problem(503, "database", detail)
+    return problem(422, "input", detail)
+
+
+def in_parameters(words: str, settings: Settings) -> str:
+    """Return a message of the command line in the words of a request.
+
+    Options lose their dashes, and the database is not named by its place.
+    """
+    for place in _places(settings):
+        words = words.replace(place, "the database")
+    return _OPTION.sub(lambda found: found[1].replace("-", "_"), words)
+
+
+def _places(settings: Settings) -> list[str]:
+    place = os.fspath(locate(settings.db))
+    places = [place, settings.db or place]
+    if "://" not in place:
+        places.append(os.path.abspath(place))  # noqa: PTH100
+    shipped = reference_file()
+    if shipped is not None:
+        places.append(str(shipped))
+    return sorted(places, key=len, reverse=True)

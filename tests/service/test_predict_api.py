@@ -1,0 +1,108 @@
+"""`/v1/predict` gives the answers of the command line and of Python."""
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import rbfrag
+from rbfrag.cli.predict_answer import answer_one, show
+
+KEYWORD = {"pgv": "pgv_m_s", "pga": "pga_g", "tm": "tm_s", "pgd": "pgd_m"}
+
+
+def printed(capsys, database, values, **more):
+    """What `rbfrag predict --json` prints."""
+    measures = {KEYWORD[name]: value for name, value in values.items() if name in KEYWORD}
+    capsys.readouterr()
+    document, warnings = answer_one(
+        values["p2"], values["kr"], None, measures, motion=None, polarity="both",
+        model=more.get("model"), level=more.get("level", 0.95), units=None, dt=None,
+        db=str(database),
+    )  # fmt: skip
+    show(document, warnings, json=True)
+    return json.loads(capsys.readouterr().out)
+
+
+POSITIVE = st.floats(1e-3, 1e3)
+SCENARIOS = st.fixed_dictionaries(
+    {"p2": POSITIVE, "kr": st.floats(1e-3, 3.0), "pgv": st.floats(0.0, 10.0)},
+    optional={"pga": st.floats(1e-3, 3.0), "tm": st.floats(0.02, 5.0)},
+)
+
+
+@settings(
+    max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(values=SCENARIOS, level=st.sampled_from([0.5, 0.95, 0.999]))
+def test_one_block_is_answered_as_by_the_command_line(client, database, capsys, values, level):
+    answer = client.get("/v1/predict", params={**values, "level": level})
+    assert answer.status_code == 200
+    assert answer.json() == printed(capsys, database, values, level=level)
+    measures = {KEYWORD[name]: value for name, value in values.items() if name in KEYWORD}
+    own = rbfrag.predict(values["p2"], values["kr"], **measures, level=level, db=database)
+    assert answer.json()["probability"] == own.probability
+    assert answer.json()["ci_low"] == own.ci_low
+    assert answer.json()["ci_high"] == own.ci_high
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(rows=st.lists(SCENARIOS.map(lambda s: {**s, "pga": 0.5}), min_size=1, max_size=20))
+def test_lists_are_answered_within_rounding_of_single_blocks(client, rows):
+    names = ("p2", "kr", "pgv")
+    body = {name: [row[name] for row in rows] for name in names} | {"pga": 0.5}
+    answer = client.post("/v1/predict", json=body)
+    assert answer.status_code == 200
+    found = answer.json()
+    for i, row in enumerate(rows):
+        query = {name: row[name] for name in names} | {"pga": 0.5, "model": found["model"]}
+        one = client.get("/v1/predict", params=query).json()
+        for name in ("probability", "ci_low", "ci_high"):
+            assert abs(found[name][i] - one[name]) <= 4.0 * np.spacing(max(one[name], 1e-300))
+        assert found["in_domain"][i] == one["in_domain"]
+
+
+def test_a_list_says_which_element_cannot_be_used(client):
+    found = client.post(
+        "/v1/predict", json={"p2": 3, "kr": [0.1, -0.1, None], "pgv": [0.6, 0.6, 0.6]}
+    ).json()
+    assert found["probability"][1:] == [1.0, None]
+    assert found["reason"][:2] == ["", "unstable"]
+    assert found["reason"][2].startswith("kr is not a number")
+
+
+@pytest.mark.parametrize(
+    ("query", "words"),
+    [
+        ("p2=3&kr=0.1", "nothing about the motion is given"),
+        ("p2=3&pgv=0.6", "kr is missing"),
+        ("p2=3&kr=0&pgv=0.6", "kr = 0"),
+        ("p2=3&kr=nan&pgv=0.6", "kr = nan"),
+        ("p2=3&kr=0.1&pgv=inf", "pgv_m_s = inf"),
+        ("p2=3&kr=0.1&pgv=0.6&pgv=0.7", "pgv is given twice"),
+        ("p2=3&kr=0.1&pgv=0.6&pvg=0.7", "there is no parameter 'pvg'"),
+        ("p2=3&kr=a tenth&pgv=0.6", "kr = 'a tenth' is not a number"),
+        ("p2=3&kr=0.1&pgv=0.6&level=95", "level = 95"),
+        ("p2=3&kr=0.1&pgv=0.6&model=", "model is empty"),
+        ("p2=3&kr=%ff&pgv=0.6", "not UTF-8"),
+    ],
+)
+def test_what_cannot_be_answered_is_refused_in_words(client, query, words):
+    answer = client.get(f"/v1/predict?{query}")
+    assert answer.status_code == 422
+    assert answer.headers["content-type"] == "application/problem+json"
+    problem = answer.json()
+    assert problem["status"] == 422
+    assert words in problem["detail"]
+    assert "--" not in problem["detail"]
+
+
+def test_an_unknown_model_is_named_without_the_place_of_the_database(client, database):
+    problem = client.get("/v1/predict?p2=3&kr=0.1&pgv=0.6&model=nobody").json()
+    assert problem["type"] == "urn:rbfrag:problem:unknown-model"
+    assert "'nobody' in the database" in problem["detail"]
+    assert str(database.parent) not in problem["detail"]
