@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import importlib.util
+import json
+import os
+from runpy import run_module
 from typing import Annotated
 
 import typer
 
 from rbfrag.cli import options
-from rbfrag.errors import InputError, MissingExtraError
+from rbfrag.errors import MissingExtraError
 
 EXAMPLE = "Example:  rbfrag serve --db rbfrag.db --port 8000"
 
@@ -23,11 +26,8 @@ def serve(
     for library in ("fastapi", "uvicorn"):
         if importlib.util.find_spec(library) is None:
             raise MissingExtraError(f"The service needs {library}", "service")
-    if workers < 1:
-        raise InputError(f"--workers {workers}: at least one process answers")
-    if not 0 <= port <= 65535:
-        raise InputError(f"--port {port}: a port is a number from 0 to 65535")
-    from rbfrag.service.run import serve as run
-    from rbfrag.service.settings import Settings
-
-    run(Settings(db=db), host=host, port=port, workers=workers)
+    # The service is no part of the command line: it is a program of its own.
+    os.environ["RBFRAG_SERVICE"] = json.dumps(
+        {"db": db, "host": host, "port": port, "workers": workers}
+    )
+    run_module("rbfrag.service", run_name="__main__")
