@@ -1,4 +1,4 @@
-"""`rbfrag critical`: the strongest block that a motion topples."""
+"""`rbfrag critical`: the strongest block that a motion brings down."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import typer
 
 from rbfrag.cli import options
 from rbfrag.cli.motion_argument import find_motion, find_vertical
+from rbfrag.cli.number_list import number_list
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
+from rbfrag.errors import InputError
 
 EXAMPLE = "Example:  rbfrag critical record.AT2 --p2 3 --json"
 
@@ -25,7 +27,46 @@ STATUS = {
 
 def critical(
     motion: options.Motion,
-    p2: options.P2,
+    p2: Annotated[
+        float | None,
+        typer.Option(
+            "--p2",
+            help="Toppling: frequency parameter p² of the block [1/s²].",
+            show_default=False,
+        ),
+    ] = None,
+    kind: Annotated[
+        str,
+        typer.Option("--kind", help="toppling, sliding, slumping or confined_toppling."),
+    ] = "toppling",
+    block: Annotated[
+        str | None,
+        typer.Option(
+            "--block",
+            metavar="FILE",
+            help="Slumping and confined toppling: block file (.toml or .csv) with beta_deg and "
+            "phi_deg. The factor on the record that brings it down is searched.",
+            show_default=False,
+        ),
+    ] = None,
+    rotation: Annotated[
+        float | None,
+        typer.Option(
+            "--rotation",
+            help="Slumping and confined toppling: rotation that counts as failure [deg]. Default: "
+            "failure past recovery.",
+            show_default=False,
+        ),
+    ] = None,
+    displacement: Annotated[
+        str | None,
+        typer.Option(
+            "--displacement",
+            metavar="LIST",
+            help="Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.",
+            show_default=False,
+        ),
+    ] = None,
     vertical: options.Vertical = None,
     reverse: options.Reverse = False,
     linear: options.Linear = False,
@@ -51,7 +92,42 @@ def critical(
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Find the largest k_r/PGA that one accelerogram topples, with its bracket."""
+    """Find the critical block of one accelerogram, with its bracket.
+
+    Toppling: the largest k_r/PGA that topples at --p2. Sliding: the largest k_y/PGA that slides
+    further than --displacement. Slumping and confined toppling: the smallest factor on the record
+    that brings the block of --block down.
+    """
+    _refuse_options_of_other_kinds(
+        kind,
+        {
+            "--p2": p2 is not None,
+            "--linear": linear,
+            "--map": full_map,
+            "--plot": plot is not None,
+            "--block": block is not None,
+            "--rotation": rotation is not None,
+            "--displacement": displacement is not None,
+        },
+    )
+    if kind != "toppling":
+        from rbfrag.cli import critical_kinds
+
+        ground = find_motion(motion, db=db, units=units, dt_s=dt)
+        upward, said = find_vertical(vertical, ground, db=db, units=units, dt_s=dt)
+        if kind == "sliding":
+            distances = [] if displacement is None else number_list(displacement, "--displacement")
+            critical_kinds.sliding(
+                ground, upward, said, displacements_m=distances, reverse=reverse, json=json
+            )
+            return
+        critical_kinds.scaled(
+            ground, upward, said, kind=kind, block=block, rotation=rotation, reverse=reverse,
+            json=json,
+        )  # fmt: skip
+        return
+    if p2 is None:
+        raise InputError("--p2 is missing: the critical block is searched for one p² [1/s²]")
     from rbfrag.solver.certified import MAP_DEPTH
     from rbfrag.solver.critical import critical as search
     from rbfrag.solver.critical_report import as_dict, map_rows
@@ -89,3 +165,21 @@ def critical(
     for row in rows:
         print(f"{row['k_lo']:.12f}  {row['k_hi']:.12f}  {row['outcome']}")
     print_warnings(warnings)
+
+
+OPTIONS_OF = {
+    "toppling": {"--p2", "--linear", "--map", "--plot"},
+    "sliding": {"--displacement"},
+    "slumping": {"--block", "--rotation"},
+    "confined_toppling": {"--block", "--rotation"},
+}
+"""Which options go with which kind."""
+
+
+def _refuse_options_of_other_kinds(kind: str, given: dict[str, bool]) -> None:
+    if kind not in OPTIONS_OF:
+        raise InputError(f"--kind {kind}: use one of {', '.join(OPTIONS_OF)}")
+    for option, is_given in given.items():
+        if is_given and option not in OPTIONS_OF[kind]:
+            kinds = " and ".join(name for name, its in OPTIONS_OF.items() if option in its)
+            raise InputError(f"{option} goes with --kind {kinds}, not with {kind}")
