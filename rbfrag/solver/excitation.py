@@ -76,9 +76,40 @@ class Excitation:
         return largest
 
     @cached_property
+    def block_min_q(self) -> FloatArray:
+        """Least q of each block of `BLOCK` nodes."""
+        n = self.q.size
+        padded = np.full(-(-n // BLOCK) * BLOCK, np.inf)
+        padded[:n] = self.q
+        least: FloatArray = padded.reshape(-1, BLOCK).min(axis=1)
+        return least
+
+    @cached_property
+    def min_q(self) -> float:
+        """Least q over the record."""
+        return float(self.q.min())
+
+    @cached_property
     def max_q(self) -> float:
         """Greatest q over the record: no block with k_r at or above it ever lifts."""
         return float(self.q.max())
+
+    def scaled(self, factor: float) -> Excitation:
+        """Return the same shaking, both components times a factor.
+
+        Args:
+            factor: what all accelerations are multiplied by, > 0; 1 gives the same numbers.
+        """
+        if factor == 1.0:
+            return self
+        return Excitation(
+            time_s=self.time_s,
+            interval_s=self.interval_s,
+            k_h=factor * self.k_h,
+            w=1.0 + factor * (self.w - 1.0),
+            pga_g=factor * self.pga_g,
+            warnings=self.warnings,
+        )
 
 
 def excitation(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -16,8 +17,16 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver import response_models
 from rbfrag.solver.block import Block
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.models import confined_toppling, slumping
-from rbfrag.solver.one_freedom.equation import Ending, Equation, Exit, Mechanism, Phase, Pose
+from rbfrag.solver.models import confined_toppling, sliding, slumping
+from rbfrag.solver.one_freedom.equation import (
+    Condition,
+    Ending,
+    Equation,
+    Exit,
+    Mechanism,
+    Phase,
+    Pose,
+)
 from rbfrag.solver.one_freedom.follow import Course, follow
 from rbfrag.solver.one_freedom.harmonics import constant, cosine, sine, turning
 from rbfrag.solver.one_freedom.rocking import rocking_equation
@@ -129,7 +138,7 @@ def test_the_error_estimate_covers_the_error(name: str, seed: int) -> None:
 
 def test_the_history_changes_nothing() -> None:
     drive = excitation(record(1, 0.8))
-    for mechanism in MECHANISMS.values():
+    for mechanism in (*MECHANISMS.values(), TWO_WAY):
         with_history = follow(mechanism, drive, travel=True)
         without = follow(mechanism, drive)
         assert with_history.travel is not None
@@ -139,6 +148,67 @@ def test_the_history_changes_nothing() -> None:
 def replace_travel(course: Course) -> list[object]:
     plain = replace(course, travel=None)
     return [getattr(plain, name) for name in plain.__dataclass_fields__]
+
+
+TWO_WAY = sliding.mechanism(
+    replace(site(Block.from_angles(10, 60, 1.0), 12, 30, 30), settings={"two_way": True})
+)
+
+
+@pytest.mark.parametrize("calm", [1, 15, 16, 17, 200])
+def test_calm_stretches_are_passed_over(calm: int) -> None:
+    # shaking below every threshold, of a length that does and does not fill blocks of nodes
+    pieces = [np.array(record(seed, 0.9).acceleration_g[100:400]) for seed in (1, 2)]
+    for samples in pieces:
+        samples[[0, -1]] = 0.0
+    rest = 0.1 * np.sin(np.arange(calm))
+    for mechanism in (*MECHANISMS.values(), TWO_WAY):
+        short, long = (
+            follow(mechanism, excitation(GroundMotion(np.concatenate(parts), DT_S)))
+            for parts in (
+                [pieces[0], np.zeros(200), pieces[1]],
+                [rest, pieces[0], np.zeros(200), rest, pieces[1], rest],
+            )
+        )
+        assert short.started_s is not None
+        assert (long.peak, long.x, long.outcome) == (short.peak, short.x, short.outcome)
+        assert long.samples_moved == short.samples_moved
+        assert long.started_s == pytest.approx(short.started_s + calm * DT_S, abs=1e-9)
+
+
+def test_limits_and_contacts_are_met_in_the_same_place_by_long_and_short_steps() -> None:
+    # an equation that is the same everywhere, and one that is all but the same
+    drive = excitation(record(3, 0.8))
+
+    def run(wobble: float, highest: float, lift: float) -> Course:
+        equation = Equation(
+            inertia=constant(1.0),
+            drive=constant(9.0) + cosine() * wobble,
+            resistance=constant(1.5),
+            conditions=(
+                Condition(constant(-lift), constant(0.3), constant(-0.004),
+                          Outcome.CONTACT_LOST, "it lifts"),
+            ),
+        )  # fmt: skip
+        phase = Phase(
+            name="moves",
+            forward=equation,
+            reverse=None,
+            pose=lambda x: Pose(0.0, (x, 0.0), x),
+            after=lambda exit: Ending(Outcome.TOPPLED, in_place=False),
+            highest=highest,
+        )
+        return follow(Mechanism(first=phase, rotates=False, critical=None), drive)
+
+    outcomes = set()
+    for highest, lift in itertools.product((0.01, 0.1, 0.5, math.inf), (0.2, 0.5, 1.0)):
+        plain, other = run(0.0, highest, lift), run(1e-14, highest, lift)
+        assert plain.outcome is other.outcome
+        assert plain.ended_s == pytest.approx(other.ended_s, abs=1e-7)
+        assert plain.peak == pytest.approx(other.peak, rel=1e-8)
+        assert plain.samples_moved == other.samples_moved
+        outcomes.add(plain.outcome)
+    assert outcomes == {Outcome.TOPPLED, Outcome.CONTACT_LOST, Outcome.STABLE}
 
 
 def test_a_scaled_time_axis_and_size_give_the_same_rotation() -> None:

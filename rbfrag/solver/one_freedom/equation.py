@@ -83,20 +83,17 @@ class Equation:
         Args:
             limit: greatest x.
         """
-        before = 0.0
-        for n in range(1, _LOOKS + 1):
-            here = limit * n / _LOOKS
-            if self.resistance(here) <= 0.0:
-                while here - before > 1e-15 * limit:
-                    middle = 0.5 * (before + here)
-                    if not before < middle < here:
-                        break
-                    before, here = (
-                        (before, middle) if self.resistance(middle) <= 0.0 else (middle, here)
-                    )
-                return here
-            before = here
-        return limit
+        places = limit * np.arange(_LOOKS + 1) / _LOOKS
+        weak = np.flatnonzero(self.resistance.at(places[1:]) <= 0.0)
+        if not weak.size:
+            return limit
+        before, here = float(places[weak[0]]), float(places[weak[0] + 1])
+        while here - before > 1e-15 * limit:
+            middle = 0.5 * (before + here)
+            if not before < middle < here:
+                break
+            before, here = (before, middle) if self.resistance(middle) <= 0.0 else (middle, here)
+        return here
 
     def threshold(self, x: float) -> float:
         """Return the k_h that starts the motion at a position where 1 + k_v = 1."""

@@ -172,7 +172,7 @@ def follow(
     said = list(mechanism.warnings)
     if seatings:
         said.append(mechanism.if_seated)
-    if mechanism.least_q > -math.inf and float(drive.q.min()) < mechanism.least_q:
+    if mechanism.least_q > -math.inf and drive.min_q < mechanism.least_q:
         said.append(mechanism.if_below)
     if following.sentence:
         said.append(following.sentence)
@@ -215,6 +215,8 @@ def _run(
             drive.k_h,
             drive.w,
             drive.tail_min_q,
+            drive.block_max_q,
+            drive.block_min_q,
             drive.jump_node,
             phase.forward.table,
             backward.table,

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.solver.results import FloatArray
 
@@ -22,34 +21,57 @@ DEGREE = 3
 SIZE = 2 * DEGREE + 1
 """Numbers that a function is made of: 1, cos θ, sin θ, cos 2θ, sin 2θ, cos 3θ, sin 3θ."""
 
+Half = tuple[complex, complex, complex, complex]
+"""Complex Fourier coefficients of the harmonics 0 to 3; those of -1 to -3 are their conjugates."""
+
 
 @dataclass(frozen=True, eq=False)
 class Harmonics:
     """A sum of harmonics of θ, which can be added, multiplied and evaluated.
 
     Args:
-        spectrum: complex Fourier coefficients of the harmonics -3 to 3, shape (7,).
+        half: complex Fourier coefficients of the harmonics 0 to 3, the first one real.
     """
 
-    spectrum: NDArray[np.complex128]
+    half: Half
+
+    # Plain numbers: on four of them, the call of an array function takes longer than the work.
 
     def __add__(self, other: Harmonics | float) -> Harmonics:
-        return Harmonics(self.spectrum + _spectrum(other))
+        a0, a1, a2, a3 = self.half
+        if not isinstance(other, Harmonics):
+            return Harmonics((a0 + other, a1, a2, a3))
+        b0, b1, b2, b3 = other.half
+        return Harmonics((a0 + b0, a1 + b1, a2 + b2, a3 + b3))
 
     def __sub__(self, other: Harmonics | float) -> Harmonics:
-        return Harmonics(self.spectrum - _spectrum(other))
+        a0, a1, a2, a3 = self.half
+        if not isinstance(other, Harmonics):
+            return Harmonics((a0 - other, a1, a2, a3))
+        b0, b1, b2, b3 = other.half
+        return Harmonics((a0 - b0, a1 - b1, a2 - b2, a3 - b3))
 
     def __neg__(self) -> Harmonics:
-        return Harmonics(-self.spectrum)
+        a0, a1, a2, a3 = self.half
+        return Harmonics((-a0, -a1, -a2, -a3))
 
     def __mul__(self, other: Harmonics | float) -> Harmonics:
         if not isinstance(other, Harmonics):
-            return Harmonics(self.spectrum * other)
-        product = np.convolve(self.spectrum, other.spectrum)
-        beyond = np.concatenate([product[:DEGREE], product[-DEGREE:]])
-        if np.any(beyond != 0.0):
+            a0, a1, a2, a3 = self.half
+            return Harmonics((a0 * other, a1 * other, a2 * other, a3 * other))
+        a0, a1, a2, a3 = self.half
+        b0, b1, b2, b3 = other.half
+        if (a3 and (b1 or b2 or b3)) or (a2 and (b2 or b3)) or (a1 and b3):
             raise ValueError(f"the product holds harmonics above {DEGREE}")
-        return Harmonics(product[DEGREE:-DEGREE])
+        # the convolution of both series, without the terms that are zero by the above
+        return Harmonics(
+            (
+                a0 * b0 + 2.0 * (a1 * b1.conjugate()).real,
+                a0 * b1 + a1 * b0 + a2 * b1.conjugate() + a1.conjugate() * b2,
+                a0 * b2 + a1 * b1 + a2 * b0,
+                a0 * b3 + a1 * b2 + a2 * b1 + a3 * b0,
+            )
+        )
 
     __radd__ = __add__
     __rmul__ = __mul__
@@ -61,57 +83,59 @@ class Harmonics:
         """Return the value at a rotation [rad]."""
         numbers = self._numbers
         value = numbers[0]
-        for n in range(1, DEGREE + 1):
-            if numbers[2 * n - 1] != 0.0 or numbers[2 * n] != 0.0:
-                value += numbers[2 * n - 1] * math.cos(n * theta)
-                value += numbers[2 * n] * math.sin(n * theta)
+        for n in range(1, self.degree + 1):
+            value += numbers[2 * n - 1] * math.cos(n * theta)
+            value += numbers[2 * n] * math.sin(n * theta)
+        return value
+
+    def at(self, theta: FloatArray) -> FloatArray:
+        """Return the values at several rotations [rad]."""
+        numbers = self._numbers
+        value = np.full_like(theta, numbers[0])
+        for n in range(1, self.degree + 1):
+            value += numbers[2 * n - 1] * np.cos(n * theta)
+            value += numbers[2 * n] * np.sin(n * theta)
         return value
 
     def derivative(self) -> Harmonics:
         """Return the derivative by θ."""
-        return Harmonics(self.spectrum * 1j * np.arange(-DEGREE, DEGREE + 1))
+        _, a1, a2, a3 = self.half
+        return Harmonics((0j, 1j * a1, 2j * a2, 3j * a3))
+
+    @cached_property
+    def degree(self) -> int:
+        """Highest harmonic whose coefficient is not zero; 0 for a constant."""
+        return max((n for n in range(1, DEGREE + 1) if self.half[n]), default=0)
 
     @cached_property
     def _numbers(self) -> tuple[float, ...]:
-        return tuple(self.coefficients.tolist())
+        a0, *others = self.half
+        return (a0.real, *(part for a in others for part in (2.0 * a.real, -2.0 * a.imag)))
 
     @cached_property
     def coefficients(self) -> FloatArray:
         """Factors of 1, cos θ, sin θ, cos 2θ, sin 2θ, cos 3θ and sin 3θ, shape (7,)."""
-        numbers = np.zeros(SIZE)
-        numbers[0] = self.spectrum[DEGREE].real
-        for n in range(1, DEGREE + 1):
-            numbers[2 * n - 1] = 2.0 * self.spectrum[DEGREE + n].real
-            numbers[2 * n] = -2.0 * self.spectrum[DEGREE + n].imag
-        return numbers
+        return np.array(self._numbers)
 
     @property
     def constant(self) -> bool:
         """Whether the function does not depend on θ."""
-        return not np.any(self.coefficients[1:])
+        return self.degree == 0
 
 
 def cosine(phase_rad: float = 0.0, sense: int = 1) -> Harmonics:
     """Return cos(phase + θ), or cos(phase - θ) where sense is -1."""
-    spectrum = np.zeros(SIZE, dtype=np.complex128)
-    half = 0.5 * complex(math.cos(phase_rad), math.sin(phase_rad))
-    spectrum[DEGREE + sense] = half
-    spectrum[DEGREE - sense] = half.conjugate()
-    return Harmonics(spectrum)
+    return _wave(math.cos(phase_rad), -sense * math.sin(phase_rad))
 
 
 def sine(phase_rad: float = 0.0, sense: int = 1) -> Harmonics:
     """Return sin(phase + θ), or sin(phase - θ) where sense is -1."""
-    spectrum = np.zeros(SIZE, dtype=np.complex128)
-    half = 0.5 * complex(math.sin(phase_rad), -math.cos(phase_rad))
-    spectrum[DEGREE + sense] = half
-    spectrum[DEGREE - sense] = half.conjugate()
-    return Harmonics(spectrum)
+    return _wave(math.sin(phase_rad), sense * math.cos(phase_rad))
 
 
 def constant(value: float) -> Harmonics:
     """Return the function that has one value everywhere."""
-    return Harmonics(_spectrum(value))
+    return Harmonics((complex(value), 0j, 0j, 0j))
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,15 +171,9 @@ def constant_vector(components: tuple[float, float]) -> Vector:
 def turning(arm: tuple[float, float], sense: int = 1) -> Vector:
     """Return an arm of the block that has turned by θ, counter-clockwise where sense is 1."""
     x, y = arm
-    return Vector(
-        cosine() * x - sine() * (sense * y),
-        sine() * (sense * x) + cosine() * y,
-    )
+    return Vector(_wave(x, -sense * y), _wave(y, sense * x))
 
 
-def _spectrum(value: Harmonics | float) -> NDArray[np.complex128]:
-    if isinstance(value, Harmonics):
-        return value.spectrum
-    spectrum = np.zeros(SIZE, dtype=np.complex128)
-    spectrum[DEGREE] = value
-    return spectrum
+def _wave(cosine_part: float, sine_part: float) -> Harmonics:
+    """Return the function with these factors of cos θ and sin θ."""
+    return Harmonics((0j, complex(0.5 * cosine_part, -0.5 * sine_part), 0j, 0j))

@@ -14,8 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rbfrag.solver.compiled import kernel
+from rbfrag.solver.excitation import BLOCK
+from rbfrag.solver.one_freedom.coast import EPSILON, coast, fill_uniform_conditions
 from rbfrag.solver.one_freedom.step import (
     BRAKING,
+    CONDITIONS,
     DRIVE,
     INERTIA,
     RESISTANCE,
@@ -38,7 +41,8 @@ AT_REST, UPPER, LOWER, REVERSE, VIOLATED, JUMPED, ENDLESS = range(7)
 NO_REVERSE, REVERSE_MOVES, REVERSE_LEAVES = range(3)
 """What the onset of motion in reverse means."""
 
-EPSILON = 2.220446049250313e-16
+CALM = 1e-12
+"""Margin of a threshold by which a whole block of nodes must fall short of it to be passed over."""
 
 FREE_STEPS_MAX = 100_000
 """Steps after the record before a motion that does not end is given up."""
@@ -78,12 +82,30 @@ class PhaseRun(NamedTuple):
 
 
 @kernel
+def calm_between(
+    f_drive: float, f_resist: float, r_drive: float, r_resist: float, may_reverse: bool
+) -> tuple[float, float]:
+    """Return bounds of k_h/(1 + k_v) between which a block certainly stays at rest."""
+    above = -math.inf
+    below = -math.inf
+    if f_drive > 0.0 and f_resist > 0.0:
+        above = f_resist / f_drive * (1.0 - CALM)
+    if may_reverse:
+        below = math.inf
+        if r_drive > 0.0 and r_resist < 0.0:
+            below = r_resist / r_drive * (1.0 - CALM)
+    return above, below
+
+
+@kernel
 def run_phase(
     time_s: FloatArray,
     interval_s: FloatArray,
     k_h: FloatArray,
     w: FloatArray,
     tail_min_q: FloatArray,
+    block_max_q: FloatArray,
+    block_min_q: FloatArray,
     jump_node: int,
     forward: FloatArray,
     reverse: FloatArray,
@@ -114,6 +136,8 @@ def run_phase(
         k_h: driving acceleration at the nodes [g].
         w: 1 + k_v at the nodes.
         tail_min_q: least k_h/(1 + k_v) from each node on, rest after the record included.
+        block_max_q: greatest k_h/(1 + k_v) of each block of `BLOCK` nodes.
+        block_min_q: least of it.
         jump_node: first node with 1 + k_v <= 0, or n.
         forward: table of the equation of forward motion, or of all motion if not `sticks`.
         reverse: table of the equation of motion in reverse.
@@ -143,6 +167,8 @@ def run_phase(
     work = np.empty((7, highest_order + 1))
     uniform = highest_order == UNIFORM_ORDER
     order = highest_order
+    conditions = np.empty(((forward.shape[0] - CONDITIONS) // 3 if uniform else 0, 3))
+    conditions_of = 0
 
     peak = x
     peak_error = error_x
@@ -233,17 +259,19 @@ def run_phase(
                     break
                 node += 1
                 tau = 0.0
-                # rest costs one comparison a sample
-                if may_reverse:
-                    while node < last:
-                        if f_drive * k_h[node + 1] > f_resist * w[node + 1]:
-                            break
-                        if r_drive * k_h[node + 1] < r_resist * w[node + 1]:
-                            break
-                        node += 1
-                else:
-                    while node < last and f_drive * k_h[node + 1] <= f_resist * w[node + 1]:
-                        node += 1
+                # rest costs one comparison a sample, or one a block of samples
+                above, below = calm_between(f_drive, f_resist, r_drive, r_resist, may_reverse)
+                while node < last:
+                    if (node + 1) % BLOCK == 0 and node + BLOCK <= last:
+                        block = (node + 1) // BLOCK
+                        if block_max_q[block] < above and block_min_q[block] > below:
+                            node += BLOCK
+                            continue
+                    if f_drive * k_h[node + 1] > f_resist * w[node + 1]:
+                        break
+                    if may_reverse and r_drive * k_h[node + 1] < r_resist * w[node + 1]:
+                        break
+                    node += 1
                 continue
             tau = min(start, 1.0)
             table = forward if sense > 0 else reverse
@@ -272,6 +300,21 @@ def run_phase(
                 filled += 1
 
         table = forward if sense > 0 or not sticks else reverse
+        if uniform and not free and tau == 0.0 and not inspect and rate * sense > 0.0:
+            if conditions_of != sense:
+                conditions_of = sense
+                fill_uniform_conditions(table, conditions)
+            before = node
+            node, x, rate, error_x, error_rate, peak, peak_error, certain_s, filled = coast(
+                time_s, interval_s, k_h, w, tail_min_q, table, conditions,
+                forward[DRIVE, 0], forward[RESISTANCE, 0], lowest, highest, node, last,
+                x, rate, error_x, error_rate, peak, peak_error, certain_s, history, filled,
+            )  # fmt: skip
+            if node > before:
+                steps += node - before
+                moved += node - before - (1 if counted == before else 0)
+                counted = node - 1
+                continue
         inertia = table[INERTIA, 0]
         own = 0.0
         if not uniform:

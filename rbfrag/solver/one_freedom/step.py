@@ -51,6 +51,23 @@ def harmonic_slope(table: FloatArray, row: int, c: float, s: float) -> float:
 
 
 @fused_kernel
+def uniform_terms(
+    inertia: float,
+    drive: float,
+    resistance: float,
+    h: float,
+    a0: float,
+    da: float,
+    w0: float,
+    dw: float,
+) -> tuple[float, float]:
+    """First and second Taylor coefficient of U where the equation is the same everywhere."""
+    scale = h * h / inertia
+    first = scale * (drive * a0 - resistance * w0)
+    return first, 0.5 * scale * (drive * da - resistance * dw)
+
+
+@fused_kernel
 def fill_step(
     table: FloatArray,
     u: FloatArray,
@@ -79,12 +96,12 @@ def fill_step(
         w0: effective gravity at the start.
         dw: its change over the step.
     """
-    hh = h * h
     if order == UNIFORM_ORDER:
-        scale = hh / table[INERTIA, 0]
-        u[1] = scale * (table[DRIVE, 0] * a0 - table[RESISTANCE, 0] * w0)
-        u[2] = 0.5 * scale * (table[DRIVE, 0] * da - table[RESISTANCE, 0] * dw)
+        u[1], u[2] = uniform_terms(
+            table[INERTIA, 0], table[DRIVE, 0], table[RESISTANCE, 0], h, a0, da, w0, dw
+        )
         return
+    hh = h * h
     c1, s1, c2, s2 = work[0], work[1], work[2], work[3]
     d, q, squared = work[4], work[5], work[6]
     c1[0], s1[0], c2[0], s2[0] = c, s, c * c - s * s, 2.0 * c * s
