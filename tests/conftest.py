@@ -16,7 +16,8 @@ DIALECTS = ("sqlite", "postgresql")
 DATABASE = "database"
 
 
-def _missing(reason: str) -> None:
+def missing(reason: str) -> None:
+    """Skip with a reason, or fail where everything must be there."""
     if os.environ.get("RBFRAG_TEST_REQUIRE_FILES"):
         pytest.fail(reason)
     pytest.skip(reason)
@@ -26,7 +27,7 @@ def _folder(variable: str, default: str) -> Path:
     folder = Path(os.environ.get(variable) or ROOT / default)
     if folder.is_dir():
         return folder
-    _missing(f"no real files at {folder}: set {variable} to the folder that holds them")
+    missing(f"no real files at {folder}: set {variable} to the folder that holds them")
     return folder
 
 
@@ -51,7 +52,7 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
         return
     url = os.environ.get("RBFRAG_TEST_POSTGRES")
     if not url:
-        _missing("no server: set RBFRAG_TEST_POSTGRES to postgresql://user@host:port/name")
+        missing("no server: set RBFRAG_TEST_POSTGRES to postgresql://user@host:port/name")
     import psycopg
     from psycopg import sql
 

@@ -22,6 +22,7 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
             "is_default": row.is_default,
             "n": row.diagnostics.get("n"),
             "events": row.diagnostics.get("events"),
+            "domain": dict(row.domain),
             "created": row.created,
         }
         for row in rows

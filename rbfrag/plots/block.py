@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rbfrag.plots.block_lines import BlockLines, block_lines
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
 from rbfrag.plots.mode_style import COLOURS, words
 from rbfrag.solver.block import Block
@@ -42,18 +43,14 @@ def plot_block(
     plot_path(path)
     figure = new_figure(7.4, 4.8)
     axes, panel = figure.subplots(1, 2, width_ratios=[2.6, 1.0])
-    place = _Frame(block, found.beta_deg)
-    _draw_planes(axes, place, found.back_fracture)
-    outline = [place.of(point) for point in block.outline]
+    lines = block_lines(block, found)
+    _draw_planes(axes, lines)
+    outline = lines.outline
     axes.fill(*zip(*outline, strict=True), color=COLOURS[found.mode], alpha=0.28, lw=0, zorder=2)
     axes.plot(
         *zip(*[*outline, outline[0]], strict=True), color=COLOURS[found.mode], lw=1.6, zorder=3
     )
-    contacts = [("1", block.heel), ("3", block.toe)]
-    if found.back_fracture:
-        contacts.insert(1, ("2", block.back))
-    for name, arm in contacts:
-        x, y = place.of(arm)
+    for name, (x, y) in lines.contacts.items():
         axes.plot([0.0, x], [0.0, y], color=_INK, lw=0.6, ls=":", zorder=4)
         axes.plot(x, y, "o", ms=5, mfc="white", mec=_INK, zorder=6)
         length = math.hypot(x, y)
@@ -68,7 +65,7 @@ def plot_block(
             bbox={"boxstyle": "circle,pad=0.1", "facecolor": "white", "linewidth": 0.0},
             zorder=7,
         )
-    _draw_resultant(axes, place, found)
+    _draw_resultant(axes, lines.resultant)
     axes.plot(0.0, 0.0, "o", ms=5, color=_INK, zorder=6)
     axes.annotate(
         "C", (0.0, 0.0), xytext=(-5, 5), textcoords="offset points", ha="right", fontsize=10
@@ -83,59 +80,16 @@ def plot_block(
     return save_figure(figure, path)
 
 
-class _Frame:
-    """The base frame of the block turned into the slope, centroid at the origin."""
-
-    def __init__(self, block: Block, beta_deg: float) -> None:
-        beta = math.radians(beta_deg)
-        self._cosine, self._sine = math.cos(beta), math.sin(beta)
-        gamma = math.radians(block.gamma_deg)
-        self.up_the_back = (-math.cos(gamma), math.sin(gamma))
-        self.behind = (-math.sin(gamma), -math.cos(gamma))
-        base_y = block.heel[1]
-        # Where the planes meet; of a block without its heel's corner that is not the heel.
-        self.corner = (block.back[0] + block.cot_gamma * (block.back[1] - base_y), base_y)
-        self.size = max(math.dist(a, b) for a in block.outline for b in block.outline)
-        self.toe, self.heel = block.toe, block.heel
-        self.back_length = math.dist(self.corner, block.back)
-
-    def of(self, point: Point) -> Point:
-        """Return a point of the base frame in the frame of the slope."""
-        x, y = point
-        return x * self._cosine + y * self._sine, -x * self._sine + y * self._cosine
-
-
-def _draw_planes(axes: Axes, place: _Frame, back_fracture: bool) -> None:
+def _draw_planes(axes: Axes, lines: BlockLines) -> None:
     """Draw the rock below and behind as a band along the planes."""
-    band, reach = 0.09 * place.size, 0.30 * place.size
-    end = (place.toe[0] + reach, place.toe[1])
-    below = (end[0], end[1] - band)
-    if back_fracture:
-        corner, up = place.corner, place.up_the_back
-        along = place.back_length + 0.6 * reach
-        top = (corner[0] + up[0] * along, corner[1] + up[1] * along)
-        behind = (top[0] + place.behind[0] * band, top[1] + place.behind[1] * band)
-        gamma = math.atan2(up[1], -up[0])
-        shift = band * min(math.tan(0.5 * gamma), 4.0)
-        line = [end, corner, top]
-        rock = [*line, behind, (corner[0] - shift, corner[1] - band), below]
-    else:
-        start = (place.heel[0] - reach, place.heel[1])
-        line = [end, start]
-        rock = [*line, (start[0], start[1] - band), below]
-    points = [place.of(point) for point in rock]
     axes.fill(
-        *zip(*points, strict=True), facecolor="#e9e5de", edgecolor=_GROUND, hatch="////", lw=0.0
-    )
-    axes.plot(*zip(*[place.of(p) for p in line], strict=True), color=_GROUND, lw=1.4, zorder=1)
+        *zip(*lines.rock, strict=True),
+        facecolor="#e9e5de", edgecolor=_GROUND, hatch="////", lw=0.0,
+    )  # fmt: skip
+    axes.plot(*zip(*lines.planes, strict=True), color=_GROUND, lw=1.4, zorder=1)
 
 
-def _draw_resultant(axes: Axes, place: _Frame, found: Stability) -> None:
-    k = found.yield_acceleration
-    moves = math.isfinite(k)
-    right, down = (k, 1.0 + found.kv) if moves else (0.0, 1.0)
-    length = 0.45 * place.size / math.hypot(right, down)
-    tip = (right * length, -down * length)
+def _draw_resultant(axes: Axes, tip: Point) -> None:
     axes.plot([0.0, 1.5 * tip[0]], [0.0, 1.5 * tip[1]], color="#b2182b", lw=0.7, ls="--", zorder=4)
     axes.annotate(
         "",

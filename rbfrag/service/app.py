@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from http import HTTPStatus
-from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI, HTTPException, Request, Response
 from fastapi.openapi.utils import get_openapi
-from fastapi.staticfiles import StaticFiles
 
 from rbfrag.errors import RbfragError
-from rbfrag.service import block_api, health_api, models_api, predict_api
+from rbfrag.service import block_api, drawing_api, health_api, models_api, predict_api
 from rbfrag.service.documents import Problem
+from rbfrag.service.page_files import PageFiles
 from rbfrag.service.problem import problem, refused
 from rbfrag.service.settings import Settings
 from rbfrag.version import __version__
-
-PAGE = Path(__file__).parent / "page"
 
 
 def make_app(settings: Settings) -> FastAPI:
@@ -39,9 +36,10 @@ def make_app(settings: Settings) -> FastAPI:
     )
     app.include_router(predict_api.router(settings))
     app.include_router(block_api.router())
+    app.include_router(drawing_api.router())
     app.include_router(models_api.router(settings))
     app.include_router(health_api.router())
-    app.mount("/", StaticFiles(directory=PAGE, html=True), name="page")
+    app.mount("/", PageFiles(), name="page")
 
     @app.exception_handler(RbfragError)
     async def on_purpose(request: Request, error: RbfragError) -> Response:  # noqa: ARG001

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request, Response
 
@@ -10,6 +11,10 @@ from rbfrag.service.documents import BlockAnswer
 from rbfrag.service.json_body import json_answer
 from rbfrag.service.operation import operation
 from rbfrag.service.parameters import Parameter, by_name, read_query
+
+if TYPE_CHECKING:
+    from rbfrag.solver.block import Block
+    from rbfrag.solver.stability import Stability
 
 PARAMETERS = by_name(
     (
@@ -45,20 +50,32 @@ _KEYWORD = {
 }
 
 
-def answer(query: bytes) -> dict[str, Any]:
-    """Return the answer to the query of a URL."""
+def block_of(values: Mapping[str, Any]) -> tuple[Block, Stability]:
+    """Return the block that parameters describe, and its stability.
+
+    Args:
+        values: those of :data:`PARAMETERS` that were given, by name.
+
+    Raises:
+        InputError: a block that is described in no way, or in two.
+    """
     from rbfrag.solver.described_block import described
     from rbfrag.solver.stability import stability
-    from rbfrag.solver.stability_report import as_dict
 
-    values = read_query(query, PARAMETERS)
     block, conditions = described(
         {name: values.get(name) for name in ("alpha1", "alpha3", "r3")},
         {name: values.get(name) for name in ("s1", "s2", "gamma")},
         {keyword: values.get(name) for name, keyword in _KEYWORD.items()},
         values.get("no_back", False),
     )
-    return as_dict(block, stability(block, **conditions))
+    return block, stability(block, **conditions)
+
+
+def answer(query: bytes) -> dict[str, Any]:
+    """Return the answer to the query of a URL."""
+    from rbfrag.solver.stability_report import as_dict
+
+    return as_dict(*block_of(read_query(query, PARAMETERS)))
 
 
 def router() -> APIRouter:

@@ -108,6 +108,19 @@ class BlockAnswer(_Document):
     warnings: list[str]
 
 
+class DrawingAnswer(_Document):
+    """A block to scale; points are (out of the slope, up) from the centroid [m]."""
+
+    mode: str
+    r3_m: float
+    rectangle_r3_m: float
+    outline_m: list[tuple[float, float]]
+    contacts_m: dict[str, tuple[float, float]]
+    planes_m: list[tuple[float, float]]
+    rock_m: list[tuple[float, float]]
+    resultant_m: tuple[float, float]
+
+
 class ModelListed(_Document):
     """A stored model: what `rbfrag models list --json` prints."""
 
@@ -117,6 +130,7 @@ class ModelListed(_Document):
     is_default: bool
     n: int | None
     events: int | None
+    domain: dict[str, tuple[float, float]]
     created: str
 
 

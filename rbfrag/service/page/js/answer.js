@@ -1,0 +1,142 @@
+/** The panel of the answer: number, interval, words, warnings, other models. */
+
+import { d3 } from "./d3.js";
+import { afterPause } from "./latest.js";
+import { quantity, readable } from "./numbers.js";
+import { byId } from "./page.js";
+import { inWords, percent } from "./percent.js";
+import { writeText } from "./subscripts.js";
+
+const SPOKEN_AFTER_MS = 700;
+
+/** What is known of the motion, by the term of a model. */
+const KNOWS = {
+  pgv: "PGV",
+  pga_tm: "PGA, T_m",
+  pgd_tm: "PGD, T_m",
+  pgv_pga: "PGV, PGA",
+  pgv_pga_tm: "PGV, PGA, T_m",
+};
+
+const speak = afterPause(SPOKEN_AFTER_MS, (/** @type {string} */ text) => {
+  byId("live").textContent = text;
+});
+
+/**
+ * Show an answer of /v1/predict.
+ * @param {any} answer
+ */
+export function showAnswer(answer) {
+  const interval = `${percent(answer.ci_low)} to ${percent(answer.ci_high)}`;
+  const range = answer.in_domain
+    ? "within the fitted range"
+    : "outside the fitted range: an extrapolation";
+  byId("probability").textContent = percent(answer.probability);
+  byId("interval").textContent = `${interval}, ${percent(answer.level)} confidence`;
+  byId("in-words").textContent = inWords(answer);
+  const domain = byId("domain");
+  domain.textContent = range;
+  domain.dataset.inside = String(answer.in_domain);
+  writeText(
+    byId("about"),
+    `Model ${answer.model}. Toppling velocity of the block y = k_r g/p = ` +
+      `${quantity(answer.y_m_s, "m/s")}; intensity ${quantity(answer.intensity_m_s, "m/s")}.`,
+  );
+  drawMeter(answer);
+  showWarnings(byId("warnings"), answer.warnings);
+  showOthers(answer.answers);
+  byId("strip").textContent = `${percent(answer.probability)} (${interval})`;
+  mark("known");
+  speak(`Probability of toppling ${percent(answer.probability)}, ${interval}, ${range}.`);
+}
+
+/**
+ * Show that there is no answer, and why.
+ * @param {string} why
+ */
+export function showNoAnswer(why) {
+  byId("probability").textContent = "\u2013";
+  byId("interval").textContent = "no answer";
+  byId("in-words").textContent = why;
+  for (const id of ["domain", "about"]) byId(id).textContent = "";
+  delete byId("domain").dataset.inside;
+  d3.select("#meter").selectAll("*").remove();
+  showWarnings(byId("warnings"), []);
+  byId("others").hidden = true;
+  byId("strip").textContent = "no answer";
+  mark("none");
+  speak(why);
+}
+
+/**
+ * Show sentences of the service as they are.
+ * @param {HTMLElement} list
+ * @param {string[]} sentences
+ */
+export function showWarnings(list, sentences) {
+  d3.select(list)
+    .selectAll("li")
+    .data(sentences)
+    .join("li")
+    .text((/** @type {string} */ sentence) => sentence);
+  list.hidden = sentences.length === 0;
+}
+
+/** @param {string} state */
+function mark(state) {
+  byId("probability").dataset.state = state;
+}
+
+/**
+ * The probability and its interval on a line from 0 to 100 %.
+ * @param {any} answer
+ */
+function drawMeter(answer) {
+  const across = (/** @type {number} */ p) => `${(100 * p).toFixed(2)}%`;
+  const meter = d3.select("#meter");
+  const svg = meter.selectAll("svg").data([null]).join("svg").attr("aria-hidden", "true");
+  svg.attr("width", "100%").attr("height", 34);
+  /** @type {(name: string, kind: string) => any} */
+  const one = (name, kind) => svg.selectAll(`.${kind}`).data([null]).join(name).attr("class", kind);
+  one("rect", "scale").attr("x", 0).attr("y", 5).attr("width", "100%").attr("height", 8);
+  one("rect", "interval")
+    .attr("x", across(answer.ci_low))
+    .attr("y", 5)
+    .attr("width", across(Math.max(answer.ci_high - answer.ci_low, 0.004)))
+    .attr("height", 8);
+  one("circle", "value").attr("cx", across(answer.probability)).attr("cy", 9).attr("r", 6);
+  const marks = [0, 0.25, 0.5, 0.75, 1];
+  svg
+    .selectAll(".mark")
+    .data(marks)
+    .join("text")
+    .attr("class", "mark")
+    .attr("x", across)
+    .attr("y", 30)
+    .attr("text-anchor", (/** @type {number} */ p) => (p === 0 ? "start" : p === 1 ? "end" : "middle"))
+    .text((/** @type {number} */ p) => `${readable(100 * p)} %`);
+}
+
+/** @param {any[]} answers */
+function showOthers(answers) {
+  const list = answers ?? [];
+  byId("others").hidden = list.length < 2;
+  d3.select("#other-answers")
+    .selectAll("tr")
+    .data(list)
+    .join("tr")
+    .attr("class", (/** @type {any} */ each) => (each.recommended ? "recommended" : null))
+    .selectAll("td")
+    .data((/** @type {any} */ each) => [
+      each.recommended ? `${each.model} (shown)` : each.model,
+      KNOWS[/** @type {keyof typeof KNOWS} */ (each.term)] ?? each.term,
+      percent(each.probability),
+      `${percent(each.ci_low)} – ${percent(each.ci_high)}`,
+      each.in_domain ? "yes" : "no",
+    ])
+    .join("td")
+    .each(function (/** @type {string} */ text) {
+      // @ts-ignore: `this` is the element, by D3's convention
+      writeText(this, text);
+    });
+}

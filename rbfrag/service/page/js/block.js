@@ -1,0 +1,162 @@
+/** The block drawn to scale on its planes, with its mode named. */
+
+import { showWarnings } from "./answer.js";
+import { d3 } from "./d3.js";
+import { quantity, readable } from "./numbers.js";
+import { byId } from "./page.js";
+import { sheetIn } from "./sheet.js";
+import { writeText } from "./subscripts.js";
+
+const MARGINS = { left: 8, right: 8, top: 14, bottom: 30 };
+
+/** What a block does in each mode. */
+const DOES = {
+  slide: "slides on its base",
+  topple: "topples about its toe (contact 3)",
+  slump: "slumps: it rotates backwards while its toe slides out",
+  confined_topple: "topples under its overhanging back plane (confined toppling)",
+};
+
+/**
+ * How a block fails, in one sentence.
+ * @param {any} block answer of /v1/block
+ */
+export function blockInWords(block) {
+  const does = DOES[/** @type {keyof typeof DOES} */ (block.mode)];
+  if (block.state === "locked") return `Locked: no horizontal acceleration moves it; else it ${does}.`;
+  if (block.state === "unstable") return `Unstable: it ${does} at rest, without an earthquake.`;
+  return `It ${does}, from a horizontal acceleration of ${quantity(block.yield_acceleration, "g", 4)}.`;
+}
+
+/**
+ * Put the drawing of a block into an element.
+ * @param {HTMLElement} place
+ */
+export function blockDrawing(place) {
+  /** @type {any} */
+  let lines = null;
+  const sheet = sheetIn(place, "The block on its planes", MARGINS, (w) => Math.min(0.85 * w, 330), draw);
+  const { svg, plot } = sheet();
+  const head = svg.append("marker").attr("id", "arrow").attr("viewBox", "0 0 8 8");
+  head.attr("refX", 7).attr("refY", 4).attr("markerWidth", 7).attr("markerHeight", 7);
+  head.attr("orient", "auto").append("path").attr("class", "head").attr("d", "M0,0L8,4L0,8Z");
+
+  function draw() {
+    const s = sheet();
+    plot.selectAll("*").remove();
+    if (!lines) return;
+    const all = [...lines.outline_m, ...lines.rock_m, lines.resultant_m];
+    const [left, right] = d3.extent(all, (/** @type {number[]} */ p) => p[0]);
+    const [low, high] = d3.extent(all, (/** @type {number[]} */ p) => p[1]);
+    const scale = Math.min((s.right - s.left) / (right - left), (s.bottom - s.top) / (high - low));
+    const midX = (s.left + s.right) / 2;
+    const midY = (s.top + s.bottom) / 2;
+    const at = (/** @type {number[]} */ [px, py]) => [
+      midX + scale * (px - (left + right) / 2),
+      midY - scale * (py - (low + high) / 2),
+    ];
+    const path = (/** @type {number[][]} */ points) => `M${points.map((p) => at(p)).join("L")}`;
+    plot.append("path").attr("class", "rock").attr("d", `${path(lines.rock_m)}Z`);
+    plot.append("path").attr("class", "planes").attr("d", path(lines.planes_m));
+    plot
+      .append("path")
+      .attr("class", `outline ${lines.mode}`)
+      .attr("d", `${path(lines.outline_m)}Z`);
+    for (const [number, contact] of Object.entries(lines.contacts_m)) {
+      const [cx, cy] = at(/** @type {number[]} */ (contact));
+      const [ox, oy] = at([0, 0]);
+      const away = Math.hypot(cx - ox, cy - oy) || 1;
+      plot.append("circle").attr("class", "contact").attr("cx", cx).attr("cy", cy).attr("r", 4);
+      plot
+        .append("text")
+        .attr("class", "contact-name")
+        .attr("x", cx + (15 * (cx - ox)) / away)
+        .attr("y", cy + (15 * (cy - oy)) / away)
+        .attr("dy", "0.34em")
+        .text(number);
+    }
+    const [ox, oy] = at([0, 0]);
+    const [tx, ty] = at(lines.resultant_m);
+    plot.append("line").attr("class", "resultant").attr("marker-end", "url(#arrow)")
+      .attr("x1", ox).attr("y1", oy).attr("x2", tx).attr("y2", ty);
+    plot.append("circle").attr("class", "centroid").attr("cx", ox).attr("cy", oy).attr("r", 3.5);
+    drawLength(plot, s, scale);
+  }
+
+  return {
+    /**
+     * @param {any} drawing answer of /v1/drawing
+     * @param {any} block answer of /v1/block, or null where the block is two numbers
+     */
+    show(drawing, block) {
+      lines = drawing;
+      draw();
+      const words = block ? blockInWords(block) : rectangle(drawing);
+      svg.attr("aria-label", `The block on its planes. ${words.replaceAll("_", "")}`);
+      writeText(byId("block-words"), words);
+      showWarnings(byId("block-warnings"), block?.warnings ?? []);
+      showNumbers(block);
+      this.upToDate(true);
+    },
+    /** @param {boolean} is whether what is drawn is the present block */
+    upToDate(is) {
+      place.classList.toggle("stale", !is);
+    },
+  };
+}
+
+/** @param {any} drawing */
+function rectangle(drawing) {
+  return (
+    "Two numbers are known of this block, not its shape. Drawn is the rectangle on level ground " +
+    `that has them (r_3 = ${quantity(drawing.r3_m, "m")}); any other block with the same ` +
+    "p² and k_r has the same probability."
+  );
+}
+
+/** @param {any} block */
+function showNumbers(block) {
+  const rows = block
+    ? [
+        ["mode", block.mode.replace("_", " ")],
+        ["state", block.state],
+        ["p²", quantity(block.p2, "1/s²")],
+        ["k_r", block.kr === null ? "does not apply" : quantity(block.kr, "g")],
+        ["sliding k_y", block.ky === null ? "none" : quantity(block.ky, "g")],
+        ["r_3", quantity(block.r3_m, "m")],
+        ["γ", quantity(block.gamma_deg, "°")],
+        ["area", quantity(block.area_m2, "m²")],
+      ]
+    : [];
+  d3.select("#block-numbers")
+    .selectAll("div")
+    .data(rows)
+    .join((/** @type {any} */ enter) => {
+      const row = enter.append("div");
+      row.append("dt");
+      row.append("dd");
+      return row;
+    })
+    .each(function (/** @type {string[]} */ [name, value]) {
+      // @ts-ignore: `this` is the element, by D3's convention
+      const row = d3.select(this);
+      writeText(row.select("dt").node(), name);
+      row.select("dd").text(value);
+    });
+}
+
+/**
+ * Draw a length of a round number of metres.
+ * @param {any} plot
+ * @param {import("./sheet.js").Sheet} s
+ * @param {number} scale pixels a metre
+ */
+function drawLength(plot, s, scale) {
+  const wanted = (0.25 * (s.right - s.left)) / scale;
+  const power = 10 ** Math.floor(Math.log10(wanted));
+  const length = ([5, 2, 1].find((d) => d * power <= wanted) ?? 1) * power;
+  const y = s.height - 16;
+  const group = plot.append("g").attr("class", "length");
+  group.append("path").attr("d", `M${s.left},${y - 3}v6m0,-3h${length * scale}m0,-3v6`);
+  group.append("text").attr("x", s.left).attr("y", y + 14).text(`${readable(length)}\u00a0m`);
+}

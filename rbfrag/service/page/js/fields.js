@@ -1,0 +1,111 @@
+/** The fields of the form: texts in, texts out, and what is wrong beside the field. */
+
+/**
+ * @typedef {import("./question.js").Question} Question
+ * @typedef {import("./question.js").Shape} Shape
+ */
+
+/**
+ * Names of fields as they stand in the service's sentences, with or without their unit.
+ * A field that an input shows is named by its id.
+ */
+const NAMED = /(?<![\w.])(p2|kr|alpha[13]|r3|s[12]|gamma|beta|phi|pgv|pga|tm|pgd|model|level|units|dt)(?:_m_s|_deg|_g|_s|_m)?(?![\w])/g;
+
+/**
+ * The form of block, shaking and model.
+ * @param {HTMLFormElement} form
+ * @param {(question: Question, shapeWas: Shape) => void} changed
+ */
+export function formFields(form, changed) {
+  const inputs = () => /** @type {HTMLInputElement[]} */ ([
+    ...form.querySelectorAll("input[id], select[id]"),
+  ]);
+  const shapes = () => /** @type {NodeListOf<HTMLInputElement>} */ (
+    form.querySelectorAll("input[name=shape]")
+  );
+  /** @type {Shape} */
+  let shape = "numbers";
+
+  /** @returns {Question} */
+  function read() {
+    const values = Object.fromEntries(
+      inputs().map((input) => [
+        input.id,
+        input.type === "checkbox" ? (input.checked ? "true" : "") : input.value.trim(),
+      ]),
+    );
+    return { shape, values };
+  }
+
+  /** @param {Question} question */
+  function show(question) {
+    shape = question.shape;
+    for (const input of inputs()) {
+      const text = question.values[input.id] ?? "";
+      if (input.type === "checkbox") input.checked = text === "true";
+      else if (input.value.trim() !== text) offer(input, text);
+    }
+    for (const radio of shapes()) radio.checked = radio.value === shape;
+    for (const part of form.querySelectorAll("[data-shape]")) {
+      const own = /** @type {HTMLElement} */ (part);
+      own.hidden = !(own.dataset.shape ?? "").split(" ").includes(shape);
+    }
+  }
+
+  form.addEventListener("submit", (event) => event.preventDefault());
+  form.addEventListener("input", (event) => {
+    const from = /** @type {HTMLInputElement} */ (event.target);
+    const was = shape;
+    if (from.name === "shape") shape = /** @type {Shape} */ (from.value);
+    changed(read(), was);
+  });
+  return { read, show };
+}
+
+/**
+ * Set a field; a choice that is not offered is added, so that a link keeps what it says.
+ * @param {HTMLInputElement} input
+ * @param {string} text
+ */
+function offer(input, text) {
+  if (input instanceof HTMLSelectElement && ![...input.options].some((o) => o.value === text)) {
+    input.add(new Option(text, text));
+  }
+  input.value = text;
+}
+
+/**
+ * The visible field that a sentence of the service is about, if it names one.
+ * @param {string} sentence
+ * @returns {HTMLElement | null}
+ */
+export function fieldNamedIn(sentence) {
+  for (const [, name] of sentence.matchAll(NAMED)) {
+    const input = document.getElementById(name);
+    if (input && input.offsetParent !== null) return input;
+  }
+  return null;
+}
+
+/**
+ * Say what is wrong beside the field that the sentence names, or in a place for the rest.
+ * @param {string} sentence
+ * @param {HTMLElement} elsewhere
+ */
+export function sayWrong(sentence, elsewhere) {
+  const input = fieldNamedIn(sentence);
+  const place = (input && document.getElementById(`${input.id}-error`)) ?? elsewhere;
+  place.textContent = sentence;
+  input?.setAttribute("aria-invalid", "true");
+}
+
+/**
+ * Take back all that was wrong in a part of the page.
+ * @param {HTMLElement} part
+ */
+export function nothingWrong(part) {
+  for (const place of part.querySelectorAll(".error")) place.textContent = "";
+  for (const input of part.querySelectorAll("[aria-invalid]")) {
+    input.removeAttribute("aria-invalid");
+  }
+}

@@ -1,0 +1,119 @@
+/** Design chart and fragility curve: which answers they show, and whether they are the present ones. */
+
+import { designChart } from "./chart.js";
+import { fragilityCurve } from "./curve.js";
+import { latest } from "./latest.js";
+import { modelNamed } from "./models.js";
+import { fromField, quantity } from "./numbers.js";
+import { byId } from "./page.js";
+import { percent } from "./percent.js";
+import { labelOf, planeOf } from "./plane.js";
+import { MEASURES } from "./question.js";
+import { askCurve, askGrid } from "./service.js";
+import { writeText } from "./subscripts.js";
+
+/**
+ * @typedef {import("./question.js").Question} Question
+ * @typedef {import("./plane.js").Plane} Plane
+ * @typedef {{question: Question, answer: any, plane: Plane, kr: number,
+ *   present: () => boolean}} Answered
+ */
+
+const NAMES = { pgv: "PGV", pga: "PGA", tm: "T_m", pgd: "PGD" };
+const UNITS = { pgv: "m/s", pga: "g", tm: "s", pgd: "m" };
+
+/**
+ * Both figures.
+ * @param {(across: import("./plane.js").Across, x: number, kr: number) => void} moved called when
+ *   the reader moves the point: the measure that runs across, its value, and k_r
+ * @param {(error: unknown) => void} failed called when the service refuses or does not answer
+ */
+export function figures(moved, failed) {
+  /** @type {Plane | null} */
+  let plane = null;
+  let gridShown = "";
+  const chart = designChart(byId("chart"), (x, kr) => plane && moved(plane.across, x, kr));
+  const curve = fragilityCurve(byId("curve"));
+
+  const drawGrid = latest(async (/** @type {Answered} */ { question, answer, plane: on, present }) => {
+    const held = MEASURES.filter((name) => name !== on.across).map((name) => question.values[name]);
+    const key = JSON.stringify([answer.model, on, held]);
+    try {
+      if (key !== gridShown) chart.showGrid(await askGrid(on, answer.model, question));
+      gridShown = key;
+      chart.upToDate(present());
+    } catch (error) {
+      failed(error);
+    }
+  });
+
+  const drawCurve = latest(async (/** @type {Answered} */ asked) => {
+    const { question, answer, plane: on, kr, present } = asked;
+    try {
+      curve.showCurve(await askCurve(on, answer.model, kr, question));
+      curve.upToDate(present());
+    } catch (error) {
+      failed(error);
+    }
+  });
+
+  return {
+    /**
+     * Show an answer, and ask for what surrounds it.
+     * @param {Question} question
+     * @param {any} answer of /v1/predict
+     * @param {{p2: number, kr: number}} block
+     * @param {() => boolean} present whether the reader still asks this
+     */
+    async show(question, answer, block, present) {
+      const model = await modelNamed(answer.model);
+      plane = planeOf(answer, block, question.values, model?.domain ?? {}, plane);
+      const x = fromField(question.values[plane.across]);
+      const { kr } = block;
+      if (present()) {
+        const yIsFree = question.shape === "numbers";
+        chart.showPoint({ plane, x, kr, yIsFree, probability: answer.probability });
+      }
+      curve.showSpot({ x, ...answer });
+      drawGrid({ question, answer, plane, kr, present });
+      drawCurve({ question, answer, plane, kr, present });
+      writeText(byId("chart-caption"), chartCaption(question, answer, plane));
+      byId("curve-caption").textContent =
+        `Probability that this block topples over ${labelOf(plane.across).name}, with its ` +
+        `${percent(answer.level)} confidence band.`;
+    },
+    /**
+     * Show the point where the reader has moved it, before there is an answer.
+     * @param {number} x
+     * @param {number} kr
+     * @param {boolean} yIsFree
+     */
+    movePoint(x, kr, yIsFree) {
+      if (plane) chart.showPoint({ plane, x, kr, yIsFree, probability: null });
+    },
+    /** Show that the figures do not answer the present question. */
+    stale() {
+      chart.upToDate(false);
+      curve.upToDate(false);
+    },
+    /** Show that the present block has no place in them. */
+    showNoBlock() {
+      this.stale();
+      chart.hidePoint();
+      curve.showSpot(null);
+      if (!plane) byId("chart-caption").textContent = "Drawn once the block topples.";
+    },
+  };
+}
+
+/** @type {(question: Question, answer: any, plane: Plane) => string} */
+function chartCaption(question, answer, plane) {
+  const held = /** @type {(keyof typeof NAMES)[]} */ (MEASURES)
+    .filter((name) => name !== plane.across && question.values[name] !== "")
+    .map((name) => `${NAMES[name]} = ${quantity(fromField(question.values[name]), UNITS[name])}`);
+  const all = [`p² = ${quantity(plane.p2, "1/s²")}`, ...held].join(", ");
+  return (
+    `Lines of equal probability of toppling by model ${answer.model}, with ${all} held. ` +
+    "Hatched: outside the fitted range, where answers are extrapolations."
+  );
+}

@@ -1,0 +1,133 @@
+/** The plane of the design chart: which measure runs across, which values are shown and asked. */
+
+import { fromField, ratios } from "./numbers.js";
+
+/**
+ * @typedef {"pgv" | "pga" | "pgd"} Across the measure that runs across
+ * @typedef {{across: Across, x: [number, number], y: [number, number], perKr: number, p2: number,
+ *   toIntensity: number, xEdges: number[], yEdges: number[]}} Plane
+ *   x and y are the ranges shown, y being the toppling velocity [m/s]; perKr is y over k_r at this
+ *   p2, toIntensity the model's intensity over x; the edges are ends of the fitted ranges
+ */
+
+const PLAIN = { pgv: [0.05, 3], pga: [0.03, 3], pgd: [0.003, 3] };
+const PLAIN_Y = [0.02, 3];
+const MARGIN = 1.35;
+const BEYOND = 1.06;
+const GRID = 45;
+const CURVE = 121;
+const BESIDE = 1e-6;
+
+/** Ratio within which a value counts as within a range: fields hold three digits. */
+const ROUNDING = 1.01;
+
+const LABELS = {
+  pgv: ["peak ground velocity PGV", "m/s"],
+  pga: ["peak ground acceleration PGA", "g"],
+  pgd: ["peak ground displacement PGD", "m"],
+};
+
+/**
+ * Name and unit of a measure.
+ * @param {Across} across
+ */
+export function labelOf(across) {
+  const [name, unit] = LABELS[across];
+  return { name, unit, title: `${name} [${unit}]` };
+}
+
+/**
+ * The plane on which an answer is shown.
+ *
+ * Factors come from the answer itself: its toppling velocity over the k_r that was asked, its
+ * intensity over the measure that was asked.
+ * @param {any} answer of /v1/predict
+ * @param {{p2: number, kr: number}} block
+ * @param {Record<string, string>} measures
+ * @param {Record<string, [number, number]>} domain of the model, by variable
+ * @param {Plane | null} before the plane shown until now: its ranges stay where they can
+ * @returns {Plane}
+ */
+export function planeOf(answer, block, measures, domain, before) {
+  const across = acrossOf(answer.term);
+  const x = fromField(measures[across]);
+  const toIntensity = x > 0 ? answer.intensity_m_s / x : NaN;
+  const xEdges = (domain.intensity_m_s ?? []).map((v) => v / toIntensity);
+  if (across === "pgv" && answer.pgv_over_pga_s) {
+    const perX = answer.pgv_over_pga_s / x;
+    xEdges.push(...(domain.pgv_over_pga_s ?? []).map((v) => v / perX));
+  }
+  return {
+    across,
+    x: around(before?.across === across ? before.x : PLAIN[across], x),
+    y: around(before?.y ?? PLAIN_Y, answer.y_m_s),
+    perKr: answer.y_m_s / block.kr,
+    p2: block.p2,
+    toIntensity,
+    xEdges: xEdges.filter((v) => v > 0 && Number.isFinite(v)),
+    yEdges: [...(domain.y_m_s ?? [])],
+  };
+}
+
+/**
+ * The values across at which the chart asks.
+ * @param {Plane} plane
+ */
+export function columnsOf(plane) {
+  return lines(plane.x, plane.xEdges, GRID);
+}
+
+/**
+ * The values across at which a curve asks.
+ * @param {Plane} plane
+ */
+export function stepsOf(plane) {
+  return lines(plane.x, plane.xEdges, CURVE);
+}
+
+/**
+ * The toppling velocities at which the chart asks.
+ * @param {Plane} plane
+ */
+export function rowsOf(plane) {
+  return lines(plane.y, plane.yEdges, GRID);
+}
+
+/**
+ * Lines at equal ratios, a little beyond the range, and on both sides of each edge: so the
+ * boundary between answers in and out of the fitted range is drawn where it is.
+ * @param {[number, number]} range
+ * @param {number[]} edges
+ * @param {number} count
+ */
+function lines([low, high], edges, count) {
+  const from = low / BEYOND;
+  const to = high * BEYOND;
+  const beside = edges
+    .filter((edge) => edge > from && edge < to)
+    .flatMap((edge) => [edge * (1 - BESIDE), edge, edge * (1 + BESIDE)]);
+  return [...ratios(from, to, count), ...beside].sort((a, b) => a - b);
+}
+
+/**
+ * @param {string} term
+ * @returns {Across}
+ */
+function acrossOf(term) {
+  if (term.startsWith("pgd")) return "pgd";
+  return term === "pga_tm" ? "pga" : "pgv";
+}
+
+/**
+ * The range shown: the one shown before, or the usual one, wider if the value lies outside it.
+ * @param {number[]} before
+ * @param {number} value
+ * @returns {[number, number]}
+ */
+function around([low, high], value) {
+  if (!(value > 0)) return [low, high];
+  return [
+    value < low / ROUNDING ? value / MARGIN : low,
+    value > high * ROUNDING ? value * MARGIN : high,
+  ];
+}

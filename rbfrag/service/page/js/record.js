@@ -1,0 +1,128 @@
+/** The reader's record: dropped on the page or chosen, asked for its spectrum, kept in a link. */
+
+import { ratios } from "./numbers.js";
+
+/**
+ * @typedef {import("./spectrum.js").Spectrum} Spectrum
+ */
+
+const SIZES = ratios(0.1, 30, 41).map((p2) => Number(p2.toPrecision(4)));
+
+/**
+ * The frequency parameters at which a spectrum is asked: a fixed range that includes the block's.
+ * @param {number} p2 of the reader's block, or NaN
+ * @returns {number[]}
+ */
+export function sizesFor(p2) {
+  const own = p2 > 0 ? [p2] : [];
+  return [...new Set([...SIZES, ...own])].sort((a, b) => a - b);
+}
+
+/**
+ * Both polarities of an answer of /v1/spectrum as one spectrum.
+ * @param {any[]} answers
+ * @param {string} name of the file, if the record names itself by nothing
+ * @returns {Spectrum}
+ */
+export function spectrumOf(answers, name) {
+  const of = (/** @type {string} */ polarity) => answers.find((each) => each.polarity === polarity);
+  const [forward, reverse] = [of("forward"), of("reverse")];
+  return {
+    name: forward.name || name,
+    pgv_m_s: forward.pgv_m_s,
+    p2: forward.p2,
+    forward: forward.x_m_s,
+    reverse: reverse.x_m_s,
+    warnings: forward.warnings,
+  };
+}
+
+/**
+ * The spectrum of one polarity at a frequency parameter, on straight lines between logarithms.
+ * @param {Spectrum} spectrum
+ * @param {"forward" | "reverse"} polarity
+ * @param {number} p2
+ * @returns {number} [m/s], NaN outside
+ */
+export function valueAt(spectrum, polarity, p2) {
+  const { p2: sizes, [polarity]: values } = spectrum;
+  const above = sizes.findIndex((size) => size >= p2);
+  if (above < 0) return NaN;
+  if (sizes[above] === p2) return values[above];
+  if (above === 0) return NaN;
+  const share = Math.log(p2 / sizes[above - 1]) / Math.log(sizes[above] / sizes[above - 1]);
+  return values[above - 1] ** (1 - share) * values[above] ** share;
+}
+
+/**
+ * A spectrum as the part of an address behind "#", which a browser sends to nobody.
+ * @param {Spectrum | null} spectrum
+ * @returns {string}
+ */
+export function toFragment(spectrum) {
+  if (!spectrum) return "";
+  const short = (/** @type {number} */ v) => Number(v.toPrecision(5));
+  const text = JSON.stringify({
+    ...spectrum,
+    p2: spectrum.p2,
+    forward: spectrum.forward.map(short),
+    reverse: spectrum.reverse.map(short),
+  });
+  const bytes = Array.from(new TextEncoder().encode(text), (b) => String.fromCharCode(b)).join("");
+  return `spectrum=${btoa(bytes).replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "")}`;
+}
+
+/**
+ * The spectrum that a part of an address holds.
+ * @param {string} fragment what stands behind "#"
+ * @returns {Spectrum | null} null if there is none, or none that can be read
+ */
+export function fromFragment(fragment) {
+  const [, packed] = fragment.match(/^spectrum=([\w-]+)$/) ?? [];
+  if (!packed) return null;
+  try {
+    const bytes = atob(packed.replaceAll("-", "+").replaceAll("_", "/"));
+    const text = new TextDecoder().decode(Uint8Array.from(bytes, (c) => c.charCodeAt(0)));
+    const read = JSON.parse(text);
+    const lists = [read.p2, read.forward, read.reverse];
+    const sound = lists.every(
+      (list) =>
+        Array.isArray(list) && list.length === read.p2.length && list.every(Number.isFinite),
+    );
+    return sound && read.p2.length > 1 && Number.isFinite(read.pgv_m_s)
+      ? { ...read, name: String(read.name), warnings: [...(read.warnings ?? [])].map(String) }
+      : null;
+  } catch {
+    return null;
+  }
+}
+
+/**
+ * Take files dropped anywhere on the page, or chosen by the button.
+ * @param {HTMLElement} zone shown as ready while a file is over the page
+ * @param {HTMLInputElement} button
+ * @param {(file: File) => void} taken
+ */
+export function recordsFrom(zone, button, taken) {
+  const ready = (/** @type {boolean} */ is) => zone.classList.toggle("ready", is);
+  addEventListener("dragover", (event) => {
+    if (!event.dataTransfer?.types.includes("Files")) return;
+    event.preventDefault();
+    ready(true);
+  });
+  addEventListener("dragleave", (event) => {
+    if (!event.relatedTarget) ready(false);
+  });
+  addEventListener("drop", (event) => {
+    if (!event.dataTransfer?.types.includes("Files")) return;
+    event.preventDefault();
+    ready(false);
+    const [file] = event.dataTransfer.files;
+    if (file) taken(file);
+  });
+  button.addEventListener("change", () => {
+    const [file] = button.files ?? [];
+    if (file) taken(file);
+    button.value = "";
+  });
+}

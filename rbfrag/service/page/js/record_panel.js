@@ -1,0 +1,120 @@
+/** The panel of the reader's record: its spectrum, its doubts, and what it means for the block. */
+
+import { showWarnings } from "./answer.js";
+import { Refusal, Unreachable } from "./ask.js";
+import { nothingWrong, sayWrong } from "./fields.js";
+import { afterPause, latest } from "./latest.js";
+import { quantity } from "./numbers.js";
+import { byId, textIn } from "./page.js";
+import { recordsFrom, valueAt } from "./record.js";
+import { askSpectrum } from "./service.js";
+import { spectrumPlot } from "./spectrum.js";
+
+const PAUSE_MS = 350;
+const READING = ["units", "dt", "trace"];
+
+/** Above X(p) by this ratio, no block topples (docs: the toppling spectrum). */
+const BOUND = 1.02;
+
+/**
+ * @typedef {import("./spectrum.js").Spectrum} Spectrum
+ * @typedef {{p2: number, y: number}} Place of the block: its p² [1/s²] and toppling velocity [m/s]
+ */
+
+/**
+ * The panel.
+ * @param {{changed: () => void, takePgv: (pgv_m_s: number) => void,
+ *   unreachable: (retry: () => void) => void}} tell whom it tells what
+ */
+export function recordPanel(tell) {
+  const panel = /** @type {HTMLElement} */ (document.querySelector(".record"));
+  const plot = spectrumPlot(byId("spectrum"));
+  /** @type {File | null} */
+  let file = null;
+  /** @type {Spectrum | null} */
+  let spectrum = null;
+  /** @type {Place | null} */
+  let block = null;
+
+  const ask = latest(async (/** @type {File} */ asked) => {
+    const reading = Object.fromEntries(READING.map((id) => [id, textIn(id)]));
+    try {
+      const found = await askSpectrum(asked, reading, block?.p2 ?? NaN);
+      nothingWrong(panel);
+      if (asked === file) show(found);
+    } catch (error) {
+      if (error instanceof Unreachable) return tell.unreachable(() => ask(asked));
+      if (!(error instanceof Refusal)) throw error;
+      nothingWrong(panel);
+      sayWrong(`${asked.name}: ${error.message}`, byId("record-error"));
+      show(null);
+    }
+  });
+  const askSoon = afterPause(PAUSE_MS, ask);
+
+  /** @param {Spectrum | null} found */
+  function show(found) {
+    spectrum = found;
+    byId("spectrum-part").hidden = !found;
+    plot.show(found);
+    byId("record-name").textContent = found
+      ? `${found.name}, PGV ${quantity(found.pgv_m_s, "m/s")}`
+      : "";
+    showWarnings(byId("record-warnings"), found?.warnings ?? []);
+    byId("spectrum-words").textContent = spectrum && block ? comparison(spectrum, block) : "";
+    tell.changed();
+  }
+
+  recordsFrom(byId("drop"), /** @type {HTMLInputElement} */ (byId("record-file")), (taken) => {
+    file = taken;
+    ask(taken);
+    panel.scrollIntoView({ block: "nearest" });
+  });
+  for (const id of READING) byId(id).addEventListener("input", () => file && askSoon(file));
+  byId("take-pgv").addEventListener("click", () => spectrum && tell.takePgv(spectrum.pgv_m_s));
+  byId("drop-record").addEventListener("click", () => {
+    file = null;
+    show(null);
+    byId("record-file").focus();
+  });
+
+  return {
+    show,
+    /** The spectrum that is shown, or null. */
+    shown: () => spectrum,
+    /**
+     * Mark the present block.
+     * @param {Place | null} place
+     * @param {number} [sizeTimesP2] r3 times p² of a rectangle [m/s²]
+     */
+    placeBlock(place, sizeTimesP2) {
+      const other = place && place.p2 !== block?.p2;
+      block = place;
+      plot.showBlock(place, sizeTimesP2);
+      byId("spectrum-words").textContent = spectrum && block ? comparison(spectrum, block) : "";
+      if (file && other) askSoon(file);
+    },
+  };
+}
+
+/**
+ * Whether a record can topple a block, in words.
+ * @param {Spectrum} spectrum
+ * @param {Place} block
+ */
+function comparison(spectrum, { p2, y }) {
+  const known = /** @type {const} */ (["forward", "reverse"]).map((polarity) => ({
+    polarity,
+    x: valueAt(spectrum, polarity, p2),
+  }));
+  if (known.some(({ x }) => !Number.isFinite(x))) {
+    return `The spectrum does not reach p² = ${quantity(p2, "1/s²")}.`;
+  }
+  const values = known.map(({ polarity, x }) => `${quantity(x, "m/s")} ${polarity}`).join(" and ");
+  const able = known.filter(({ x }) => y <= BOUND * x).map(({ polarity }) => polarity);
+  const verdict = able.length
+    ? `That is not above X(p) in the ${able.join(" and the ")} polarity: so this record may topple the block.`
+    : "That is above X(p) in both polarities: without vertical motion this record does not topple the block.";
+  const own = `this block has y = ${quantity(y, "m/s")}`;
+  return `At p² = ${quantity(p2, "1/s²")} X(p) is ${values}; ${own}. ${verdict}`;
+}

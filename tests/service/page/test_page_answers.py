@@ -1,0 +1,197 @@
+"""What is typed is answered: by the service's numbers, in its words, the newest question last."""
+
+import re
+import threading
+import time
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.service.page.reading import agrees, probability_shown
+
+REFUSED = "Failed to load resource: the server responded with a status of 422"
+
+
+def forgive(opened, words):
+    """Take back the browser's complaints about answers that the test provoked."""
+    assert opened.complaints
+    assert all(words in each for each in opened.complaints)
+    opened.complaints.clear()
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        {},
+        {"pgv": "1.2"},
+        {"p2": "12.5", "kr": "0.031", "pgv": "0.35"},
+        {"pga": "0.4", "tm": "0.5"},
+        {"pga": "0.7", "tm": "0.3", "kr": "0.03", "pgv": ""},
+        {"pgd": "0.4", "tm": "0.6", "level": "0.8", "pgv": ""},
+        {"pgv": "0"},
+        {"pgv": "2.9", "kr": "0.0005"},
+    ],
+)
+def test_the_answer_is_the_services(open_page, ask, typed):
+    opened = open_page()
+    page = opened.page
+    for name, text in typed.items():
+        page.fill(f"#{name}", text)
+    asked = {"p2": "3", "kr": "0.1", "pgv": "0.6", **typed}
+    answer = ask("v1/predict", **{name: text for name, text in asked.items() if text})
+    opened.settled()
+    assert agrees(probability_shown(page), answer["probability"])
+    low, high = re.findall(r"[<>]?\s*[\d.]+\s*%", opened.text("#interval"))[:2]
+    assert agrees(low, answer["ci_low"])
+    assert agrees(high, answer["ci_high"])
+    assert page.locator("#warnings li").all_text_contents() == answer["warnings"]
+    inside = "within" if answer["in_domain"] else "outside"
+    expect(page.locator("#domain")).to_contain_text(inside)
+    rows = page.locator("#other-answers tr")
+    assert rows.count() == len(answer["answers"])
+
+
+def test_an_extrapolation_is_said_and_its_reasons_are_the_services(open_page, ask):
+    opened = open_page("?p2=40&kr=0.1&pgv=6")
+    answer = ask("v1/predict", p2=40, kr=0.1, pgv=6)
+    assert not answer["in_domain"]
+    assert len(answer["warnings"]) >= 3
+    expect(opened.page.locator("#domain")).to_have_text(
+        "outside the fitted range: an extrapolation"
+    )
+    assert opened.page.locator("#warnings li").all_text_contents() == answer["warnings"]
+
+
+@pytest.mark.parametrize(
+    ("field", "text", "words"),
+    [
+        ("pgv", "abc", "pgv = 'abc' is not a number"),
+        ("kr", "-0.1", "kr = -0.1 is not above zero"),
+        ("p2", "", "p2 is missing"),
+        ("level", "2", "level"),
+        ("pgv", "-1", "pgv_m_s = -1 m/s is negative"),
+    ],
+)
+def test_what_is_wrong_is_said_beside_its_field(open_page, field, text, words):
+    opened = open_page()
+    page = opened.page
+    page.fill(f"#{field}", text)
+    expect(page.locator(f"#{field}-error")).to_contain_text(words)
+    expect(page.locator(f"#{field}")).to_have_attribute("aria-invalid", "true")
+    assert f"{field}-error" in page.get_attribute(f"#{field}", "aria-describedby")
+    expect(page.locator("#interval")).to_have_text("no answer")
+    expect(page.locator(".plot.stale")).not_to_have_count(0)
+    page.fill(f"#{field}", {"pgv": "0.6", "kr": "0.1", "p2": "3", "level": "0.95"}[field])
+    expect(page.locator(f"#{field}-error")).to_have_text("")
+    opened.settled()
+    assert probability_shown(page) == "12 %"
+    forgive(opened, REFUSED)
+
+
+def test_an_old_answer_never_replaces_a_newer_one(open_page, ask):
+    opened = open_page()
+    page = opened.page
+    held = threading.Event()
+
+    def slow(route):
+        if "pgv=0.9" in route.request.url:
+            held.set()
+            time.sleep(1.0)
+        route.continue_()
+
+    page.context.route("**/v1/predict?**", slow)
+    page.fill("#pgv", "0.9")
+    page.wait_for_timeout(400)
+    assert held.is_set()
+    for text in ("1.1", "1.3", "1.5"):
+        page.fill("#pgv", text)
+        page.wait_for_timeout(250)
+    expect(page.locator("#about")).to_contain_text("intensity 1.5")
+    page.wait_for_timeout(1500)
+    assert "intensity 1.5" in opened.text("#about")
+    assert agrees(probability_shown(page), ask("v1/predict", p2=3, kr=0.1, pgv=1.5)["probability"])
+
+
+def test_a_service_out_of_reach_is_said_and_asked_again(open_page):
+    opened = open_page()
+    page = opened.page
+    out_of_reach = True
+    page.context.route(
+        "**/v1/**", lambda route: route.abort() if out_of_reach else route.continue_()
+    )
+    page.fill("#pgv", "1.2")
+    expect(page.locator("#unreachable")).to_contain_text("does not answer")
+    assert probability_shown(page) == "12 %"
+    out_of_reach = False
+    expect(page.locator("#unreachable")).to_be_hidden()
+    opened.settled()
+    assert probability_shown(page) != "12 %"
+    forgive(opened, "net::ERR_FAILED")
+
+
+def test_a_token_is_asked_for_and_kept_out_of_the_link(open_page):
+    opened = open_page()
+    page = opened.page
+
+    def guarded(route):
+        if route.request.headers.get("authorization") == "Bearer open-sesame":
+            return route.continue_()
+        problem = '{"title": "Unauthorized", "status": 401, "detail": "bring the token"}'
+        return route.fulfill(status=401, content_type="application/problem+json", body=problem)
+
+    page.context.route("**/v1/**", guarded)
+    page.fill("#pgv", "1.2")
+    expect(page.locator("#token-form")).to_be_visible()
+    page.fill("#token", "open-sesame")
+    page.press("#token", "Enter")
+    expect(page.locator("#token-form")).to_be_hidden()
+    opened.settled()
+    assert probability_shown(page) != "12 %"
+    assert "sesame" not in page.url
+    forgive(opened, "401")
+
+
+def test_a_shape_names_its_mode_and_answers_by_it(open_page, ask):
+    opened = open_page()
+    page = opened.page
+    page.get_by_label("angles", exact=True).check()
+    opened.settled()
+    block = ask("v1/block", alpha1=-15, alpha3=24, r3=2.5, beta=18, phi=38)
+    expect(page.locator("#block-words")).to_contain_text("topples about its toe")
+    expect(page.locator("#block .outline.topple")).to_have_count(1)
+    answer = ask("v1/predict", p2=block["p2"], kr=block["kr"], pgv=0.6)
+    assert agrees(probability_shown(page), answer["probability"])
+    page.fill("#phi", "15")
+    expect(page.locator("#block .outline.slide")).to_have_count(1)
+    expect(page.locator("#in-words")).to_contain_text(
+        "The fitted models answer for blocks that topple"
+    )
+    page.fill("#phi", "38")
+    expect(page.locator("#block .outline.topple")).to_have_count(1)
+    page.get_by_label("two numbers").check()
+    opened.settled()
+    assert float(page.input_value("#p2")) == pytest.approx(block["p2"], rel=5e-3)
+    assert float(page.input_value("#kr")) == pytest.approx(block["kr"], rel=5e-3)
+
+
+def test_a_model_can_be_chosen(open_page, ask):
+    opened = open_page()
+    page = opened.page
+    page.select_option("#model", "lognormal-pgv")
+    expect(page.locator("#about")).to_contain_text("Model lognormal-pgv.")
+    opened.settled()
+    answer = ask("v1/predict", p2=3, kr=0.1, pgv=0.6, model="lognormal-pgv")
+    assert agrees(probability_shown(page), answer["probability"])
+    offered = page.eval_on_selector_all("#model option", "all => all.map((each) => each.value)")
+    assert "record-xp" not in offered
+    assert "wls-pgv" in offered
+
+
+def test_a_link_is_text_and_never_markup(open_page):
+    opened = open_page(
+        "?p2=3&kr=0.1&pgv=0.6&model=%3Cimg%20src%3Dx%20onerror%3Dalert(1)%3E", settle=False
+    )
+    page = opened.page
+    expect(page.locator("#model-error")).to_contain_text("<img src=x")
+    assert page.locator("main img").count() == 0
+    forgive(opened, REFUSED)

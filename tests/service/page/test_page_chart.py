@@ -1,0 +1,164 @@
+"""The design chart says what the service says, and its point can be moved in every way."""
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.service.page.reading import agrees, plane_of, points_of, probability_shown
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobile": True}
+
+
+def field(page, name):
+    return float(page.input_value(f"#{name}"))
+
+
+def on_screen(page, place):
+    box = page.locator("#chart svg").bounding_box()
+    return box["x"] + place[0], box["y"] + place[1]
+
+
+def kr_at(y_m_s, p2=3.0):
+    """k_r of a block of some toppling velocity y = k_r g/p."""
+    return y_m_s * p2**0.5 / 9.80665
+
+
+@pytest.mark.parametrize(
+    ("query", "model"),
+    [("", "weibull-pgv"), ("?p2=3&kr=0.1&pgv=0.6&pga=0.5&tm=0.5", "bounded-pgv_pga_tm")],
+)
+def test_on_each_line_the_service_gives_the_lines_probability(open_page, ask, query, model):
+    page = open_page(query).page
+    plane = plane_of(page)
+    paths = page.eval_on_selector_all(
+        "#chart .line", "all => all.map((path) => path.getAttribute('d'))"
+    )
+    others = {"pga": 0.5, "tm": 0.5} if query else {}
+    levels = (0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
+    asked = 0
+    for level, path in zip(levels, paths, strict=True):
+        values = [plane.value(*point) for point in points_of(path)]
+        inside = [(x, y) for x, y in values if 0.06 < x < 2.5 and 0.03 < y < 2.5]
+        for x, y in inside[:: max(len(inside) // 4, 1)]:
+            answer = ask("v1/predict", p2=3, kr=kr_at(y), pgv=x, model=model, **others)
+            assert answer["probability"] == pytest.approx(
+                level, abs=0.12 * level * (1 - level) + 1e-3
+            )
+            asked += 1
+    assert asked > 20
+
+
+def test_what_is_hatched_begins_where_the_fitted_range_ends(open_page, ask):
+    page = open_page().page
+    plane = plane_of(page)
+    path = page.get_attribute("#chart .outside", "d")
+    first = min(plane.value(*point)[0] for point in points_of(path))
+    inside = ask("v1/predict", p2=3, kr=0.1, pgv=0.999 * first)
+    outside = ask("v1/predict", p2=3, kr=0.1, pgv=1.001 * first)
+    assert inside["in_domain"]
+    assert not outside["in_domain"]
+
+
+def test_the_point_is_dragged(open_page, ask):
+    opened = open_page()
+    page = opened.page
+    plane = plane_of(page)
+    start = plane.place(0.6, 0.566)
+    goal = plane.place(1.2, 0.3)
+    page.mouse.move(*on_screen(page, start))
+    page.mouse.down()
+    page.mouse.move(*on_screen(page, goal), steps=25)
+    page.mouse.up()
+    assert field(page, "pgv") == pytest.approx(1.2, rel=0.02)
+    assert field(page, "kr") == pytest.approx(kr_at(0.3), rel=0.02)
+    expect(page.locator("#about")).to_contain_text(f"intensity {field(page, 'pgv'):g}")
+    opened.settled()
+    answer = ask("v1/predict", p2=3, kr=page.input_value("#kr"), pgv=page.input_value("#pgv"))
+    assert agrees(probability_shown(page), answer["probability"])
+    shown = page.get_attribute(".point", "transform")
+    [(px, py)] = points_of(shown)
+    assert plane.value(px, py) == pytest.approx((field(page, "pgv"), answer["y_m_s"]), rel=1e-3)
+
+
+def test_a_dragged_point_stays_on_the_chart(open_page):
+    opened = open_page()
+    page = opened.page
+    page.mouse.move(*on_screen(page, plane_of(page).place(0.6, 0.566)))
+    page.mouse.down()
+    page.mouse.move(1360, 5, steps=10)
+    page.mouse.up()
+    assert field(page, "pgv") == pytest.approx(3.0)
+    assert field(page, "kr") == pytest.approx(kr_at(3.0), rel=0.01)
+
+
+def test_a_click_moves_the_point(open_page):
+    opened = open_page()
+    page = opened.page
+    page.mouse.click(*on_screen(page, plane_of(page).place(0.2, 0.1)))
+    opened.settled()
+    assert field(page, "pgv") == pytest.approx(0.2, rel=0.02)
+    assert field(page, "kr") == pytest.approx(kr_at(0.1), rel=0.02)
+
+
+def test_a_finger_moves_the_point(open_page):
+    opened = open_page(**PHONE)
+    page = opened.page
+    page.locator("#chart").scroll_into_view_if_needed()
+    plane = plane_of(page)
+    touch = page.context.new_cdp_session(page)
+
+    def send(kind, places):
+        points = [{"x": x, "y": y} for x, y in places]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+
+    start, goal = on_screen(page, plane.place(0.6, 0.566)), on_screen(page, plane.place(1.0, 0.3))
+    scrolled = page.evaluate("scrollY")
+    send("touchStart", [start])
+    for i in range(1, 11):
+        send("touchMove", [tuple(a + (b - a) * i / 10 for a, b in zip(start, goal, strict=True))])
+    send("touchEnd", [])
+    opened.settled()
+    assert page.evaluate("scrollY") == scrolled
+    assert field(page, "pgv") == pytest.approx(1.0, rel=0.06)
+    assert field(page, "kr") == pytest.approx(kr_at(0.3), rel=0.06)
+
+
+def test_a_block_of_a_shape_moves_along_the_shaking_only(open_page):
+    opened = open_page("?alpha1=-15&alpha3=24&r3=2.5&beta=18&phi=38&pgv=0.6")
+    page = opened.page
+    before = page.text_content("#block-numbers")
+    page.focus(".point")
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("ArrowRight")
+    opened.settled()
+    assert field(page, "pgv") == pytest.approx(0.612)
+    assert page.text_content("#block-numbers") == before
+
+
+def test_another_measure_runs_across_where_pgv_is_not_known(open_page, ask):
+    opened = open_page("?p2=3&kr=0.05&pga=0.4&tm=0.5")
+    page = opened.page
+    expect(page.locator("#chart .axis .title").first).to_have_text(
+        "peak ground acceleration PGA [g]"
+    )
+    page.focus(".point")
+    page.keyboard.press("Shift+ArrowRight")
+    opened.settled()
+    assert field(page, "pga") == pytest.approx(0.44)
+    answer = ask("v1/predict", p2=3, kr=0.05, pga=0.44, tm=0.5)
+    assert agrees(probability_shown(page), answer["probability"])
+
+
+def test_the_curve_is_the_services(open_page, ask):
+    page = open_page().page
+    path = page.get_attribute("#curve .curve", "d")
+    box = page.eval_on_selector(
+        "#curve .area",
+        "a => ['x', 'y', 'width', 'height'].map((name) => Number(a.getAttribute(name)))",
+    )
+    left, top, width, height = box
+    points = [p for p in points_of(path) if left <= p[0] <= left + width]
+    for px, py in points[::12]:
+        pgv = 0.05 * 60.0 ** ((px - left) / width)
+        shown = 1.0 - (py - top) / height
+        answer = ask("v1/predict", p2=3, kr=0.1, pgv=pgv)
+        assert shown == pytest.approx(answer["probability"], abs=2e-3)

@@ -1,0 +1,44 @@
+"""What the page draws of a block."""
+
+import pytest
+
+from rbfrag.plots.block_lines import block_lines
+from rbfrag.solver.block import Block
+from rbfrag.solver.stability import stability
+
+SHAPE = {"alpha1": -15, "alpha3": 24, "r3": 2.5, "beta": 18, "phi": 38}
+
+
+def test_a_shape_is_drawn_on_its_planes(client):
+    answer = client.get("/v1/drawing", params=SHAPE).json()
+    block = Block.from_angles(-15.0, 24.0, 2.5)
+    lines = block_lines(block, stability(block, beta_deg=18.0, phi_deg=38.0))
+    assert answer["mode"] == "topple"
+    assert answer["outline_m"] == [list(point) for point in lines.outline]
+    assert answer["contacts_m"] == {name: list(at) for name, at in lines.contacts.items()}
+    assert answer["resultant_m"] == list(lines.resultant)
+
+
+def test_two_numbers_are_drawn_as_a_rectangle(client):
+    answer = client.get("/v1/drawing", params={"p2": 3, "kr": 0.1}).json()
+    (left, _), (right, bottom), (_, top), _ = answer["outline_m"]
+    assert (right - left) / (top - bottom) == pytest.approx(0.1)
+    assert answer["rectangle_r3_m"] == pytest.approx(answer["r3_m"])
+
+
+@pytest.mark.parametrize(
+    ("query", "named"),
+    [
+        ("", "p2"),
+        ("p2=3", "kr"),
+        ("p2=3&kr=-1", "kr"),
+        ("p2=3&kr=0.1&beta=20", "p2"),
+        ("alpha1=1&alpha3=20&r3=2&phi=30", "beta"),
+        ("s1=1&s2=x&gamma=60&beta=20&phi=30", "s2"),
+    ],
+)
+def test_what_is_no_block_is_refused_in_words(client, query, named):
+    answer = client.get(f"/v1/drawing?{query}")
+    assert answer.status_code == 422
+    assert named in answer.json()["detail"]
+    assert "--" not in answer.json()["detail"]
