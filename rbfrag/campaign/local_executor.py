@@ -6,41 +6,48 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.connection import wait as wait_for_end
+from typing import TypeVar
 
-from rbfrag.campaign.worker import MotionResults, MotionWork, run_work
 from rbfrag.errors import WorkFailedError
 
+W = TypeVar("W")
+R = TypeVar("R")
+
 QUEUED_PER_WORKER = 2
-"""Motions handed out ahead of each worker: enough to keep it busy, little enough for memory."""
+"""Pieces handed out ahead of each worker: enough to keep it busy, little enough for memory."""
 
 
-def run_locally(work: Iterator[MotionWork], workers: int) -> Iterator[MotionResults]:
+def run_locally(
+    do: Callable[[W], R], work: Iterator[W], workers: int, *, after_a_death: str
+) -> Iterator[R]:
     """Yield the answers as they come, from worker processes or, for one worker, from here.
 
-    Work is fetched as it is handed out, and no more than three motions a worker are under way:
+    Work is fetched as it is handed out, and no more than three pieces a worker are under way:
     a writer that is slower than the workers holds them up instead of filling the memory.
 
     Args:
-        work: what to do.
+        do: what is done to each piece of work; a function of a module.
+        work: the pieces.
         workers: number of processes.
+        after_a_death: what to do next when a worker process has died.
 
     Raises:
         WorkFailedError: a process died.
     """
     if workers <= 1:
-        yield from map(run_work, work)
+        yield from map(do, work)
         return
     # spawn: the same on every system, and no lock or connection is inherited half-way
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(workers, mp_context=context, initializer=prepare)
-    running: set[Future[MotionResults]] = set()
+    running: set[Future[R]] = set()
     try:
         for item in work:
-            running.add(pool.submit(run_work, item))
+            running.add(pool.submit(do, item))
             if len(running) >= workers * (1 + QUEUED_PER_WORKER):
                 finished, running = wait(running, return_when=FIRST_COMPLETED)
                 yield from _results(finished)
@@ -49,8 +56,8 @@ def run_locally(work: Iterator[MotionWork], workers: int) -> Iterator[MotionResu
             yield from _results(finished)
     except BrokenProcessPool:
         raise WorkFailedError(
-            "a worker process died (killed, or out of memory); what was finished is stored: "
-            "run the same command again to go on, with fewer --jobs if memory is short"
+            f"a worker process died (killed, or out of memory); {after_a_death}, with fewer "
+            "--jobs if memory is short"
         ) from None
     finally:
         for future in running:
@@ -58,7 +65,7 @@ def run_locally(work: Iterator[MotionWork], workers: int) -> Iterator[MotionResu
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _results(finished: set[Future[MotionResults]]) -> Iterator[MotionResults]:
+def _results(finished: set[Future[R]]) -> Iterator[R]:
     # Each is let go before the next is waited for.
     while finished:
         yield finished.pop().result()

@@ -17,7 +17,7 @@ from rbfrag.campaign.local_executor import run_locally
 from rbfrag.campaign.made_on import made_on
 from rbfrag.campaign.plan import DEFAULT_P2, CampaignPlan, plan_campaign
 from rbfrag.campaign.todo import MotionTasks, Todo, Wanted, still_to_do
-from rbfrag.campaign.worker import MotionResults, MotionWork
+from rbfrag.campaign.worker import MotionResults, MotionWork, run_work
 from rbfrag.db.campaign_store import (
     CombinationRecord,
     KnownCombination,
@@ -267,7 +267,12 @@ def _wanted(
 @contextmanager
 def _executor(jobs: int | None, scheduler: str | None) -> Iterator[Executor]:
     if scheduler is None:
-        yield lambda work, motions: run_locally(work, min(jobs or os.cpu_count() or 1, motions))
+        yield lambda work, motions: run_locally(
+            run_work,
+            work,
+            min(jobs or os.cpu_count() or 1, motions),
+            after_a_death="what was finished is stored: run the same command again to go on",
+        )
         return
     with connected(scheduler) as client:
         yield lambda work, _: run_on_cluster(client, work)

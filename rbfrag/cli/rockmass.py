@@ -8,6 +8,7 @@ import typer
 
 from rbfrag.cli import options
 from rbfrag.cli.output import cell, print_json, print_pairs, print_table, print_warnings
+from rbfrag.cli.rockmass_shaking import print_failures, run_shaken
 from rbfrag.errors import InputError
 
 EXAMPLE = "Example:  rbfrag rockmass rockmass.toml --pgv 0.6 --out blocks.csv --plot counts.png"
@@ -30,6 +31,52 @@ def rockmass(
         int | None,
         typer.Option("--seed", help="Seed of the random numbers. Default: the file's, else 1."),
     ] = None,
+    motion: Annotated[
+        str | None,
+        typer.Option(
+            "--motion",
+            metavar="MOTION",
+            help="Run every block under this accelerogram, each in its own mode: a file, "
+            "FILE#INDEX for one trace of several, or a database id.",
+            show_default=False,
+        ),
+    ] = None,
+    vertical: options.Vertical = None,
+    reverse: options.Reverse = False,
+    scales: Annotated[
+        str | None,
+        typer.Option(
+            "--scales",
+            metavar="LIST",
+            help="Factors on the motion, such as 0.5,1,1.5,2. Default: 1.",
+            show_default=False,
+        ),
+    ] = None,
+    displacement: Annotated[
+        float | None,
+        typer.Option(
+            "--displacement",
+            help="A slide fails beyond this displacement [m]. Default: 0.05.",
+            show_default=False,
+        ),
+    ] = None,
+    rotation: Annotated[
+        float | None,
+        typer.Option(
+            "--rotation",
+            help="A slump, or a topple against the back plane, fails beyond this rotation [deg]. "
+            "Default: failure past recovery only.",
+            show_default=False,
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            "--jobs",
+            help="Worker processes. Default: one per processor, where there is work for them.",
+            show_default=False,
+        ),
+    ] = None,
     pgv: options.Pgv = None,
     pga: options.Pga = None,
     tm: options.Tm = None,
@@ -39,26 +86,35 @@ def rockmass(
     out: Annotated[
         str | None,
         typer.Option(
-            "--out", help="Write one row a block (.csv, .parquet), for predict --batch and others."
+            "--out",
+            help="Write one row a block, with a motion one a block and scale (.csv, .parquet).",
         ),
     ] = None,
     plot: Annotated[
         str | None,
         typer.Option(
             "--plot",
-            help="Draw the cumulative counts of blocks against PGA by mode (.png, .pdf, .svg).",
+            help="Draw the cumulative counts of blocks against PGA by mode, with a motion the "
+            "shares that fail (.png, .pdf, .svg).",
         ),
     ] = None,
+    units: options.Units = None,
+    dt: options.Dt = None,
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
     """Draw blocks from two fracture sets; print their modes and yield accelerations.
 
-    With a measure of the motion (--pgv ...), the probability of failure is averaged over the
-    blocks of each mode for which there is a fragility model.
+    With --motion every block that the motion moves is run, and the shares that fail are counted by
+    mode. With a measure of the motion (--pgv ...), the probability of failure is averaged over
+    the blocks of each mode for which there is a fragility model.
     """
     from rbfrag.exchange.block_table import table_path, write_block_table
+    from rbfrag.fragility.exact_interval import checked_level
     from rbfrag.fragility.rockmass_counts import crossings, mode_counts
+    from rbfrag.fragility.rockmass_failures import failures
+    from rbfrag.fragility.rockmass_failures_report import failures_as_dict
+    from rbfrag.fragility.rockmass_failures_table import fate_columns
     from rbfrag.fragility.rockmass_file import read_rock_mass
     from rbfrag.fragility.rockmass_report import as_dict
     from rbfrag.fragility.rockmass_scenario import scenario
@@ -72,29 +128,81 @@ def rockmass(
         plot_path(plot)
     measures = {"pgv_m_s": pgv, "pga_g": pga, "tm_s": tm, "pgd_m": pgd}
     shaken = any(value is not None for value in measures.values())
-    if not shaken and (model is not None or db is not None):
-        extra = "--db" if model is None else "--model"
-        raise InputError(
-            f"{extra} goes with a measure of the motion: give --pgv, --pga and --tm, or --pgd and "
-            "--tm, too"
-        )
+    _refuse_options_without_their_cause(
+        motion,
+        shaken,
+        with_motion={
+            "--vertical": vertical is not None,
+            "--reverse": reverse,
+            "--scales": scales is not None,
+            "--displacement": displacement is not None,
+            "--rotation": rotation is not None,
+            "--jobs": jobs is not None,
+            "--units": units is not None,
+            "--dt": dt is not None,
+        },
+        model=model,
+        db=db,
+    )
     made = read_rock_mass(file).realise(n, seed)
-    answer = None
+    answer = fates = found = None
+    about: list[str] = []
     if shaken:
         answer = scenario(made, **measures, model=model, level=level, db=db)
-    counts, meetings = mode_counts(made), crossings(made)
-    document = as_dict(made, counts, meetings, answer)
+    if motion is not None:
+        checked_level(level)
+        fates, about = run_shaken(
+            made, motion, vertical=vertical, reverse=reverse, scales=scales,
+            displacement=displacement, rotation=rotation, jobs=jobs, db=db, units=units, dt=dt,
+        )  # fmt: skip
+        found = failures_as_dict(fates, failures(fates, level), level)
+    document = as_dict(made, mode_counts(made), crossings(made), answer, found)
+    document["warnings"] += about
     if out is not None:
-        write_block_table(block_columns(made, answer), out)
+        columns = block_columns(made, answer) if fates is None else fate_columns(fates)
+        write_block_table(columns, out)
     if plot is not None:
-        from rbfrag.plots.rockmass import plot_rockmass
+        if fates is None:
+            from rbfrag.plots.rockmass import plot_rockmass
 
-        plot_rockmass(made, plot)
+            plot_rockmass(made, plot)
+        else:
+            from rbfrag.plots.rockmass_failures import plot_failures
+
+            plot_failures(fates, plot, level=level)
     if json:
         print_json(document)
         return
     _print(document)
     print_warnings(document["warnings"])
+
+
+def _refuse_options_without_their_cause(
+    motion: str | None,
+    measured: bool,
+    *,
+    with_motion: dict[str, bool],
+    model: str | None,
+    db: str | None,
+) -> None:
+    """Refuse options that would do nothing, and two descriptions of one motion."""
+    if motion is not None and measured:
+        raise InputError(
+            "--motion does not go with --pgv, --pga, --tm and --pgd: either the blocks are run "
+            "under a motion, or a fragility model answers for measures of one"
+        )
+    if motion is None and (extra := [name for name, given in with_motion.items() if given]):
+        raise InputError(f"{extra[0]} goes with --motion: name the accelerogram, too")
+    if model is not None and not measured:
+        raise InputError(
+            "--model goes with a measure of the motion: give --pgv, --pga and --tm, or --pgd and "
+            "--tm, too"
+        )
+    if db is not None and not measured and motion is None:
+        raise InputError(
+            "--db goes with a motion or a measure of it: give --motion, or --pgv, --pga and --tm, "
+            "or --pgd and --tm, too"
+        )
 
 
 def _print(document: dict[str, Any]) -> None:
@@ -134,6 +242,8 @@ def _print(document: dict[str, Any]) -> None:
         )
     if document["scenario"] is not None:
         _print_scenario(document["scenario"])
+    if document["shaking"] is not None:
+        print_failures(document["shaking"])
 
 
 def _print_scenario(found: dict[str, Any]) -> None:

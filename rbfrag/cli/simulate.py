@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-import time
 from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
@@ -11,14 +9,13 @@ import typer
 from rbfrag.cli import options
 from rbfrag.cli.number_list import number_list
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
+from rbfrag.cli.progress_line import ProgressLine
 
 if TYPE_CHECKING:
     from rbfrag.campaign.simulate import CampaignProgress
     from rbfrag.db.queries import Vertical
 
 EXAMPLE = "Example:  rbfrag simulate --p2 30,10,3,1,0.3,0.1 --vertical both --grid 23"
-
-SECONDS_BETWEEN_LINES = 5.0
 
 
 def simulate(
@@ -82,7 +79,11 @@ def simulate(
     """
     from rbfrag.campaign.simulate import simulate as run
 
-    with _Progress() as progress:
+    with ProgressLine("simulate", "combinations") as line:
+
+        def show(progress: CampaignProgress) -> None:
+            line.show(progress, f"{progress.resumed} stored before" if progress.resumed else "")
+
         summary = run(
             db,
             suite=suite,
@@ -92,7 +93,7 @@ def simulate(
             store_responses=_blocks(store_responses),
             jobs=jobs,
             scheduler=scheduler,
-            on_progress=progress.show,
+            on_progress=show,
         )
     report = summary.as_dict()
     if json:
@@ -117,40 +118,3 @@ def _blocks(text: str | None) -> list[float | Literal["critical"]]:
         else:
             blocks += number_list(part, "--store-responses")
     return blocks
-
-
-class _Progress:
-    """A line on standard error: rewritten on a terminal, now and then elsewhere."""
-
-    def __init__(self) -> None:
-        self._terminal = sys.stderr.isatty()
-        self._last = -SECONDS_BETWEEN_LINES
-        self._shown = False
-
-    def __enter__(self) -> _Progress:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._terminal and self._shown:
-            print(file=sys.stderr)
-
-    def show(self, progress: CampaignProgress) -> None:
-        """Show how far the campaign is."""
-        now = time.monotonic()
-        finished = progress.done == progress.total
-        if not self._terminal and now - self._last < SECONDS_BETWEEN_LINES and not finished:
-            return
-        self._last = now
-        left = progress.seconds_left
-        text = f"simulate: {progress.done}/{progress.total} combinations"
-        if progress.resumed:
-            text += f" ({progress.resumed} stored before)"
-        if progress.rate_per_s:
-            text += f", {progress.rate_per_s:.1f} per second"
-        if left is not None and not finished:
-            text += f", {int(left) // 60}:{int(left) % 60:02d} left"
-        if self._terminal:
-            print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
-            self._shown = True
-        else:
-            print(text, file=sys.stderr, flush=True)

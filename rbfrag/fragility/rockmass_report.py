@@ -20,6 +20,7 @@ def as_dict(
     counts: Mapping[ModeName, ModeCount],
     crossings: list[Crossing],
     answer: Scenario | None = None,
+    shaking: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Return the answer under the keys of the JSON contract.
 
@@ -28,6 +29,7 @@ def as_dict(
         counts: blocks by mode.
         crossings: where cumulative counts cross.
         answer: the answer to a scenario, if one was asked for.
+        shaking: what a motion did to the blocks, if they were run under one.
     """
     return {
         "realisations": made.n,
@@ -60,6 +62,7 @@ def as_dict(
             for crossing in crossings
         ],
         "scenario": None if answer is None else _scenario(answer),
+        "shaking": None if shaking is None else dict(shaking),
         "warnings": _warnings(made, answer),
     }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
@@ -12,6 +12,9 @@ from rbfrag.solver.block import Block
 from rbfrag.solver.mechanism import ModeName
 from rbfrag.solver.one_freedom.equation import Mechanism
 from rbfrag.solver.results import Polarity, Response
+
+if TYPE_CHECKING:
+    from rbfrag.solver.fate import Runner
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,9 @@ class ResponseModel(Protocol):
     def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
         """Return what the block does."""
 
+    def runner(self, site: BlockOnPlanes) -> Runner:
+        """Return a function that says what becomes of the block under an excitation."""
+
 
 @dataclass(frozen=True)
 class MechanismModel:
@@ -105,12 +111,25 @@ class MechanismModel:
         Raises:
             InputError: the base has cohesion.
         """
+        from rbfrag.solver.mechanism_response import mechanism_response
+
+        return mechanism_response(self.kind, self._made(site), shaking)
+
+    def runner(self, site: BlockOnPlanes) -> Runner:
+        """Return a function that says what becomes of the block under an excitation.
+
+        Raises:
+            InputError: the base has cohesion.
+        """
+        from rbfrag.solver.fate import mechanism_runner
+
+        return mechanism_runner(self._made(site))
+
+    def _made(self, site: BlockOnPlanes) -> Mechanism:
         if site.cohesive:
             raise InputError(
                 f"cohesion_pa does not go with {self.kind} in time: a bond is broken by the first "
                 "slip, which the model does not describe; its effect on the yield is told by  "
                 "rbfrag block --cohesion"
             )
-        from rbfrag.solver.mechanism_response import mechanism_response
-
-        return mechanism_response(self.kind, self.mechanism(site), shaking)
+        return self.mechanism(site)

@@ -1,0 +1,96 @@
+"""Running the blocks of a rock mass under one motion, by workers."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from rbfrag.campaign.local_executor import run_locally
+from rbfrag.errors import InputError
+from rbfrag.fragility.rockmass import Realisations
+from rbfrag.fragility.rockmass_shaken import CHUNK, ShakenMass, plan_shaking
+from rbfrag.fragility.rockmass_shaking import BlockFates, FailureLimits, run_blocks
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.polarity import Polarity
+
+WORTH_A_PROCESS = 500
+"""Blocks below which a worker process takes longer to start than to work."""
+
+
+@dataclass(frozen=True)
+class ShakingProgress:
+    """How far the blocks have been run."""
+
+    done: int
+    total: int
+    seconds: float
+
+    @property
+    def rate_per_s(self) -> float:
+        """Blocks run per second, at all scales."""
+        return self.done / self.seconds if self.seconds > 0.0 else 0.0
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Estimated time left [s]; None before anything is finished."""
+        return (self.total - self.done) / self.rate_per_s if self.rate_per_s else None
+
+
+def shake(
+    made: Realisations,
+    motion: GroundMotion,
+    *,
+    scales: Sequence[float] = (1.0,),
+    vertical: GroundMotion | None = None,
+    polarity: Polarity = "forward",
+    limits: FailureLimits | None = None,
+    jobs: int | None = None,
+    on_progress: Callable[[ShakingProgress], None] | None = None,
+) -> ShakenMass:
+    """Run every block of a rock mass that a motion moves, each in its own mode.
+
+    The answer does not depend on the number of workers.
+
+    Args:
+        made: blocks of a rock mass.
+        motion: horizontal ground motion.
+        scales: factors on the motion.
+        vertical: vertical motion of the same recording, upward positive; scaled likewise.
+        polarity: ``forward`` (positive samples drive out of the slope) or ``reverse``.
+        limits: what counts as failure.
+        jobs: worker processes; None for one per processor, where there is work enough for them.
+        on_progress: called at the beginning and after each piece of work.
+
+    Raises:
+        InputError: as for :func:`rbfrag.fragility.rockmass_shaken.plan_shaking`; `jobs` below 1;
+            a block that cannot be run.
+        WorkFailedError: a worker died.
+    """
+    if jobs is not None and jobs < 1:
+        raise InputError(f"--jobs must be at least 1, not {jobs}")
+    plan = plan_shaking(
+        made, motion, scales=scales, vertical=vertical, polarity=polarity, limits=limits
+    )
+    total = int(plan.places.size)
+    workers = min(jobs or os.cpu_count() or 1, math.ceil(total / CHUNK))
+    if jobs is None and total < WORTH_A_PROCESS:
+        workers = 1
+    started = time.perf_counter()
+
+    def told(answers: Iterator[BlockFates]) -> Iterator[BlockFates]:
+        done = 0
+        if on_progress is not None and total:
+            on_progress(ShakingProgress(0, total, 0.0))
+        for answer in answers:
+            done += int(answer.place.size)
+            if on_progress is not None:
+                on_progress(ShakingProgress(done, total, time.perf_counter() - started))
+            yield answer
+
+    answers = run_locally(
+        run_blocks, plan.work(), workers, after_a_death="run the same command again"
+    )
+    return plan.gathered(told(answers))

@@ -1,0 +1,96 @@
+"""`rbfrag rockmass --motion`: the shell says what the library says."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from rbfrag.exchange.block_columns import read_columns
+from rbfrag.fragility.rockmass_failures import failures
+from rbfrag.fragility.rockmass_file import read_rock_mass
+from rbfrag.fragility.rockmass_shaken import plan_shaking
+from rbfrag.fragility.rockmass_shaking import FailureLimits, run_blocks
+from rbfrag.motions.recognise import read_motion
+from tests.cli.conftest import Refuses, Shell
+from tests.synthetic import shaking, write_at2
+
+EXAMPLE = Path(__file__).resolve().parent.parent.parent / "docs" / "examples" / "rockmass.toml"
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Path:
+    shutil.copy(EXAMPLE, tmp_path / "mass.toml")
+    return write_at2(tmp_path / "record.AT2", shaking(3))
+
+
+def test_shares_table_and_figure(shell: Shell, record: Path, tmp_path: Path) -> None:
+    asked = (
+        "rockmass", "mass.toml", "--n", "60", "--motion", record, "--reverse",
+        "--scales", "2,0.5,1", "--displacement", "0.02", "--rotation", "1", "--level", "0.9",
+    )  # fmt: skip
+    answer = shell.json(*asked, "--out", "blocks.csv", "--plot", "shares.png")
+    assert answer["scenario"] is None
+    told = answer["shaking"]
+    assert told["polarity"] == "reverse"
+    assert (told["displacement_limit_m"], told["rotation_limit_deg"]) == (0.02, 1.0)
+    assert [each["scale"] for each in told["scales"]] == [0.5, 1.0, 2.0]
+    plan = plan_shaking(
+        read_rock_mass(EXAMPLE).realise(60),
+        read_motion(record),
+        scales=[0.5, 1.0, 2.0],
+        polarity="reverse",
+        limits=FailureLimits(0.02, 1.0),
+    )
+    fates = plan.gathered(map(run_blocks, plan.work()))
+    for each, found in zip(told["scales"], failures(fates, 0.9), strict=True):
+        assert set(each["modes"]) == {"slide", "slump"}
+        for mode, counted in found.modes.items():
+            assert each["modes"][mode]["fails"] == counted.fails
+            assert each["modes"][mode]["fails_of_all"]["ci_high"] == counted.of_all.high
+        assert each["all"]["fails_of_mode"]["share"] == each["all"]["fails"] / 60
+    assert told["scales"][2]["all"]["fails"] > 0
+    assert any("leans on its back plane" in warning for warning in answer["warnings"])
+    rows = read_columns(tmp_path / "blocks.csv", ("scale", "displacement_m"))
+    assert rows["scale"].tolist() == [0.5] * 60 + [1.0] * 60 + [2.0] * 60
+    assert (tmp_path / "shares.png").stat().st_size > 10_000
+    # the same again, and without a figure of the time that it took
+    assert shell.json(*asked) == answer
+
+
+def test_the_printed_table(shell: Shell, record: Path) -> None:
+    result = shell("rockmass", "mass.toml", "--n", "40", "--motion", record)
+    lines = result.stdout.splitlines()
+    (header,) = [i for i, line in enumerate(lines) if line.startswith("scale")]
+    assert [line.split()[2] for line in lines[header + 1 :]] == ["slide", "slump", "all"]
+    assert "fails beyond 0.05 m" in lines[header - 1]
+    assert "rockmass: " in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (("--scales", "1,2"), "--scales goes with --motion"),
+        (("--jobs", "2"), "--jobs goes with --motion"),
+        (("--displacement", "0.1"), "--displacement goes with --motion"),
+        (("--reverse",), "--reverse goes with --motion"),
+        (("--motion", "record.AT2", "--pgv", "0.5"), "does not go with --pgv"),
+        (("--motion", "record.AT2", "--model", "x"), "--model goes with a measure"),
+        (("--motion", "none.AT2"), "none.AT2"),
+        (("--motion", "record.AT2", "--vertical", "none.AT2"), "none.AT2"),
+        (("--motion", "record.AT2", "--scales", "1,x"), "--scales"),
+        (("--motion", "record.AT2", "--scales", "0"), "scale 0"),
+        (("--motion", "record.AT2", "--displacement", "0"), "displacement"),
+        (("--motion", "record.AT2", "--rotation", "-2"), "rotation"),
+        (("--motion", "record.AT2", "--level", "1.5"), "level"),
+        (("--motion", "record.AT2", "--jobs", "0"), "--jobs"),
+        (("--motion", "record.AT2", "--plot", "shares.bmp"), "shares.bmp"),
+        (("--motion", "record.AT2", "--out", "blocks.txt"), "blocks.txt"),
+    ],
+)
+def test_refused(
+    refuses: Refuses, record: Path, tmp_path: Path, options: tuple[str, ...], word: str
+) -> None:
+    assert word in refuses("rockmass", "mass.toml", "--n", "20", *options)
+    assert {path.name for path in tmp_path.iterdir()} == {"mass.toml", "record.AT2"}
