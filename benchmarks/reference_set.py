@@ -24,7 +24,8 @@ from benchmarks.page import ROOT
 from rbfrag.campaign.add_motions import AddReport, add_motions
 from rbfrag.campaign.bench.cases import RECORDS_VARIABLE
 from rbfrag.campaign.bench.tables import markdown
-from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
+from rbfrag.campaign.progress import CampaignProgress
+from rbfrag.campaign.simulate import CampaignSummary, simulate
 from rbfrag.db import schema
 from rbfrag.db.check import check_database
 from rbfrag.db.content import content_digest

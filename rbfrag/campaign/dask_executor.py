@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
-from rbfrag.campaign.worker import MotionResults, MotionWork, run_work
 from rbfrag.errors import InputError, MissingExtraError, RbfragError, WorkFailedError
 from rbfrag.version import __version__
+
+Work = TypeVar("Work")
+Results = TypeVar("Results")
 
 CONNECT_TIMEOUT_S = 10.0
 """How long to wait for the scheduler to answer [s]."""
@@ -60,7 +62,9 @@ def connected(address: str) -> Iterator[Any]:
         client.close(timeout=CONNECT_TIMEOUT_S)
 
 
-def run_on_cluster(client: Any, work: Iterator[MotionWork]) -> Iterator[MotionResults]:
+def run_on_cluster(
+    client: Any, run_work: Callable[[Work], Results], work: Iterator[Work]
+) -> Iterator[Results]:
     """Yield the answers as they come from a cluster.
 
     A motion travels inside its task, so that the scheduler can give the task to another worker
@@ -69,6 +73,7 @@ def run_on_cluster(client: Any, work: Iterator[MotionWork]) -> Iterator[MotionRe
 
     Args:
         client: from :func:`connected`.
+        run_work: does one piece of work; a function of a module, which workers can find.
         work: what to do.
 
     Raises:
@@ -96,10 +101,9 @@ def _most_under_way(client: Any) -> int:
     return max(threads, 1) * (1 + QUEUED_PER_THREAD)
 
 
-def _result(future: Any, address: str) -> MotionResults:
+def _result(future: Any, address: str) -> Any:
     if future.status == "finished":
-        answer: MotionResults = future.result()
-        return answer
+        return future.result()
     if future.status == "error":
         error = future.exception()
         if isinstance(error, RbfragError):

@@ -100,9 +100,67 @@ def plan_campaign(
         InputError: no such suite, no horizontal motion, none with a vertical one where it is
             needed, a p² that is not positive or repeats.
     """
+    sizes = _sizes(p2)
+    chosen = chosen_motions(connection, suite=suite, vertical=vertical)
+    settings = {**SETTINGS, "map_depth": positive(map_depth, "map_depth", "a width of k_r/PGA")}
+    plans = [
+        MotionPlan(
+            motion=row,
+            vertical=chosen.fitting.get(row.id),
+            cases=tuple(
+                _case(row, up, polarity, value, settings)
+                for up in excitations(vertical, chosen.fitting.get(row.id))
+                for value in sizes
+                for polarity in POLARITIES
+            ),
+        )
+        for row in chosen.rows
+    ]
+    return CampaignPlan(
+        motions=tuple(
+            sorted(
+                (plan for plan in plans if plan.cases), key=lambda p: (-p.motion.npts, p.motion.id)
+            )
+        ),
+        settings=settings,
+        without_vertical=chosen.without_vertical,
+        warnings=chosen.warnings,
+    )
+
+
+@dataclass(frozen=True)
+class ChosenMotions:
+    """The horizontal motions of a campaign.
+
+    Args:
+        rows: the motions.
+        fitting: the vertical motion that goes with each, by row id, where there is one.
+        without_vertical: how many were to have a vertical one and have none.
+        warnings: sentences about these.
+    """
+
+    rows: tuple[MotionRow, ...]
+    fitting: Mapping[int, VerticalPair]
+    without_vertical: int
+    warnings: tuple[str, ...]
+
+
+def chosen_motions(
+    connection: Connection, *, suite: str | None, vertical: Vertical
+) -> ChosenMotions:
+    """Return the horizontal motions of a campaign with their vertical ones.
+
+    Args:
+        connection: the database.
+        suite: only the horizontal motions of this suite; their verticals need not be in it.
+        vertical: ``without`` vertical motion, ``with`` that of the same recording, or ``both``.
+
+    Raises:
+        InputError: no such suite, no horizontal motion, none with a vertical one where it is
+            needed.
+    """
     if vertical not in ("without", "with", "both"):
         raise InputError(f"--vertical must be without, with or both, not {vertical!r}")
-    sizes = _sizes(p2)
     rows = [row for row in motion_rows(connection, suite=suite) if not row.is_vertical]
     if not rows:
         where = "the database" if suite is None else f"suite {suite!r}"
@@ -117,20 +175,6 @@ def plan_campaign(
             f"none of the {len(rows)} horizontal motions has a vertical one that fits: "
             f"{_first(lacking)}; add the vertical components, or leave --vertical out"
         )
-    settings = {**SETTINGS, "map_depth": positive(map_depth, "map_depth", "a width of k_r/PGA")}
-    plans = [
-        MotionPlan(
-            motion=row,
-            vertical=fitting.get(row.id),
-            cases=tuple(
-                _case(row, up, polarity, value, settings)
-                for up in _excitations(vertical, fitting.get(row.id))
-                for value in sizes
-                for polarity in POLARITIES
-            ),
-        )
-        for row in rows
-    ]
     warnings = []
     if lacking:
         left = "left out" if vertical == "with" else "shaken without one only"
@@ -138,16 +182,7 @@ def plan_campaign(
             f"{len(lacking)} of {len(rows)} horizontal motions have no vertical one that fits and "
             f"are {left}: {_first(lacking)}"
         )
-    return CampaignPlan(
-        motions=tuple(
-            sorted(
-                (plan for plan in plans if plan.cases), key=lambda p: (-p.motion.npts, p.motion.id)
-            )
-        ),
-        settings=settings,
-        without_vertical=len(lacking),
-        warnings=tuple(warnings),
-    )
+    return ChosenMotions(tuple(rows), fitting, len(lacking), tuple(warnings))
 
 
 def _sizes(p2: Sequence[float]) -> list[float]:
@@ -160,9 +195,10 @@ def _sizes(p2: Sequence[float]) -> list[float]:
     return sizes
 
 
-def _excitations(
+def excitations(
     vertical: Vertical, companion: VerticalPair | None
 ) -> Iterable[VerticalPair | None]:
+    """Yield the vertical motions that a horizontal one is shaken with, None for without."""
     if vertical != "with":
         yield None
     if vertical != "without" and companion is not None:

@@ -5,17 +5,16 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
 from sqlalchemy import Engine
 
-from rbfrag.campaign.dask_executor import connected, run_on_cluster
+from rbfrag.campaign.executor import CLUSTER, check_workers, executor
 from rbfrag.campaign.grid import checked_ratios, grid_of
-from rbfrag.campaign.local_executor import run_locally
 from rbfrag.campaign.made_on import made_on
 from rbfrag.campaign.plan import DEFAULT_P2, CampaignPlan, plan_campaign
+from rbfrag.campaign.progress import CampaignProgress
 from rbfrag.campaign.todo import MotionTasks, Todo, Wanted, still_to_do
 from rbfrag.campaign.worker import MotionResults, MotionWork, run_work
 from rbfrag.db.campaign_store import (
@@ -31,36 +30,9 @@ from rbfrag.db.motion_store import load_motion
 from rbfrag.db.queries import Vertical
 from rbfrag.db.response_store import insert_responses
 from rbfrag.db.spectrum_store import store_spectrum
-from rbfrag.errors import InputError, WorkFailedError
+from rbfrag.errors import WorkFailedError
 from rbfrag.solver.certified import MAP_DEPTH
 from rbfrag.solver.results import NUMERICS_VERSION
-
-Executor = Callable[[Iterator[MotionWork], int], Iterator[MotionResults]]
-"""Takes the work and the number of motions; yields the answers in any order."""
-
-CLUSTER = "a cluster"
-"""Stands for the processor where workers are elsewhere: nobody's bits are promised then."""
-
-
-@dataclass(frozen=True)
-class CampaignProgress:
-    """How far a campaign is, in combinations."""
-
-    done: int
-    total: int
-    resumed: int
-    seconds: float
-
-    @property
-    def rate_per_s(self) -> float:
-        """Combinations finished per second by this run."""
-        made = self.done - self.resumed
-        return made / self.seconds if self.seconds > 0.0 else 0.0
-
-    @property
-    def seconds_left(self) -> float | None:
-        """Estimated time left [s]; None before anything is finished."""
-        return (self.total - self.done) / self.rate_per_s if self.rate_per_s else None
 
 
 @dataclass(frozen=True)
@@ -146,10 +118,7 @@ def simulate(
         DatabaseError: the database cannot be used.
         WorkFailedError: a worker died; what was finished is stored.
     """
-    if jobs is not None and jobs < 1:
-        raise InputError(f"--jobs must be at least 1, not {jobs}")
-    if jobs is not None and scheduler is not None:
-        raise InputError("--jobs counts local workers, --scheduler names others: give one of them")
+    check_workers(jobs, scheduler)
     wanted = _wanted(grid, store_responses)
     started = time.perf_counter()
     with opened_database(db) as engine:
@@ -158,7 +127,7 @@ def simulate(
                 connection, suite=suite, p2=p2, vertical=vertical, map_depth=map_depth
             )
             todo = still_to_do(connection, plan, wanted)
-        with _executor(jobs, scheduler if todo.motions else None) as execute:
+        with executor(run_work, jobs, scheduler if todo.motions else None) as execute:
             settings = {
                 "suite": suite,
                 "p2": list(map(float, p2)),
@@ -262,20 +231,6 @@ def _wanted(
         histories=checked_ratios(histories, "--store-responses"),
         critical_history="critical" in store_responses,
     )
-
-
-@contextmanager
-def _executor(jobs: int | None, scheduler: str | None) -> Iterator[Executor]:
-    if scheduler is None:
-        yield lambda work, motions: run_locally(
-            run_work,
-            work,
-            min(jobs or os.cpu_count() or 1, motions),
-            after_a_death="what was finished is stored: run the same command again to go on",
-        )
-        return
-    with connected(scheduler) as client:
-        yield lambda work, _: run_on_cluster(client, work)
 
 
 def _work(engine: Engine, todo: Todo, map_depth: float) -> Iterator[MotionWork]:

@@ -39,11 +39,11 @@ __all__ = [
 
 _COLUMNS = (
     "natural_key", "campaign_id", "motion_id", "vertical_motion_id", "polarity", "kind", "linear",
-    "p2", "settings", "numerics_version", "status", "search_limit", "kr_over_pga", "lower",
+    "p2", "block", "settings", "numerics_version", "status", "search_limit", "kr_over_pga", "lower",
     "upper", "kr", "y_m_s", "certified", "k_up_over_pga", "undecided", "island_width",
     "kr_over_pga_resolved", "reentrant", "n_runs", "warnings",
 )  # fmt: skip
-_POINT_COLUMNS = ("combination_id", "kr_over_pga", "theta_n", "outcome")
+_POINT_COLUMNS = ("combination_id", "kr_over_pga", "theta_n", "outcome", "displacement_m")
 _INTERVAL_COLUMNS = ("combination_id", "k_lo", "k_hi", "outcome")
 
 _KEYS_AT_ONCE = 500  # below the number of variables that any SQLite build takes
@@ -61,6 +61,7 @@ class CombinationRecord:
         settings: the same that went into the key.
         kind: response kind.
         numerics_version: the same that went into the key.
+        block: which block it is, the same that went into the key; None for toppling.
     """
 
     natural_key: str
@@ -70,6 +71,7 @@ class CombinationRecord:
     settings: Mapping[str, object]
     kind: str = "toppling"
     numerics_version: str = NUMERICS_VERSION
+    block: Mapping[str, object] | None = None
 
 
 @dataclass(frozen=True)
@@ -284,7 +286,8 @@ def _combination_row(campaign_id: int, record: CombinationRecord) -> tuple[objec
         result.polarity,
         record.kind,
         bool(result.linear),
-        float(result.p2),
+        _number(result.p2),
+        None if record.block is None else canonical_json(record.block),
         canonical_json(record.settings),
         record.numerics_version,
         result.status,
@@ -316,10 +319,16 @@ def _interval_rows(
 
 def _point_rows(combination_id: int, points: SearchPoints) -> Iterator[tuple[object, ...]]:
     # A search may come back to a point; a run of the same input gives the same answer.
-    for k, theta, outcome in zip(
-        points.kr_over_pga.tolist(), points.theta_n.tolist(), points.outcome, strict=True
-    ):
-        yield combination_id, k, None if math.isnan(theta) else theta, str(outcome)
+    slid = points.displacement_m
+    rows = zip(
+        points.kr_over_pga.tolist(),
+        points.theta_n.tolist(),
+        points.outcome,
+        [None] * len(points.outcome) if slid is None else slid.tolist(),
+        strict=True,
+    )
+    for k, theta, outcome, displacement_m in rows:
+        yield combination_id, k, _number(theta), str(outcome), _number(displacement_m)
 
 
 def _number(value: float | None) -> float | None:

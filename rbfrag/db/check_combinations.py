@@ -11,6 +11,7 @@ from typing import Any
 from sqlalchemy import Connection, Row, RowMapping, Select, select
 
 from rbfrag.db.check_intervals import interval_problems
+from rbfrag.db.check_kinds import rotation_of, sliding_problems
 from rbfrag.db.finding import COMPUTE_AGAIN, Finding
 from rbfrag.db.natural_key import combination_key
 from rbfrag.db.schema import campaign, combination, motion, outcome_interval, simulation
@@ -96,14 +97,23 @@ def _problems(
     except ValueError as error:
         yield f"its warnings cannot be read: {error}"
     yield from _value_problems(row)
+    if row["kind"] == "sliding":
+        yield from sliding_problems(row, points)
+        return
     toppled = [point.kr_over_pga for point in points if point.outcome == "toppled"]
     unsure = [point.kr_over_pga for point in points if point.outcome == "undetermined"]
-    yield from _point_problems(row, toppled, unsure)
+    if rotation_of(row["settings"]) is None:
+        yield from _point_problems(row, toppled, unsure)
     stable = [point.kr_over_pga for point in points if point.outcome == "stable"]
     yield from interval_problems(row, intervals, toppled, stable)
 
 
 def _key_problems(row: RowMapping) -> Iterator[str]:
+    try:
+        block = None if row["block"] is None else json.loads(row["block"])
+    except ValueError as error:
+        yield f"its block cannot be read: {error}"
+        return
     try:
         settings = json.loads(row["settings"])
         expected = combination_key(
@@ -116,6 +126,7 @@ def _key_problems(row: RowMapping) -> Iterator[str]:
             settings=settings,
             numerics_version=row["numerics_version"],
             linear=row["linear"],
+            block=block,
         )
     except ValueError as error:
         yield f"its settings cannot be read: {error}"
@@ -134,6 +145,8 @@ def _value_problems(row: RowMapping) -> Iterator[str]:
         yield f"kr/PGA {k!r} lies above its bracket, {lower!r} to {upper!r}"
     if not math.isclose(row["kr"], k * row["pga_g"], rel_tol=_ROUNDING):
         yield f"kr {row['kr']!r} is not kr/PGA times the motion's PGA"
+    if row["p2"] is None:
+        return
     y_m_s = row["kr"] * STANDARD_GRAVITY_M_S2 / math.sqrt(row["p2"])
     if not math.isclose(row["y_m_s"], y_m_s, rel_tol=_ROUNDING):
         yield f"y {row['y_m_s']!r} m/s is not kr g/p = {y_m_s!r} m/s"

@@ -70,8 +70,8 @@ def _said(outcome: str) -> str:
 
 def _cover_problems(row: RowMapping, intervals: Sequence[Row[Any]]) -> Iterator[str]:
     limit, bottom = row["search_limit"], intervals[0].k_lo
-    # The shipped reference keeps decided intervals alone.
-    gaps = _setting(row["settings"], "map") == "decided"
+    # The shipped reference keeps decided intervals alone; other kinds say what they saw.
+    gaps = _setting(row["settings"], "map") in ("decided", "seen")
     needed = limit
     if not _states_depth(row["settings"]) and row["status"] == "found" and row["lower"] is not None:
         # earlier maps end where a search was given up, which may be anywhere below the bracket

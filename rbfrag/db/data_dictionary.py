@@ -115,7 +115,9 @@ _MEANINGS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
         },
     ),
     "combination": (
-        "Critical searches: the strongest block of size p² that a motion topples.",
+        "Critical searches: the strongest block of size p² that a motion topples, or that it "
+        "slides a stated distance; for blocks that slump, their strength over the critical "
+        "factor on the record.",
         {
             "id": ("", "row number, of this database alone"),
             "natural_key": ("", _KEY),
@@ -125,7 +127,12 @@ _MEANINGS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "polarity": ("", _POLARITY),
             "kind": ("", _KIND),
             "linear": ("", _LINEAR),
-            "p2": ("1/s²", _P2),
+            "p2": ("1/s²", f"{_P2}; p_s² at rest of other kinds; missing for sliding"),
+            "block": (
+                "",
+                "JSON object: shape, size, friction and dip of a block that slumps or topples "
+                "confined, or the plane that it slides on; missing for toppling",
+            ),
             "settings": ("", "JSON: what else decided the answer, part of the natural key"),
             "numerics_version": ("", _NUMERICS),
             "status": (
@@ -171,6 +178,10 @@ _MEANINGS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "kr_over_pga": ("k_r/PGA", "strength of the block"),
             "theta_n": ("", "peak rotation over the critical angle; missing where it toppled"),
             "outcome": ("", _OUTCOME),
+            "displacement_m": (
+                "m",
+                "permanent displacement of a sliding block down a level plane; missing for others",
+            ),
         },
     ),
     "response": (
@@ -202,6 +213,7 @@ _MEANINGS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
         {
             "id": ("", "row number, of this database alone"),
             "name": ("", "name of the model"),
+            "kind": ("", _KIND),
             "term": ("", "intensity term: pgv, pga_tm, pgd_tm, pgv_pga, pgv_pga_tm, xp"),
             "method": ("", "method of the fit"),
             "coefficients": ("", "JSON object: value by parameter, in order"),
@@ -209,7 +221,10 @@ _MEANINGS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "domain": ("", "JSON object: fitted range [low, high] by variable"),
             "data_fingerprint": ("", "hash of the data that were fitted"),
             "diagnostics": ("", "JSON object: counts, scores, warnings"),
-            "is_default": ("", "true for the one model that answers when none is named"),
+            "is_default": (
+                "",
+                "true for the one model of its kind that answers when none is named",
+            ),
             "created": ("", "UTC time of the fit"),
         },
     ),

@@ -17,7 +17,7 @@ def merge_models(source: Connection, target: Connection, ledger: Ledger) -> None
     """Bring models in; of two that differ under one name, the other's gets a number.
 
     A model "m" that differs from the "m" here is stored as "m-2", or the first number that is
-    free. The default stays; a database without models takes the other's.
+    free. The defaults stay; a database without models of a kind takes the other's.
 
     Args:
         source: the other database.
@@ -25,7 +25,7 @@ def merge_models(source: Connection, target: Connection, ledger: Ledger) -> None
         ledger: what was done.
     """
     ours = {row.name: row for row in model_rows(target)}
-    had_none = not ours
+    had = {row.kind for row in ours.values()}
     for theirs in model_rows(source):
         name, number = theirs.name, 1
         while name in ours and not _same(ours[name], theirs):
@@ -34,7 +34,7 @@ def merge_models(source: Connection, target: Connection, ledger: Ledger) -> None
         if name in ours:
             ledger.same["fragility_model"] += 1
             continue
-        row = replace(theirs, name=name, is_default=theirs.is_default and had_none)
+        row = replace(theirs, name=name, is_default=theirs.is_default and theirs.kind not in had)
         target.execute(insert(fragility_model).values(**encode_model(row)))
         ours[name] = row
         ledger.added["fragility_model"] += 1

@@ -28,14 +28,16 @@ from rbfrag.db.schema import (
 
 _AT_ONCE = 500
 _COLUMNS = tuple(column.name for column in combination.c if column.name != "id")
-_INPUTS = ("natural_key", "polarity", "kind", "linear", "p2", "settings", "numerics_version")
+_INPUTS = (
+    "natural_key", "polarity", "kind", "linear", "p2", "block", "settings", "numerics_version",
+)  # fmt: skip
 _INCIDENTAL = ("campaign_id", "motion_id", "vertical_motion_id", "warnings")
 _VALUES = tuple(name for name in _COLUMNS if name not in (*_INPUTS, *_INCIDENTAL))
 
 ROTATION_ERROR = 1e-6
 """Relative error of a rotation that another processor's last bits can make."""
 
-Point = tuple[float, float | None, str]
+Point = tuple[float, float | None, str, float | None]
 AnyRow = RowMapping | Mapping[str, Any]
 
 
@@ -164,6 +166,7 @@ def _key_here(source: Connection, row: AnyRow, motions: MergedMotions) -> str:
         settings=json.loads(row["settings"]),
         numerics_version=row["numerics_version"],
         linear=row["linear"],
+        block=None if row["block"] is None else json.loads(row["block"]),
     )
 
 
@@ -260,14 +263,19 @@ def _more_points(
     band: tuple[float, float] | None,
     ledger: Ledger,
 ) -> list[Point]:
-    known = {k: (theta, outcome) for k, theta, outcome in here}
+    known = {k: rest for k, *rest in here}
     more: list[Point] = []
-    for k, theta, outcome in there:
+    for k, theta, outcome, slid in there:
         if k not in known:
             if band is None or not band[0] <= k <= band[1]:
-                more.append((k, theta, outcome))
+                more.append((k, theta, outcome, slid))
             continue
-        our_theta, our_outcome = known[k]
+        our_theta, our_outcome, our_slid = known[k]
+        if None not in (slid, our_slid) and not math.isclose(
+            slid, our_slid, rel_tol=ROTATION_ERROR, abs_tol=1e-12
+        ):
+            column = f"displacement_m at ky/PGA {k!r}"
+            ledger.conflict("simulation", name, column, our_slid, slid)
         if outcome != our_outcome and (band is None or not band[0] <= k <= band[1]):
             column = f"the outcome at kr/PGA {k!r}"
             ledger.conflict("simulation", name, column, our_outcome, outcome)

@@ -26,7 +26,7 @@ def read_model(path: str | PathLike[str], name: str | None = None) -> ModelRow:
 
     Args:
         path: the database file.
-        name: the model's name; None for the default.
+        name: the model's name; None for the default of toppling.
 
     Raises:
         DatabaseError: one of its kinds, as for :func:`rbfrag.db.engine.open_database`.
@@ -35,7 +35,7 @@ def read_model(path: str | PathLike[str], name: str | None = None) -> ModelRow:
     file = Path(path)
     with _opened(file) as connection:
         if name is None:
-            row = connection.execute(f"{_SELECT} WHERE is_default").fetchone()
+            row = connection.execute(f"{_SELECT} WHERE is_default AND kind = 'toppling'").fetchone()
         else:
             row = connection.execute(f"{_SELECT} WHERE name = ?", (name,)).fetchone()
         if row is not None:

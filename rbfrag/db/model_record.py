@@ -25,6 +25,7 @@ COLUMNS = (
     "diagnostics",
     "is_default",
     "created",
+    "kind",
 )
 """The columns that make a model, in the order of :func:`decode_model`."""
 
@@ -65,6 +66,7 @@ def encode_model(row: ModelRow) -> dict[str, Any]:
         "diagnostics": diagnostics,
         "is_default": bool(row.is_default),
         "created": row.created,
+        "kind": row.kind,
     }
 
 
@@ -92,6 +94,7 @@ def decode_model(values: Sequence[Any]) -> ModelRow:
             diagnostics=json.loads(by_name["diagnostics"]),
             is_default=bool(by_name["is_default"]),
             created=by_name["created"],
+            kind=by_name["kind"],
         )
     except (ValueError, TypeError, AttributeError) as error:
         raise DatabaseError(

@@ -17,7 +17,7 @@ from rbfrag.errors import InputError, UnknownModelError
 def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) -> ModelRow:
     """Store a fitted model.
 
-    The first model of a database becomes its default; a later one only when it asks to be.
+    The first model of a kind becomes its default; a later one only when it asks to be.
     A model that is replaced passes its being the default on.
 
     Args:
@@ -33,16 +33,17 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
     """
     values = encode_model(row)
     values["created"] = row.created or utc_now()
-    query = select(fragility_model.c.name, fragility_model.c.is_default)
-    defaults = {stored.name: stored.is_default for stored in connection.execute(query)}
-    if row.name in defaults and not replace:
+    query = select(fragility_model.c.name, fragility_model.c.is_default, fragility_model.c.kind)
+    stored = connection.execute(query).all()
+    if any(other.name == row.name for other in stored) and not replace:
         raise InputError(
             f"there is a model {row.name!r} already: give another --name, or replace it with "
             "--replace"
         )
+    defaults = {other.name: other.is_default for other in stored if other.kind == row.kind}
     values["is_default"] = row.is_default or defaults.get(row.name, False) or not defaults
     if values["is_default"]:
-        _clear_default(connection)
+        _clear_default(connection, row.kind)
     connection.execute(delete(fragility_model).where(fragility_model.c.name == row.name))
     connection.execute(insert(fragility_model).values(**values))
     return load_model(connection, row.name)
@@ -59,14 +60,14 @@ def load_model(connection: Connection, name: str | None = None) -> ModelRow:
 
     Args:
         connection: the database.
-        name: its name; None for the default.
+        name: its name; None for the default of toppling.
 
     Raises:
         UnknownModelError: there is none; the message lists the names there are.
     """
     query = _model_query()
     if name is None:
-        query = query.where(fragility_model.c.is_default)
+        query = query.where(fragility_model.c.is_default, fragility_model.c.kind == "toppling")
     else:
         query = query.where(fragility_model.c.name == name)
     row = connection.execute(query).one_or_none()
@@ -76,21 +77,22 @@ def load_model(connection: Connection, name: str | None = None) -> ModelRow:
 
 
 def set_default(connection: Connection, name: str) -> None:
-    """Make a model the one that answers when none is named.
+    """Make a model the one of its kind that answers when none is named.
 
     Raises:
         UnknownModelError: there is none of that name.
     """
-    load_model(connection, name)
-    _clear_default(connection)
+    _clear_default(connection, load_model(connection, name).kind)
     connection.execute(
         update(fragility_model).where(fragility_model.c.name == name).values(is_default=True)
     )
 
 
-def _clear_default(connection: Connection) -> None:
+def _clear_default(connection: Connection, kind: str) -> None:
     connection.execute(
-        update(fragility_model).where(fragility_model.c.is_default).values(is_default=False)
+        update(fragility_model)
+        .where(fragility_model.c.is_default, fragility_model.c.kind == kind)
+        .values(is_default=False)
     )
 
 

@@ -18,10 +18,11 @@ def combination_key(
     vertical_sha256: str | None,
     polarity: str,
     kind: str,
-    p2: float,
+    p2: float | None,
     settings: Mapping[str, object],
     numerics_version: str,
     linear: bool = False,
+    block: Mapping[str, object] | None = None,
 ) -> str:
     """Return the key of one critical search: equal inputs, equal key, on every machine.
 
@@ -31,10 +32,11 @@ def combination_key(
         vertical_sha256: hash of the vertical samples; None without vertical motion.
         polarity: ``forward`` or ``reverse``.
         kind: response kind (``toppling``).
-        p2: block frequency parameter p² [1/s²].
+        p2: block frequency parameter p² [1/s²]; None for sliding.
         settings: whatever else changes the answer (search limit, resolution, ...).
         numerics_version: of the solver.
         linear: True for the linear verification model.
+        block: what else says which block it is; None for toppling.
 
     Returns:
         SHA-256 as 64 hexadecimal digits.
@@ -42,19 +44,18 @@ def combination_key(
     Raises:
         InputError: a number that is not finite.
     """
-    return _digest(
-        {
-            "motion": motion_sha256,
-            "dt_s": float(dt_s),
-            "vertical": vertical_sha256 or "-",
-            "polarity": polarity,
-            "kind": kind,
-            "linear": bool(linear),
-            "p2": float(p2),
-            "settings": settings,
-            "numerics": numerics_version,
-        }
-    )
+    inputs = {
+        "motion": motion_sha256,
+        "dt_s": float(dt_s),
+        "vertical": vertical_sha256 or "-",
+        "polarity": polarity,
+        "kind": kind,
+        "linear": bool(linear),
+        "p2": None if p2 is None else float(p2),
+        "settings": settings,
+        "numerics": numerics_version,
+    }
+    return _digest(inputs if block is None else {**inputs, "block": block})
 
 
 def response_key(

@@ -56,12 +56,13 @@ def combination_table(
     suite: str | None = None,
     vertical: Vertical = "without",
     kind: str = "toppling",
+    rotation_deg: float | None = None,
     numerics_version: str = NUMERICS_VERSION,
     doubtful_pgd: bool = False,
 ) -> CombinationTable:
     """Return the critical values of the non-linear model with their motions' intensity.
 
-    A pair of motion, polarity and p² appears once, though several campaigns may have searched
+    A pair of motion, polarity and block appears once, though several campaigns may have searched
     it with different settings: the search that went lowest counts (of equals, the one of the
     smaller natural key). Versions of the numerics never mix.
 
@@ -69,7 +70,9 @@ def combination_table(
         connection: the database.
         suite: only motions of this suite.
         vertical: ``without`` vertical motion, ``with`` it, or ``both``.
-        kind: response kind.
+        kind: response kind other than sliding, which has no critical velocity.
+        rotation_deg: slumping and confined toppling: the rotation that counts as failure [deg];
+            None for failure past recovery.
         numerics_version: of the solver.
         doubtful_pgd: True to return the PGD of motions that are flagged for an implausible
             final velocity or displacement; by default it is NaN, so that no fit reads it.
@@ -99,8 +102,10 @@ def combination_table(
     order = (combination.c.search_limit, combination.c.natural_key)
     rows: dict[tuple[Any, ...], Any] = {}
     for row in connection.execute(query.order_by(*order)).mappings():
-        pair = (row["motion_id"], row["vertical_motion_id"], row["polarity"], row["p2"])
-        rows.setdefault(pair, row)
+        if kind != "toppling" and json.loads(row["settings"]).get("rotation_deg") != rotation_deg:
+            continue
+        block = (row["p2"], row["block"])
+        rows.setdefault((row["motion_id"], row["vertical_motion_id"], row["polarity"], block), row)
     kept = sorted(rows.values(), key=lambda row: str(row["natural_key"]))
 
     def floats(name: str) -> Any:
@@ -172,7 +177,9 @@ def database_info(connection: Connection) -> DatabaseInfo:
         },
         numerics_versions=tuple(sorted(connection.scalars(versions))),
         default_model=connection.scalar(
-            select(fragility_model.c.name).where(fragility_model.c.is_default)
+            select(fragility_model.c.name).where(
+                fragility_model.c.is_default, fragility_model.c.kind == "toppling"
+            )
         ),
     )
 
@@ -189,6 +196,8 @@ def _combination_query() -> Select[Any]:
         combination.c.vertical_motion_id,
         combination.c.polarity,
         combination.c.p2,
+        combination.c.block,
+        combination.c.settings,
         combination.c.status,
         combination.c.search_limit,
         combination.c.kr_over_pga,

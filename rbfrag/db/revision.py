@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from rbfrag.errors import SchemaVersionError
 
-REVISIONS = ("0001", "0002")
+REVISIONS = ("0001", "0002", "0003")
 """Every schema revision this rbfrag knows, oldest first."""
 
 SCHEMA_REVISION = REVISIONS[-1]

@@ -106,8 +106,9 @@ class ModelRow:
         domain: fitted range (low, high) of each variable by name.
         data_fingerprint: hash of the data that were fitted.
         diagnostics: everything else a report prints (counts, scores, warnings), JSON-able.
-        is_default: True for the model that answers when none is named.
+        is_default: True for the model of its kind that answers when none is named.
         created: UTC time of the fit, ISO 8601.
+        kind: response kind of the blocks that it answers for.
     """
 
     name: str
@@ -120,3 +121,4 @@ class ModelRow:
     diagnostics: Mapping[str, object] = field(default_factory=dict)
     is_default: bool = False
     created: str = ""
+    kind: str = "toppling"

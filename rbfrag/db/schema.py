@@ -34,6 +34,13 @@ metadata = MetaData(
 
 POLARITY = "polarity IN ('forward', 'reverse')"
 KIND = "kind IN ('toppling', 'sliding', 'slumping', 'confined_toppling')"
+# Two numbers say all about a block that topples freely; the others need more.
+BLOCK_OF_KIND = "(kind = 'toppling') = (block IS NULL)"
+P2_OF_KIND = "p2 IS NOT NULL OR kind = 'sliding'"
+FOUND_HAS_VALUE = (
+    "status <> 'found' OR (kr_over_pga > 0 AND kr > 0 AND kr_over_pga IS NOT NULL "
+    "AND kr IS NOT NULL AND (kind = 'sliding' OR (y_m_s > 0 AND y_m_s IS NOT NULL)))"
+)
 STATUS = "status IN ('found', 'below_limit', 'no_motion', 'outside_model')"
 OUTCOME = (
     "outcome IN ('stable', 'toppled', 'undetermined', 'jump', 'contact_lost', 'indeterminate')"
@@ -160,7 +167,8 @@ combination = Table(
     Column("polarity", Text, nullable=False),
     Column("kind", Text, nullable=False),
     Column("linear", Boolean, nullable=False),
-    Column("p2", Double, nullable=False),  # 1/s²
+    Column("p2", Double),  # 1/s²; NULL for sliding
+    Column("block", Text),  # JSON object; NULL for toppling
     Column("settings", Text, nullable=False),  # JSON
     Column("numerics_version", Text, nullable=False),
     Column("status", Text, nullable=False),
@@ -184,11 +192,9 @@ combination = Table(
     CheckConstraint(KIND, name="kind"),
     CheckConstraint(STATUS, name="status"),
     CheckConstraint("p2 > 0 AND search_limit > 0 AND n_runs >= 0", name="ranges"),
-    CheckConstraint(
-        "status <> 'found' OR (kr_over_pga > 0 AND kr > 0 AND y_m_s > 0 "
-        "AND kr_over_pga IS NOT NULL AND kr IS NOT NULL AND y_m_s IS NOT NULL)",
-        name="found_has_value",
-    ),
+    CheckConstraint(BLOCK_OF_KIND, name="block_of_kind"),
+    CheckConstraint(P2_OF_KIND, name="p2_of_kind"),
+    CheckConstraint(FOUND_HAS_VALUE, name="found_has_value"),
     CheckConstraint(
         "status = 'found' OR (kr_over_pga IS NULL AND kr IS NULL AND y_m_s IS NULL)",
         name="value_is_found",
@@ -218,6 +224,7 @@ simulation = Table(
     Column("kr_over_pga", Double, nullable=False),
     Column("theta_n", Double),  # peak rotation over the critical angle; NULL where it toppled
     Column("outcome", Text, nullable=False),
+    Column("displacement_m", Double),  # down a level plane; sliding only
     PrimaryKeyConstraint("combination_id", "kr_over_pga"),
     CheckConstraint("kr_over_pga > 0", name="kr_over_pga"),
     CheckConstraint("theta_n >= 0", name="theta_n"),
@@ -263,6 +270,7 @@ fragility_model = Table(
     metadata,
     Column("id", Integer, primary_key=True),
     Column("name", Text, nullable=False),
+    Column("kind", Text, nullable=False),
     Column("term", Text, nullable=False),
     Column("method", Text, nullable=False),
     Column("coefficients", Text, nullable=False),  # JSON object, ordered
@@ -274,10 +282,11 @@ fragility_model = Table(
     Column("created", Text, nullable=False),
     UniqueConstraint("name"),
     CheckConstraint("name <> ''", name="name"),
-    # At most one default: the index holds only the rows that are it.
+    CheckConstraint(KIND, name="kind"),
+    # At most one default of a kind: the index holds only the rows that are it.
     Index(
         "uq_fragility_model_default",
-        "is_default",
+        "kind",
         unique=True,
         sqlite_where=text("is_default"),
         postgresql_where=text("is_default"),

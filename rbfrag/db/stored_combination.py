@@ -59,7 +59,6 @@ def keys_with_samples(connection: Connection, *, numerics_version: str) -> list[
         )
         .where(
             combination.c.numerics_version == numerics_version,
-            combination.c.kind == "toppling",
             motion.c.samples.is_not(None),
             combination.c.vertical_motion_id.is_(None) | vertical.c.samples.is_not(None),
         )
@@ -81,7 +80,12 @@ def stored_combination(connection: Connection, natural_key: str) -> StoredCombin
         .one()
     )
     points = connection.execute(
-        select(simulation.c.kr_over_pga, simulation.c.theta_n, simulation.c.outcome)
+        select(
+            simulation.c.kr_over_pga,
+            simulation.c.theta_n,
+            simulation.c.outcome,
+            simulation.c.displacement_m,
+        )
         .where(simulation.c.combination_id == row["id"])
         .order_by(simulation.c.kr_over_pga.desc())
     ).all()
@@ -99,9 +103,12 @@ def stored_combination(connection: Connection, natural_key: str) -> StoredCombin
         settings=json.loads(row["settings"]),
         campaign_settings=json.loads(row["campaign_settings"]),
         points=SearchPoints(
-            kr_over_pga=_floats([k for k, _, _ in points]),
-            theta_n=_floats([theta for _, theta, _ in points]),
-            outcome=tuple(outcome for _, _, outcome in points),
+            kr_over_pga=_floats([point.kr_over_pga for point in points]),
+            theta_n=_floats([point.theta_n for point in points]),
+            outcome=tuple(point.outcome for point in points),
+            displacement_m=None
+            if row["kind"] != "sliding"
+            else _floats([point.displacement_m for point in points]),
         ),
         intervals=OutcomeIntervals(
             k_lo=_floats([low for low, _, _ in intervals]),

@@ -161,11 +161,14 @@ class SearchPoints:
         kr_over_pga: block strength over PGA, shape (n,).
         theta_n: peak rotation over the critical angle, shape (n,); NaN where it toppled.
         outcome: :class:`Outcome` values as text, length n.
+        displacement_m: displacement down a level plane of blocks that slide [m], shape (n,);
+            None for other kinds.
     """
 
     kr_over_pga: FloatArray
     theta_n: FloatArray
     outcome: tuple[str, ...]
+    displacement_m: FloatArray | None = None
 
 
 IntervalOutcome = Literal["topples", "safe", "undecided"]
@@ -197,7 +200,7 @@ class CriticalResult:
     """The critical block of one motion: the strongest one that it topples.
 
     Args:
-        p2: the block's frequency parameter p² [1/s²].
+        p2: the block's frequency parameter p² [1/s²]; NaN for sliding, which has none.
         polarity: ``forward`` or ``reverse``.
         linear: True for the linear verification model.
         pga_g: PGA of the horizontal motion [g].

@@ -11,7 +11,7 @@ looked at is not proven.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -27,6 +27,7 @@ from rbfrag.solver.one_freedom.follow import Course, follow
 from rbfrag.solver.quantity import number, positive
 from rbfrag.solver.results import (
     SEARCH_LIMIT,
+    CriticalResult,
     IntervalOutcome,
     Outcome,
     OutcomeIntervals,
@@ -153,10 +154,14 @@ class ScaledResult:
 
     @property
     def intervals(self) -> OutcomeIntervals:
-        """What was seen, by rising k/PGA: neighbours of one verdict, the gaps left out."""
+        """What was seen, by rising k/PGA: neighbours of one verdict, the gaps left out.
+
+        Blocks that do not move, and those between them and the first that was looked at, are safe.
+        """
         rows: list[tuple[float, float, IntervalOutcome]] = []
         before: ScaledRun | None = None
-        for run in sorted(self.runs, key=lambda each: -each.scale):
+        still = () if self.starts is None else (_at_rest(self.starts),)
+        for run in sorted((*self.runs, *still), key=lambda each: -each.scale):
             word = _MAP_WORDS.get(run.verdict)
             if word is not None:
                 k = self.k_over_pga(run.scale)
@@ -210,6 +215,57 @@ def critical_scale(
         InputError: a value outside its range, a block of another mode, or one that no earthquake
             decides about.
     """
+    (found,) = critical_scales(
+        motion,
+        block,
+        rotations_deg=[rotation_deg],
+        beta_deg=beta_deg,
+        phi_deg=phi_deg,
+        phi_back_deg=phi_back_deg,
+        kind=kind,
+        vertical=vertical,
+        polarity=polarity,
+        search_limit=search_limit,
+        scan_ratio=scan_ratio,
+        bracket=bracket,
+    )
+    return found
+
+
+def critical_scales(
+    motion: GroundMotion,
+    block: Block,
+    *,
+    rotations_deg: Sequence[float | None],
+    beta_deg: float,
+    phi_deg: float,
+    phi_back_deg: float | None = None,
+    kind: str = "slumping",
+    vertical: GroundMotion | None = None,
+    polarity: Polarity = "forward",
+    search_limit: float = SEARCH_LIMIT,
+    scan_ratio: float = SCAN_RATIO,
+    bracket: float = BRACKET,
+) -> tuple[ScaledResult, ...]:
+    """Return the same for several rotations that count as failure; they share their runs.
+
+    Args:
+        motion: horizontal ground motion.
+        block: shape and size.
+        rotations_deg: the rotations [deg]; None among them for failure past recovery.
+        beta_deg: the others as for :func:`critical_scale`, whose answers these are.
+        phi_deg: likewise.
+        phi_back_deg: likewise.
+        kind: likewise.
+        vertical: likewise.
+        polarity: likewise.
+        search_limit: likewise.
+        scan_ratio: likewise.
+        bracket: likewise.
+
+    Raises:
+        InputError: as for :func:`critical_scale`.
+    """
     limit = positive(search_limit, "search_limit", "k/PGA")
     ratio = number(scan_ratio, "scan_ratio", "a ratio above 1")
     if not ratio > 1.0:
@@ -218,7 +274,7 @@ def critical_scale(
     shaken = shaken_mechanism(
         block, kind=kind, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg
     )
-    fails_rad = _rotation_rad(rotation_deg, shaken)
+    failures_rad = [_rotation_rad(rotation_deg, shaken) for rotation_deg in rotations_deg]
     drive = excitation(motion, vertical, polarity)
     remarks = [*shaken.remarks, *motion.remarks]
     remarks += [flag.sentence for flag in quality_flags(motion)]
@@ -228,7 +284,7 @@ def critical_scale(
     nothing = ScaledResult(
         kind=kind,
         polarity=polarity,
-        rotation_deg=rotation_deg,
+        rotation_deg=None,
         pga_g=drive.pga_g,
         yield_g=shaken.yield_g,
         p2=shaken.p2,
@@ -247,13 +303,24 @@ def critical_scale(
         runs=(),
         warnings=tuple(remarks),
     )
-    if nothing.starts is None or nothing.starts >= nothing.scale_limit:
-        return replace(nothing, certified=True)
+    courses: dict[float, Course] = {}
 
-    def run(scale: float) -> ScaledRun:
-        return _run(shaken, scaled(drive, scale), scale, fails_rad)
+    def runner(fails_rad: float) -> Callable[[float], ScaledRun]:
+        def run(scale: float) -> ScaledRun:
+            if scale not in courses:
+                courses[scale] = follow(shaken.mechanism, scaled(drive, scale))
+            return _judged(courses[scale], scale, fails_rad)
 
-    return _search(nothing, run, ratio, width)
+        return run
+
+    found = []
+    for rotation_deg, fails_rad in zip(rotations_deg, failures_rad, strict=True):
+        empty = replace(nothing, rotation_deg=rotation_deg)
+        if empty.starts is None or empty.starts >= empty.scale_limit:
+            found.append(replace(empty, certified=True))
+        else:
+            found.append(_search(empty, runner(fails_rad), ratio, width))
+    return tuple(found)
 
 
 def first_motion(drive: Excitation, yield_g: float) -> float | None:
@@ -282,6 +349,10 @@ def scaled(drive: Excitation, scale: float) -> Excitation:
     )
 
 
+def _at_rest(scale: float) -> ScaledRun:
+    return ScaledRun(scale, 0.0, Outcome.STABLE, "safe", "")
+
+
 def _rotation_rad(rotation_deg: float | None, shaken: ShakenMechanism) -> float:
     if rotation_deg is None:
         return math.inf
@@ -304,8 +375,7 @@ def _critical_rad(shaken: ShakenMechanism) -> float:
     return highest if math.isfinite(highest) else 0.5 * math.pi
 
 
-def _run(shaken: ShakenMechanism, drive: Excitation, scale: float, fails_rad: float) -> ScaledRun:
-    course = follow(shaken.mechanism, drive)
+def _judged(course: Course, scale: float, fails_rad: float) -> ScaledRun:
     return ScaledRun(
         scale, course.peak, course.outcome, _verdict(course, fails_rad), _ending(course)
     )
@@ -393,4 +463,38 @@ def _result(
         n_runs=len(runs),
         runs=tuple(runs),
         warnings=tuple(warnings),
+    )
+
+
+def as_critical_result(found: ScaledResult) -> CriticalResult:
+    """Return a critical scale in the terms of toppling, as it is stored.
+
+    k/PGA takes the place of k_r/PGA: the yield acceleration over the PGA of the scaled record. The
+    critical k is that over the critical scale, which the record as it is brings down.
+    """
+    k = None if found.scale is None else found.k_over_pga(found.scale)
+    safe = None if found.lower is None else found.k_over_pga(found.lower)
+    kr = None if k is None else k * found.pga_g
+    return CriticalResult(
+        p2=found.p2,
+        polarity=found.polarity,
+        linear=False,
+        pga_g=found.pga_g,
+        status=found.status,
+        search_limit=found.search_limit,
+        kr_over_pga=k,
+        lower=k,
+        upper=safe,
+        kr=kr,
+        y_m_s=None if kr is None else kr * STANDARD_GRAVITY_M_S2 / math.sqrt(found.p2),
+        certified=found.certified,
+        k_up_over_pga=None if found.starts is None else found.k_over_pga(found.starts),
+        undecided=None,
+        island_width=None,
+        kr_over_pga_resolved=None,
+        reentrant=found.reentrant,
+        n_runs=found.n_runs,
+        warnings=found.warnings,
+        points=found.points,
+        intervals=found.intervals,
     )

@@ -15,7 +15,8 @@ from typing import Any
 import pytest
 
 from rbfrag.campaign import dask_executor
-from rbfrag.campaign.simulate import CampaignProgress, simulate
+from rbfrag.campaign.progress import CampaignProgress
+from rbfrag.campaign.simulate import simulate
 from rbfrag.db.engine import opened_database
 from rbfrag.db.queries import database_info
 from rbfrag.errors import InputError, MissingExtraError, WorkFailedError

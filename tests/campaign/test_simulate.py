@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from rbfrag.campaign.add_motions import add_motions
-from rbfrag.campaign.simulate import CampaignProgress, simulate
+from rbfrag.campaign.progress import CampaignProgress
+from rbfrag.campaign.simulate import simulate
 from rbfrag.db.content import content_digest
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motion_store import load_motion
