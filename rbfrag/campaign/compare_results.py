@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from rbfrag.db.compare_maps import BORDER_ERROR, Interval, contradictions
 from rbfrag.db.stored_combination import StoredCombination
-from rbfrag.solver.results import CriticalResult, OutcomeIntervals
+from rbfrag.solver.results import CriticalResult, OutcomeIntervals, SearchPoints
 
 _VALUES = (
     "status",
@@ -62,6 +62,7 @@ def differences(
     # earlier databases hold no maps; the search then still proves a part of one
     if stored.intervals.k_lo.size and not _same_intervals(stored.intervals, again.intervals):
         yield "its map of intervals is another when computed again"
+    yield from _displacement_differences(stored.points, again.points, 0.0)
     points = stored.points
     then_at = dict(zip(points.kr_over_pga.tolist(), _ends(stored), strict=True))
     now_at = {k: _end(run.theta_n, run.outcome) for k, run in runs.items()}
@@ -105,6 +106,7 @@ def deviations(
         _intervals(stored.intervals), _intervals(again.intervals)
     ):
         yield f"its map says {then} from kr/PGA {low!r} to {high!r}, computed again {now}"
+    yield from _displacement_differences(stored.points, again.points, ROTATION_ERROR)
     then_at = dict(zip(stored.points.kr_over_pga.tolist(), _ends(stored), strict=True))
     borders = _borders(again)
     for k, run in runs.items():
@@ -121,6 +123,19 @@ def deviations(
                 f"the simulation at kr/PGA {k!r} reaches {theta!r} of the critical angle, "
                 f"computed again {run.theta_n!r}"
             )
+
+
+def _displacement_differences(
+    then: SearchPoints, now: SearchPoints, relative: float
+) -> Iterator[str]:
+    """Yield displacements of sliding blocks of one strength that differ."""
+    if then.displacement_m is None or now.displacement_m is None:
+        return
+    now_at = dict(zip(now.kr_over_pga.tolist(), now.displacement_m.tolist(), strict=True))
+    for k, slid in zip(then.kr_over_pga.tolist(), then.displacement_m.tolist(), strict=True):
+        again = now_at.get(k, slid)
+        if not math.isclose(slid, again, rel_tol=relative, abs_tol=1e-12 if relative else 0.0):
+            yield f"the block of ky/PGA {k!r} slides {slid!r} m, computed again {again!r}"
 
 
 def _ends(stored: StoredCombination) -> list[tuple[str, float | None]]:

@@ -12,6 +12,7 @@ from sqlalchemy import Connection
 from rbfrag.campaign.compare_results import SingleRun, deviations, differences
 from rbfrag.campaign.grid import run_grid
 from rbfrag.campaign.made_on import made_on
+from rbfrag.campaign.recompute_kind import recompute_kind
 from rbfrag.db.finding import COMPUTE_AGAIN, Finding
 from rbfrag.db.motion_store import load_motion
 from rbfrag.db.stored_combination import (
@@ -19,7 +20,7 @@ from rbfrag.db.stored_combination import (
     keys_with_samples,
     stored_combination,
 )
-from rbfrag.errors import RbfragError
+from rbfrag.errors import InputError, RbfragError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.certified import MAP_DEPTH
 from rbfrag.solver.critical import critical
@@ -99,6 +100,12 @@ def _compute(
     connection: Connection, stored: StoredCombination
 ) -> tuple[CriticalResult, dict[float, SingleRun]]:
     values = stored.values
+    if values["kind"] != "toppling":
+        again = recompute_kind(connection, stored)
+        searched = set(again.points.kr_over_pga.tolist())
+        if extra := [k for k in stored.points.kr_over_pga.tolist() if k not in searched]:
+            raise InputError(f"it holds a simulation at k/PGA {extra[0]!r} that no search makes")
+        return again, {}
     motion = load_motion(connection, stored.motion_id)
     vertical = None
     if stored.vertical_motion_id is not None:

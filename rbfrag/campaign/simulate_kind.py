@@ -24,6 +24,7 @@ from rbfrag.campaign.kind_plan import (
 from rbfrag.campaign.kind_worker import KindResults, KindWork, run_kind_work
 from rbfrag.campaign.made_on import made_on
 from rbfrag.campaign.progress import CampaignProgress
+from rbfrag.campaign.slumping_family import FAMILY, BlockClass
 from rbfrag.db.campaign_store import (
     CombinationRecord,
     KnownCombination,
@@ -84,6 +85,7 @@ def simulate_kind(
     suite: str | None = None,
     rotations_deg: Sequence[float | None] = ROTATIONS_DEG,
     displacements_m: Sequence[float] = THRESHOLDS_M,
+    family: Sequence[BlockClass] = FAMILY,
     vertical: Vertical = "without",
     jobs: int | None = None,
     scheduler: str | None = None,
@@ -104,6 +106,7 @@ def simulate_kind(
         rotations_deg: slumping: rotations that count as failure [deg]; None for failure past
             recovery.
         displacements_m: sliding: displacements [m].
+        family: slumping: the blocks.
         vertical: ``without`` vertical motion, ``with`` that of the same recording, or ``both``.
         jobs: worker processes; None for one per processor, 1 for none (in this process).
         scheduler: address of a Dask scheduler whose workers take the place of local ones.
@@ -116,7 +119,7 @@ def simulate_kind(
     """
     check_workers(jobs, scheduler)
     if kind == "slumping":
-        criteria = slumping_criteria(rotations_deg)
+        criteria = slumping_criteria(rotations_deg, family)
         asked: dict[str, object] = {"rotations_deg": list(rotations_deg)}
     elif kind == "sliding":
         criteria = sliding_criteria(displacements_m)

@@ -26,6 +26,7 @@ class StoredCombination:
         pga_g: PGA of the horizontal motion [g].
         values: the columns of the combination by name.
         settings: what else went into its natural key.
+        block: which block it is; None for toppling.
         campaign_settings: what the campaign that made it was asked for, and on which machine.
         points: its simulations, by falling k_r/PGA.
         intervals: its map; empty where none is stored.
@@ -37,6 +38,7 @@ class StoredCombination:
     pga_g: float
     values: Mapping[str, Any]
     settings: Mapping[str, Any]
+    block: Mapping[str, Any] | None
     campaign_settings: Mapping[str, Any]
     points: SearchPoints
     intervals: OutcomeIntervals
@@ -101,6 +103,7 @@ def stored_combination(connection: Connection, natural_key: str) -> StoredCombin
         pga_g=row["pga_g"],
         values={column.name: row[column.name] for column in combination.c},
         settings=json.loads(row["settings"]),
+        block=None if row["block"] is None else json.loads(row["block"]),
         campaign_settings=json.loads(row["campaign_settings"]),
         points=SearchPoints(
             kr_over_pga=_floats([point.kr_over_pga for point in points]),

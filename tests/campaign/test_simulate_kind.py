@@ -1,0 +1,257 @@
+"""Campaigns of blocks that slump or slide: what is stored, resumed, checked and merged."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from sqlalchemy import Engine, select, update
+
+from rbfrag.campaign.progress import CampaignProgress
+from rbfrag.campaign.resimulate import resimulate
+from rbfrag.campaign.simulate import simulate
+from rbfrag.campaign.simulate_kind import KindSummary, simulate_kind
+from rbfrag.campaign.slumping_family import FAMILY, BlockClass
+from rbfrag.db import schema
+from rbfrag.db.check import check_database
+from rbfrag.db.content import table_rows_by_natural_key
+from rbfrag.db.engine import open_database, opened_database
+from rbfrag.db.merge import merge_databases
+from rbfrag.db.motion_store import add_motion, load_motion
+from rbfrag.db.outcome_maps import outcome_maps
+from rbfrag.db.queries import combination_table
+from rbfrag.db.rows import EarthquakeInfo
+from rbfrag.errors import InputError
+from rbfrag.exchange.database_export import export_database
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.scaled_search import critical_scale
+from rbfrag.solver.shaken_mechanism import shaken_mechanism
+from rbfrag.solver.sliding_search import KY_OVER_PGA, critical_sliding, sliding_displacements
+from tests.synthetic import shaking
+
+TWO = (FAMILY[0], FAMILY[2])
+
+
+def fill(place: str | Path, count: int = 2) -> None:
+    with opened_database(place, create=True) as engine, engine.begin() as connection:
+        for seed in range(count):
+            motion = GroundMotion(shaking(seed, 450), 0.02, source_file=f"{seed}.txt")
+            quake = EarthquakeInfo(f"quake-{seed}", guessed=False)
+            add_motion(connection, motion, earthquake=quake, is_vertical=False, recording=str(seed))
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Path:
+    fill(tmp_path / "k.db")
+    return tmp_path / "k.db"
+
+
+def slump(place: str | Path, **more: Any) -> KindSummary:
+    options: dict[str, Any] = {"family": TWO, "jobs": 1, "rotations_deg": (1.0, None), **more}
+    return simulate_kind(place, kind="slumping", **options)
+
+
+def rows(engine: Engine, kind: str) -> list[Any]:
+    query = select(schema.combination).where(schema.combination.c.kind == kind)
+    with engine.connect() as connection:
+        return list(connection.execute(query.order_by(schema.combination.c.id)).mappings())
+
+
+def findings(engine: Engine) -> list[Any]:
+    with engine.connect() as connection:
+        return list(check_database(connection))
+
+
+def test_every_block_of_the_family_slumps_and_is_stable_at_rest() -> None:
+    assert len(FAMILY) == len(set(FAMILY)) == 18
+    for each in FAMILY:
+        shaken = shaken_mechanism(
+            each.block, kind="slumping", beta_deg=each.beta_deg, phi_deg=each.phi_deg
+        )
+        assert 0.05 < shaken.yield_g < 1.0
+        assert shaken.p2 > 0.0
+
+
+def test_slumps_are_stored_as_the_search_finds_them(place: str) -> None:
+    fill(place)
+    summary = slump(place)
+    assert summary.combinations == 2 * 2 * len(TWO) * 2
+    assert summary.found > 0
+    assert summary.resumed == 0
+    engine = open_database(place)
+    try:
+        stored = rows(engine, "slumping")
+        assert len(stored) == summary.combinations
+        for row in stored[:6]:
+            with engine.connect() as connection:
+                motion = load_motion(connection, row["motion_id"])
+            block = BlockClass(**json.loads(row["block"]))
+            found = critical_scale(
+                motion,
+                block.block,
+                beta_deg=block.beta_deg,
+                phi_deg=block.phi_deg,
+                rotation_deg=json.loads(row["settings"])["rotation_deg"],
+                polarity=row["polarity"],
+            )
+            assert (row["status"], row["n_runs"]) == (found.status, found.n_runs)
+            assert row["p2"] == found.p2
+            if found.scale is not None:
+                assert row["kr_over_pga"] == found.k_over_pga(found.scale)
+                assert row["y_m_s"] == pytest.approx(found.y_m_s, rel=1e-12)
+        assert findings(engine) == []
+    finally:
+        engine.dispose()
+
+
+def test_slides_are_stored_with_their_displacements(place: str) -> None:
+    fill(place)
+    summary = simulate_kind(place, kind="sliding", displacements_m=(0.01, 0.1), jobs=1)
+    assert summary.combinations == 2 * 2 * 3
+    engine = open_database(place)
+    try:
+        for row in rows(engine, "sliding"):
+            distance = json.loads(row["settings"])["displacement_m"]
+            with engine.connect() as connection:
+                motion = load_motion(connection, row["motion_id"])
+                points = connection.execute(
+                    select(schema.simulation)
+                    .where(schema.simulation.c.combination_id == row["id"])
+                    .order_by(schema.simulation.c.kr_over_pga)
+                ).all()
+            found = critical_sliding(motion, displacement_m=distance, polarity=row["polarity"])
+            assert (row["kr_over_pga"], row["status"]) == (found.ky_over_pga, found.status)
+            assert (row["p2"], row["y_m_s"]) == (None, None)
+            if distance == 0.0:
+                assert [point.kr_over_pga for point in points] == list(KY_OVER_PGA)
+                slid = sliding_displacements(motion, polarity=row["polarity"])
+                assert [point.displacement_m for point in points] == slid.tolist()
+        assert findings(engine) == []
+    finally:
+        engine.dispose()
+
+
+def test_one_and_two_workers_give_equal_databases(
+    database: Path, copy_of: Callable[[Path, str], Path], digest_of: Callable[[Path], str]
+) -> None:
+    other = copy_of(database, "other.db")
+    for place, jobs in ((database, 1), (other, 2)):
+        slump(place, jobs=jobs)
+        simulate_kind(place, kind="sliding", jobs=jobs)
+    assert digest_of(database) == digest_of(other)
+
+
+def test_an_interrupted_campaign_goes_on_where_it_stopped(
+    database: Path, copy_of: Callable[[Path, str], Path], digest_of: Callable[[Path], str]
+) -> None:
+    other = copy_of(database, "other.db")
+    slump(other)
+
+    def stop(progress: CampaignProgress) -> None:
+        if progress.done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        slump(database, on_progress=stop)
+    again = slump(database)
+    assert 0 < again.resumed < again.combinations
+    assert slump(database).runs == 0
+    assert digest_of(database) == digest_of(other)
+
+
+def test_toppling_rows_do_not_notice(database: Path) -> None:
+    def toppling() -> list[Any]:
+        with opened_database(database, read_only=True) as engine, engine.connect() as connection:
+            return [
+                row
+                for row in table_rows_by_natural_key(connection, "combination")
+                if "toppling" in row
+            ]
+
+    simulate(database, p2=(10.0, 1.0), jobs=1)
+    before = toppling()
+    slump(database)
+    simulate_kind(database, kind="sliding", jobs=1)
+    assert toppling() == before
+    assert simulate(database, p2=(10.0, 1.0), jobs=1).runs == 0
+
+
+def test_tables_of_one_rotation_hold_each_block_once(database: Path) -> None:
+    slump(database)
+    with opened_database(database, read_only=True) as engine, engine.connect() as connection:
+        one = combination_table(connection, kind="slumping", rotation_deg=1.0)
+        recovery = combination_table(connection, kind="slumping")
+        none = combination_table(connection, kind="slumping", rotation_deg=7.0)
+        told = outcome_maps(connection, one.combination_id)
+        seen = told.outcomes(np.nan_to_num(one.kr_over_pga, nan=0.5)[:, None])
+        assert combination_table(connection).p2.size == 0
+    assert one.p2.size == recovery.p2.size == 2 * 2 * len(TWO)
+    assert none.p2.size == 0
+    found = one.status == "found"
+    assert found.any()
+    assert np.all(seen[found, 0] != 0.0)
+    both = found & (recovery.status == "found")
+    # the keys sort differently: compare what is reached at most
+    assert np.nanmax(one.kr_over_pga[both]) >= np.nanmax(recovery.kr_over_pga[both])
+
+
+def test_a_sample_is_computed_again_bit_for_bit(database: Path) -> None:
+    slump(database)
+    simulate_kind(database, kind="sliding", jobs=1)
+    with opened_database(database, read_only=True) as engine, engine.connect() as connection:
+        answer = resimulate(connection, sample=12, seed=2)
+    assert (answer.sampled, answer.exact, answer.findings) == (12, 12, ())
+
+
+def test_damage_is_found(database: Path) -> None:
+    simulate_kind(database, kind="sliding", jobs=1)
+    table = schema.simulation
+    with opened_database(database) as engine:
+        with engine.begin() as connection:
+            connection.execute(
+                update(table).where(table.c.kr_over_pga == 0.2).values(displacement_m=99.0)
+            )
+        (first, *_) = findings(engine)
+        assert "further than" in first.problem
+        with engine.connect() as connection:
+            again = resimulate(connection, sample=100)
+        assert any("computed again" in each.problem for each in again.findings)
+
+
+def test_what_two_databases_found_is_merged_and_exported(
+    database: Path, tmp_path: Path, digest_of: Callable[[Path], str]
+) -> None:
+    both = tmp_path / "both.db"
+    both.write_bytes(database.read_bytes())
+    other = tmp_path / "other.db"
+    other.write_bytes(database.read_bytes())
+    slump(database)
+    simulate_kind(other, kind="sliding", jobs=1)
+    slump(both)
+    simulate_kind(both, kind="sliding", jobs=1)
+    merge_databases(other, db=database)
+    assert digest_of(database) == digest_of(both)
+    export_database(tmp_path / "out", db=database, format="csv", tables=["combination"])
+    text = (tmp_path / "out" / "combination.csv").read_text()
+    assert '""gamma_deg"":20.0' in text
+    assert "displacement_m" in text
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"kind": "slumping", "rotations_deg": ()}, "the list is empty"),
+        ({"kind": "slumping", "rotations_deg": (2.0, 2.0)}, "2 is in the list twice"),
+        ({"kind": "slumping", "rotations_deg": (25.0,)}, "lies on its back edge"),
+        ({"kind": "sliding", "displacements_m": (0.0,)}, "above zero"),
+        ({"kind": "confined_toppling"}, "toppling, slumping or sliding"),
+        ({"kind": "sliding", "jobs": 0}, "at least 1"),
+    ],
+)
+def test_what_cannot_be_run_is_refused(database: Path, options: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        simulate_kind(database, **options)
