@@ -132,7 +132,6 @@ def simulate(
     from rbfrag.campaign.simulate import simulate as run
 
     with ProgressLine("simulate", "combinations") as line:
-
         summary = run(
             db,
             suite=suite,
