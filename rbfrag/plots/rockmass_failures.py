@@ -156,5 +156,9 @@ def _part(each: ModeFailures, part: str) -> int:
 
 
 def _title(shaken: ShakenMass) -> str:
-    shaking = shaken.shaking
-    return f"{shaking.motion.label}: {shaken.made.n_blocks} blocks of a rock mass"
+    limits = shaken.limits
+    turned = "" if limits.rotation_deg is None else f"by more than {limits.rotation_deg:g}° or "
+    return (
+        f"{shaken.shaking.motion.label}: {shaken.made.n_blocks} blocks of a rock mass\n"
+        f"a slide fails beyond {limits.displacement_m:g} m, a block that turns {turned}past recovery"
+    )
