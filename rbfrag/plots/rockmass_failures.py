@@ -160,5 +160,6 @@ def _title(shaken: ShakenMass) -> str:
     turned = "" if limits.rotation_deg is None else f"by more than {limits.rotation_deg:g}° or "
     return (
         f"{shaken.shaking.motion.label}: {shaken.made.n_blocks} blocks of a rock mass\n"
-        f"a slide fails beyond {limits.displacement_m:g} m, a block that turns {turned}past recovery"
+        f"a slide fails beyond {limits.displacement_m:g} m, "
+        f"a block that turns {turned}past recovery"
     )
