@@ -119,6 +119,8 @@ def test_every_folder_is_a_known_room() -> None:
         ("typer", {"cli"}),
         ("fastapi", {"service"}),
         ("uvicorn", {"service"}),
+        ("prometheus_client", {"service"}),
+        ("pebble", {"service"}),
         ("pyslammer", set()),
     ],
 )
@@ -153,7 +155,8 @@ def test_every_imported_library_is_declared() -> None:
     declared = [*project["dependencies"]]
     for extra in runtime:
         declared += project["optional-dependencies"][extra]
-    names = {line.split(">")[0].split("[")[0].strip() for line in declared}
+    # a library is imported by a name without dashes
+    names = {line.split(">")[0].split("[")[0].strip().replace("-", "_") for line in declared}
     used = set()
     for path in SOURCES:
         used |= libraries(imported(path.read_text(encoding="utf-8")))

@@ -130,7 +130,7 @@ def critical(
         raise InputError("--p2 is missing: the critical block is searched for one p² [1/s²]")
     from rbfrag.solver.certified import MAP_DEPTH
     from rbfrag.solver.critical import critical as search
-    from rbfrag.solver.critical_report import as_dict, map_rows
+    from rbfrag.solver.critical_report import as_dict
 
     if plot is not None:
         from rbfrag.plots.canvas import plot_path
@@ -151,10 +151,7 @@ def critical(
         from rbfrag.plots.islands import plot_islands
 
         plot_islands(ground, result, plot, vertical=upward, title=ground.label)
-    answer = as_dict(result)
-    answer["warnings"] = [*remarks, *answer["warnings"]]
-    if full_map:
-        answer["map"] = map_rows(result)
+    answer = as_dict(result, remarks=remarks, full_map=full_map)
     if json:
         print_json(answer)
         return

@@ -97,6 +97,7 @@ def hazard(
     from rbfrag.exchange.block_table import table_path, write_block_table
     from rbfrag.exchange.hazard_file import read_hazard_curves, suited_curves
     from rbfrag.fragility.hazard_answer import hazard as answer
+    from rbfrag.fragility.hazard_report import as_dict
     from rbfrag.fragility.velocity_conversion import velocity_conversion
 
     if out is not None:
@@ -122,7 +123,6 @@ def hazard(
         )
         for one in curves
     ]  # fmt: skip
-    warnings = [*remarks, *dict.fromkeys(w for one in found for w in one.warnings)]
     if out is not None:
         from rbfrag.exchange.rate_table import rate_columns
 
@@ -131,44 +131,23 @@ def hazard(
         from rbfrag.plots.hazard import plot_contribution
 
         plot_contribution(curves[0], found[0], plot)
-    rows = [
-        {
-            "site": one.place or None,
-            "block_id": name,
-            "annual_rate": rate.annual_rate[i],
-            "ci_low": rate.ci_low[i],
-            "ci_high": rate.ci_high[i],
-            "probability": rate.probability[i],
-        }
-        for one, rate in zip(curves, found, strict=True)
-        for i, name in enumerate(table["block_id"])
-    ]
-    shared = {
-        "years": years,
-        "level": level,
-        "model": found[0].model,
-        "term": found[0].term,
-        "method": found[0].method,
-        "imt": curves[0].imt,
-    }
-    if len(rows) == 1:
-        document: dict[str, Any] = {**rows[0], **shared}
-        document.pop("block_id")
-        if json:
-            print_json({**document, "contributions": _parts(found[0]), "warnings": warnings})
-            return
+    document = as_dict(curves, table["block_id"], found, remarks)
+    if json:
+        print_json(document)
+        return
+    warnings = document.pop("warnings")
+    if "answers" in document:
+        rows = document.pop("answers")
+        print_pairs(document)
+        print()
+        print_table(list(rows[0]), [list(row.values()) for row in rows])
+    else:
+        del document["contributions"]
         print_pairs(document)
         if document["annual_rate"] > 0.0:
             print(f"once in {1.0 / document['annual_rate']:.4g} years on average")
             print()
             print_table(["from", "to", "share_%"], _shares(found[0], curves[0]))
-    else:
-        if json:
-            print_json({**shared, "answers": [_plain(row) for row in rows], "warnings": warnings})
-            return
-        print_pairs(shared)
-        print()
-        print_table(list(rows[0]), [list(row.values()) for row in rows])
     print_warnings(warnings)
 
 
@@ -194,27 +173,17 @@ def _blocks(
         )
         return {"block_id": ["rock mass"], "p2_1_s2": p2s, "kr": krs}, (remark,)
     if blocks is None:
+        from rbfrag.solver.quantity import positive
+
         p2, kr, remarks = toppling_block(p2, kr, block)
-        return {"block_id": [None], "p2_1_s2": [p2], "kr": [kr]}, remarks
+        sizes = [positive(p2, "p2", "1/s²")], [positive(kr, "kr", "g")]
+        return {"block_id": [None], "p2_1_s2": sizes[0], "kr": sizes[1]}, remarks
     if p2 is not None or kr is not None or block is not None:
         raise InputError("--blocks does not go with --p2, --kr or --block: the table has them")
     from rbfrag.exchange.waiting_blocks import waiting_blocks
 
     table = waiting_blocks(blocks)
     return {**table, "block_id": table["block_id"].tolist()}, ()
-
-
-def _parts(found: Any) -> list[dict[str, float]]:
-    """Return the contributions by intensity in the intervals of the table."""
-    return [
-        {"from": low, "to": high, "annual_rate": part}
-        for low, high, part in zip(
-            found.edges[:-1].tolist(),
-            found.edges[1:].tolist(),
-            found.contribution[0].tolist(),
-            strict=True,
-        )
-    ]
 
 
 def _shares(found: Any, curve: Any) -> list[list[object]]:
@@ -231,8 +200,3 @@ def _shares(found: Any, curve: Any) -> list[list[object]]:
     if beyond >= 5e-4:
         rows.append([f"{imt} {levels[-1]:.3g}", "beyond", round(100.0 * float(beyond), 1)])
     return rows
-
-
-def _plain(row: dict[str, Any]) -> dict[str, Any]:
-    return {key: value if isinstance(value, str) or value is None else float(value)
-            for key, value in row.items()}  # fmt: skip

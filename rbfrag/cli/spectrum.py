@@ -49,8 +49,7 @@ def spectrum(
     motion in one polarity is an object, several are a list of such objects.
     """
     from rbfrag.exchange.block_table import table_path, write_block_table
-    from rbfrag.motions.quality import quality_flags
-    from rbfrag.motions.toppling_spectrum import toppling_spectrum
+    from rbfrag.motions.spectrum_report import as_dict
 
     sizes, polarities = number_list(p2, "--p2"), polarities_of(polarity)
     if csv is not None:
@@ -60,19 +59,8 @@ def spectrum(
 
         plot_path(plot)
     found = [find_motion(text, db=db, units=units, dt_s=dt) for text in motions]
-    answers: list[dict[str, Any]] = [
-        {
-            "motion": text,
-            "name": ground.label,
-            "polarity": each,
-            "pgv_m_s": ground.pgv_m_s,
-            "p2": sizes,
-            "x_m_s": toppling_spectrum(ground, sizes, each).tolist(),
-            "warnings": [
-                *ground.remarks,
-                *(flag.sentence for flag in quality_flags(ground)),
-            ],
-        }
+    answers = [
+        as_dict(text, ground, sizes, each)
         for text, ground in zip(motions, found, strict=True)
         for each in polarities
     ]

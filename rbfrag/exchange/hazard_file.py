@@ -26,8 +26,23 @@ def read_hazard_curves(
         InputError: the file cannot be used, or holds no such curve; the message names the
             line or the element.
     """
-    text = source_text(path, "a hazard curve")
-    source = str(path)
+    return hazard_curves_in(source_text(path, "a hazard curve"), str(path), imt=imt, site=site)
+
+
+def hazard_curves_in(
+    text: str, source: str, *, imt: str | None = None, site: str | None = None
+) -> list[HazardCurve]:
+    """Return the hazard curves of a file's text.
+
+    Args:
+        text: what the file holds.
+        source: what messages call it.
+        imt: as for :func:`read_hazard_curves`.
+        site: as for :func:`read_hazard_curves`.
+
+    Raises:
+        InputError: as for :func:`read_hazard_curves`.
+    """
     if is_openquake_curve(text):
         curves = openquake_curves(text, source)
     elif is_nshm_curve(text):

@@ -31,6 +31,7 @@ from __future__ import annotations
 import csv
 import os
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 
 from rbfrag.errors import InputError
@@ -62,11 +63,52 @@ def read_rock_mass(path: str | os.PathLike[str]) -> RockMass:
         raise InputError(f"{source}: a rock mass file ends in .toml or .csv, not {suffix!r}")
     text = _text(source)
     try:
-        return RockMass.of(_from_toml(text) if suffix == ".toml" else _from_csv(text))
+        return rock_mass_of_toml(text) if suffix == ".toml" else rock_mass_of_csv(text)
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
+
+
+def rock_mass_of_toml(text: str) -> RockMass:
+    """Return the rock mass that TOML describes.
+
+    Raises:
+        InputError: it is not TOML, or describes no rock mass; the message names the key.
+    """
+    try:
+        document = tomllib.loads(text)
+    # Beside its own error, the parser passes on those of absurd numbers and nesting.
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"not valid TOML: {error}") from None
+    return rock_mass_of_tables(document)
+
+
+def rock_mass_of_csv(text: str) -> RockMass:
+    """Return the rock mass that CSV describes.
+
+    Raises:
+        InputError: it is not CSV, or describes no rock mass; the message names the line or key.
+    """
+    try:
+        return RockMass.of(_from_csv(text))
     except csv.Error as error:
-        raise InputError(f"{source}: not a CSV file: {error}") from None
+        raise InputError(f"not a CSV file: {error}") from None
+
+
+def rock_mass_of_tables(document: Mapping[str, object]) -> RockMass:
+    """Return the rock mass that the tables of a TOML or JSON document describe.
+
+    Raises:
+        InputError: they describe no rock mass; the message names the key.
+    """
+    stated: dict[str, object] = {}
+    for name, content in document.items():
+        if name not in _SECTIONS:
+            stated[name] = content
+            continue
+        if not isinstance(content, dict):
+            raise InputError(f"{name} = {content!r} is not a table: write [{name}] and its keys")
+        stated |= {f"{name}.{key}": value for key, value in content.items()}
+    return RockMass.of(stated)
 
 
 def _text(source: Path) -> str:
@@ -82,23 +124,6 @@ def _text(source: Path) -> str:
         raise InputError(f"{source}: not a text file (UTF-8)") from None
     except OSError as error:
         raise InputError(f"{source}: cannot be read: {error.strerror}") from None
-
-
-def _from_toml(text: str) -> dict[str, object]:
-    try:
-        document = tomllib.loads(text)
-    # Beside its own error, the parser passes on those of absurd numbers and nesting.
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"not valid TOML: {error}") from None
-    stated: dict[str, object] = {}
-    for name, content in document.items():
-        if name not in _SECTIONS:
-            stated[name] = content
-            continue
-        if not isinstance(content, dict):
-            raise InputError(f"{name} = {content!r} is not a table: write [{name}] and its keys")
-        stated |= {f"{name}.{key}": value for key, value in content.items()}
-    return stated
 
 
 def _from_csv(text: str) -> dict[str, object]:

@@ -27,7 +27,7 @@ from rbfrag.motions import (
     usgs_smc,
 )
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text_file import cut_number, read_text
+from rbfrag.motions.text_file import cut_number, decoded, read_text
 from rbfrag.motions.units import acceleration_unit
 
 READERS: tuple[ModuleType, ...] = (
@@ -77,11 +77,41 @@ def read_motions(
         InputError: an unknown unit, or a dt that is not positive.
     """
     file = Path(path)
+    _check_stated(units, dt_s)
+    return _read_whole(file, read_text(file), units, dt_s, allow_partial=allow_partial)
+
+
+def motions_in(
+    raw: bytes, name: str, *, units: str | None = None, dt_s: float | None = None
+) -> list[GroundMotion]:
+    """Return every acceleration trace of a file that is no file here, such as one sent.
+
+    Args:
+        raw: what the file holds.
+        name: what messages call it; nothing of that name is looked for.
+        units: as for :func:`read_motions`.
+        dt_s: as for :func:`read_motions`.
+
+    Raises:
+        MotionFileError: as for :func:`read_motions`.
+        InputError: likewise.
+    """
+    _check_stated(units, dt_s)
+    # readers look for an index beside a file, and beside this one there is nothing
+    file = Path(os.devnull) / Path(name).name
+    return _read_whole(file, decoded(file, raw), units, dt_s, allow_partial=False)
+
+
+def _check_stated(units: str | None, dt_s: float | None) -> None:
     if units is not None:
         acceleration_unit(units)
     if dt_s is not None and not 0.0 < dt_s < float("inf"):
         raise InputError(f"--dt must be a positive number of seconds, not {dt_s:g}")
-    text = read_text(file)
+
+
+def _read_whole(
+    file: Path, text: str, units: str | None, dt_s: float | None, *, allow_partial: bool
+) -> list[GroundMotion]:
     motions: list[GroundMotion]
     try:
         if word := cut_number(text):

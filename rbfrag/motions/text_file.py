@@ -51,6 +51,15 @@ def read_text(path: Path) -> str:
     except ValueError as error:
         # a name with a zero byte
         raise MotionFileError(path, f"the file cannot be read: {error}") from None
+    return decoded(path, raw)
+
+
+def decoded(path: Path, raw: bytes) -> str:
+    """Return the text of a file's bytes: byte-order mark removed, newlines as ``\\n``.
+
+    Raises:
+        MotionFileError: they are none, or not text.
+    """
     if not raw.removeprefix(codecs.BOM_UTF8).strip():
         raise MotionFileError(path, "the file is empty: export the record again")
     if b"\0" in raw:

@@ -2,18 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI, HTTPException, Request, Response
+from fastapi.concurrency import run_in_threadpool
+from fastapi.middleware.cors import CORSMiddleware
 from fastapi.openapi.utils import get_openapi
 
 from rbfrag.errors import RbfragError
-from rbfrag.service import block_api, drawing_api, health_api, models_api, predict_api
+from rbfrag.service import (
+    block_api,
+    drawing_api,
+    hazard_api,
+    health_api,
+    metrics_api,
+    models_api,
+    motion_api,
+    predict_api,
+    rockmass_api,
+)
+from rbfrag.service.body import Bodies
 from rbfrag.service.documents import Problem
+from rbfrag.service.guard import Guard
+from rbfrag.service.metrics import Metrics
 from rbfrag.service.page_files import PageFiles
 from rbfrag.service.problem import problem, refused
+from rbfrag.service.request_log import RequestLog
 from rbfrag.service.settings import Settings
+from rbfrag.service.workshop import Workshop
 from rbfrag.version import __version__
 
 
@@ -23,6 +42,14 @@ def make_app(settings: Settings) -> FastAPI:
     Args:
         settings: what it reads, whom it answers and how much it takes on.
     """
+    bodies = Bodies(settings)
+    workshop = Workshop(settings.jobs, settings.time_limit_s)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001
+        yield
+        await run_in_threadpool(workshop.close)
+
     app = FastAPI(
         title="rbfrag",
         version=__version__,
@@ -33,13 +60,33 @@ def make_app(settings: Settings) -> FastAPI:
         docs_url=None,  # its scripts come from another host
         redoc_url=None,
         redirect_slashes=False,
+        lifespan=lifespan,
     )
-    app.include_router(predict_api.router(settings))
-    app.include_router(block_api.router())
-    app.include_router(drawing_api.router())
-    app.include_router(models_api.router(settings))
-    app.include_router(health_api.router())
+    for each in (
+        predict_api.router(settings, bodies, workshop),
+        block_api.router(),
+        drawing_api.router(),
+        rockmass_api.router(settings, bodies, workshop),
+        motion_api.router(bodies, workshop),
+        hazard_api.router(settings, bodies, workshop),
+        models_api.router(settings),
+        health_api.router(),
+    ):
+        # one flat list: looking through routers in routers takes longer than an answer
+        app.router.routes.extend(each.routes)
+    document = _document(app)
+    app.openapi = lambda: document  # type: ignore[method-assign]
+    metrics = Metrics([*document["paths"], "/v1/metrics", "/v1/openapi.json"])
+    app.router.routes.extend(metrics_api.router(metrics).routes)
     app.mount("/", PageFiles(), name="page")
+    app.add_middleware(Guard, settings=settings, metrics=metrics, log=RequestLog())
+    if settings.allowed_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=settings.allowed_origins,
+            allow_methods=["GET", "POST"],
+            allow_headers=["Authorization", "Content-Type"],
+        )
 
     @app.exception_handler(RbfragError)
     async def on_purpose(request: Request, error: RbfragError) -> Response:  # noqa: ARG001
@@ -58,12 +105,6 @@ def make_app(settings: Settings) -> FastAPI:
             "a mistake in rbfrag itself; what happened is in the log of the service",
         )
 
-    def openapi() -> dict[str, Any]:
-        if app.openapi_schema is None:
-            app.openapi_schema = _document(app)
-        return app.openapi_schema
-
-    app.openapi = openapi  # type: ignore[method-assign]
     return app
 
 

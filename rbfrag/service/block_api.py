@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Request, Response
 
+from rbfrag.service.answer import json_answer
 from rbfrag.service.documents import BlockAnswer
-from rbfrag.service.json_body import json_answer
 from rbfrag.service.operation import operation
 from rbfrag.service.parameters import Parameter, by_name, read_query
+from rbfrag.service.plain_route import plain_router
 
 if TYPE_CHECKING:
     from rbfrag.solver.block import Block
@@ -80,7 +81,7 @@ def answer(query: bytes) -> dict[str, Any]:
 
 def router() -> APIRouter:
     """Return the operation on `/v1/block`."""
-    routes = APIRouter()
+    routes = plain_router()
 
     @routes.get(
         "/v1/block",

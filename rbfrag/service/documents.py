@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
 
 
 class _Document(BaseModel):
@@ -139,3 +141,100 @@ class Health(_Document):
 
     status: str
     version: str
+
+
+class SpectrumAnswer(_Document):
+    """The toppling spectrum of a motion in one polarity: what `rbfrag spectrum --json` prints."""
+
+    motion: str
+    name: str
+    polarity: str
+    pgv_m_s: float
+    p2: list[float]
+    x_m_s: list[float]
+    warnings: list[str]
+
+
+class MapRow(_Document):
+    """An interval of k_r/PGA with one outcome."""
+
+    k_lo: float
+    k_hi: float
+    outcome: str
+
+
+class CriticalAnswer(_Document):
+    """The largest k_r/PGA that topples: what `rbfrag critical --json` prints."""
+
+    kr_over_pga: float | None
+    lower: float | None
+    upper: float | None
+    kr: float | None
+    y_m_s: float | None
+    status: str
+    search_limit: float
+    certified: bool
+    k_up_over_pga: float | None
+    undecided: float | None
+    island_width: float | None
+    kr_over_pga_resolved: float | None
+    reentrant: bool
+    n_runs: int
+    p2: float
+    polarity: str
+    pga_g: float
+    warnings: list[str]
+    map: list[MapRow] | None = None
+
+
+class RockmassAnswer(_Document):
+    """Blocks by mode: what `rbfrag rockmass --json` prints."""
+
+    realisations: int
+    blocks: int
+    seed: int
+    impossible: dict[str, int]
+    variables: dict[str, str]
+    back_fracture: bool
+    modes: dict[str, dict[str, Any]]
+    crossings: list[dict[str, Any]]
+    scenario: dict[str, Any] | None
+    warnings: list[str]
+
+
+class Contribution(_Document):
+    """The part of a rate that comes from an interval of the shaking [1/a]."""
+
+    from_: float = Field(alias="from")
+    to: float
+    annual_rate: float
+
+
+class SiteRate(_Document):
+    """The rate at one of several sites."""
+
+    site: str | None
+    block_id: str | None
+    annual_rate: float
+    ci_low: float
+    ci_high: float
+    probability: float
+
+
+class HazardAnswer(_Document):
+    """Annual rates of toppling [1/a]: what `rbfrag hazard --json` prints."""
+
+    years: float
+    level: float
+    model: str
+    term: str
+    method: str
+    imt: str
+    warnings: list[str]
+    site: str | None = None
+    annual_rate: float | None = None
+    ci_low: float | None = None
+    ci_high: float | None = None
+    probability: float | None = None
+    contributions: list[Contribution] | None = None
+    answers: list[SiteRate] | None = None

@@ -9,10 +9,11 @@ from fastapi import APIRouter, Request, Response
 
 from rbfrag.errors import InputError
 from rbfrag.service import block_api
+from rbfrag.service.answer import json_answer
 from rbfrag.service.documents import DrawingAnswer
-from rbfrag.service.json_body import json_answer
 from rbfrag.service.operation import operation
 from rbfrag.service.parameters import by_name, read_query
+from rbfrag.service.plain_route import plain_router
 from rbfrag.service.scenario_parameters import KR, P2
 
 _NUMBERS = by_name((replace(P2, required=False), replace(KR, required=False)))
@@ -58,7 +59,7 @@ def answer(query: bytes) -> dict[str, Any]:
 
 def router() -> APIRouter:
     """Return the operation on `/v1/drawing`."""
-    routes = APIRouter()
+    routes = plain_router()
 
     @routes.get(
         "/v1/drawing",

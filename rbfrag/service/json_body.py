@@ -5,19 +5,18 @@ from __future__ import annotations
 import json
 from typing import Any, NoReturn
 
-from fastapi import Response
-
 from rbfrag.errors import InputError
+
+_ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
 
 class MalformedError(InputError):
     """A body that is not what its type says."""
 
 
-def json_answer(document: object, status: int = 200) -> Response:
-    """Return a document as the answer to a request."""
-    text = json.dumps(document, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return Response(text.encode("utf-8"), status, media_type="application/json")
+def json_text(document: object) -> bytes:
+    """Return a document as JSON."""
+    return _ENCODER.encode(document).encode("utf-8")
 
 
 def read_json(body: bytes) -> Any:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
 
 from rbfrag.fragility.model_list import model_list
 from rbfrag.fragility.model_lookup import stored_rows
+from rbfrag.service.answer import json_answer
 from rbfrag.service.documents import ModelListed
-from rbfrag.service.json_body import json_answer
 from rbfrag.service.operation import operation
+from rbfrag.service.plain_route import plain_router
 from rbfrag.service.settings import Settings
 
 
 def router(settings: Settings) -> APIRouter:
     """Return the operation on `/v1/models`."""
-    routes = APIRouter()
+    routes = plain_router()
 
     @routes.get(
         "/v1/models",
@@ -26,7 +27,7 @@ def router(settings: Settings) -> APIRouter:
             problems=(401, 503),
         ),
     )
-    async def models() -> Response:
+    async def models(request: Request) -> Response:  # noqa: ARG001
         return json_answer(model_list(stored_rows(settings.db)))
 
     return routes

@@ -9,9 +9,11 @@ from urllib.parse import parse_qsl
 
 from rbfrag.errors import InputError
 
-Kind = Literal["number", "integer", "string", "boolean"]
+Kind = Literal["number", "integer", "string", "boolean", "numbers"]
 
 MOST_PARAMETERS = 50
+
+_NUMBERS = r"^[0-9.]+([eE][+-]?[0-9]+)?(,[0-9.]+([eE][+-]?[0-9]+)?)*$"
 
 _FLAGS = {"true": True, "1": True, "false": False, "0": False}
 
@@ -22,7 +24,7 @@ class Parameter:
 
     Args:
         name: its name.
-        kind: what it is, as JSON schema says it.
+        kind: what it is, as JSON schema says it; ``numbers`` are numbers between commas.
         words: what it means, with its unit.
         example: a value for the documentation.
         limits: further JSON schema, such as ``{"exclusiveMinimum": 0}``.
@@ -38,6 +40,8 @@ class Parameter:
 
     def schema(self) -> dict[str, Any]:
         """Return the JSON schema of a value."""
+        if self.kind == "numbers":
+            return {"type": "string", "pattern": _NUMBERS, **(self.limits or {})}
         return {"type": self.kind, **(self.limits or {})}
 
     def openapi(self) -> dict[str, Any]:
@@ -71,12 +75,7 @@ def read_query(query: bytes, known: Mapping[str, Parameter]) -> dict[str, Any]:
             of its kind.
     """
     try:
-        pairs = parse_qsl(
-            query.decode("utf-8"),
-            keep_blank_values=True,
-            errors="strict",
-            max_num_fields=MOST_PARAMETERS,
-        )
+        pairs = _pairs(query.decode("utf-8"))
     except ValueError:  # UnicodeDecodeError is one
         raise InputError(
             f"the query is not UTF-8 text of at most {MOST_PARAMETERS} parameters: "
@@ -96,15 +95,31 @@ def read_query(query: bytes, known: Mapping[str, Parameter]) -> dict[str, Any]:
     return found
 
 
-def _value(parameter: Parameter, text: str) -> float | int | str | bool:
+def _pairs(query: str) -> list[tuple[str, str]]:
+    """Return names and values.
+
+    Raises:
+        ValueError: not UTF-8, or too many.
+    """
+    if query.count("&") >= MOST_PARAMETERS:
+        raise ValueError
+    if "%" in query or "+" in query:
+        return parse_qsl(query, keep_blank_values=True, errors="strict")
+    parts = (each.partition("=") for each in query.split("&") if each)
+    return [(name, value) for name, _, value in parts]
+
+
+def _value(parameter: Parameter, text: str) -> float | int | str | bool | list[float]:
     kind, value = parameter.kind, text[:60]
     try:
+        if kind == "numbers":
+            return [float(part) for part in text.split(",")]
         if kind == "number":
             return float(text)
         if kind == "integer":
             return int(text)
     except ValueError:
-        raise InputError(f"{parameter.name} = {value!r} is not a {_NAMED[kind]}") from None
+        raise InputError(f"{parameter.name} = {value!r} is not {_NAMED[kind]}") from None
     if kind == "boolean":
         flag = _FLAGS.get(text.lower())
         if flag is None:
@@ -112,7 +127,14 @@ def _value(parameter: Parameter, text: str) -> float | int | str | bool:
         return flag
     if not text:
         raise InputError(f"{parameter.name} is empty: {parameter.words}")
+    choices = (parameter.limits or {}).get("enum")
+    if choices and text not in choices:
+        raise InputError(f"{parameter.name} is {value!r}: write {' or '.join(choices)}")
     return text
 
 
-_NAMED = {"number": "number", "integer": "whole number"}
+_NAMED = {
+    "number": "a number",
+    "integer": "a whole number",
+    "numbers": "a list of numbers such as 30,10,3,1",
+}

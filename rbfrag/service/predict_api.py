@@ -6,17 +6,26 @@ import math
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
+from fastapi.concurrency import run_in_threadpool
 
+from rbfrag.db.location import locate
 from rbfrag.errors import InputError
 from rbfrag.fragility.prediction_document import prediction_document
+from rbfrag.service.answer import answer, json_answer
+from rbfrag.service.body import Bodies
 from rbfrag.service.documents import PredictAnswer, PredictArrays
-from rbfrag.service.json_body import json_answer, read_json
+from rbfrag.service.json_body import json_text, read_json
 from rbfrag.service.operation import operation
 from rbfrag.service.parameters import by_name, read_query
+from rbfrag.service.plain_route import plain_router
 from rbfrag.service.scenario_parameters import KEYWORD, KR, LEVEL, MEASURES, MODEL, P2, measures_in
 from rbfrag.service.settings import Settings
+from rbfrag.service.workshop import Workshop
 
 PARAMETERS = by_name((P2, KR, *MEASURES, MODEL, LEVEL))
+
+ROWS_AT_ONCE = 64
+"""So many rows are answered without a detour by another process."""
 
 ARRAYS = ("p2", "kr", *KEYWORD)
 """Names of the body that may be a list."""
@@ -35,9 +44,8 @@ def answer_one(query: bytes, db: str | None) -> dict[str, Any]:
     )
 
 
-def answer_many(body: bytes, row_limit: int, db: str | None) -> dict[str, Any]:
-    """Return the answer to a body with numbers and lists of numbers."""
-    given = _checked(read_json(body), row_limit)
+def answer_many(given: dict[str, Any], db: str | None) -> bytes:
+    """Return the answer to numbers and lists of numbers by name, as :func:`checked` gives them."""
     from rbfrag.fragility.prediction import predict
 
     # an array of one element, so that single numbers are answered by lists too
@@ -49,25 +57,32 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> dict[str, Any]:
         level=given.get("level", 0.95),
         db=db,
     )
-    return {
-        "probability": _plain(found.probability),
-        "ci_low": _plain(found.ci_low),
-        "ci_high": _plain(found.ci_high),
-        "in_domain": found.in_domain.tolist(),
-        "reason": found.reason.tolist(),
-        "level": found.level,
-        "model": found.model,
-        "term": found.term,
-        "method": found.method,
-        "warnings": list(found.notes),
-    }
+    return json_text(
+        {
+            "probability": _plain(found.probability),
+            "ci_low": _plain(found.ci_low),
+            "ci_high": _plain(found.ci_high),
+            "in_domain": found.in_domain.tolist(),
+            "reason": found.reason.tolist(),
+            "level": found.level,
+            "model": found.model,
+            "term": found.term,
+            "method": found.method,
+            "warnings": list(found.notes),
+        }
+    )
 
 
 def _plain(values: Any) -> list[float | None]:
     return [None if math.isnan(value) else value for value in values.tolist()]
 
 
-def _checked(stated: Any, row_limit: int) -> dict[str, Any]:
+def checked(stated: Any, row_limit: int) -> dict[str, Any]:
+    """Return the numbers and lists of numbers of a body by name.
+
+    Raises:
+        InputError: a name that is not known, or a value that is no number and no such list.
+    """
     if not isinstance(stated, dict):
         raise InputError('the body is a JSON object such as {"p2": 3, "kr": [0.1, 0.2], "pgv": 1}')
     for name in stated:
@@ -115,9 +130,17 @@ def _number(name: str, value: Any, place: int | None) -> float:
         raise InputError(f"{where} is too large for a number") from None
 
 
-def router(settings: Settings) -> APIRouter:
-    """Return the operations on `/v1/predict`."""
-    routes = APIRouter()
+def router(settings: Settings, bodies: Bodies, workshop: Workshop) -> APIRouter:
+    """Return the operations on `/v1/predict`.
+
+    Args:
+        settings: database and limits.
+        bodies: reads what is sent.
+        workshop: where long work is done.
+    """
+    routes = plain_router()
+    # a server's answer is waited for; a file's models are in memory
+    on_server = isinstance(locate(settings.db), str)
 
     @routes.get(
         "/v1/predict",
@@ -129,7 +152,10 @@ def router(settings: Settings) -> APIRouter:
         ),
     )
     async def predict_one(request: Request) -> Response:
-        return json_answer(answer_one(request.scope["query_string"], settings.db))
+        query = request.scope["query_string"]
+        if on_server:
+            return json_answer(await run_in_threadpool(answer_one, query, settings.db))
+        return json_answer(answer_one(query, settings.db))
 
     number = {"type": "number"}
     lists = {
@@ -174,6 +200,11 @@ def router(settings: Settings) -> APIRouter:
         ),
     )
     async def predict_many(request: Request) -> Response:
-        return json_answer(answer_many(await request.body(), settings.row_limit, settings.db))
+        async with bodies.read(request) as body:
+            given = checked(read_json(body), settings.row_limit)
+            rows = max((len(each) for each in given.values() if isinstance(each, list)), default=1)
+            if rows > ROWS_AT_ONCE or on_server:
+                return answer(await workshop.do(answer_many, given, settings.db))
+            return answer(answer_many(given, settings.db))
 
     return routes

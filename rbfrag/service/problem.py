@@ -13,6 +13,7 @@ from fastapi import Response
 from rbfrag.db.location import locate, reference_file
 from rbfrag.errors import DatabaseError, RbfragError, UnknownModelError
 from rbfrag.service.json_body import MalformedError
+from rbfrag.service.refusal import RequestRefusedError
 from rbfrag.service.settings import Settings
 
 MEDIA_TYPE = "application/problem+json"
@@ -48,6 +49,8 @@ def refused(error: RbfragError, settings: Settings) -> Response:
         error: what was raised.
         settings: those of the service; the place of its database is left out of the words.
     """
+    if isinstance(error, RequestRefusedError):
+        return problem(error.status, error.kind, str(error), error.headers)
     detail = in_parameters(str(error), settings)
     if isinstance(error, MalformedError):
         return problem(400, "malformed", detail)

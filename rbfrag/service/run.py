@@ -4,15 +4,79 @@ from __future__ import annotations
 
 import json
 import os
-from typing import Any
+from dataclasses import dataclass
+from tempfile import TemporaryDirectory
 
 from fastapi import FastAPI
 
 from rbfrag.errors import InputError
 from rbfrag.service.settings import Settings
+from rbfrag.service.token import check_reach, is_loopback, read_token
 
 VARIABLE = "RBFRAG_SERVICE"
 """Environment variable in which the service, and each of its processes, finds what it is told."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """What `rbfrag serve` passes on to the service; the names are those of its options.
+
+    Args:
+        db: database of the models.
+        host: address to listen at.
+        port: port to listen at; 0 for any that is free.
+        workers: number of processes that answer.
+        token_file: file with the token.
+        allow_origin: origins of web pages elsewhere whose scripts may read answers.
+        allow_host: further names the service may be asked by.
+        body_limit_mb: longest body [10^6 bytes].
+        row_limit: most blocks of one request.
+        time_limit: longest time [s] that an answer may take.
+    """
+
+    db: str | None = None
+    host: str = "127.0.0.1"
+    port: int = 8000
+    workers: int = 1
+    token_file: str | None = None
+    allow_origin: tuple[str, ...] = ()
+    allow_host: tuple[str, ...] = ()
+    body_limit_mb: float = 16.0
+    row_limit: int = 100_000
+    time_limit: float = 60.0
+
+    def settings(self) -> Settings:
+        """Return the settings of the application.
+
+        Raises:
+            InputError: what was told cannot be done.
+        """
+        token = read_token(self.token_file)
+        check_reach(self.host, token)
+        if self.workers < 1:
+            raise InputError(f"--workers {self.workers}: at least one process answers")
+        if not 0 <= self.port <= 65535:
+            raise InputError(f"--port {self.port}: a port is a number from 0 to 65535")
+        for name, value in (
+            ("--body-limit-mb", self.body_limit_mb),
+            ("--row-limit", self.row_limit),
+            ("--time-limit", self.time_limit),
+        ):
+            if not 0.0 < value < float("inf"):
+                raise InputError(f"{name} {value:g}: give a number above zero")
+        hosts = self.allow_host
+        if token is None and is_loopback(self.host):
+            # else a web page could ask by a name of its own that leads to this computer
+            hosts = ("localhost", "127.0.0.1", "[::1]", self.host, *hosts)
+        return Settings(
+            db=self.db,
+            token=token,
+            allowed_origins=self.allow_origin,
+            allowed_hosts=hosts,
+            body_limit_bytes=int(1e6 * self.body_limit_mb),
+            row_limit=self.row_limit,
+            time_limit_s=self.time_limit,
+        )
 
 
 def serve_as_told() -> None:
@@ -22,56 +86,44 @@ def serve_as_told() -> None:
         InputError: the environment does not say how.
     """
     told = _told()
-    serve(
-        host=told.get("host", "127.0.0.1"),
-        port=told.get("port", 8000),
-        workers=told.get("workers", 1),
-    )
-
-
-def serve(*, host: str, port: int, workers: int) -> None:
-    """Answer requests until the process is told to stop.
-
-    Args:
-        host: address to listen at.
-        port: port to listen at; 0 for any that is free.
-        workers: number of processes that answer.
-
-    Raises:
-        InputError: no port, or no worker.
-    """
-    if workers < 1:
-        raise InputError(f"--workers {workers}: at least one process answers")
-    if not 0 <= port <= 65535:
-        raise InputError(f"--port {port}: a port is a number from 0 to 65535")
+    settings = told.settings()
     import uvicorn
 
-    uvicorn.run(
-        f"{__name__}:app",
-        factory=True,
-        interface="asgi3",
-        host=host,
-        port=port,
-        workers=workers,
-        ws="none",
-        access_log=False,
-        server_header=False,
-        proxy_headers=False,
-    )
+    from rbfrag.service.json_log import CONFIGURATION
+    from rbfrag.service.metrics import SHARED_FOLDER
+    from rbfrag.service.protocol import BoundedProtocol
+
+    with TemporaryDirectory(prefix="rbfrag-metrics-") as folder:
+        if told.workers > 1:
+            os.environ[SHARED_FOLDER] = folder
+        uvicorn.run(
+            f"{__name__}:app",
+            factory=True,
+            interface="asgi3",
+            http=BoundedProtocol,
+            ws="none",
+            host=told.host,
+            port=told.port,
+            workers=told.workers,
+            log_config=CONFIGURATION,
+            access_log=False,
+            server_header=False,
+            proxy_headers=False,
+            limit_concurrency=2000,
+            timeout_graceful_shutdown=int(settings.body_time_s + settings.time_limit_s) + 1,
+        )
 
 
 def app() -> FastAPI:
     """Return the application that the environment describes."""
     from rbfrag.service.app import make_app
 
-    return make_app(Settings(db=_told().get("db")))
+    return make_app(_told().settings())
 
 
-def _told() -> dict[str, Any]:
+def _told() -> Told:
     try:
-        told = json.loads(os.environ.get(VARIABLE, "{}"))
-    except ValueError as error:
-        raise InputError(f"{VARIABLE} is not JSON ({error}): start with  rbfrag serve") from None
-    if not isinstance(told, dict):
-        raise InputError(f"{VARIABLE} is not a JSON object: start with  rbfrag serve")
+        told = Told(**json.loads(os.environ.get(VARIABLE, "{}")))
+    except (ValueError, TypeError) as error:
+        raise InputError(f"{VARIABLE} cannot be read ({error}): start with  rbfrag serve") from None
     return told

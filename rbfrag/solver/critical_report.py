@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from rbfrag.solver.results import CriticalResult
 
 
-def as_dict(result: CriticalResult) -> dict[str, Any]:
-    """Return the answer with the keys of the JSON contract."""
-    return {
+def as_dict(
+    result: CriticalResult, *, remarks: Sequence[str] = (), full_map: bool = False
+) -> dict[str, Any]:
+    """Return the answer with the keys of the JSON contract.
+
+    Args:
+        result: the answer.
+        remarks: warnings about the motion, which go before those of the answer.
+        full_map: put the map of outcomes in.
+    """
+    answer: dict[str, Any] = {
         "kr_over_pga": result.kr_over_pga,
         "lower": result.lower,
         "upper": result.upper,
@@ -27,8 +36,11 @@ def as_dict(result: CriticalResult) -> dict[str, Any]:
         "p2": result.p2,
         "polarity": result.polarity,
         "pga_g": result.pga_g,
-        "warnings": list(result.warnings),
+        "warnings": [*remarks, *result.warnings],
     }
+    if full_map:
+        answer["map"] = map_rows(result)
+    return answer
 
 
 def map_rows(result: CriticalResult) -> list[dict[str, Any]]:

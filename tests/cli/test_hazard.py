@@ -127,3 +127,11 @@ def test_blocks_that_do_not_wait_are_refused(refuses: Callable[..., str], curve:
     Path("blocks.csv").write_text("block_id,p2_1_s2,kr\nA7,3,-0.1\n")
     assert "block A7" in refuses("hazard", curve, "--blocks", "blocks.csv")
     assert "does not go with" in refuses("hazard", curve, "--blocks", "blocks.csv", "--p2", "3")
+
+
+@pytest.mark.parametrize(("p2", "kr"), [("0", "0.1"), ("nan", "0.1"), ("3", "-0.1"), ("3", "inf")])
+def test_a_block_that_waits_for_no_earthquake_is_refused(
+    shell: Shell, curve: Path, p2: str, kr: str
+) -> None:
+    told = shell("hazard", curve, f"--p2={p2}", f"--kr={kr}", expect=2).stderr
+    assert "above" in told or "finite" in told

@@ -1,4 +1,5 @@
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,5 +18,6 @@ def database(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def client(database: Path) -> TestClient:
-    return TestClient(make_app(Settings(db=str(database))), raise_server_exceptions=False)
+def client(database: Path) -> Iterator[TestClient]:
+    with TestClient(make_app(Settings(db=str(database))), raise_server_exceptions=False) as found:
+        yield found

@@ -1,0 +1,91 @@
+"""HTTP connections, in bounds: headers so long and so slow, and none dropped that has asked."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+HEADERS_S = 15.0
+"""Longest time [s] that the headers of a request may take to come."""
+
+HEADERS_BYTES = 64 * 1024
+"""Longest headers of a request, its URL included."""
+
+LAST_WORDS_S = 0.5
+"""How long [s] an idle connection is still read when the service ends."""
+
+_END = b"connection: close\r\ncontent-length: 0\r\n\r\n"
+_TOO_LARGE = b"HTTP/1.1 431 Request Header Fields Too Large\r\n" + _END
+_TOO_SLOW = b"HTTP/1.1 408 Request Timeout\r\n" + _END
+
+
+class BoundedProtocol(HttpToolsProtocol):
+    """A connection whose headers have limits, and that ends with an answer."""
+
+    _late: asyncio.TimerHandle | None = None
+    _read = 0
+    _ending = False
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Begin to wait for the first headers."""
+        super().connection_made(transport)
+        self._wait_for_headers()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Wait for nothing more."""
+        self._stop_waiting()
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Read on, unless the headers are too long."""
+        super().data_received(data)
+        if self._late is not None:
+            self._read += len(data)
+            if self._read > HEADERS_BYTES:
+                self._refuse(_TOO_LARGE)
+
+    def on_message_begin(self) -> None:
+        """Begin to wait for the headers of a request."""
+        super().on_message_begin()
+        if self._late is None:
+            self._wait_for_headers()
+
+    def on_headers_complete(self) -> None:
+        """Begin to answer."""
+        self._stop_waiting()
+        super().on_headers_complete()
+        if self._ending:
+            self.cycle.keep_alive = False
+
+    def shutdown(self) -> None:
+        """End after the answer that is due, if one is: the client may have asked just now."""
+        self._ending = True
+        if self._idle():
+            self._unset_keepalive_if_required()
+            self.loop.call_later(LAST_WORDS_S, self._end_if_idle)
+        else:
+            super().shutdown()
+
+    def _idle(self) -> bool:
+        return self.cycle is None or self.cycle.response_complete
+
+    def _end_if_idle(self) -> None:
+        if self._idle() and not self.transport.is_closing():
+            self.transport.close()
+
+    def _wait_for_headers(self) -> None:
+        self._read = 0
+        self._late = self.loop.call_later(HEADERS_S, self._refuse, _TOO_SLOW)
+
+    def _stop_waiting(self) -> None:
+        if self._late is not None:
+            self._late.cancel()
+            self._late = None
+
+    def _refuse(self, answer: bytes) -> Any:
+        self._stop_waiting()
+        if not self.transport.is_closing():
+            self.transport.write(answer)
+            self.transport.close()

@@ -1,0 +1,205 @@
+"""Answers that take long: functions for a process beside the one that answers.
+
+Each takes plain values and returns JSON, so that nothing else travels between the processes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Literal
+
+from rbfrag.errors import InputError, MotionFileError
+from rbfrag.service.json_body import MalformedError, json_text, read_json
+
+if TYPE_CHECKING:
+    from rbfrag.motions.ground_motion import GroundMotion
+
+FILE = "the file"
+"""What messages call an accelerogram or a curve that was sent."""
+
+
+def rock_mass(
+    body: bytes,
+    form: Literal["toml", "json", "csv"],
+    measures: Mapping[str, float],
+    n: int | None,
+    seed: int | None,
+    model: str | None,
+    level: float,
+    row_limit: int,
+    db: str | None,
+) -> bytes:
+    """Return what `rbfrag rockmass --json` prints.
+
+    Args:
+        body: the description of the rock mass.
+        form: how it is written.
+        measures: measures of the motion, by the keywords of :func:`rbfrag.predict`.
+        n: number of realisations; None for that of the description.
+        seed: seed of the random numbers; None for that of the description.
+        model: name of a stored model, or None.
+        level: confidence level of the interval.
+        row_limit: most realisations.
+        db: database of the models.
+    """
+    from rbfrag.fragility.rockmass_counts import crossings, mode_counts
+    from rbfrag.fragility.rockmass_file import (
+        rock_mass_of_csv,
+        rock_mass_of_tables,
+        rock_mass_of_toml,
+    )
+    from rbfrag.fragility.rockmass_report import as_dict
+    from rbfrag.fragility.rockmass_scenario import scenario
+
+    if form == "json":
+        document = read_json(body)
+        if not isinstance(document, dict):
+            raise InputError("the body is a JSON object with the tables base, back and friction")
+        described = rock_mass_of_tables(document)
+    else:
+        described = (rock_mass_of_toml if form == "toml" else rock_mass_of_csv)(_text(body))
+    wanted = described.realisations if n is None else n
+    if wanted > row_limit:
+        raise InputError(
+            f"{wanted} realisations are more than the {row_limit} of one request: ask for fewer "
+            "with n"
+        )
+    if not measures and model is not None:
+        raise InputError(
+            "model goes with a measure of the motion: give pgv, pga and tm, or pgd and tm, too"
+        )
+    made = described.realise(n, seed)
+    answer = scenario(made, **measures, model=model, level=level, db=db) if measures else None
+    return json_text(as_dict(made, mode_counts(made), crossings(made), answer))
+
+
+def spectrum(
+    body: bytes,
+    trace: int | None,
+    units: str | None,
+    dt_s: float | None,
+    p2: list[float],
+    polarity: str,
+) -> bytes:
+    """Return what `rbfrag spectrum --json` prints.
+
+    Args:
+        body: the accelerogram in any format that rbfrag reads.
+        trace: number of the trace in it, from 0; None where there is one.
+        units: unit of acceleration, where the file does not state it.
+        dt_s: sampling interval [s], where the file does not state it.
+        p2: frequency parameters [1/s²].
+        polarity: forward, reverse or both.
+    """
+    from rbfrag.motions.polarity import POLARITIES
+    from rbfrag.motions.spectrum_report import as_dict
+
+    ground = _motion(body, trace, units, dt_s)
+    asked = [each for each in POLARITIES if polarity in (each, "both")]
+    answers = [as_dict(ground.label, ground, p2, each) for each in asked]
+    return json_text(answers[0] if len(answers) == 1 else answers)
+
+
+def critical(
+    body: bytes,
+    trace: int | None,
+    units: str | None,
+    dt_s: float | None,
+    p2: float,
+    reverse: bool,
+    linear: bool,
+    full_map: bool,
+) -> bytes:
+    """Return what `rbfrag critical --json` prints.
+
+    Args:
+        body: as for :func:`spectrum`.
+        trace: likewise.
+        units: likewise.
+        dt_s: likewise.
+        p2: frequency parameter of the block [1/s²].
+        reverse: positive samples drive backward.
+        linear: the linear model.
+        full_map: map all outcomes.
+    """
+    from rbfrag.solver.critical import critical as search
+    from rbfrag.solver.critical_report import as_dict
+
+    result = search(
+        _motion(body, trace, units, dt_s),
+        p2=p2,
+        polarity="reverse" if reverse else "forward",
+        linear=linear,
+        full_map=full_map,
+    )
+    return json_text(as_dict(result, full_map=full_map))
+
+
+def hazard(
+    body: bytes,
+    imt: str | None,
+    site: str | None,
+    p2: float,
+    kr: float,
+    given: Mapping[str, Any],
+    db: str | None,
+) -> bytes:
+    """Return what `rbfrag hazard --json` prints.
+
+    Args:
+        body: a file with hazard curves.
+        imt: only curves of this intensity measure.
+        site: only the curve of this site.
+        p2: frequency parameter of the block [1/s²].
+        kr: its yield acceleration coefficient for toppling at rest.
+        given: further arguments of :func:`rbfrag.hazard`.
+        db: database of the models.
+    """
+    from rbfrag.exchange.hazard_file import hazard_curves_in, suited_curves
+    from rbfrag.fragility.hazard_answer import hazard as answer
+    from rbfrag.fragility.hazard_report import as_dict
+    from rbfrag.fragility.velocity_conversion import velocity_conversion
+    from rbfrag.solver.quantity import positive
+
+    p2, kr = positive(p2, "p2", "1/s²"), positive(kr, "kr", "g")
+    convert = given.get("convert")
+    try:
+        found = hazard_curves_in(_text(body), FILE, imt=imt, site=site)
+    except RecursionError:
+        raise MalformedError("the body is nested too deeply") from None
+    curves = suited_curves(
+        found,
+        with_mean_period=given.get("tm_s") is not None,
+        converted_period_s=None if convert is None else velocity_conversion(convert).period_s,
+    )
+    rates = [answer(curve, p2, kr, **given, db=db) for curve in curves]
+    return json_text(as_dict(curves, [None], rates))
+
+
+def _motion(body: bytes, trace: int | None, units: str | None, dt_s: float | None) -> GroundMotion:
+    from rbfrag.motions.recognise import motions_in
+
+    try:
+        found = motions_in(body, "upload", units=units, dt_s=dt_s)
+    except MotionFileError as error:
+        where = FILE if error.line is None else f"{FILE}, line {error.line}"
+        raise InputError(f"{where}: {error.reason}") from None
+    except RecursionError:
+        raise MalformedError("the body is nested too deeply") from None
+    if trace is None and len(found) == 1:
+        return found[0]
+    if trace is not None and 0 <= trace < len(found):
+        return found[trace]
+    listed = ", ".join(f"{i} ({each.component})" for i, each in enumerate(found))
+    trouble = f"holds {len(found)} traces" if trace is None else f"has no trace {trace}"
+    raise InputError(f"{FILE} {trouble}: name one of  {listed}  as trace=0, for example")
+
+
+def _text(body: bytes) -> str:
+    try:
+        text = body.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise MalformedError(f"byte {error.start} of the body is not UTF-8 text") from None
+    if not text.strip():
+        raise MalformedError("the body is empty")
+    return text

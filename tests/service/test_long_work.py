@@ -1,0 +1,175 @@
+"""Rock masses, accelerograms and hazard curves that are sent: the command line's answers."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from rbfrag.db.location import REFERENCE
+from rbfrag.motions.export import export_motions
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.service.app import make_app
+from rbfrag.service.hazard_api import EXAMPLE as CURVE
+from rbfrag.service.motion_api import EXAMPLE as RECORD
+from rbfrag.service.rockmass_api import EXAMPLE as TABLES
+from rbfrag.service.rockmass_api import EXAMPLE_TOML
+from rbfrag.service.settings import Settings
+from tests.cli.conftest import Shell
+
+TOML = {"content-type": "application/toml"}
+
+
+@pytest.fixture(scope="module")
+def client():
+    """One service for all: its processes take a while to start."""
+    with TestClient(make_app(Settings(db=str(REFERENCE), row_limit=5000))) as found:
+        yield found
+
+
+@pytest.fixture
+def written(shell: Shell, tmp_path: Path):
+    """A file in the folder that commands run in."""
+
+    def write(name: str, text: str) -> Path:
+        path = tmp_path / name
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def refusal(answer, status=422):
+    assert answer.status_code == status, answer.text
+    assert answer.headers["content-type"] == "application/problem+json"
+    detail = answer.json()["detail"]
+    assert "--" not in detail
+    assert "/dev/null" not in detail
+    return detail
+
+
+def test_a_rock_mass_is_answered_as_by_the_command_line(client, written, shell: Shell):
+    file = written("rockmass.toml", EXAMPLE_TOML)
+    printed = shell.json("rockmass", file, "--pgv", "0.6", "--n", "300", "--db", REFERENCE)
+    query = "/v1/rockmass?pgv=0.6&n=300"
+    assert client.post(query, content=EXAMPLE_TOML, headers=TOML).json() == printed
+    assert client.post(query, json=TABLES).json() == printed
+
+
+@pytest.mark.parametrize(
+    ("query", "body", "words"),
+    [
+        ("n=5001", EXAMPLE_TOML, "5001 realisations are more than the 5000 of one request"),
+        ("n=0", EXAMPLE_TOML, "n = 0"),
+        ("model=wls-pgv", EXAMPLE_TOML, "model goes with a measure of the motion"),
+        ("", "[base]\n", "base.dip_deg is missing"),
+        ("", "[base\n", "not valid TOML"),
+        ("", "base = 3\n", "base = 3 is not a table"),
+    ],
+)
+def test_a_rock_mass_that_is_none_is_refused(client, query, body, words):
+    assert words in refusal(client.post(f"/v1/rockmass?{query}", content=body, headers=TOML))
+
+
+def test_a_rock_mass_says_how_it_is_written(client):
+    answer = client.post(
+        "/v1/rockmass", content=EXAMPLE_TOML, headers={"content-type": "text/html"}
+    )
+    assert "application/toml" in refusal(answer, 415)
+
+
+@pytest.mark.parametrize("polarity", ["forward", "both"])
+def test_a_spectrum_is_answered_as_by_the_command_line(client, written, shell: Shell, polarity):
+    file = written("record.csv", RECORD)
+    options = ["--p2", "3,1", "--polarity", polarity]
+    printed = shell.json("spectrum", file, *options)
+    query = f"/v1/spectrum?p2=3,1&polarity={polarity}"
+    for answer in (
+        client.post(query, content=RECORD),
+        client.post(query, files={"file": ("../../etc/passwd", RECORD)}),
+    ):
+        found = answer.json()
+        for one, other in zip(
+            *([each] if isinstance(each, dict) else each for each in (found, printed)), strict=True
+        ):
+            # the command line names the file that was given; here there is none
+            assert {**other, "motion": "upload", "name": "upload"} == one
+
+
+def test_the_critical_block_is_answered_as_by_the_command_line(client, written, shell: Shell):
+    file = written("record.csv", RECORD)
+    printed = shell.json("critical", file, "--p2", "3", "--reverse", "--map")
+    assert client.post("/v1/critical?p2=3&reverse=true&map=1", content=RECORD).json() == printed
+
+
+def test_an_annual_rate_is_answered_as_by_the_command_line(client, written, shell: Shell):
+    file = written("curve.csv", CURVE)
+    options = ["--p2", "3", "--kr", "0.1", "--years", "100", "--component", "rotd50"]
+    printed = shell.json("hazard", file, *options, "--db", REFERENCE)
+    query = "/v1/hazard?p2=3&kr=0.1&years=100&component=rotd50"
+    assert client.post(query, content=CURVE).json() == printed
+    assert client.post(query, files={"file": ("curve.csv", CURVE)}).json() == printed
+
+
+def test_one_trace_of_several_is_asked_for_by_its_number(client, tmp_path):
+    rng = np.random.default_rng(1)
+    motions = [GroundMotion(rng.normal(0.0, 0.1, 400), 0.01, component=c) for c in ("N", "E")]
+    export_motions(motions, tmp_path / "two.csv")
+    body = (tmp_path / "two.csv").read_bytes()
+    assert "holds 2 traces: name one of  0 (N), 1 (E)" in refusal(
+        client.post("/v1/spectrum", content=body)
+    )
+    for i, motion in enumerate(motions):
+        found = client.post(f"/v1/spectrum?trace={i}", content=body).json()
+        assert found["pgv_m_s"] == motion.pgv_m_s
+
+
+@pytest.mark.parametrize(
+    ("query", "body", "words"),
+    [
+        ("p2=3", "no record at all", "no known format of accelerogram"),
+        ("p2=3", "time_s,acceleration_g\n0,0\n0.1,x\n", "the file, line 3"),
+        ("p2=3", "0.1\n0.2\n0.3\n", "unit"),
+        ("p2=3&units=g", "0.1\n0.2\n0.3\n", "no sampling interval"),
+        ("p2=3&units=gal", RECORD, "units is 'gal': write g or m/s2 or cm/s2 or mm/s2"),
+        ("p2=3&trace=1", RECORD, "has no trace 1: name one of  0"),
+        ("p2=0", RECORD, "p2"),
+        ("p2=", RECORD, "p2 = '' is not"),
+        ("p2=3&dt=-1&units=g", "0.1\n0.2\n", "dt must be a positive number"),
+    ],
+)
+def test_an_accelerogram_that_is_none_is_refused(client, query, body, words):
+    for path in ("spectrum", "critical"):
+        assert words in refusal(client.post(f"/v1/{path}?{query}", content=body))
+
+
+@pytest.mark.parametrize(
+    ("query", "body", "words"),
+    [
+        ("p2=3&kr=0.1", "no curve at all", "the file"),
+        ("p2=3&kr=0.1&imt=SA(9)", CURVE, "there is no curve of SA(9)"),
+        ("p2=3&kr=0.1&convert=none", CURVE, "none"),
+        ("p2=3&kr=0.1&years=-1", CURVE, "years = -1"),
+        ("p2=3&kr=-0.1", CURVE, "kr"),
+        ("p2=nan&kr=0.1", CURVE, "p2"),
+    ],
+)
+def test_a_curve_that_is_none_is_refused(client, query, body, words):
+    assert words in refusal(client.post(f"/v1/hazard?{query}", content=body))
+
+
+def test_many_rows_are_answered_as_few_are(client):
+    n = 300
+    rng = np.random.default_rng(2)
+    body = {"p2": 3.0, "kr": rng.uniform(0.02, 0.3, n).tolist(), "pgv": 0.6}
+    many = client.post("/v1/predict", json=body).json()
+    few = client.post("/v1/predict", json={**body, "kr": body["kr"][:60]}).json()
+    assert many["probability"][:60] == few["probability"]
+    assert len(many["probability"]) == n
+    assert json.dumps(many["warnings"]) == json.dumps(few["warnings"])
+
+
+def test_more_rows_than_the_limit_are_refused(client):
+    answer = client.post("/v1/predict", json={"p2": 3.0, "kr": [0.1] * 5001, "pgv": 0.6})
+    assert "one request may hold 5000" in refusal(answer)
