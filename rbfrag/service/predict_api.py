@@ -25,7 +25,10 @@ from rbfrag.service.workshop import Workshop
 PARAMETERS = by_name((P2, KR, *MEASURES, MODEL, LEVEL))
 
 ROWS_AT_ONCE = 64
-"""So many rows are answered without a detour by another process."""
+"""So many rows are answered while others wait."""
+
+ROWS_BESIDE = 5000
+"""So many rows are answered beside others; more than these, by another process."""
 
 ARRAYS = ("p2", "kr", *KEYWORD)
 """Names of the body that may be a list."""
@@ -203,8 +206,10 @@ def router(settings: Settings, bodies: Bodies, workshop: Workshop) -> APIRouter:
         async with bodies.read(request) as body:
             given = checked(read_json(body), settings.row_limit)
             rows = max((len(each) for each in given.values() if isinstance(each, list)), default=1)
-            if rows > ROWS_AT_ONCE or on_server:
+            if rows > ROWS_BESIDE:
                 return answer(await workshop.do(answer_many, given, settings.db))
+            if rows > ROWS_AT_ONCE or on_server:
+                return answer(await run_in_threadpool(answer_many, given, settings.db))
             return answer(answer_many(given, settings.db))
 
     return routes
