@@ -80,7 +80,7 @@ export function blockDrawing(place) {
     plot.append("line").attr("class", "resultant").attr("marker-end", "url(#arrow)")
       .attr("x1", ox).attr("y1", oy).attr("x2", tx).attr("y2", ty);
     plot.append("circle").attr("class", "centroid").attr("cx", ox).attr("cy", oy).attr("r", 3.5);
-    drawLength(plot, s, scale);
+    drawLength(plot, s, scale, 0.4 * (right - left));
   }
 
   return {
@@ -150,9 +150,9 @@ function showNumbers(block) {
  * @param {any} plot
  * @param {import("./sheet.js").Sheet} s
  * @param {number} scale pixels a metre
+ * @param {number} wanted about how long it may be [m]
  */
-function drawLength(plot, s, scale) {
-  const wanted = (0.25 * (s.right - s.left)) / scale;
+function drawLength(plot, s, scale, wanted) {
   const power = 10 ** Math.floor(Math.log10(wanted));
   const length = ([5, 2, 1].find((d) => d * power <= wanted) ?? 1) * power;
   const y = s.height - 16;

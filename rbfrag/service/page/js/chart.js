@@ -20,7 +20,9 @@ export const MARGINS = { left: 62, right: 58, top: 10, bottom: 44 };
 /**
  * Put a design chart into an element.
  * @param {HTMLElement} place
- * @param {(x: number, kr: number) => void} moved called when the reader moves the point
+ * @param {{to: (x: number, kr: number | null) => void,
+ *   by: (ratioOfX: number, ratioOfKr: number) => void}} moved called when the reader moves the
+ *   point to a place, or by a step; k_r is null where it may not be changed
  */
 export function designChart(place, moved) {
   /** @type {Spot | null} */
@@ -63,11 +65,11 @@ export function designChart(place, moved) {
         if (!spot || !scales) return;
         const { plane } = spot;
         const x = within(scales.x.invert(px), plane.x);
-        const kr = spot.yIsFree ? within(scales.y.invert(py), plane.y) / plane.perKr : spot.kr;
-        moved(x, kr);
+        const kr = spot.yIsFree ? within(scales.y.invert(py), plane.y) / plane.perKr : null;
+        moved.to(x, kr);
       },
     ([byX, byY]) => {
-      if (spot) moved(spot.x * byX, spot.yIsFree ? spot.kr * byY : spot.kr);
+      if (spot) moved.by(byX, spot.yIsFree ? byY : 1);
     },
   );
 
@@ -168,6 +170,14 @@ export function designChart(place, moved) {
     /** @param {Spot} where */
     showPoint(where) {
       spot = where;
+      draw();
+    },
+    /**
+     * @param {number} x
+     * @param {number | null} kr null where it stays as it is
+     */
+    movePoint(x, kr) {
+      if (spot) spot = { ...spot, x, kr: kr ?? spot.kr, probability: null };
       draw();
     },
     hidePoint() {

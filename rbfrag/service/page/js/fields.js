@@ -9,7 +9,7 @@
  * Names of fields as they stand in the service's sentences, with or without their unit.
  * A field that an input shows is named by its id.
  */
-const NAMED = /(?<![\w.])(p2|kr|alpha[13]|r3|s[12]|gamma|beta|phi|pgv|pga|tm|pgd|model|level|units|dt)(?:_m_s|_deg|_g|_s|_m)?(?![\w])/g;
+const NAMED = /(?<![\w.])(p2|kr|alpha[13]|r3|s[12]|gamma|beta|phi|pgv|pga|tm|pgd|model|level|units|dt|trace)(?:_m_s|_deg|_g|_s|_m)?(?![\w])/g;
 
 /**
  * The form of block, shaking and model.

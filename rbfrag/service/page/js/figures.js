@@ -15,6 +15,7 @@ import { writeText } from "./subscripts.js";
 /**
  * @typedef {import("./question.js").Question} Question
  * @typedef {import("./plane.js").Plane} Plane
+ * @typedef {import("./plane.js").Across} Across
  * @typedef {{question: Question, answer: any, plane: Plane, kr: number,
  *   present: () => boolean}} Answered
  */
@@ -24,15 +25,19 @@ const UNITS = { pgv: "m/s", pga: "g", tm: "s", pgd: "m" };
 
 /**
  * Both figures.
- * @param {(across: import("./plane.js").Across, x: number, kr: number) => void} moved called when
- *   the reader moves the point: the measure that runs across, its value, and k_r
+ * @param {{to: (across: Across, x: number, kr: number | null) => void,
+ *   by: (across: Across, ratioOfX: number, ratioOfKr: number) => void}} moved called when the reader
+ *   moves the point: the measure that runs across, and to where or by which step
  * @param {(error: unknown) => void} failed called when the service refuses or does not answer
  */
 export function figures(moved, failed) {
   /** @type {Plane | null} */
   let plane = null;
   let gridShown = "";
-  const chart = designChart(byId("chart"), (x, kr) => plane && moved(plane.across, x, kr));
+  const chart = designChart(byId("chart"), {
+    to: (x, kr) => plane && moved.to(plane.across, x, kr),
+    by: (ofX, ofKr) => plane && moved.by(plane.across, ofX, ofKr),
+  });
   const curve = fragilityCurve(byId("curve"));
 
   const drawGrid = latest(async (/** @type {Answered} */ { question, answer, plane: on, present }) => {
@@ -85,11 +90,10 @@ export function figures(moved, failed) {
     /**
      * Show the point where the reader has moved it, before there is an answer.
      * @param {number} x
-     * @param {number} kr
-     * @param {boolean} yIsFree
+     * @param {number | null} kr null where it stays as it is
      */
-    movePoint(x, kr, yIsFree) {
-      if (plane) chart.showPoint({ plane, x, kr, yIsFree, probability: null });
+    movePoint(x, kr) {
+      chart.movePoint(x, kr);
     },
     /** Show that the figures do not answer the present question. */
     stale() {

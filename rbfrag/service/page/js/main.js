@@ -26,7 +26,7 @@ let block = null;
 const form = /** @type {HTMLFormElement} */ (byId("form"));
 const fields = formFields(form, fieldsChanged);
 const drawing = blockDrawing(byId("block"));
-const sheets = figures(pointMoved, failed);
+const sheets = figures({ to: pointMoved, by: pointStepped }, failed);
 const record = recordPanel({
   changed: () => showAddress(addressOf(question, record.shown())),
   takePgv: (pgv) => set({ pgv: forField(pgv) }),
@@ -54,12 +54,21 @@ function fieldsChanged(now, shapeWas) {
   askSoon();
 }
 
-/** @type {(across: string, x: number, kr: number) => void} */
+/** @type {(across: string, x: number, kr: number | null) => void} */
 function pointMoved(across, x, kr) {
-  const free = question.shape === "numbers";
-  const values = { [across]: forField(x), ...(free ? { kr: forField(kr) } : {}) };
-  sheets.movePoint(fromField(values[across]), free ? fromField(values.kr) : kr, free);
+  /** @type {Record<string, string>} */
+  const values = { [across]: forField(x) };
+  if (kr !== null) values.kr = forField(kr);
+  sheets.movePoint(fromField(values[across]), kr === null ? null : fromField(values.kr));
   set(values);
+}
+
+/** A step starts from what the fields say, even where that is not answered yet.
+ * @type {(across: string, ratioOfX: number, ratioOfKr: number) => void} */
+function pointStepped(across, ratioOfX, ratioOfKr) {
+  const x = fromField(question.values[across]) * ratioOfX;
+  const kr = ratioOfKr === 1 ? null : fromField(question.values.kr) * ratioOfKr;
+  if (x > 0 && (kr === null || kr > 0)) pointMoved(across, x, kr);
 }
 
 /** @param {Record<string, string>} values */

@@ -14,7 +14,7 @@ const PLAIN = { pgv: [0.05, 3], pga: [0.03, 3], pgd: [0.003, 3] };
 const PLAIN_Y = [0.02, 3];
 const MARGIN = 1.35;
 const BEYOND = 1.06;
-const GRID = 45;
+const GRID = 57;
 const CURVE = 121;
 const BESIDE = 1e-6;
 

@@ -28,9 +28,11 @@ export function movable(point, area, toPlace, onKeys) {
   point.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
     point.setPointerCapture(event.pointerId);
-    point.focus();
+    point.focus({ preventScroll: true });
     event.preventDefault();
   });
+  // a finger on the point moves it, not the page; CSS cannot say so for a part of a drawing
+  point.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
   point.addEventListener("pointermove", (event) => {
     if (point.hasPointerCapture(event.pointerId)) toPlace()(placeOf(event));
   });

@@ -1,0 +1,173 @@
+"""A record dropped on the page, or chosen by keyboard, gives its toppling spectrum."""
+
+import math
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from playwright.sync_api import expect
+
+from rbfrag.motions.toppling_spectrum import toppling_spectrum
+from tests.service.page.reading import points_of
+from tests.service.page.test_page_answers import forgive
+
+STANDARD_GRAVITY = 9.80665
+
+# Handing a file over as a person's mouse does it: over the page, then let go.
+DROP = """([name, text]) => {
+  const data = new DataTransfer();
+  data.items.add(new File([text], name));
+  for (const type of ['dragenter', 'dragover', 'drop']) {
+    document.querySelector('#chart').dispatchEvent(
+      new DragEvent(type, { dataTransfer: data, bubbles: true, cancelable: true }));
+  }
+}"""
+
+
+def pulse(amplitude_g=0.4, duration_s=1.0):
+    """One sine pulse as a text file."""
+    times = np.linspace(0.0, duration_s, 201)
+    rows = [f"{t:.6g},{amplitude_g * math.sin(2 * math.pi * t / duration_s):.8g}" for t in times]
+    return "\n".join(["# Time (s),Acceleration (g)", *rows, ""])
+
+
+def drop(page, name, text):
+    page.evaluate(DROP, [name, text])
+
+
+def curve(page, kind):
+    """p² and X of a drawn spectrum."""
+    frame = page.eval_on_selector(
+        "#spectrum .area",
+        "a => ['x', 'y', 'width', 'height'].map((name) => Number(a.getAttribute(name)))",
+    )
+    left, _, width, _ = frame
+    texts = page.locator("#spectrum .axis").nth(2).locator(".tick")
+    ticks = [
+        (
+            float(texts.nth(i).text_content()),
+            points_of(texts.nth(i).get_attribute("transform"))[0][1],
+        )
+        for i in range(texts.count())
+    ]
+    (v1, y1), (v2, y2) = ticks[0], ticks[-1]
+    scale = math.log(v2 / v1) / (y2 - y1)
+    path = points_of(page.get_attribute(f"#spectrum g[clip-path] .spectrum.{kind}", "d"))
+    return [(0.1 * 300.0 ** ((x - left) / width), v1 * math.exp((y - y1) * scale)) for x, y in path]
+
+
+def test_a_dropped_record_shows_its_spectrum(open_page, tmp_path):
+    opened = open_page()
+    page = opened.page
+    drop(page, "pulse.csv", pulse())
+    expect(page.locator("#spectrum-part")).to_be_visible()
+    (tmp_path / "pulse.csv").write_text(pulse(), encoding="utf-8")
+    from rbfrag import read_motions
+
+    [motion] = read_motions(tmp_path / "pulse.csv")
+    for polarity in ("forward", "reverse"):
+        drawn = curve(page, polarity)
+        assert len(drawn) > 40
+        for p2, x in drawn[::5]:
+            assert x == pytest.approx(toppling_spectrum(motion, p2, polarity), rel=0.01)
+    expect(page.locator("#record-name")).to_contain_text("PGV")
+    expect(page.locator("#spectrum .dot")).to_have_count(1)
+
+
+def test_the_words_compare_the_present_block_with_the_record(open_page, tmp_path):
+    opened = open_page("?p2=3&kr=0.3&pgv=0.6")
+    page = opened.page
+    drop(page, "pulse.csv", pulse())
+    words = page.locator("#spectrum-words")
+    expect(words).to_contain_text("does not topple the block")
+    page.fill("#kr", "0.01")
+    expect(words).to_contain_text("may topple the block")
+    page.fill("#p2", "7")
+    expect(words).to_contain_text("At p² = 7")
+    (tmp_path / "pulse.csv").write_text(pulse(), encoding="utf-8")
+    from rbfrag import read_motions
+
+    [motion] = read_motions(tmp_path / "pulse.csv")
+    x = toppling_spectrum(motion, 7.0, "forward")
+    expect(words).to_contain_text(f"{x:.3g}")
+
+
+def test_its_pgv_becomes_the_shaking(open_page):
+    opened = open_page()
+    page = opened.page
+    drop(page, "pulse.csv", pulse())
+    page.click("#take-pgv")
+    opened.settled()
+    # the velocity gained over half a sine: 2 a g/ω
+    assert float(page.input_value("#pgv")) == pytest.approx(
+        0.4 * STANDARD_GRAVITY / math.pi, rel=5e-3
+    )
+
+
+def test_a_record_is_chosen_by_keyboard(open_page, tmp_path):
+    opened = open_page()
+    page = opened.page
+    (tmp_path / "pulse.csv").write_text(pulse(), encoding="utf-8")
+    page.focus("#record-file")
+    with page.expect_file_chooser() as chooser:
+        page.keyboard.press("Enter")
+    chooser.value.set_files(tmp_path / "pulse.csv")
+    expect(page.locator("#spectrum-part")).to_be_visible()
+    page.focus("#drop-record")
+    page.keyboard.press("Enter")
+    expect(page.locator("#spectrum-part")).to_be_hidden()
+
+
+def test_a_file_that_is_no_record_is_refused_in_words(open_page):
+    opened = open_page()
+    page = opened.page
+    drop(page, "shopping.txt", "bread\nbutter\n")
+    expect(page.locator("#record-error")).to_contain_text("shopping.txt")
+    expect(page.locator("#spectrum-part")).to_be_hidden()
+    forgive(opened, "Failed to load resource")
+
+
+def test_a_unit_that_the_file_leaves_open_is_asked_for(open_page):
+    opened = open_page()
+    page = opened.page
+    bare = "\n".join(f"{i / 100:.2f},{100 * math.sin(i / 16):.4f}" for i in range(200)) + "\n"
+    drop(page, "bare.csv", bare)
+    expect(page.locator("#units-error, #record-error").filter(has_text="unit")).to_have_count(1)
+    page.select_option("#units", "cm/s2")
+    expect(page.locator("#spectrum-part")).to_be_visible()
+    expect(page.locator("#units-error")).to_have_text("")
+    forgive(opened, "Failed to load resource")
+
+
+def test_a_link_holds_the_spectrum(open_page):
+    opened = open_page("?p2=3&kr=0.02&pgv=0.6")
+    page = opened.page
+    drop(page, "pulse.csv", pulse())
+    expect(page.locator("#spectrum-part")).to_be_visible()
+    page.wait_for_function("() => location.hash.startsWith('#spectrum=')")
+    parts = urlsplit(page.url)
+    again = open_page(f"?{parts.query}#{parts.fragment}")
+    expect(again.page.locator("#spectrum-part")).to_be_visible()
+    assert not [url for url in again.requests if "v1/spectrum" in url]
+    for selector in ("#record-name", "#spectrum-words"):
+        assert again.text(selector) == opened.text(selector)
+    for (p2, x), (again_p2, again_x) in zip(
+        curve(page, "forward"), curve(again.page, "forward"), strict=True
+    ):
+        assert (again_p2, again_x) == pytest.approx((p2, x), rel=1e-3)
+
+
+@pytest.mark.parametrize("damaged", ["spectrum=", "spectrum=AAAA", "spectrum=%00", "other=1"])
+def test_a_damaged_link_shows_no_record(open_page, damaged):
+    opened = open_page(f"?p2=3&kr=0.1&pgv=0.6#{damaged}")
+    expect(opened.page.locator("#spectrum-part")).to_be_hidden()
+
+
+def test_a_recorded_accelerogram(open_page, records_dir):
+    path = records_dir / "slammer_csv" / "Coyote_Lake_1979_G02-050.csv"
+    opened = open_page("?p2=3&kr=0.01&pgv=0.6")
+    page = opened.page
+    page.set_input_files("#record-file", path)
+    expect(page.locator("#record-name")).to_contain_text("PGV 0.109")
+    expect(page.locator("#spectrum-words")).to_contain_text("0.0839")
+    expect(page.locator("#spectrum-words")).to_contain_text("may topple")
