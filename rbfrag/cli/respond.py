@@ -93,7 +93,8 @@ def respond(
         str | None,
         typer.Option(
             "--animate",
-            help="Film the block on its planes (.gif, .html); it must be given by its geometry.",
+            help="Film the block on its planes (.gif, .mp4 where ffmpeg is installed, .html); it "
+            "must be given by its geometry.",
             show_default=False,
         ),
     ] = None,
@@ -126,6 +127,10 @@ def respond(
     )
     if animate is not None and shape is None:
         raise InputError("--animate needs the shape of the block: give --block or its geometry")
+    if animate is not None:
+        from rbfrag.plots.film import film_path
+
+        film_path(animate)
     ground = find_motion(motion, db=db, units=units, dt_s=dt)
     upward, about = find_vertical(vertical, ground, db=db, units=units, dt_s=dt)
     try:

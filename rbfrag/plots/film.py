@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import os
+import shutil
+import subprocess
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +22,10 @@ if TYPE_CHECKING:
     from matplotlib.animation import AbstractMovieWriter
     from matplotlib.axes import Axes
 
-SUFFIXES = (".gif", ".html")
+SUFFIXES = (".gif", ".mp4", ".html")
+
+BITRATE_KBIT_S = 1500
+"""Rate of an .mp4: lines and letters stay sharp."""
 
 FRAMES_PER_S = 20
 
@@ -48,7 +53,7 @@ def film(
     Args:
         response: a response asked for with its history.
         block: the block.
-        path: .gif, or .html with buttons.
+        path: .gif, .mp4 (by the program ffmpeg), or .html with buttons.
         beta_deg: dip of the base, out of the slope positive [deg].
         back_fracture: draw the back plane.
         exaggerate: factor on displacement and rotation; 1 is true scale.
@@ -59,17 +64,17 @@ def film(
 
     Raises:
         InputError: no history, a factor that is not positive, an unknown suffix, a folder that
-            cannot be written.
+            cannot be written, an .mp4 without ffmpeg.
         MissingExtraError: matplotlib is not installed.
     """
-    target = _film_path(path)
+    target = film_path(path)
     if not (math.isfinite(exaggerate) and exaggerate > 0.0):
         raise InputError(f"exaggerate = {exaggerate:g}: give a factor above 0; 1 is true scale")
     history = response.history
     if history is None:
         raise InputError("this response holds no history: ask for it with history=True")
     figure = new_figure(width_in=6.4, height_in=6.0)
-    from matplotlib.animation import FuncAnimation, HTMLWriter, PillowWriter
+    from matplotlib.animation import FuncAnimation
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     FigureCanvasAgg(figure)
@@ -98,11 +103,7 @@ def film(
     figure.canvas.draw()
     figure.set_layout_engine("none")
     moving = FuncAnimation(figure, show, frames=time_s.size, interval=1000 // FRAMES_PER_S)
-    writer: AbstractMovieWriter = (
-        PillowWriter(fps=FRAMES_PER_S)
-        if target.suffix.lower() == ".gif"
-        else HTMLWriter(fps=FRAMES_PER_S, embed_frames=True, default_mode="loop")
-    )
+    writer = _writer(target.suffix.lower())
     try:
         # the film appears whole or not at all
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}-") as folder:
@@ -111,18 +112,45 @@ def film(
             unfinished.replace(target)
     except OSError as error:
         raise InputError(f"film {target} cannot be written: {error.strerror}") from error
+    except subprocess.CalledProcessError as error:
+        raise InputError(
+            f"film {target}: ffmpeg failed (exit status {error.returncode}), perhaps because it "
+            "was built without H.264; name the film .gif or .html, which do without ffmpeg"
+        ) from error
     return target
 
 
-def _film_path(path: str | os.PathLike[str]) -> Path:
+def film_path(path: str | os.PathLike[str]) -> Path:
+    """Return the path if a film can be made there; ask before long work.
+
+    Raises:
+        InputError: an unknown suffix, a folder that cannot be written, an .mp4 without ffmpeg.
+    """
     target = Path(path)
-    if target.suffix.lower() not in SUFFIXES:
+    suffix = target.suffix.lower()
+    if suffix not in SUFFIXES:
         raise InputError(
             f"film {target}: the suffix {target.suffix!r} is none of {', '.join(SUFFIXES)}"
         )
     if not target.parent.is_dir() or not os.access(target.parent, os.W_OK):
         raise InputError(f"film {target}: the folder {target.parent} cannot be written")
+    if suffix == ".mp4" and shutil.which("ffmpeg") is None:
+        raise InputError(
+            f"film {target}: an .mp4 needs the program ffmpeg, which is not on the PATH: install "
+            "it (apt install ffmpeg, brew install ffmpeg, conda install ffmpeg), or name the film "
+            ".gif or .html, which do without it"
+        )
     return target
+
+
+def _writer(suffix: str) -> AbstractMovieWriter:
+    from matplotlib.animation import FFMpegWriter, HTMLWriter, PillowWriter
+
+    if suffix == ".gif":
+        return PillowWriter(fps=FRAMES_PER_S)
+    if suffix == ".mp4":
+        return FFMpegWriter(fps=FRAMES_PER_S, codec="h264", bitrate=BITRATE_KBIT_S)
+    return HTMLWriter(fps=FRAMES_PER_S, embed_frames=True, default_mode="loop")
 
 
 def _frame_times(response: Response, history: ResponseHistory) -> tuple[FloatArray, float]:

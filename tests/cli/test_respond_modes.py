@@ -84,6 +84,15 @@ def test_refused(refuses: Refuses, record: Path, options: tuple[str, ...], word:
     assert word in refuses("respond", record, *options)
 
 
+def test_a_film_that_cannot_be_made_is_refused_before_anything_is_written(
+    refuses: Refuses, record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", "")
+    asked = ("respond", record, *SLUMP, "--csv", "m.csv", "--animate", "m.mp4")
+    assert "name the film .gif or .html" in refuses(*asked)
+    assert list(tmp_path.iterdir()) == [record]
+
+
 def test_a_model_against_the_mode_says_so(shell: Shell, record: Path) -> None:
     answer = shell.json("respond", record, *SLUMP, "--kind", "sliding")
     assert answer["kind"] == "sliding"

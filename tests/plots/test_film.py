@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +13,7 @@ from PIL import Image
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.plots.film import film
+from rbfrag.plots.film import FRAMES_PER_S, film
 from rbfrag.solver.block import Block
 from rbfrag.solver.response import respond
 from rbfrag.solver.results import Response
@@ -38,10 +41,65 @@ def test_the_block_moves_in_the_film(slump: Response, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.skipif(
+    shutil.which("ffmpeg") is None or shutil.which("ffprobe") is None,
+    reason="ffmpeg and ffprobe, which make and read an .mp4, are not installed",
+)
+def test_a_film_as_mp4(slump: Response, tmp_path: Path) -> None:
+    path = film(slump, BLOCK, tmp_path / "slump.mp4", beta_deg=0.0, exaggerate=3.0, title="pulse")
+    assert list(tmp_path.iterdir()) == [path]
+    asked = ("codec_name", "pix_fmt", "r_frame_rate", "nb_read_frames")
+    told = subprocess.run(
+        ["ffprobe", "-v", "error", "-count_frames", "-show_entries", f"stream={','.join(asked)}",
+         "-of", "default=noprint_wrappers=1", path],
+        capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    about = dict(line.split("=") for line in told.splitlines())
+    # what browsers and slides play
+    assert (about["codec_name"], about["pix_fmt"]) == ("h264", "yuv420p")
+    assert about["r_frame_rate"] == f"{FRAMES_PER_S}/1"
+    assert int(about["nb_read_frames"]) >= 5
+    for at, name in (("0", "first.png"), ("0.35", "later.png")):
+        subprocess.run(
+            ["ffmpeg", "-v", "error", "-ss", at, "-i", path, "-frames:v", "1", tmp_path / name],
+            check=True,
+        )
+    first, later = (
+        np.asarray(Image.open(tmp_path / name).convert("L"), dtype=float)
+        for name in ("first.png", "later.png")
+    )
+    scene = slice(0, first.shape[0] // 2)
+    assert (np.abs(first[scene] - later[scene]) > 20.0).mean() > 0.005
+
+
+def test_without_ffmpeg_a_film_as_mp4_is_refused_with_the_remedy(
+    slump: Response, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(
+        InputError, match=r"install it \(apt install ffmpeg.* or name the film \.gif"
+    ):
+        film(slump, BLOCK, tmp_path / "slump.mp4", beta_deg=0.0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_ffmpeg_that_fails_is_told(
+    slump: Response, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = tmp_path / "bin" / "ffmpeg"
+    broken.parent.mkdir()
+    broken.write_text("#!/bin/sh\ncat > /dev/null\nexit 3\n")
+    broken.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{broken.parent}{os.pathsep}{os.environ['PATH']}")
+    with pytest.raises(InputError, match=r"ffmpeg failed \(exit status 3\)"):
+        film(slump, BLOCK, tmp_path / "slump.mp4", beta_deg=0.0)
+    assert list(tmp_path.iterdir()) == [broken.parent]
+
+
 @pytest.mark.parametrize(
     ("name", "exaggerate", "word"),
     [
-        ("film.avi", 1.0, "none of .gif, .html"),
+        ("film.avi", 1.0, "none of .gif, .mp4, .html"),
         ("nowhere/film.gif", 1.0, "cannot be written"),
         ("film.gif", 0.0, "exaggerate = 0"),
     ],
