@@ -3,7 +3,9 @@
 pyslammer (GPL-3.0, extra `samples`) is run here, beside rbfrag, and imported nowhere else. It
 integrates at the samples: a slide starts and stops at a sample, and the last part of a step in
 which it stops is left out. The same records with straight lines between more and more samples show
-that this is all of the difference.
+that this is all of the difference, but for one thing: a block slower than 1e-5 m/s is not braked
+there, and creeps on until the ground drives it again. That is at most 1e-5 m/s times the length of
+the record, which matters beside displacements of less than a millimetre.
 """
 
 from __future__ import annotations
@@ -27,6 +29,9 @@ YIELDS = (0.05, 0.1, 0.2, 0.4)
 REFINED = (1, 4, 16)
 """Samples that one of the record becomes."""
 
+CREEP_M_S = 1e-5
+"""Speed below which pyslammer 0.2.2 does not brake a block (`tol` in its rigid analysis)."""
+
 LEAST_M = 1e-4
 """Displacements below are not compared: they are a few samples long."""
 
@@ -38,6 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     found = find_records(chosen.records)
     motions = [motion for motion in found.motions if motion.dt_s is not None][: chosen.most]
     errors: dict[int, list[float]] = {fine: [] for fine in REFINED}
+    beyond: dict[int, list[float]] = {fine: [] for fine in REFINED}
     for motion in motions:
         for share in YIELDS:
             ky = share * motion.pga_g
@@ -45,16 +51,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
             if ours is None or ours < LEAST_M:
                 continue
             for fine in REFINED:
-                errors[fine].append(abs(peer(motion, ky, fine) / ours - 1.0))
+                error_m = abs(peer(motion, ky, fine) - ours)
+                errors[fine].append(error_m / ours)
+                crept_m = CREEP_M_S * motion.duration_s
+                beyond[fine].append(max(error_m - crept_m, 0.0) / ours)
     cells = [
         [
             "as recorded" if fine == 1 else f"{fine} times as many",
             str(len(of)),
-            *(f"{100.0 * value:.2g} %" for value in (np.median(of), np.max(of))),
+            *(
+                f"{100.0 * value:.2g} %"
+                for value in (np.median(of), np.max(of), np.max(beyond[fine]))
+            ),
         ]
         for fine, of in errors.items()
     ]
-    headers = ["samples", "cases", "median difference", "greatest"]
+    headers = ["samples", "cases", "median difference", "greatest", "beyond creep"]
     text = markdown((headers, cells))
     text += f"\n\n{len(motions)} records, k_y/PGA of {', '.join(map(str, YIELDS))}; {found.source}."
     report("sliding-peer", text, write=chosen.write, page=PAGE)
