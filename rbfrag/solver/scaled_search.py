@@ -308,7 +308,7 @@ def critical_scales(
     def runner(fails_rad: float) -> Callable[[float], ScaledRun]:
         def run(scale: float) -> ScaledRun:
             if scale not in courses:
-                courses[scale] = follow(shaken.mechanism, scaled(drive, scale))
+                courses[scale] = follow(shaken.mechanism, drive.scaled(scale))
             return _judged(courses[scale], scale, fails_rad)
 
         return run
@@ -335,18 +335,6 @@ def first_motion(drive: Excitation, yield_g: float) -> float | None:
     """
     most = float(np.max(drive.k_h - yield_g * (drive.w - 1.0)))
     return yield_g / most if most > 0.0 else None
-
-
-def scaled(drive: Excitation, scale: float) -> Excitation:
-    """Return an excitation times a factor: both components, not gravity."""
-    return Excitation(
-        time_s=drive.time_s,
-        interval_s=drive.interval_s,
-        k_h=drive.k_h * scale,
-        w=1.0 + (drive.w - 1.0) * scale,
-        pga_g=drive.pga_g * scale,
-        warnings=drive.warnings,
-    )
 
 
 def _at_rest(scale: float) -> ScaledRun:

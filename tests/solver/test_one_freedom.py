@@ -326,3 +326,16 @@ def test_equations_that_are_the_same_everywhere_are_solved_exactly() -> None:
     equation = Equation(inertia=constant(1.0), drive=constant(2.0), resistance=constant(1.0))
     assert equation.uniform
     assert not rocking_equation(Block.from_angles(-15, 18, 1.0), 0.0).uniform
+
+
+def test_a_scaled_excitation_scales_the_ground_and_not_gravity() -> None:
+    drive = excitation(record(1, 0.5), record(2, 0.3))
+    half = drive.scaled(0.5)
+    assert half.k_h == pytest.approx(0.5 * drive.k_h, rel=1e-15)
+    assert half.w - 1.0 == pytest.approx(0.5 * (drive.w - 1.0), abs=1e-15)
+    assert half.pga_g == 0.5 * drive.pga_g
+    # the same numbers as of the motion times one half
+    motion = excitation(record(1, 0.5).scaled(0.5), record(2, 0.3).scaled(0.5))
+    assert half.q == pytest.approx(motion.q, rel=1e-14)
+    same = drive.scaled(1.0)
+    assert np.array_equal(same.w, drive.w)

@@ -18,7 +18,7 @@ from rbfrag.solver.one_freedom.follow import follow
 from rbfrag.solver.response import respond
 from rbfrag.solver.results import Outcome
 from rbfrag.solver.scaled_report import scaled_as_dict
-from rbfrag.solver.scaled_search import ScaledResult, critical_scale, first_motion, scaled
+from rbfrag.solver.scaled_search import ScaledResult, critical_scale, first_motion
 from rbfrag.solver.shaken_mechanism import shaken_mechanism
 from rbfrag.solver.sliding_search import sliding_displacements
 from tests.synthetic import shaking as samples
@@ -57,8 +57,8 @@ def test_the_block_moves_just_above_the_scale_of_first_motion(with_vertical: boo
     drive = excitation(motion, up)
     starts = first_motion(drive, shaken.yield_g)
     assert starts is not None
-    below = follow(shaken.mechanism, scaled(drive, starts * (1.0 - 1e-9)))
-    above = follow(shaken.mechanism, scaled(drive, starts * (1.0 + 1e-3)))
+    below = follow(shaken.mechanism, drive.scaled(starts * (1.0 - 1e-9)))
+    above = follow(shaken.mechanism, drive.scaled(starts * (1.0 + 1e-3)))
     assert below.peak == 0.0
     assert above.peak > 0.0
 
