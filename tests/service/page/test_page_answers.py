@@ -1,8 +1,6 @@
 """What is typed is answered: by the service's numbers, in its words, the newest question last."""
 
 import re
-import threading
-import time
 
 import pytest
 from playwright.sync_api import expect
@@ -91,25 +89,69 @@ def test_what_is_wrong_is_said_beside_its_field(open_page, field, text, words):
 def test_an_old_answer_never_replaces_a_newer_one(open_page, ask):
     opened = open_page()
     page = opened.page
-    held = threading.Event()
+    held, sent = [], []
 
     def slow(route):
+        sent.append(route.request.url)
         if "pgv=0.9" in route.request.url:
-            held.set()
-            time.sleep(1.0)
-        route.continue_()
+            held.append(route)
+        else:
+            route.continue_()
 
     page.context.route("**/v1/predict?**", slow)
-    page.fill("#pgv", "0.9")
-    page.wait_for_timeout(400)
-    assert held.is_set()
-    for text in ("1.1", "1.3", "1.5"):
+    for text in ("0.9", "1.1", "1.3", "1.5"):
         page.fill("#pgv", text)
-        page.wait_for_timeout(250)
+        page.wait_for_timeout(300)
+    assert len(held) == 1
+    held[0].continue_()
     expect(page.locator("#about")).to_contain_text("intensity 1.5")
-    page.wait_for_timeout(1500)
+    opened.settled()
+    page.wait_for_timeout(500)
     assert "intensity 1.5" in opened.text("#about")
     assert agrees(probability_shown(page), ask("v1/predict", p2=3, kr=0.1, pgv=1.5)["probability"])
+    assert not [url for url in sent if "pgv=1.1" in url or "pgv=1.3" in url]
+
+
+def test_what_the_chart_lacks_takes_no_answer_away(open_page):
+    opened = open_page()
+    page = opened.page
+    problem = '{"title": "Too large", "status": 413, "detail": "too many rows for this service"}'
+
+    def refuse_arrays(route):
+        if route.request.method == "POST":
+            route.fulfill(status=413, content_type="application/problem+json", body=problem)
+        else:
+            route.continue_()
+
+    page.context.route("**/v1/predict", refuse_arrays)
+    page.fill("#p2", "4")
+    expect(page.locator("#chart-caption")).to_contain_text("too many rows for this service")
+    expect(page.locator("#curve-caption")).to_contain_text("too many rows for this service")
+    assert page.get_attribute("#probability", "data-state") == "known"
+    expect(page.locator("#chart.stale")).to_have_count(1)
+    forgive(opened, "413")
+
+
+def test_a_busy_service_is_asked_again(open_page):
+    opened = open_page()
+    page = opened.page
+    problem = '{"title": "Busy", "status": 503, "detail": "other requests are being worked on"}'
+    busy = True
+
+    def answer(route):
+        if busy:
+            route.fulfill(status=503, content_type="application/problem+json", body=problem)
+        else:
+            route.continue_()
+
+    page.context.route("**/v1/**", answer)
+    page.fill("#pgv", "1.2")
+    expect(page.locator("#unreachable")).to_contain_text("other requests are being worked on")
+    busy = False
+    expect(page.locator("#unreachable")).to_be_hidden()
+    opened.settled()
+    assert probability_shown(page) != "12 %"
+    forgive(opened, "503")
 
 
 def test_a_service_out_of_reach_is_said_and_asked_again(open_page):

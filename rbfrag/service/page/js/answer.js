@@ -113,7 +113,9 @@ function drawMeter(answer) {
     .attr("class", "mark")
     .attr("x", across)
     .attr("y", 30)
-    .attr("text-anchor", (/** @type {number} */ p) => (p === 0 ? "start" : p === 1 ? "end" : "middle"))
+    .attr("text-anchor", (/** @type {number} */ p) =>
+      p === 0 ? "start" : p === 1 ? "end" : "middle",
+    )
     .text((/** @type {number} */ p) => `${readable(100 * p)} %`);
 }
 

@@ -16,17 +16,18 @@ export function useToken(text) {
 export class Refusal extends Error {
   /**
    * @param {number} status
-   * @param {{title?: string, detail?: string, errors?: object[]}} problem
+   * @param {{title?: string, detail?: string}} problem
    */
   constructor(status, problem) {
     super(problem.detail || problem.title || `the service answered with status ${status}`);
     this.status = status;
-    this.problem = problem;
   }
 }
 
-/** The service did not answer at all. */
+/** The service did not answer, or has no time or no database now: the same may be asked again. */
 export class Unreachable extends Error {}
+
+const NOT_NOW = 503;
 
 /**
  * Ask with GET.
@@ -76,9 +77,10 @@ function search(query) {
 
 /**
  * @param {string} path
- * @param {RequestInit & {headers?: Record<string, string>}} request
+ * @param {{method?: string, headers?: Record<string, string>, body?: BodyInit}} request
  */
 async function answer(path, request) {
+  /** @type {Record<string, string>} */
   const headers = { Accept: "application/json", ...request.headers };
   if (token) headers.Authorization = `Bearer ${token}`;
   let response, text;
@@ -87,11 +89,12 @@ async function answer(path, request) {
     response = await fetch(path, { ...request, headers, signal, credentials: "same-origin" });
     text = await response.text();
   } catch (error) {
-    throw new Unreachable(String(error));
+    throw new Unreachable("the service does not answer", { cause: error });
   }
   const document = parsed(text);
+  if (response.status === NOT_NOW) throw new Unreachable(document?.detail ?? "the service is busy");
   if (!response.ok) throw new Refusal(response.status, document ?? {});
-  if (document === undefined) throw new Unreachable("the answer is not JSON");
+  if (document === undefined) throw new Unreachable("what answers is not this service");
   return document;
 }
 

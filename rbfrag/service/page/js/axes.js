@@ -42,9 +42,9 @@ export function drawAxis(group, side, scale, title, how = {}) {
   const axis = { bottom: d3.axisBottom, top: d3.axisTop, left: d3.axisLeft, right: d3.axisRight };
   const values = how.values ?? marks(scale);
   const text = how.text ?? ((/** @type {number} */ value) => readable(value));
-  group.attr("class", "axis").call(
-    axis[side](scale).tickValues(values).tickFormat(text).tickSize(5).tickSizeOuter(0),
-  );
+  group
+    .attr("class", "axis")
+    .call(axis[side](scale).tickValues(values).tickFormat(text).tickSize(5).tickSizeOuter(0));
   group.selectAll(".title").data([title]).join("text").attr("class", "title");
   const [a, b] = scale.range();
   const middle = (a + b) / 2;

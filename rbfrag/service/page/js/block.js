@@ -23,9 +23,11 @@ const DOES = {
  */
 export function blockInWords(block) {
   const does = DOES[/** @type {keyof typeof DOES} */ (block.mode)];
-  if (block.state === "locked") return `Locked: no horizontal acceleration moves it; else it ${does}.`;
+  if (block.state === "locked")
+    return `Locked: no horizontal acceleration moves it; else it ${does}.`;
   if (block.state === "unstable") return `Unstable: it ${does} at rest, without an earthquake.`;
-  return `It ${does}, from a horizontal acceleration of ${quantity(block.yield_acceleration, "g", 4)}.`;
+  const from = quantity(block.yield_acceleration, "g", 4);
+  return `It ${does}, from a horizontal acceleration of ${from}.`;
 }
 
 /**
@@ -35,7 +37,13 @@ export function blockInWords(block) {
 export function blockDrawing(place) {
   /** @type {any} */
   let lines = null;
-  const sheet = sheetIn(place, "The block on its planes", MARGINS, (w) => Math.min(0.85 * w, 330), draw);
+  const sheet = sheetIn(
+    place,
+    "The block on its planes",
+    MARGINS,
+    (w) => Math.min(0.85 * w, 330),
+    draw,
+  );
   const { svg, plot } = sheet();
   const head = svg.append("marker").attr("id", "arrow").attr("viewBox", "0 0 8 8");
   head.attr("refX", 7).attr("refY", 4).attr("markerWidth", 7).attr("markerHeight", 7);
@@ -56,7 +64,10 @@ export function blockDrawing(place) {
       midY - scale * (py - (low + high) / 2),
     ];
     const path = (/** @type {number[][]} */ points) => `M${points.map((p) => at(p)).join("L")}`;
-    plot.append("path").attr("class", "rock").attr("d", `${path(lines.rock_m)}Z`);
+    plot
+      .append("path")
+      .attr("class", "rock")
+      .attr("d", `${path(lines.rock_m)}Z`);
     plot.append("path").attr("class", "planes").attr("d", path(lines.planes_m));
     plot
       .append("path")
@@ -77,8 +88,14 @@ export function blockDrawing(place) {
     }
     const [ox, oy] = at([0, 0]);
     const [tx, ty] = at(lines.resultant_m);
-    plot.append("line").attr("class", "resultant").attr("marker-end", "url(#arrow)")
-      .attr("x1", ox).attr("y1", oy).attr("x2", tx).attr("y2", ty);
+    plot
+      .append("line")
+      .attr("class", "resultant")
+      .attr("marker-end", "url(#arrow)")
+      .attr("x1", ox)
+      .attr("y1", oy)
+      .attr("x2", tx)
+      .attr("y2", ty);
     plot.append("circle").attr("class", "centroid").attr("cx", ox).attr("cy", oy).attr("r", 3.5);
     drawLength(plot, s, scale, 0.4 * (right - left));
   }
@@ -158,5 +175,9 @@ function drawLength(plot, s, scale, wanted) {
   const y = s.height - 16;
   const group = plot.append("g").attr("class", "length");
   group.append("path").attr("d", `M${s.left},${y - 3}v6m0,-3h${length * scale}m0,-3v6`);
-  group.append("text").attr("x", s.left).attr("y", y + 14).text(`${readable(length)}\u00a0m`);
+  group
+    .append("text")
+    .attr("x", s.left)
+    .attr("y", y + 14)
+    .text(`${readable(length)}\u00a0m`);
 }

@@ -53,7 +53,11 @@ export function designChart(place, moved) {
   parts.point.append("circle").attr("class", "reach").attr("r", 22);
   parts.point.append("circle").attr("class", "ring").attr("r", 12);
   parts.point.append("circle").attr("class", "dot").attr("r", 7);
-  parts.point.attr("tabindex", 0).attr("role", "slider").attr("aria-label", "Point on the chart").attr("display", "none");
+  parts.point
+    .attr("tabindex", 0)
+    .attr("role", "slider")
+    .attr("aria-label", "Point on the chart")
+    .attr("display", "none");
   /** @type {{x: any, y: any} | null} */
   let scales = null;
 

@@ -114,7 +114,8 @@ function contoursOf(grid, values, thresholds, x, y) {
           between(up, j - 0.5),
         ]);
         points.push(...placed);
-        path += `M${placed.map(([px, py]) => `${px.toFixed(2)},${py.toFixed(2)}`).join("L")}Z`;
+        const corners = placed.map((/** @type {number[]} */ at) => at.map((v) => v.toFixed(2)));
+        path += `M${corners.join("L")}Z`;
       }
     }
     return { path, points };

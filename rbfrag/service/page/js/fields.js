@@ -5,11 +5,13 @@
  * @typedef {import("./question.js").Shape} Shape
  */
 
-/**
- * Names of fields as they stand in the service's sentences, with or without their unit.
- * A field that an input shows is named by its id.
- */
-const NAMED = /(?<![\w.])(p2|kr|alpha[13]|r3|s[12]|gamma|beta|phi|pgv|pga|tm|pgd|model|level|units|dt|trace)(?:_m_s|_deg|_g|_s|_m)?(?![\w])/g;
+const NAMES = [
+  ...["p2", "kr", "alpha1", "alpha3", "r3", "s1", "s2", "gamma", "beta", "phi"],
+  ...["pgv", "pga", "tm", "pgd", "model", "level", "units", "dt", "trace"],
+];
+
+/** Names of fields as they stand in the service's sentences, with or without their unit. */
+const NAMED = new RegExp(`(?<![\\w.])(${NAMES.join("|")})(?:_m_s|_deg|_g|_s|_m)?(?!\\w)`, "g");
 
 /**
  * The form of block, shaking and model.
@@ -17,12 +19,10 @@ const NAMED = /(?<![\w.])(p2|kr|alpha[13]|r3|s[12]|gamma|beta|phi|pgv|pga|tm|pgd
  * @param {(question: Question, shapeWas: Shape) => void} changed
  */
 export function formFields(form, changed) {
-  const inputs = () => /** @type {HTMLInputElement[]} */ ([
-    ...form.querySelectorAll("input[id], select[id]"),
-  ]);
-  const shapes = () => /** @type {NodeListOf<HTMLInputElement>} */ (
-    form.querySelectorAll("input[name=shape]")
-  );
+  const inputs = () =>
+    /** @type {HTMLInputElement[]} */ ([...form.querySelectorAll("input[id], select[id]")]);
+  const shapes = () =>
+    /** @type {NodeListOf<HTMLInputElement>} */ (form.querySelectorAll("input[name=shape]"));
   /** @type {Shape} */
   let shape = "numbers";
 

@@ -1,5 +1,6 @@
-/** Design chart and fragility curve: which answers they show, and whether they are the present ones. */
+/** Design chart and fragility curve: what they ask, and whether they answer the present question. */
 
+import { Refusal } from "./ask.js";
 import { designChart } from "./chart.js";
 import { fragilityCurve } from "./curve.js";
 import { latest } from "./latest.js";
@@ -28,7 +29,7 @@ const UNITS = { pgv: "m/s", pga: "g", tm: "s", pgd: "m" };
  * @param {{to: (across: Across, x: number, kr: number | null) => void,
  *   by: (across: Across, ratioOfX: number, ratioOfKr: number) => void}} moved called when the reader
  *   moves the point: the measure that runs across, and to where or by which step
- * @param {(error: unknown) => void} failed called when the service refuses or does not answer
+ * @param {(error: unknown) => void} failed called when the service does not answer
  */
 export function figures(moved, failed) {
   /** @type {Plane | null} */
@@ -40,17 +41,21 @@ export function figures(moved, failed) {
   });
   const curve = fragilityCurve(byId("curve"));
 
-  const drawGrid = latest(async (/** @type {Answered} */ { question, answer, plane: on, present }) => {
-    const held = MEASURES.filter((name) => name !== on.across).map((name) => question.values[name]);
-    const key = JSON.stringify([answer.model, on, held]);
-    try {
-      if (key !== gridShown) chart.showGrid(await askGrid(on, answer.model, question));
-      gridShown = key;
-      chart.upToDate(present());
-    } catch (error) {
-      failed(error);
-    }
-  });
+  const drawGrid = latest(
+    async (/** @type {Answered} */ { question, answer, plane: on, present }) => {
+      const held = MEASURES.filter((name) => name !== on.across).map(
+        (name) => question.values[name],
+      );
+      const key = JSON.stringify([answer.model, on, held]);
+      try {
+        if (key !== gridShown) chart.showGrid(await askGrid(on, answer.model, question));
+        gridShown = key;
+        chart.upToDate(present());
+      } catch (error) {
+        notDrawn(error, "chart-caption");
+      }
+    },
+  );
 
   const drawCurve = latest(async (/** @type {Answered} */ asked) => {
     const { question, answer, plane: on, kr, present } = asked;
@@ -58,9 +63,19 @@ export function figures(moved, failed) {
       curve.showCurve(await askCurve(on, answer.model, kr, question));
       curve.upToDate(present());
     } catch (error) {
-      failed(error);
+      notDrawn(error, "curve-caption");
     }
   });
+
+  /**
+   * What a figure lacks does not take the answer away.
+   * @param {unknown} error
+   * @param {string} caption
+   */
+  function notDrawn(error, caption) {
+    if (!(error instanceof Refusal)) return failed(error);
+    byId(caption).textContent = `Not drawn for the present block: ${error.message}`;
+  }
 
   return {
     /**

@@ -30,7 +30,6 @@ const sheets = figures({ to: pointMoved, by: pointStepped }, failed);
 const record = recordPanel({
   changed: () => showAddress(addressOf(question, record.shown())),
   takePgv: (pgv) => set({ pgv: forField(pgv) }),
-  unreachable,
 });
 const ask = latest(answerQuestion);
 const askSoon = afterPause(TYPING_MS, () => ask(question));
@@ -143,7 +142,7 @@ function nothingKnown(why) {
 /** @param {unknown} error */
 function failed(error) {
   sheets.stale();
-  if (error instanceof Unreachable) return unreachable(() => ask(question));
+  if (error instanceof Unreachable) return unreachable(error, () => ask(question));
   if (!(error instanceof Refusal)) throw error;
   nothingWrong(form);
   if (error.status === 401) {

@@ -66,6 +66,7 @@ export function asked({ shape, values }) {
  * @returns {Question}
  */
 export function fromQuery(query) {
+  /** @type {Values} */
   const values = { ...DEFAULTS };
   if (MEASURES.some((name) => query.has(name))) values.pgv = "";
   for (const [name, text] of query) if (name in values) values[name] = text;

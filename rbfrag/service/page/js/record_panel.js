@@ -9,6 +9,7 @@ import { byId, textIn } from "./page.js";
 import { recordsFrom, valueAt } from "./record.js";
 import { askSpectrum } from "./service.js";
 import { spectrumPlot } from "./spectrum.js";
+import { reached, unreachable } from "./trouble.js";
 
 const PAUSE_MS = 350;
 const READING = ["units", "dt", "trace"];
@@ -23,8 +24,7 @@ const BOUND = 1.02;
 
 /**
  * The panel.
- * @param {{changed: () => void, takePgv: (pgv_m_s: number) => void,
- *   unreachable: (retry: () => void) => void}} tell whom it tells what
+ * @param {{changed: () => void, takePgv: (pgv_m_s: number) => void}} tell whom it tells what
  */
 export function recordPanel(tell) {
   const panel = /** @type {HTMLElement} */ (document.querySelector(".record"));
@@ -40,13 +40,15 @@ export function recordPanel(tell) {
     const reading = Object.fromEntries(READING.map((id) => [id, textIn(id)]));
     try {
       const found = await askSpectrum(asked, reading, block?.p2 ?? NaN);
+      reached();
       nothingWrong(panel);
       if (asked === file) show(found);
     } catch (error) {
-      if (error instanceof Unreachable) return tell.unreachable(() => ask(asked));
+      if (error instanceof Unreachable) return unreachable(error, () => ask(asked));
       if (!(error instanceof Refusal)) throw error;
       nothingWrong(panel);
-      sayWrong(`${asked.name}: ${error.message}`, byId("record-error"));
+      const words = error.message.replace(/^the file: /, "");
+      sayWrong(`${asked.name}: ${words}`, byId("record-error"));
       show(null);
     }
   });
@@ -113,8 +115,10 @@ function comparison(spectrum, { p2, y }) {
   const values = known.map(({ polarity, x }) => `${quantity(x, "m/s")} ${polarity}`).join(" and ");
   const able = known.filter(({ x }) => y <= BOUND * x).map(({ polarity }) => polarity);
   const verdict = able.length
-    ? `That is not above X(p) in the ${able.join(" and the ")} polarity: so this record may topple the block.`
-    : "That is above X(p) in both polarities: without vertical motion this record does not topple the block.";
+    ? `That is not more than 2 % above X(p) in the ${able.join(" and the ")} polarity: so this record ` +
+      "may topple the block."
+    : "That is more than 2 % above X(p) in both polarities: without vertical motion this record does " +
+      "not topple the block.";
   const own = `this block has y = ${quantity(y, "m/s")}`;
   return `At p² = ${quantity(p2, "1/s²")} X(p) is ${values}; ${own}. ${verdict}`;
 }

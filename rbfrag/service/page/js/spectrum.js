@@ -24,7 +24,13 @@ export function spectrumPlot(place) {
   let block = null;
   /** Distance from centroid to toe of a rectangular block, times its p² [m/s²]. */
   let sizeTimesP2 = NaN;
-  const sheet = sheetIn(place, "Toppling spectrum of the record", MARGINS, (w) => Math.min(Math.max(0.6 * w, 300), 430), draw);
+  const sheet = sheetIn(
+    place,
+    "Toppling spectrum of the record",
+    MARGINS,
+    (w) => Math.min(Math.max(0.6 * w, 300), 430),
+    draw,
+  );
   const { svg, plot } = sheet();
   const clip = svg.append("clipPath").attr("id", "spectrum-clip").append("rect");
   plot.append("rect").attr("class", "area");
@@ -81,36 +87,41 @@ export function spectrumPlot(place) {
     spot.selectAll("*").remove();
     if (!block || !(block.y > 0)) return;
     const [px, py] = [x(block.p2), y(block.y)];
-    spot.append("circle").attr("class", "dot").attr("r", 6).attr("cx", px).attr("cy", py);
     const right = px < (x.range()[0] + x.range()[1]) / 2;
     spot
       .append("text")
-      .attr("class", "on-line")
+      .attr("class", right ? "beside" : "beside before")
       .attr("x", px + (right ? 11 : -11))
       .attr("y", py)
       .attr("dy", "0.32em")
-      .attr("text-anchor", right ? "start" : "end")
       .text("this block");
+    spot.append("circle").attr("class", "dot").attr("r", 6).attr("cx", px).attr("cy", py);
   }
 
   /** @param {import("./sheet.js").Sheet} s */
   function drawKey(s) {
     const items = [
-      ["forward", "X(p), forward"],
-      ["reverse", "X(p), reverse"],
-      ["pgv", `PGV`],
+      ["forward", "X, forward"],
+      ["reverse", "X, reverse"],
+      ["pgv", "PGV"],
     ];
-    const step = (s.right - s.left) / items.length;
+    const step = Math.min((s.width - 24) / items.length, 150);
+    const from = Math.min(s.left, s.width - 12 - step * items.length);
     const rows = key.selectAll("g").data(items).join("g");
-    rows.attr("transform", (/** @type {any} */ _, /** @type {number} */ i) =>
-      `translate(${s.left + i * step},${s.height - 10})`,
+    rows.attr(
+      "transform",
+      (/** @type {any} */ _, /** @type {number} */ i) =>
+        `translate(${from + i * step},${s.height - 10})`,
     );
     rows.selectAll("*").remove();
     rows
       .append("path")
       .attr("class", (/** @type {string[]} */ [kind]) => `spectrum ${kind}`)
       .attr("d", "M0,-4h22");
-    rows.append("text").attr("x", 28).text((/** @type {string[]} */ [, text]) => text);
+    rows
+      .append("text")
+      .attr("x", 28)
+      .text((/** @type {string[]} */ [, text]) => text);
   }
 
   return {

@@ -27,7 +27,9 @@ export function writeText(element, text) {
  * @param {string} text
  */
 export function writeSvgText(selection, text) {
-  const parts = text.split(PARTS).map((part, i) => ({ part, low: i % 2 === 1, after: i > 0 && i % 2 === 0 }));
+  const parts = text
+    .split(PARTS)
+    .map((part, i) => ({ part, low: i % 2 === 1, after: i > 0 && i % 2 === 0 }));
   selection
     .selectAll("tspan")
     .data(parts)

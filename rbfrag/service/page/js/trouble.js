@@ -6,13 +6,14 @@ import { byId, textIn } from "./page.js";
 const RETRY_MS = 4000;
 
 /**
- * Say that the service does not answer, and try again.
+ * Say that there is no answer now, and try again.
+ * @param {import("./ask.js").Unreachable} error
  * @param {() => void} retry
  */
-export function unreachable(retry) {
+export function unreachable(error, retry) {
   const banner = byId("unreachable");
-  banner.textContent =
-    "The service does not answer. What is shown is its last answer; the page keeps asking.";
+  const still = "What is shown is the last answer; the page keeps asking.";
+  banner.textContent = `No answer now: ${error.message}. ${still}`;
   banner.hidden = false;
   setTimeout(retry, RETRY_MS);
 }
