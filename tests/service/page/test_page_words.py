@@ -1,0 +1,90 @@
+"""How the page writes numbers: never more, and never else, than the number itself."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.service.page.reading import agrees
+
+
+@pytest.fixture
+def run(open_page):
+    """Call a function of one of the page's modules for each of many arguments."""
+    page = open_page().page
+
+    def call(module, name, arguments):
+        return page.evaluate(
+            """async ([module, name, every]) => {
+              const found = await import(new URL(`js/${module}`, document.baseURI).href);
+              return every.map((given) => found[name](...given));
+            }""",
+            [module, name, arguments],
+        )
+
+    return call
+
+
+def test_percent_agrees_with_the_probability(run):
+    small = np.geomspace(1e-9, 0.5, 700)
+    values = [*small.tolist(), *(1.0 - small).tolist(), 0.0, 1.0, 0.1, 0.9, 0.99, 0.999, 0.9999]
+    written = run("percent.js", "percent", [[p] for p in values])
+    for p, text in zip(values, written, strict=True):
+        plain = text.replace("\u00a0", " ")
+        if p in (0.0, 1.0):
+            assert plain == f"{100 * p:g} %"
+        else:
+            assert plain not in ("0 %", "100 %")
+            assert agrees(plain, p), (p, plain)
+
+
+def test_words_count_what_the_numbers_say(run):
+    answers = [
+        {"probability": p, "ci_low": low, "ci_high": high, "level": 0.95}
+        for p, low, high in [
+            (0.12, 0.05, 0.4),
+            (0.004, 0.001, 0.02),
+            (0.9996, 0.9, 0.99999),
+            (0, 0, 0),
+        ]
+    ]
+    twelve, few, most, none = run("percent.js", "inWords", [[each] for each in answers])
+    assert "Of 100" in twelve
+    assert "about 12 topple" in twelve
+    assert "Between 5 and 40" in twelve
+    assert "Of 1\u202f000" in few
+    assert "about 4 topple" in few
+    assert "9\u202f996" in most
+    assert "almost all" in most
+    assert none.startswith("No earthquake motion")
+
+
+def test_readable_numbers_keep_their_value(run):
+    values = [*np.geomspace(1e-8, 1e9, 300).tolist(), 0.0, -0.25, 1234.5]
+    written = run("numbers.js", "readable", [[v] for v in values])
+    for value, text in zip(values, written, strict=True):
+        assert float(text.replace("\u2212", "-")) == pytest.approx(value, rel=5.1e-3)
+
+
+def test_a_spectrum_is_read_between_its_points(run):
+    sizes = np.geomspace(0.1, 30.0, 41).tolist()
+    spectrum = {"p2": sizes, "forward": [2.0 * p2**-0.3 for p2 in sizes], "reverse": sizes}
+    between = [0.1, 0.123, 3.0, 29.0, 30.0]
+    found = run("record.js", "valueAt", [[spectrum, "forward", p2] for p2 in between])
+    assert found == pytest.approx([2.0 * p2**-0.3 for p2 in between], rel=1e-9)
+    outside = run("record.js", "valueAt", [[spectrum, "forward", p2] for p2 in (0.09, 31.0)])
+    assert all(math.isnan(value) for value in outside)
+
+
+def test_a_spectrum_survives_a_link(run):
+    spectrum = {
+        "name": "Größe 記録 <b>&",
+        "pgv_m_s": 0.25,
+        "p2": [0.1, 1.0, 30.0],
+        "forward": [0.3, 0.2, 0.1],
+        "reverse": [0.31, 0.21, 0.0],
+        "warnings": ["a doubt; and another"],
+    }
+    [fragment] = run("record.js", "toFragment", [[spectrum]])
+    assert all(each.isascii() and (each.isalnum() or each in "=-_") for each in fragment)
+    assert run("record.js", "fromFragment", [[fragment]]) == [spectrum]
