@@ -68,6 +68,14 @@ def test_the_printed_table(shell: Shell, record: Path) -> None:
     assert "rockmass: " in result.stderr
 
 
+def test_a_stored_motion_by_its_number(shell: Shell, record: Path) -> None:
+    shell("motions", "add", record, "--raw")
+    asked = ("rockmass", "mass.toml", "--n", "30", "--motion")
+    by_number, by_file = (shell.json(*asked, name)["shaking"] for name in ("1", record))
+    assert by_number["scales"] == by_file["scales"]
+    assert by_number["scales"][0]["all"]["moved"] > 0
+
+
 @pytest.mark.parametrize(
     ("options", "word"),
     [
