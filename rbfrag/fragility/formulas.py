@@ -2,7 +2,7 @@
 
 Written once: `predict` calls these functions as they stand, and for many rows the same
 functions are compiled (`rbfrag.fragility.compiled_formulas`), so that both give the same bits.
-No library is loaded here.
+Logarithm and exponential are our own for that reason. No library is loaded here.
 
 A model is eta = Σ b_i f_i and P = F(eta); the numbers (1)-(9) are those of
 docs/theory/fragility.md. The slopes of eta by the parameters are the f_i, except for the two
@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from rbfrag.fragility.elementary import MOST, exponential, ln
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 LINE = 0
@@ -34,8 +35,12 @@ MOST_PARAMETERS = 6
 LEAST_Y_M_S = 1e-290
 """Velocities and accelerations are taken for at least this much, which no logarithm minds."""
 
-FLOOR_FROM, FLOOR_STEP, FLOOR_NODES = -10.0, 0.5, 41
-"""Nodes of eta at which the least width of an interval, over its quantile, is tabulated."""
+FLOOR_NODES = 41
+"""Nodes at which the least width of an interval, over its quantile, is tabulated: by eta, and by
+y/2x, the share of twice the velocity."""
+FLOOR_FROM, FLOOR_STEP = -10.0, 0.5
+"""The first node of eta, and from one to the next."""
+FLOOR_SHARE_STEP = 0.025
 
 SHAPES = {
     ("wls", "pgv"): LINE,
@@ -91,7 +96,6 @@ EXPONENTS = frozenset({"m_minus_1", "b_ln_p"})
 """Parameters of models whose exponent M was estimated: P then depends on p beside y."""
 
 _ROOT_HALF = math.sqrt(0.5)
-_FAR = 700.0  # beyond it exp leaves the range of numbers
 
 
 def bound(shape: int, y: float, p: float, x: float, pga_g: float) -> int:
@@ -123,25 +127,25 @@ def features(
     Only where :func:`bound` says FREE. Arguments as there, and Tm [s] for the shapes that
     need it.
     """
-    ln_y = math.log(y)
-    if shape == RATIO:  # (4)
-        return 1.0, math.log(x) - ln_y, math.log(p), 0.0, 0.0, 0.0
-    if shape == POWER:  # (9)
-        return 1.0, math.log(x) - ln_y, 0.0, 0.0, 0.0, 0.0
     ground = pga_g * STANDARD_GRAVITY_M_S2
-    if shape == RECORD:  # (8)
-        return 1.0, math.log(x) - ln_y, math.log(p * x / ground), 0.0, 0.0, 0.0
     share = y / (2.0 * x)
+    if shape >= ODDS_PGA and shape <= BOUNDED_TM and shape != BOUNDED_PGV:
+        r = y * p / ground
+        ln_z = ln(p * x / ground)
+        ln_zt = ln(p * tm_s / (2.0 * math.pi)) if shape in (ODDS_TM, BOUNDED_TM) else 0.0
+        if shape <= ODDS_TM:  # (6)
+            return 1.0, ln((1.0 - r) / r), ln_z, ln_zt, 0.0, 0.0
+        return 1.0, -ln(r), ln(1.0 - r), ln(1.0 - share), ln_z, ln_zt  # (7)
     if shape == ODDS_PGV:  # (5)
-        return 1.0, math.log((1.0 - share) / share), 0.0, 0.0, 0.0, 0.0
+        return 1.0, ln((1.0 - share) / share), 0.0, 0.0, 0.0, 0.0
     if shape == BOUNDED_PGV:  # (7)
-        return 1.0, -math.log(share), math.log(1.0 - share), 0.0, 0.0, 0.0
-    r = y * p / ground
-    ln_z = math.log(p * x / ground)
-    ln_zt = math.log(p * tm_s / (2.0 * math.pi)) if shape in (ODDS_TM, BOUNDED_TM) else 0.0
-    if shape <= ODDS_TM:  # (6)
-        return 1.0, math.log((1.0 - r) / r), ln_z, ln_zt, 0.0, 0.0
-    return 1.0, -math.log(r), math.log(1.0 - r), math.log(1.0 - share), ln_z, ln_zt  # (7)
+        return 1.0, -ln(share), ln(1.0 - share), 0.0, 0.0, 0.0
+    ln_ratio = ln(x) - ln(y)
+    if shape == RATIO:  # (4)
+        return 1.0, ln_ratio, ln(p), 0.0, 0.0, 0.0
+    if shape == POWER:  # (9)
+        return 1.0, ln_ratio, 0.0, 0.0, 0.0, 0.0
+    return 1.0, ln_ratio, ln(p * x / ground), 0.0, 0.0, 0.0  # (8)
 
 
 def score(
@@ -171,9 +175,9 @@ def score(
         by_v = eta / (variance * -2.0)
         return eta, 1.0 / sigma, x / sigma, by_v, by_v * x, by_v * x * x, 0.0
     if shape == LOGNORMAL:  # (3)
-        sigma = math.exp(b[2])
-        ln_x, ln_p = math.log(x), math.log(p)
-        eta = (b[0] + b[1] * ln_x + b[3] * ln_p - math.log(y)) / sigma
+        sigma = exponential(b[2])
+        ln_x, ln_p = ln(x), ln(p)
+        eta = (b[0] + b[1] * ln_x + b[3] * ln_p - ln(y)) / sigma
         return eta, 1.0 / sigma, ln_x / sigma, -eta, ln_p / sigma, 0.0, 0.0
     f0, f1, f2, f3, f4, f5 = features(shape, y, p, x, pga_g, tm_s)
     eta = b[0] * f0 + b[1] * f1 + b[2] * f2 + b[3] * f3 + b[4] * f4 + b[5] * f5
@@ -205,22 +209,48 @@ def standard_error(
     return math.sqrt(total) if total > 0.0 else 0.0
 
 
-def least_width(floor: Sequence[float], eta: float) -> float:
+def least_width(floor: Sequence[float], eta: float, share: float) -> float:
     """Return the least width of an interval over its quantile, linear between nodes.
 
+    The less of what the tables by eta and by y/2x say; why, is told in
+    :mod:`rbfrag.fragility.interval_floor`.
+
     Args:
-        floor: its values at the nodes; empty for none.
-        eta: where.
+        floor: values at the nodes of eta, then at those of y/2x; empty for none.
+        eta: of the block.
+        share: its y/2x.
     """
     if len(floor) == 0:
         return 0.0
-    place = (eta - FLOOR_FROM) / FLOOR_STEP
-    if not place > 0.0:
-        return floor[0]
-    if place >= FLOOR_NODES - 1.0:
-        return floor[FLOOR_NODES - 1]
-    node = int(place)
-    return floor[node] + (place - node) * (floor[node + 1] - floor[node])
+    by_eta = _between(floor, 0, (eta - FLOOR_FROM) / FLOOR_STEP)
+    by_share = _between(floor, FLOOR_NODES, share / FLOOR_SHARE_STEP)
+    return by_eta if by_eta < by_share else by_share
+
+
+def _between(floor: Sequence[float], first: int, place: float) -> float:
+    last = FLOOR_NODES - 1.0
+    place = place if place > 0.0 else 0.0
+    place = place if place < last else last
+    node = int(place if place < last - 1.0 else last - 1.0)
+    value = floor[first + node]
+    return value + (place - node) * (floor[first + node + 1] - value)
+
+
+def widened(least: float, middle: float, low: float, high: float) -> tuple[float, float]:
+    """Return the ends of an interval of at least some width, inside 0 and 1.
+
+    Args:
+        least: width.
+        middle: the probability; what lacks is added in proportion to the room on either side.
+        low: lower end.
+        high: upper end.
+    """
+    lacking = least - (high - low)
+    lacking = lacking if lacking > 0.0 else 0.0
+    low, high = low - lacking * middle, high + lacking * (1.0 - middle)
+    below, above = -low if low < 0.0 else 0.0, high - 1.0 if high > 1.0 else 0.0
+    low, high = low - above, high + below
+    return low if low > 0.0 else 0.0, high if high < 1.0 else 1.0
 
 
 def interval(link: int, eta: float, reach: float) -> tuple[float, float, float]:
@@ -242,11 +272,16 @@ def interval(link: int, eta: float, reach: float) -> tuple[float, float, float]:
             -math.expm1(-low) if low > 0.0 else 0.0,
             -math.expm1(-high) if high > 0.0 else 0.0,
         )
-    falling = math.exp(-min(max(eta, -_FAR), _FAR))
-    spread = math.exp(min(reach, _FAR))
+    falling = exponential(-eta)
+    spread = exponential(reach)
     if link == LOGIT:
         return 1.0 / (1.0 + falling), 1.0 / (1.0 + falling * spread), 1.0 / (1.0 + falling / spread)
-    return math.exp(-falling), math.exp(-falling * spread), math.exp(-falling / spread)
+    return _faded(falling), _faded(falling * spread), _faded(falling / spread)
+
+
+def _faded(x: float) -> float:
+    # e^-700 is not 0, which P of an impossible block is to be
+    return 0.0 if x > MOST else exponential(-x)
 
 
 def answer(
@@ -282,15 +317,8 @@ def answer(
     eta, f0, f1, f2, f3, f4, f5 = score(shape, b, y, p, x, pga_g, tm_s)
     reach = half_width * standard_error(v, f0, f1, f2, f3, f4, f5)
     middle, low, high = interval(link, eta, reach)
-    lacking = half_width * least_width(floor, eta) - (high - low)
-    if lacking > 0.0:
-        # in proportion to the room on either side, which keeps within 0 and 1
-        low, high = low - lacking * middle, high + lacking * (1.0 - middle)
-        if low < 0.0:
-            low, high = 0.0, high - low
-        elif high > 1.0:
-            low, high = low - (high - 1.0), 1.0
-        low, high = max(low, 0.0), min(high, 1.0)
+    least = half_width * least_width(floor, eta, y / (2.0 * x))
+    low, high = widened(least, middle, low, high)
     return middle, low, high
 
 
@@ -299,6 +327,7 @@ def is_plain(
     b: Sequence[float],
     limits: Sequence[float],
     p2: float,
+    p: float,
     kr: float,
     y: float,
     x: float,
@@ -316,7 +345,8 @@ def is_plain(
         shape: one of LINE … POWER.
         b: six parameters.
         limits: low and high edges of p², x, y, Tm and PGV/(PGA g).
-        p2: frequency parameter of the block [1/s²].
+        p2: frequency parameter p² of the block [1/s²].
+        p: its root [1/s].
         kr: its yield acceleration coefficient.
         y: its toppling velocity [m/s].
         x: intensity [m/s].
@@ -339,7 +369,7 @@ def is_plain(
     ):
         return False
     if shape != LINE:
-        return bound(shape, y, math.sqrt(p2), x, pga_g) == FREE
+        return bound(shape, y, p, x, pga_g) == FREE
     mean = b[1] * x + b[0]
     variance = (b[4] * x + b[3]) * x + b[2]
     # 2.5 % below zero is a mean of 1.96 standard deviations; the checks decide near it

@@ -3,11 +3,16 @@
 The interval of a model says how well its parameters are known. A model of few measures has
 few parameters, so that its interval may come out narrower than that of a model which knows
 more of the motion, though the answer is vaguer. To keep the order, every model carries a
-table: the widest interval that any model which knows more gives, at level 0.95, for a block
-and a motion at which the model itself has that eta. Its own intervals are never narrower.
+table of least widths, and its own intervals are never narrower.
+
+The least width is the less of two, each of which is enough: the widest interval that any model
+which knows more gives, at level 0.95, for a block and a motion at which the model itself has that
+eta; and the widest one for a block of that y/2x, with PGV the same for all models that know it.
+Either alone would add up from model to model: the second does not, because what a model takes
+over from a better one at some y/2x the next one compares at the same y/2x.
 
 With few earthquakes the widest is noise: a richer model that is hardly determined may know
-nothing at all of some block, which says little of the others. The table then holds what nine in
+nothing at all of some block, which says little of the others. The tables then hold what nine in
 ten of the intervals do not exceed.
 """
 
@@ -46,6 +51,9 @@ RICHER = {
     "xp": (),
 }
 """The terms of the models that know more than one of each term, directly or by their table."""
+
+_ROUNDING = np.array([0.06, 0.24, 0.4, 0.24, 0.06])
+"""Weights of a node and its neighbours, a bell of standard deviation one node."""
 
 _BLOCKS = np.geomspace(0.02, 2.0, 60)
 
@@ -114,7 +122,7 @@ def _intensities(pgv: FloatArray, pga: FloatArray, tm: FloatArray) -> dict[str, 
 def interval_floor(
     model: FragilityModel, richer: Sequence[FragilityModel], sample: Sample
 ) -> list[float]:
-    """Return the least width of the model's interval over its quantile, at each node of eta.
+    """Return the least widths of the model's interval over its quantile, at all nodes.
 
     With fewer than `FEW_EARTHQUAKES` it is the `SHARE_OF_FEW` quantile of a cell's widths.
 
@@ -146,7 +154,7 @@ def interval_floor(
             other.link,
             np.array(other.padded),
             np.array(other.packed_covariance),
-            np.array(other.floor),
+            np.array(other.floor or (0.0,) * (2 * formulas.FLOOR_NODES)),
             half_width,
             sample.y,
             sample.p,
@@ -159,20 +167,32 @@ def interval_floor(
         )
         widest = np.fmax(widest, (high - low) / half_width)
     few = min(other.degrees_of_freedom for other in richer) < FEW_EARTHQUAKES - 1
-    return _table(eta, widest * MARGIN, SHARE_OF_FEW if few else 1.0)
-
-
-def _table(eta: FloatArray, width: FloatArray, share: float) -> list[float]:
+    share = SHARE_OF_FEW if few else 1.0
     known = np.isfinite(eta)
-    cell = np.floor((eta[known] - formulas.FLOOR_FROM) / formulas.FLOOR_STEP).astype(np.int64)
-    cell = np.clip(cell, -1, formulas.FLOOR_NODES - 1) + 1  # the first and last have no end
-    order = np.argsort(cell, kind="stable")
-    cell, width = cell[order], width[known][order]
-    cells = np.arange(formulas.FLOOR_NODES + 1)
-    starts, ends = np.searchsorted(cell, cells), np.searchsorted(cell, cells, side="right")
-    by_cell = np.zeros(cells.size)
-    for i, (start, end) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
-        if end > start:
-            by_cell[i] = np.quantile(width[start:end], share)
-    # A line between nodes is nowhere below a cell whose two ends are not.
-    return [float(each) for each in np.maximum(by_cell[:-1], by_cell[1:])]
+    by_y = sample.y[known] / (2.0 * sample.intensity_m_s[model.term.name][known])
+    places = (
+        (eta[known] - formulas.FLOOR_FROM) / formulas.FLOOR_STEP,
+        by_y / formulas.FLOOR_SHARE_STEP,
+    )
+    widest = widest[known] * MARGIN
+    return [value for place in places for value in _table(place, widest, share)]
+
+
+def _table(place: FloatArray, width: FloatArray, share: float) -> list[float]:
+    """Return widths at the nodes such that the lines between them are below none of a cell.
+
+    Args:
+        place: where each interval is, in nodes from the first.
+        width: its width.
+        share: quantile of a cell's widths that stands for it.
+    """
+    cell = np.clip(np.floor(place), 0, formulas.FLOOR_NODES - 2).astype(np.int64)
+    nodes = np.zeros(formulas.FLOOR_NODES)
+    for each in np.unique(cell).tolist():
+        own = np.quantile(width[cell == each], share)
+        nodes[each : each + 2] = np.maximum(nodes[each : each + 2], own)
+    # Rounded off upwards, or bands would show the cells.
+    around = np.pad(nodes, 3, mode="edge")
+    highest = np.maximum(np.maximum(around[:-2], around[1:-1]), around[2:])
+    smooth = np.convolve(highest, _ROUNDING, mode="valid")
+    return [float(value) for value in np.maximum(nodes, smooth)]

@@ -50,7 +50,8 @@ class FragilityModel:
         parameters: values of the coefficients, without those that the model does not have.
         padded: the six parameters of the formula.
         packed_covariance: the 21 numbers of :func:`rbfrag.fragility.formulas.standard_error`.
-        floor: least widths of the interval over its quantile, or empty.
+        floor: least widths of the interval over its quantile, of
+            :func:`rbfrag.fragility.formulas.least_width`, or empty.
         limits: edges of the fitted ranges for :func:`rbfrag.fragility.formulas.is_plain`.
         limits_with_both: the same where PGV and PGA are both given, with the range of PGV/PGA
             that earthquakes have.
@@ -103,8 +104,13 @@ class FragilityModel:
                 f"method {row.method} on {row.term} has {', '.join(names)}: fit it again"
             )
         floor = row.diagnostics.get("interval_floor") or ()
-        if not isinstance(floor, list | tuple) or len(floor) not in (0, formulas.FLOOR_NODES):
-            raise ModelError(f"model {row.name!r} holds a torn table of least widths: fit it again")
+        if isinstance(floor, list | tuple) and len(floor) == formulas.FLOOR_NODES:
+            # stored before there was a second table, which must not be the lower one then
+            floor = [*floor, *[max(floor)] * formulas.FLOOR_NODES]
+        if not isinstance(floor, list | tuple) or len(floor) not in (0, 2 * formulas.FLOOR_NODES):
+            raise ModelError(
+                f"model {row.name!r} holds a table of least widths of another size: fit it again"
+            )
         limits = tuple(
             edge
             for variable in ("p2", "intensity_m_s", "y_m_s", "tm_s", "pgv_over_pga_s")

@@ -228,6 +228,7 @@ def _predict_one(
             model.padded,
             model.limits_with_both if both else model.limits,
             p2,
+            p,
             kr,
             y,
             x,

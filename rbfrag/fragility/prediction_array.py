@@ -28,6 +28,8 @@ CHUNK = 1 << 17
 COMPILED_FROM = 20_000
 """Rows from which on the compiled formulas are worth loading."""
 
+NO_FLOOR = (0.0,) * (2 * formulas.FLOOR_NODES)
+
 _COMPILED = "rbfrag.fragility.compiled_formulas"
 
 
@@ -132,18 +134,13 @@ def _plain_part(
     if compiled:
         from rbfrag.fragility.compiled_formulas import plain_answers
 
-        plain_answers(
-            model.shape,
-            model.link,
-            np.array(model.padded),
-            np.array(model.packed_covariance),
-            np.array(model.floor),
+        plain_answers(model.shape, model.link)(
+            model.padded,
+            model.packed_covariance,
+            np.array(model.floor or NO_FLOOR),
             half_width,
-            np.array(model.limits_with_both if both else model.limits),
-            *columns,  # type: ignore[call-arg]
-            np.array([min(column.size - 1, 1) for column in columns], dtype=np.int64)
-            if y.size > 1
-            else np.zeros(len(columns), dtype=np.int64),
+            model.limits_with_both if both else model.limits,
+            *columns,
             y,
             probability,
             low,
@@ -245,7 +242,7 @@ def _answer_each(
             model.link,
             np.array(model.padded),
             np.array(model.packed_covariance),
-            np.array(model.floor),
+            np.array(model.floor or NO_FLOOR),
             half_width,
             y, p, x, pga, tm, *three,
         )  # fmt: skip

@@ -10,6 +10,8 @@ from numba import njit
 P = ParamSpec("P")
 R = TypeVar("R")
 
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
     """Compile a function over arrays to machine code.
@@ -33,8 +35,17 @@ def fused_kernel(function: Callable[P, R]) -> Callable[P, R]:
     return _compile(function, {"fastmath": {"contract"}})
 
 
+def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile like :func:`kernel`, as a part of every kernel that calls it.
+
+    For short functions without a branch: a loop that calls nothing takes several rows at a time.
+    Nothing of it is kept on disk but in those kernels.
+    """
+    return cast("Callable[P, R]", njit(**_OPTIONS, forceinline=True)(function))
+
+
 def _compile(function: Callable[P, R], extra: dict[str, Any]) -> Callable[P, R]:
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", **extra}
+    options: dict[str, Any] = {**_OPTIONS, **extra}
     try:
         return cast("Callable[P, R]", njit(cache=True, **options)(function))
     except RuntimeError:  # numba's "cannot cache function": no folder is writable

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbfrag.db.rows import ModelRow
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility import interval_floor, outcome_method, prediction_array
 from rbfrag.fragility.answers import MotionPrediction
 from rbfrag.fragility.fitting import fit
@@ -171,7 +171,7 @@ def test_many_chunks_are_one_answer(monkeypatch):
 
 
 def test_the_least_width_is_kept_inside_zero_and_one():
-    floor = [0.2] * FLOOR_NODES
+    floor = [0.2] * (2 * FLOOR_NODES)
     wide = model_of("logistic", "pgv", interval_floor=floor)
     for kr in np.geomspace(1e-3, 1.0, 40):
         answer = predict(3.0, float(kr), pgv_m_s=0.5, model=wide)
@@ -213,16 +213,36 @@ def test_knowing_less_is_never_narrower(monkeypatch):
     assert narrower == 0
 
 
+def test_the_lower_of_the_two_tables_holds():
+    low, high = [0.05] * FLOOR_NODES, [0.3] * FLOOR_NODES
+    for floor in (low + high, high + low):
+        narrow = model_of("logistic", "pgv", interval_floor=floor)
+        plain = predict(3.0, 1.2, pgv_m_s=0.5, model=MODELS["logistic-pgv"])
+        answer = predict(3.0, 1.2, pgv_m_s=0.5, model=narrow)
+        assert plain.ci_high - plain.ci_low < 0.05
+        assert answer.ci_high - answer.ci_low == pytest.approx(0.05 * 1.959963985, rel=1e-9)
+
+
+def test_a_table_of_before_there_were_two_still_holds():
+    once = model_of("logistic", "pgv", interval_floor=[0.1, *[0.2] * (FLOOR_NODES - 1)])
+    for kr in (0.02, 0.3, 1.2):
+        answer = predict(3.0, kr, pgv_m_s=0.5, model=once)
+        width = answer.ci_high - answer.ci_low
+        assert width == pytest.approx((0.1 if kr > 1.0 else 0.2) * 1.959963985, rel=1e-6)
+    with pytest.raises(ModelError, match="another size"):
+        model_of("logistic", "pgv", interval_floor=[0.1] * 7)
+
+
 def test_few_earthquakes_do_not_widen_to_the_widest():
     random = np.random.default_rng(2)
-    eta = np.full(1000, FLOOR_FROM + 2.3 * FLOOR_STEP)
-    width = random.uniform(0.0, 1.0, eta.size)
-    widest, nine_in_ten = (interval_floor._table(eta, width, share) for share in (1.0, 0.9))
-    # the two nodes of the cell, and no other
-    assert [i for i, value in enumerate(widest) if value > 0.0] == [2, 3]
-    assert widest[2] == width.max()
-    assert nine_in_ten[2] == np.quantile(width, 0.9)
-    assert 0.85 < nine_in_ten[2] < 0.95 < widest[2]
+    place, width = np.full(1000, 20.3), random.uniform(0.0, 1.0, 1000)
+    widest, nine_in_ten = (interval_floor._table(place, width, share) for share in (1.0, 0.9))
+    # both nodes of the cell, and rounded off a little beyond
+    assert widest[20] == widest[21] == width.max()
+    assert max(nine_in_ten) == np.quantile(width, 0.9) < 0.95 < width.max()
+    assert [i for i, value in enumerate(widest) if value > 0.0] == list(range(17, 25))
+    assert widest[:21] == sorted(widest[:21])
+    assert widest[21:] == sorted(widest[21:], reverse=True)
 
 
 def shaking(n=800, dt=0.01):
