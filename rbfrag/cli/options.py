@@ -157,6 +157,35 @@ Pga = Annotated[
 
 Tm = Annotated[float | None, typer.Option("--tm", help="Mean period [s].", show_default=False)]
 
+HeldP2 = Annotated[
+    float | None,
+    typer.Option(
+        "--p2",
+        help="Frequency parameter p² [1/s²] of the blocks drawn. Default: the middle of the "
+        "fitted range.",
+        show_default=False,
+    ),
+]
+
+HeldPga = Annotated[
+    float | None,
+    typer.Option(
+        "--pga",
+        help="PGA [g] of the motions drawn. Default: in proportion to PGV, by the middle of the "
+        "fitted range.",
+        show_default=False,
+    ),
+]
+
+HeldTm = Annotated[
+    float | None,
+    typer.Option(
+        "--tm",
+        help="Mean period [s] of the motions drawn. Default: the middle of the fitted range.",
+        show_default=False,
+    ),
+]
+
 Pgd = Annotated[
     float | None,
     typer.Option("--pgd", help="Peak ground displacement [m].", show_default=False),

@@ -35,23 +35,22 @@ def plot_fit(
     """Draw the data of a fit with its 2.5 %, 50 % and 97.5 % failure lines and histograms."""
     from rbfrag.db.engine import opened_database
     from rbfrag.db.model_store import load_model
-    from rbfrag.db.queries import combination_table
     from rbfrag.fragility.fit_data import fit_data
     from rbfrag.fragility.model import FragilityModel
-    from rbfrag.fragility.source import FitSource
+    from rbfrag.fragility.source import read_source
     from rbfrag.plots.fit import plot_fit as draw
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         fitted = FragilityModel.from_row(load_model(connection, model))
         suite = fitted.row.diagnostics.get("suite")
-        table = combination_table(
+        source = read_source(
             connection,
             suite=None if suite is None else str(suite),
             doubtful_pgd=bool(fitted.row.diagnostics.get("doubtful_pgd")),
         )
-    draw(table, fitted, out, log=log)
+    draw(source.table, fitted, out, log=log, xp_m_s=source.xp_m_s)
     print(out)
-    if fit_data(FitSource.of_table(table), fitted.term).fingerprint != fitted.row.data_fingerprint:
+    if fit_data(source, fitted.term).fingerprint != fitted.row.data_fingerprint:
         print_warnings(
             [
                 f"the data have changed since {fitted.name} was fitted: the points are those of "
@@ -60,23 +59,36 @@ def plot_fit(
         )
 
 
-@app.command("chart", epilog="Example:  rbfrag plot chart --model lognormal-pgv --out chart.pdf")
+@app.command(
+    "chart",
+    epilog="Example:  rbfrag plot chart --model bounded-pgv_pga --p2 3 --pga 0.4 --out chart.pdf",
+)
 def plot_chart(
     out: Out,
     model: Annotated[
         str | None,
         typer.Option(
-            "--model", help="Model of PGV, PGA*Tm or PGD/Tm. Default: the one that answers for PGV."
+            "--model",
+            help="Model of PGV, PGA*Tm, PGD/Tm, or PGV with PGA (and Tm). Default: the one that "
+            "answers for PGV.",
         ),
     ] = None,
+    p2: options.HeldP2 = None,
+    pga: options.HeldPga = None,
+    tm: options.HeldTm = None,
     db: options.Db = None,
 ) -> None:
-    """Draw lines of equal probability of toppling over intensity and block, to read by hand."""
+    """Draw lines of equal probability of toppling over intensity and block, to read by hand.
+
+    A model of PGV with PGA is drawn over PGV, with --p2, --pga and --tm held.
+    """
     from rbfrag.fragility.model_lookup import find_model
     from rbfrag.plots.chart import plot_chart as draw
+    from rbfrag.plots.held_measures import held_measures
 
     given = ["pgv_m_s"] if model is None else ["pgv_m_s", "pga_g", "tm_s", "pgd_m"]
-    draw(find_model(model, given, db), out)
+    chosen = find_model(model, given, db)
+    draw(chosen, out, held_measures(chosen, p2=p2, pga_g=pga, tm_s=tm))
     print(out)
 
 

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
     from rbfrag.db.queries import Vertical
 
+Selection = tuple[str | None, str, bool]
+"""Suite, vertical motion, and whether doubtful PGD is read: what a fit was asked to read."""
+
 State = Literal["unchanged", "changed", "no data", "unreadable"]
 
 
@@ -41,12 +44,12 @@ class ModelCheck:
 
 def check_models(connection: Connection, rows: list[ModelRow]) -> list[ModelCheck]:
     """Compare the fingerprint of each model with that of the data its fit would read today."""
-    sources: dict[tuple[str | None, str], FitSource] = {}
+    sources: dict[Selection, FitSource] = {}
     return [_check(connection, row, sources) for row in rows]
 
 
 def _check(
-    connection: Connection, row: ModelRow, sources: dict[tuple[str | None, str], FitSource]
+    connection: Connection, row: ModelRow, sources: dict[Selection, FitSource]
 ) -> ModelCheck:
     try:
         model = FragilityModel.from_row(row)
@@ -54,11 +57,14 @@ def _check(
         return ModelCheck(row.name, "unreadable", str(error))
     suite = cast("str | None", row.diagnostics.get("suite"))
     vertical = str(row.diagnostics.get("vertical", "without"))
-    key = (suite, vertical)
+    doubtful = bool(row.diagnostics.get("doubtful_pgd", False))
+    key = (suite, vertical, doubtful)
     try:
         if key not in sources:
             kind = cast("Vertical", vertical)
-            sources[key] = read_source(connection, suite=suite, vertical=kind)
+            sources[key] = read_source(
+                connection, suite=suite, vertical=kind, doubtful_pgd=doubtful
+            )
         data = fit_data(sources[key], model.term)
     except (FitError, InputError) as error:
         return ModelCheck(row.name, "no data", str(error))

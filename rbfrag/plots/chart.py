@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.terms import TERMS
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
 from rbfrag.plots.failure_lines import failure_line
+from rbfrag.plots.held_measures import MORE_TERMS, HeldMeasures, held_measures
 from rbfrag.plots.numbers import plain_numbers
 
 if TYPE_CHECKING:
@@ -29,15 +31,20 @@ _SPAN = 1.6
 _DEFAULT_RANGE = (0.01, 2.0)
 
 
-def plot_chart(model: FragilityModel, path: str | PathLike[str]) -> Path:
+def plot_chart(
+    model: FragilityModel, path: str | PathLike[str], held: HeldMeasures | None = None
+) -> Path:
     """Draw lines of equal probability of toppling over intensity and block.
 
-    The ordinate is the block's toppling velocity k_r g/p: one chart serves blocks of every size
-    and strength. Outside the ranges that were fitted the sheet is shaded.
+    The ordinate is the block's toppling velocity k_r g/p: one chart of a model of one number
+    serves blocks of every size and strength. A model of PGV with PGA is drawn over PGV, with
+    block size, PGA and Tm held; the caption says at what. Outside the ranges that were fitted
+    the sheet is shaded.
 
     Args:
-        model: a model of a term that is one number: pgv, pga_tm or pgd_tm.
+        model: a model of pgv, pga_tm, pgd_tm, pgv_pga or pgv_pga_tm.
         path: file to write: .png, .pdf or .svg.
+        held: what is held; None for the middle of the fitted ranges.
 
     Returns:
         The path.
@@ -47,11 +54,12 @@ def plot_chart(model: FragilityModel, path: str | PathLike[str]) -> Path:
         MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
+    held = held_measures(model) if held is None else held
     domain = model.row.domain
     fitted_x = domain.get("intensity_m_s") or domain.get(model.term.inputs[0]) or _DEFAULT_RANGE
     low, high = (max(float(edge), 1e-4) for edge in fitted_x)
     x = np.geomspace(low / _SPAN, _SPAN * high, _POINTS)
-    lines = {p: failure_line(model, x, p) for p in CONTOURS}
+    lines = {p: failure_line(model, x, p, held) for p in CONTOURS}
     figure = new_figure(7.0, 7.0)
     axes = figure.add_subplot()
     axes.set_xscale("log")
@@ -65,15 +73,15 @@ def plot_chart(model: FragilityModel, path: str | PathLike[str]) -> Path:
         axes.plot(x, y, color="#1f4e79", lw=width)
         diagonal = _DIAGONALS[number % len(_DIAGONALS)]
         _write_on(axes, x, y, f"{100.0 * probability:g} %", diagonal)
-    _shade_outside(axes, (low, high), domain.get("y_m_s"))
-    axes.set_xlabel(model.term.label)
+    _shade_outside(axes, held.fitted_range(model, low, high), domain.get("y_m_s"))
+    axes.set_xlabel(TERMS["pgv"].label if model.term.name in MORE_TERMS else model.term.label)
     axes.set_ylabel("toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
     plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
     plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
     axes.grid(visible=True, which="major", lw=0.6, color="#9a9a9a")
     axes.grid(visible=True, which="minor", lw=0.3, color="#c8c8c8")
     axes.set_axisbelow(True)
-    axes.set_title(_caption(model), fontsize=10)
+    axes.set_title(_caption(model, held), fontsize=10)
     return save_figure(figure, path)
 
 
@@ -119,11 +127,12 @@ def _shade_outside(axes: Axes, across: tuple[float, float], up: tuple[float, flo
         axes.axhspan(min(float(up[1]), top), top, **shade)
 
 
-def _caption(model: FragilityModel) -> str:
+def _caption(model: FragilityModel, held: HeldMeasures) -> str:
     about = model.row.diagnostics
     n, events = about.get("n"), about.get("events")
     counts = f"fitted on {n} critical blocks of {events} earthquakes; " if n and events else ""
     return (
         f"Probability that the block topples: model {model.name}\n"
+        f"{held.words + chr(10) if held.words else ''}"
         f"{counts}shaded: outside the fitted range"
     )

@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
+from rbfrag.fragility.formulas import EXPONENTS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
 from rbfrag.plots.density import density
 from rbfrag.plots.failure_lines import failure_line
+from rbfrag.plots.held_measures import ONE_NUMBER_TERMS
 from rbfrag.plots.numbers import plain_numbers
+from rbfrag.plots.predicted_strengths import predicted_strengths, running_medians
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,30 +38,42 @@ def plot_fit(
     path: str | PathLike[str],
     *,
     log: bool = False,
+    xp_m_s: NDArray[np.float64] | None = None,
 ) -> Path:
     """Draw critical toppling velocities against intensity with the lines of a model.
 
     A block above the upper line fails with less than 2.5 % probability, one below the lower
     line with more than 97.5 %. Histograms at the edges show how the data are distributed.
 
+    A model that reads more than one number is drawn over what it expects: the block that each
+    motion topples with 50 % probability. Its other lines are running medians of what it expects
+    of each motion.
+
     Args:
         table: the critical values.
-        model: a model of a term that is one number: pgv, pga_tm or pgd_tm.
+        model: the model.
         path: file to write: .png, .pdf or .svg.
         log: logarithmic axes.
+        xp_m_s: toppling spectrum of each row [m/s], which models of the term xp need.
 
     Returns:
         The path.
 
     Raises:
-        InputError: nothing to draw, a model of another term, or a path that cannot be written.
+        InputError: nothing to draw, or a path that cannot be written.
         MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     term = model.term
-    failure_line(model, np.ones(1), 0.5)  # refuses models of other terms
-    x = np.asarray(
-        term.intensity_m_s({name: getattr(table, name) for name in term.inputs}), dtype=np.float64
+    alone = term.name in ONE_NUMBER_TERMS and EXPONENTS.isdisjoint(model.row.coefficients)
+    spectrum = np.full(table.p2.shape, np.nan) if xp_m_s is None else xp_m_s
+    x = (
+        np.asarray(
+            term.intensity_m_s({name: getattr(table, name) for name in term.inputs}),
+            dtype=np.float64,
+        )
+        if alone
+        else predicted_strengths(model, table, spectrum, 0.5)
     )
     shown = (table.status == "found") & np.isfinite(x) & np.isfinite(table.y_m_s)
     if not shown.any():
@@ -66,12 +81,22 @@ def plot_fit(
             f"there is no critical value with the term {term.name} to draw: run  rbfrag simulate"
         )
     figure = new_figure(7.6, 6.0)
+    expected = x
     x, y = x[shown], table.y_m_s[shown]
     left, right = (0.9 * float(x.min()), 1.1 * float(x.max())) if log else (0.0, 1.03 * x.max())
-    line_x = np.geomspace(left, right, 400) if log else np.linspace(right / 400.0, right, 400)
-    lines = [failure_line(model, line_x, probability) for probability, *_ in _LINES]
+    lines = []
+    for probability, *_ in _LINES:
+        line_x = np.geomspace(left, right, 400) if log else np.linspace(right / 400.0, right, 400)
+        if alone:
+            lines.append((line_x, failure_line(model, line_x, probability)))
+        elif probability == 0.5:
+            lines.append((line_x, line_x))
+        else:
+            there = np.isfinite(expected)
+            one = predicted_strengths(model, table, spectrum, probability)
+            lines.append(running_medians(expected[there], one[there]))
     # The data fill the sheet; a line far above them may leave it.
-    highest = float(np.nanmax(lines[0], initial=0.0))
+    highest = float(np.nanmax(lines[0][1], initial=0.0))
     top = max(float(y.max()), min(highest, 1.3 * float(y.max()))) * 1.05
     bottom = 0.8 * float(y.min()) if log else 0.0
 
@@ -86,10 +111,12 @@ def plot_fit(
     if log:
         plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
         plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
-    for (_, style, colour, words), line in zip(_LINES, lines, strict=True):
+    for (_, style, colour, words), (line_x, line) in zip(_LINES, lines, strict=True):
         label = words if np.isfinite(line).any() else f"{words}\n(below zero)"
         axes.plot(line_x, line, style, color=colour, linewidth=1.8, label=label)
-    axes.set_xlabel(term.label)
+    axes.set_xlabel(
+        term.label if alone else "expected of the motion: $y$ at 50 % probability of failure [m/s]"
+    )
     axes.set_ylabel("critical toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
     spaced = np.geomspace if log else np.linspace
     _histogram(above, x, spaced(left, right, _BARS + 1), horizontal=False)

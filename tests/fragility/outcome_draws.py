@@ -6,6 +6,7 @@ import numpy as np
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility import formulas
+from rbfrag.fragility.compiled_formulas import probabilities
 from rbfrag.fragility.scores import GRID_OF_Y0_OVER_PGV
 from rbfrag.fragility.source import FitSource
 
@@ -50,14 +51,11 @@ def drawn_outcomes(
     xp = xp / (1.0 + p * xp / (pga * G))
     x = {"pgv": pgv, "pgv_pga": pgv, "pgv_pga_tm": pgv, "xp": xp}[term]
     shape, link = formulas.SHAPES[method, term], formulas.LINKS[method]
-    b = parameters + (0.0,) * (6 - len(parameters))
+    b = np.array(parameters + (0.0,) * (formulas.MOST_PARAMETERS - len(parameters)))
     y0 = pgv[:, None] * GRID_OF_Y0_OVER_PGV
-    probability = np.zeros(y0.shape)
-    for i, j in np.ndindex(*y0.shape):
-        known = (y0[i, j], p[i], x[i], pga[i])
-        if formulas.bound(shape, *known) == formulas.FREE:
-            eta = formulas.score(shape, b, *known, tm[i])[0]
-            probability[i, j] = formulas.interval(link, eta, 0.0)[0]
+    probability = np.empty(y0.shape)
+    each = [np.repeat(column, y0.shape[1]) for column in (p, x, pga, tm)]
+    probabilities(shape, link, b, y0.ravel(), *each, probability.reshape(-1))  # type: ignore[call-arg]
     from scipy.special import ndtr
 
     common = random.normal(size=events)[event][:, None]

@@ -37,16 +37,6 @@ def test_a_line_below_zero_is_none() -> None:
     assert np.isnan(failure_line(straight_line_model(), np.array([1e-3]), 0.999)).all()
 
 
-def test_other_terms_are_refused() -> None:
-    from types import SimpleNamespace
-
-    model = SimpleNamespace(
-        name="m", term=SimpleNamespace(name="pgv_pga", inputs=("pgv_m_s", "pga_g"))
-    )
-    with pytest.raises(InputError, match="pgv_m_s and pga_g"):
-        failure_line(model, X, 0.5)  # type: ignore[arg-type]
-
-
 def test_an_estimated_exponent_is_refused() -> None:
     from dataclasses import replace
 

@@ -1,0 +1,64 @@
+"""`rbfrag models check`: whether the data of a model are still those it was fitted on."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from rbfrag.db.location import REFERENCE
+from tests.cli.conftest import Refuses, Shell
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Path:
+    return Path(shutil.copy(REFERENCE, tmp_path / "rbfrag.db"))
+
+
+def change(database: Path, statement: str) -> None:
+    with closing(sqlite3.connect(database)) as connection, connection:
+        assert connection.execute(statement).rowcount > 0
+
+
+def test_data_as_they_were(shell: Shell, database: Path) -> None:
+    found = shell.json("models", "check")
+    assert {each["state"] for each in found} == {"unchanged"}
+    assert "bounded-pgv_pga" in {each["name"] for each in found}
+    assert {each["remark"] for each in found} == {""}
+    table = shell("models", "check").stdout
+    assert table.splitlines()[0].split() == ["model", "data", "remark"]
+
+
+def test_another_critical_value_is_noticed(shell: Shell, database: Path) -> None:
+    change(
+        database,
+        "UPDATE combination SET y_m_s = 1.001 * y_m_s WHERE id = (SELECT min(id) FROM combination "
+        "WHERE status = 'found' AND kind = 'toppling' AND vertical_motion_id IS NULL)",
+    )
+    told = shell("models", "check", expect=1).stdout
+    assert "other values: fit it again with  rbfrag fit --replace" in told
+    assert "unchanged" not in told.replace("lognormal-pgd", "")
+
+
+def test_a_value_that_is_gone_is_counted(shell: Shell, database: Path) -> None:
+    change(
+        database,
+        "UPDATE combination SET status = 'below_limit', kr_over_pga = NULL, kr = NULL, "
+        "y_m_s = NULL, lower = NULL WHERE id = (SELECT min(id) FROM combination WHERE "
+        "status = 'found' AND kind = 'toppling' AND vertical_motion_id IS NULL)",
+    )
+    assert "fitted to 3095 critical values, 3094 today" in shell("models", "check", expect=1).stdout
+
+
+def test_a_model_that_cannot_be_read_is_told(shell: Shell, database: Path) -> None:
+    change(database, "UPDATE fragility_model SET method = 'guess' WHERE name = 'weibull-pgv'")
+    told = shell("models", "check", expect=1).stdout
+    assert "unreadable" in told
+    assert "'guess', which this rbfrag does not know" in " ".join(told.split())
+
+
+def test_without_a_database_it_is_refused(refuses: Refuses, tmp_path: Path) -> None:
+    assert "none.db" in refuses("models", "check", "--db", tmp_path / "none.db")

@@ -1,0 +1,102 @@
+"""What charts of more than one measure hold: said, refused, and the answers of predict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rbfrag.db.rows import ModelRow
+from rbfrag.errors import InputError
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.prediction import predict
+from rbfrag.plots.chart import plot_chart
+from rbfrag.plots.failure_lines import failure_line
+from rbfrag.plots.held_measures import held_measures
+
+G = 9.80665
+DOMAIN = {
+    "p2": (0.1, 10.0),
+    "intensity_m_s": (0.01, 1.0),
+    "tm_s": (0.1, 1.6),
+    "pgv_over_pga_s": (0.02, 0.32),
+}
+
+
+def model_of(term: str, names: tuple[str, ...], values: tuple[float, ...], method: str):
+    return FragilityModel.from_row(
+        ModelRow(
+            name=f"{method}-{term}",
+            term=term,
+            method=method,
+            coefficients=dict(zip(names, values, strict=True)),
+            covariance=tuple(map(tuple, (1e-4 * np.eye(len(values))).tolist())),
+            domain=DOMAIN,
+            data_fingerprint="",
+            diagnostics={"n": 100, "events": 9},
+        )
+    )
+
+
+WITH_TM = model_of(
+    "pgv_pga_tm", ("b0", "b_logit_r", "b_ln_z", "b_ln_zt"), (1.0, 3.3, 2.6, 1.0), "weibull"
+)
+WITH_PGA = model_of("pgv_pga", ("b0", "b_logit_r", "b_ln_z"), (0.7, 3.3, 3.8), "weibull")
+ALONE = model_of("pgv", ("b0", "b_logit_share"), (-1.0, 2.5), "weibull")
+
+
+def test_what_is_not_given_is_the_middle_of_the_fitted_range() -> None:
+    held = held_measures(WITH_TM)
+    assert held.p2 == pytest.approx(1.0)
+    assert held.pgv_over_pga_s == pytest.approx(0.08)
+    assert held.tm_s == pytest.approx(0.4)
+    assert held.words == "at p² = 1 1/s², PGV/(PGA g) = 0.08 s, Tm = 0.4 s"
+    assert held_measures(ALONE).words == ""
+
+
+@pytest.mark.parametrize("model", [WITH_PGA, WITH_TM])
+@pytest.mark.parametrize("pga", [None, 0.5])
+def test_blocks_on_a_line_have_its_probability(model, pga) -> None:
+    held = held_measures(model, p2=3.0, pga_g=pga)
+    x = np.array([0.05, 0.2, 0.6])
+    for pgv, y in zip(x, failure_line(model, x, 0.25, held), strict=True):
+        known = {"pgv_m_s": float(pgv), "pga_g": pgv / (0.08 * G) if pga is None else pga}
+        if model is WITH_TM:
+            known["tm_s"] = 0.4
+        answer = predict(3.0, y * 3.0**0.5 / G, model=model, **known)
+        assert answer.probability == pytest.approx(0.25, rel=1e-9)
+
+
+def test_no_line_reaches_what_pga_cannot_lift() -> None:
+    held = held_measures(WITH_PGA, p2=3.0, pga_g=0.3)
+    line = failure_line(WITH_PGA, np.array([0.5, 5.0, 50.0]), 0.01, held)
+    assert (line < 0.3 * G / 3.0**0.5).all()
+    assert held.fitted_range(WITH_PGA, 0.01, 1.0) == pytest.approx((0.02 * 0.3 * G, 0.32 * 0.3 * G))
+
+
+@pytest.mark.parametrize(
+    ("model", "given", "words"),
+    [
+        (ALONE, {"p2": 3.0}, "--p2 = 3 changes nothing"),
+        (ALONE, {"pga_g": 0.3}, "--pga = 0.3 changes nothing"),
+        (WITH_PGA, {"tm_s": 0.3}, "--tm = 0.3 changes nothing"),
+        (WITH_TM, {"tm_s": 0.0}, "--tm = 0 is not above zero"),
+        (WITH_TM, {"pga_g": float("nan")}, "--pga = nan is not above zero"),
+        (replace(WITH_TM, row=replace(WITH_TM.row, domain={})), {}, "range of p2"),
+        (
+            model_of("xp", ("b0", "b_ln_xp_over_y", "b_ln_s"), (4.0, 3.0, 1.0), "record"),
+            {},
+            "one intensity cannot stand for them",
+        ),
+    ],
+)
+def test_what_cannot_be_held_is_refused(model, given, words) -> None:
+    with pytest.raises(InputError, match=words):
+        held_measures(model, **given)
+
+
+def test_the_caption_says_what_is_held(tmp_path) -> None:
+    path = tmp_path / "chart.svg"
+    plot_chart(WITH_TM, path, held_measures(WITH_TM, p2=3.0, pga_g=0.4, tm_s=0.5))
+    assert "PGA = 0.4 g, Tm = 0.5 s" in path.read_text(encoding="utf-8")

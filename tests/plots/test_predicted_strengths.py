@@ -1,0 +1,47 @@
+"""The block that a motion topples with a given probability: the answers of predict turned round."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rbfrag.fragility.prediction import predict
+from rbfrag.plots.fit import plot_fit
+from rbfrag.plots.predicted_strengths import predicted_strengths, running_medians
+from tests.fragility.outcome_draws import drawn_outcomes
+from tests.plots.test_held_measures import WITH_TM, model_of
+
+G = 9.80665
+
+
+def test_each_motion_topples_its_block_with_the_probability() -> None:
+    source = drawn_outcomes("weibull", "pgv", (-1.0, 2.5), events=4, motions=1)
+    table = source.table
+    y = predicted_strengths(WITH_TM, table, source.xp_m_s, 0.3)
+    for i in range(table.p2.size):
+        answer = predict(
+            float(table.p2[i]),
+            y[i] * float(table.p2[i]) ** 0.5 / G,
+            pgv_m_s=float(table.pgv_m_s[i]),
+            pga_g=float(table.pga_g[i]),
+            tm_s=float(table.tm_s[i]),
+            model=WITH_TM,
+        )
+        assert answer.probability == pytest.approx(0.3, rel=1e-9)
+
+
+def test_models_of_the_record_and_of_free_exponents_are_drawn(tmp_path) -> None:
+    source = drawn_outcomes("weibull", "pgv", (-1.0, 2.5), events=4, motions=1)
+    record = model_of("xp", ("b0", "b_ln_xp_over_y", "b_ln_s"), (4.0, 3.0, 1.0), "record")
+    names = ("ln_median", "slope", "ln_sigma", "m_minus_1")
+    free = model_of("pgv", names, (-0.4, 0.95, -1.2, -0.1), "lognormal")
+    for model in (record, free, WITH_TM):
+        path = plot_fit(source.table, model, tmp_path / "fit.svg", log=True, xp_m_s=source.xp_m_s)
+        assert "at 50 % probability of failure" in path.read_text(encoding="utf-8")
+
+
+def test_running_medians() -> None:
+    x = np.arange(100.0)
+    middle, of = running_medians(x[::-1], 2.0 * x[::-1] + 1.0, bins=10)
+    assert middle.tolist() == [10.0 * i + 4.5 for i in range(10)]
+    assert of.tolist() == [20.0 * i + 10.0 for i in range(10)]
