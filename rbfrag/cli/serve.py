@@ -58,12 +58,21 @@ def serve(
     body_limit_mb: Annotated[
         float, typer.Option("--body-limit-mb", help="Longest body of a request [MB].")
     ] = 16.0,
+    body_time: Annotated[
+        float, typer.Option("--body-time", help="Longest time that a body may take to come [s].")
+    ] = 30.0,
     row_limit: Annotated[
         int, typer.Option("--row-limit", help="Most blocks or realisations of one request.")
     ] = 100_000,
     time_limit: Annotated[
         float, typer.Option("--time-limit", help="Longest time that an answer may take [s].")
     ] = 60.0,
+    jobs: Annotated[
+        int,
+        typer.Option(
+            "--jobs", help="Number of processes that do long work beside each that answers."
+        ),
+    ] = 2,
 ) -> None:
     """Answer over HTTP what the command line answers, and serve the page."""
     for library in ("fastapi", "uvicorn", "httptools", "pebble", "prometheus_client"):
@@ -80,8 +89,10 @@ def serve(
             "allow_origin": allow_origin or [],
             "allow_host": allow_host or [],
             "body_limit_mb": body_limit_mb,
+            "body_time": body_time,
             "row_limit": row_limit,
             "time_limit": time_limit,
+            "jobs": jobs,
         }
     )
     run_module("rbfrag.service", run_name="__main__")

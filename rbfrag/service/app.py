@@ -23,6 +23,7 @@ from rbfrag.service import (
     motion_api,
     predict_api,
     rockmass_api,
+    work,
 )
 from rbfrag.service.body import Bodies
 from rbfrag.service.documents import Problem
@@ -47,6 +48,8 @@ def make_app(settings: Settings) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001
+        if settings.early:
+            workshop.open().schedule(work.warm_up)
         yield
         await run_in_threadpool(workshop.close)
 
@@ -91,6 +94,10 @@ def make_app(settings: Settings) -> FastAPI:
     @app.exception_handler(RbfragError)
     async def on_purpose(request: Request, error: RbfragError) -> Response:  # noqa: ARG001
         return refused(error, settings)
+
+    @app.exception_handler(400)
+    async def unreadable(request: Request, error: HTTPException) -> Response:  # noqa: ARG001
+        return problem(400, "malformed", f"the form cannot be read: {error.detail}")
 
     @app.exception_handler(404)
     @app.exception_handler(405)

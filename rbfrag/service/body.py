@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
-from fastapi import HTTPException, Request
+from fastapi import Request
 
 from rbfrag.service.json_body import MalformedError
 from rbfrag.service.refusal import busy, gone, too_long, too_slow
@@ -84,11 +84,8 @@ async def _file_of_form(request: Request, body: bytes) -> bytes:
     async def receive() -> dict[str, Any]:
         return {"type": "http.request", "body": body, "more_body": False}
 
-    try:
-        async with Request(request.scope, receive).form(max_files=1, max_fields=1) as form:
-            files = [each for _, each in form.multi_items() if not isinstance(each, str)]
-            if len(files) != 1 or len(form.multi_items()) != 1:
-                raise MalformedError("the form does not hold one file and nothing else")
-            return await files[0].read()
-    except HTTPException as error:
-        raise MalformedError(f"the form cannot be read: {error.detail}") from None
+    async with Request(request.scope, receive).form(max_files=1, max_fields=1) as form:
+        files = [each for _, each in form.multi_items() if not isinstance(each, str)]
+        if len(files) != 1 or len(form.multi_items()) != 1:
+            raise MalformedError("the form does not hold one file and nothing else")
+        return await files[0].read()

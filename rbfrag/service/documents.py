@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 
 class _Document(BaseModel):
     model_config = ConfigDict(extra="forbid", protected_namespaces=())
+
+
+Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+"""Two numbers that belong together."""
 
 
 class Problem(_Document):
@@ -116,11 +120,11 @@ class DrawingAnswer(_Document):
     mode: str
     r3_m: float
     rectangle_r3_m: float
-    outline_m: list[tuple[float, float]]
-    contacts_m: dict[str, tuple[float, float]]
-    planes_m: list[tuple[float, float]]
-    rock_m: list[tuple[float, float]]
-    resultant_m: tuple[float, float]
+    outline_m: list[Pair]
+    contacts_m: dict[str, Pair]
+    planes_m: list[Pair]
+    rock_m: list[Pair]
+    resultant_m: Pair
 
 
 class ModelListed(_Document):
@@ -132,7 +136,7 @@ class ModelListed(_Document):
     is_default: bool
     n: int | None
     events: int | None
-    domain: dict[str, tuple[float, float]]
+    domain: dict[str, Pair]
     created: str
 
 

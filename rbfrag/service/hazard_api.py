@@ -92,9 +92,16 @@ def router(settings: Settings, bodies: Bodies, workshop: Workshop) -> APIRouter:
         }
         async with bodies.read(request) as body:
             found = await workshop.do(
-                work.hazard, body, asked.get("imt"), asked.get("site"), asked["p2"], asked["kr"],
-                given, settings.db,
-            )  # fmt: skip
+                request,
+                work.hazard,
+                body,
+                asked.get("imt"),
+                asked.get("site"),
+                asked["p2"],
+                asked["kr"],
+                given,
+                settings.db,
+            )
         return answer(found)
 
     return routes

@@ -74,18 +74,12 @@ CRITICAL = by_name(
     )
 )
 
-EXAMPLE = "time_s,acceleration_g\n" + "".join(
-    f"{0.1 * i:.1f},{value}\n"
-    for i, value in enumerate((0.0, 0.2, 0.4, 0.4, 0.2, -0.2, -0.4, -0.4, -0.2, 0.0))
-)
-"""A made-up accelerogram, short enough for the documentation."""
-
 ACCELEROGRAM = {
     "application/octet-stream": {
         "schema": {"type": "string", "format": "binary"},
-        "example": EXAMPLE,
+        "example": work.EXAMPLE,
     },
-    "text/plain": {"schema": {"type": "string"}, "example": EXAMPLE},
+    "text/plain": {"schema": {"type": "string"}, "example": work.EXAMPLE},
     MULTIPART: {
         "schema": {
             "type": "object",
@@ -125,9 +119,15 @@ def router(bodies: Bodies, workshop: Workshop) -> APIRouter:
             raise InputError(f"p2 has {len(sizes)} values; one request may ask for {MOST_SIZES}")
         async with bodies.read(request) as body:
             found = await workshop.do(
-                work.spectrum, body, asked.get("trace"), asked.get("units"), asked.get("dt"),
-                sizes, asked.get("polarity", "forward"),
-            )  # fmt: skip
+                request,
+                work.spectrum,
+                body,
+                asked.get("trace"),
+                asked.get("units"),
+                asked.get("dt"),
+                sizes,
+                asked.get("polarity", "forward"),
+            )
         return answer(found)
 
     @routes.post(
@@ -145,10 +145,17 @@ def router(bodies: Bodies, workshop: Workshop) -> APIRouter:
         asked = read_query(request.scope["query_string"], CRITICAL)
         async with bodies.read(request) as body:
             found = await workshop.do(
-                work.critical, body, asked.get("trace"), asked.get("units"), asked.get("dt"),
-                asked["p2"], asked.get("reverse", False), asked.get("linear", False),
+                request,
+                work.critical,
+                body,
+                asked.get("trace"),
+                asked.get("units"),
+                asked.get("dt"),
+                asked["p2"],
+                asked.get("reverse", False),
+                asked.get("linear", False),
                 asked.get("map", False),
-            )  # fmt: skip
+            )
         return answer(found)
 
     return routes

@@ -91,7 +91,9 @@ def checked(stated: Any, row_limit: int) -> dict[str, Any]:
     for name in stated:
         if name not in PARAMETERS:
             raise InputError(f"there is no {name[:60]!r}; known are {', '.join(PARAMETERS)}")
-    values = {name: value for name, value in stated.items() if value is not None}
+        if stated[name] is None:
+            raise InputError(f"{name} is null: leave it out, or give {PARAMETERS[name].words}")
+    values = dict(stated)
     for name in ("p2", "kr"):
         if name not in values:
             raise InputError(f"{name} is missing: {PARAMETERS[name].words}")
@@ -113,7 +115,7 @@ def checked(stated: Any, row_limit: int) -> dict[str, Any]:
         sizes = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise InputError(f"the lists differ in length: {sizes}; give one length, or one number")
     model, level = values.get("model"), values.get("level", 0.95)
-    if model is not None and not isinstance(model, str):
+    if model is not None and not (isinstance(model, str) and model):
         raise InputError("model is not a text: give the name of a stored model")
     if isinstance(level, bool) or not isinstance(level, int | float):
         raise InputError("level is not a number: a confidence level lies between 0 and 1")
@@ -207,7 +209,7 @@ def router(settings: Settings, bodies: Bodies, workshop: Workshop) -> APIRouter:
             given = checked(read_json(body), settings.row_limit)
             rows = max((len(each) for each in given.values() if isinstance(each, list)), default=1)
             if rows > ROWS_BESIDE:
-                return answer(await workshop.do(answer_many, given, settings.db))
+                return answer(await workshop.do(request, answer_many, given, settings.db))
             if rows > ROWS_AT_ONCE or on_server:
                 return answer(await run_in_threadpool(answer_many, given, settings.db))
             return answer(answer_many(given, settings.db))

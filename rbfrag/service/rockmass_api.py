@@ -70,6 +70,7 @@ phi_deg = 40.0
 _FORMS: dict[str, Literal["toml", "json", "csv"]] = {
     "application/json": "json",
     "application/toml": "toml",
+    "text/plain": "toml",
     "text/csv": "csv",
 }
 
@@ -93,6 +94,7 @@ def router(settings: Settings, bodies: Bodies, workshop: Workshop) -> APIRouter:
             body={
                 "application/json": {"schema": {"type": "object"}, "example": EXAMPLE},
                 "application/toml": {"schema": {"type": "string"}, "example": EXAMPLE_TOML},
+                "text/plain": {"schema": {"type": "string"}, "example": EXAMPLE_TOML},
                 "text/csv": {"schema": {"type": "string"}},
             },
             description="What `rbfrag rockmass --json` prints for a rock mass file: TOML, its "
@@ -111,9 +113,18 @@ def router(settings: Settings, bodies: Bodies, workshop: Workshop) -> APIRouter:
             )
         async with bodies.read(request) as body:
             found = await workshop.do(
-                work.rock_mass, body, form, measures_in(asked), asked.get("n"), asked.get("seed"),
-                asked.get("model"), asked.get("level", 0.95), settings.row_limit, settings.db,
-            )  # fmt: skip
+                request,
+                work.rock_mass,
+                body,
+                form,
+                measures_in(asked),
+                asked.get("n"),
+                asked.get("seed"),
+                asked.get("model"),
+                asked.get("level", 0.95),
+                settings.row_limit,
+                settings.db,
+            )
         return answer(found)
 
     return routes

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
+import socket
 from dataclasses import dataclass
 from tempfile import TemporaryDirectory
 
@@ -30,8 +32,10 @@ class Told:
         allow_origin: origins of web pages elsewhere whose scripts may read answers.
         allow_host: further names the service may be asked by.
         body_limit_mb: longest body [10^6 bytes].
+        body_time: longest time [s] that a body may take to come.
         row_limit: most blocks of one request.
         time_limit: longest time [s] that an answer may take.
+        jobs: number of processes that do long work beside each that answers.
     """
 
     db: str | None = None
@@ -42,8 +46,10 @@ class Told:
     allow_origin: tuple[str, ...] = ()
     allow_host: tuple[str, ...] = ()
     body_limit_mb: float = 16.0
+    body_time: float = 30.0
     row_limit: int = 100_000
     time_limit: float = 60.0
+    jobs: int = 2
 
     def settings(self) -> Settings:
         """Return the settings of the application.
@@ -59,8 +65,10 @@ class Told:
             raise InputError(f"--port {self.port}: a port is a number from 0 to 65535")
         for name, value in (
             ("--body-limit-mb", self.body_limit_mb),
+            ("--body-time", self.body_time),
             ("--row-limit", self.row_limit),
             ("--time-limit", self.time_limit),
+            ("--jobs", self.jobs),
         ):
             if not 0.0 < value < float("inf"):
                 raise InputError(f"{name} {value:g}: give a number above zero")
@@ -74,8 +82,11 @@ class Told:
             allowed_origins=self.allow_origin,
             allowed_hosts=hosts,
             body_limit_bytes=int(1e6 * self.body_limit_mb),
+            body_time_s=self.body_time,
             row_limit=self.row_limit,
             time_limit_s=self.time_limit,
+            jobs=self.jobs,
+            early=True,
         )
 
 
@@ -96,7 +107,7 @@ def serve_as_told() -> None:
     with TemporaryDirectory(prefix="rbfrag-metrics-") as folder:
         if told.workers > 1:
             os.environ[SHARED_FOLDER] = folder
-        uvicorn.run(
+        config = uvicorn.Config(
             f"{__name__}:app",
             factory=True,
             interface="asgi3",
@@ -112,6 +123,38 @@ def serve_as_told() -> None:
             limit_concurrency=2000,
             timeout_graceful_shutdown=int(settings.body_time_s + settings.time_limit_s) + 1,
         )
+        with listener(told.host, told.port) as found:
+            name, port = found.getsockname()[:2]
+            shown = f"[{name}]" if ":" in name else name
+            logging.getLogger(__name__).info("answering at http://%s:%d", shown, port)
+            if told.workers == 1:
+                uvicorn.Server(config).run(sockets=[found])
+            else:
+                from rbfrag.service.workers import Workers
+
+                Workers(config, sockets=[found]).run()
+
+
+def listener(host: str, port: int) -> socket.socket:
+    """Return a socket that listens.
+
+    Args:
+        host: address to listen at.
+        port: port to listen at; 0 for any that is free.
+
+    Raises:
+        InputError: nobody can listen there, or somebody does.
+    """
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        found = socket.create_server((host, port), family=family, backlog=2048)
+    except OSError as error:
+        reason = (error.strerror or str(error)).partition(" (")[0]
+        raise InputError(
+            f"--host {host} --port {port}: {reason}: choose another port or address"
+        ) from None
+    found.set_inheritable(True)
+    return found
 
 
 def app() -> FastAPI:

@@ -21,6 +21,7 @@ class Settings:
         time_limit_s: longest time [s] that an answer may take once its body is there.
         bodies_at_once: most requests with a body that a process works on; others wait.
         jobs: number of processes that do long work beside each that answers.
+        early: start them with the service, and not when they are first needed.
     """
 
     db: str | None = None
@@ -33,3 +34,4 @@ class Settings:
     time_limit_s: float = 60.0
     bodies_at_once: int = 16
     jobs: int = 1
+    early: bool = False

@@ -18,6 +18,19 @@ FILE = "the file"
 """What messages call an accelerogram or a curve that was sent."""
 
 
+EXAMPLE = "time_s,acceleration_g\n" + "".join(
+    f"{0.1 * i:.1f},{value}\n"
+    for i, value in enumerate((0.0, 0.2, 0.4, 0.4, 0.2, -0.2, -0.4, -0.4, -0.2, 0.0))
+)
+"""A made-up accelerogram, short enough for the documentation."""
+
+
+def warm_up() -> None:
+    """Load or compile the kernels, so that no request waits for that or is ended for it."""
+    spectrum(EXAMPLE.encode(), None, None, None, [3.0], "forward")
+    critical(EXAMPLE.encode(), None, None, None, 3.0, False, False, False)
+
+
 def rock_mass(
     body: bytes,
     form: Literal["toml", "json", "csv"],

@@ -8,9 +8,11 @@ import signal
 from collections.abc import Callable
 from typing import Any
 
+from fastapi import Request
 from pebble import ProcessExpired, ProcessPool
 
-from rbfrag.service.refusal import busy, too_much_work
+from rbfrag.service import work
+from rbfrag.service.refusal import busy, gone, too_much_work
 
 PIECES = 500
 """So many pieces of work does a process do before a fresh one takes its place."""
@@ -29,45 +31,59 @@ class Workshop:
         self._limit_s = time_limit_s
         self._pool: ProcessPool | None = None
 
-    async def do(self, work: Callable[..., bytes], *given: Any) -> bytes:
-        """Return what a function answers.
-
-        Args:
-            work: a function of a module.
-            given: its arguments.
-
-        Raises:
-            RequestRefusedError: it took too long, or waited too long.
-            RbfragError: as the function raises.
-        """
-        if self._pool is None:
+    def open(self) -> ProcessPool:
+        """Return the processes, started."""
+        if self._pool is None or not self._pool.active:
             # a forked copy of a process with threads and sockets would be none to rely on
             context = multiprocessing.get_context("spawn")
             self._pool = ProcessPool(
                 max_workers=self._jobs, max_tasks=PIECES, initializer=_begin, context=context
             )
-        future = self._pool.schedule(work, args=given)
+        return self._pool
+
+    async def do(self, request: Request, function: Callable[..., bytes], *given: Any) -> bytes:
+        """Return what a function answers.
+
+        Args:
+            request: who wants to know, its body read; the work ends when the client goes.
+            function: a function of a module.
+            given: its arguments.
+
+        Raises:
+            RequestRefusedError: it took too long, or waited too long, or the client has gone.
+            RbfragError: as the function raises.
+        """
+        future = self.open().schedule(function, args=given)
         answer = asyncio.wrap_future(future)
+        left = asyncio.ensure_future(_disconnected(request))
+        either: list[asyncio.Future[Any]] = [answer, left]
         try:
-            await asyncio.wait({answer}, timeout=self._limit_s)
+            await asyncio.wait(either, timeout=self._limit_s, return_when=asyncio.FIRST_COMPLETED)
             if answer.done():
                 return answer.result()
+            if left.done():
+                raise gone()
             raise too_much_work(self._limit_s) if future.running() else busy()
         except ProcessExpired:
             raise busy() from None
         finally:
+            left.cancel()
             # ends the process, if it still works on it
             answer.cancel()
 
     def close(self) -> None:
-        """End the processes once their work is done."""
+        """End the processes, whatever they do; nobody waits for an answer any more."""
         if self._pool is not None:
-            self._pool.close()  # type: ignore[no-untyped-call]
-            self._pool.join(self._limit_s)
             self._pool.stop()  # type: ignore[no-untyped-call]
             self._pool.join()
+
+
+async def _disconnected(request: Request) -> None:
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
 
 
 def _begin() -> None:
     # Ctrl-C reaches every process of a terminal; only the one that answers decides what it ends
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    work.warm_up()

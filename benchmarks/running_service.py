@@ -1,0 +1,122 @@
+"""A service in processes of its own, for those who ask it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rbfrag.db.location import REFERENCE
+
+ROOT = Path(__file__).resolve().parent.parent
+
+PATIENCE_S = 60.0
+
+
+@dataclass(frozen=True)
+class Running:
+    """A service that answers.
+
+    Args:
+        process: its first process.
+        port: where it listens.
+        log: what it writes down.
+    """
+
+    process: subprocess.Popen[bytes]
+    port: int
+    log: Path
+
+    @property
+    def address(self) -> str:
+        """The address that paths are appended to."""
+        return f"http://127.0.0.1:{self.port}"
+
+    def terminate(self) -> int:
+        """End it as a service manager does; return its exit status."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGTERM)
+        return self.process.wait(PATIENCE_S)
+
+    def lines(self) -> list[dict[str, Any]]:
+        """Return the lines of its log."""
+        return [json.loads(line) for line in self.log.read_text().splitlines()]
+
+
+def free_port() -> int:
+    """Return a port that nobody listens at."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port: int = free.getsockname()[1]
+        return port
+
+
+@contextmanager
+def running_service(
+    folder: Path, *, environment: dict[str, str] | None = None, **told: Any
+) -> Iterator[Running]:
+    """Start a service and end it.
+
+    Args:
+        folder: where its log goes.
+        environment: further environment variables.
+        told: options of `rbfrag serve`, underlines for dashes.
+    """
+    port = free_port()
+    settings = {"db": str(REFERENCE), "port": port, **told}
+    with running_program(
+        ["-m", "rbfrag.service"],
+        folder / "service.log",
+        f"http://127.0.0.1:{port}/v1/healthz",
+        {"RBFRAG_SERVICE": json.dumps(settings), **(environment or {})},
+    ) as process:
+        yield Running(process, port, folder / "service.log")
+
+
+@contextmanager
+def running_program(
+    words: list[str], log: Path, asked: str, environment: dict[str, str]
+) -> Iterator[subprocess.Popen[bytes]]:
+    """Start a Python program that answers at an address, and end it.
+
+    Args:
+        words: what Python is called with.
+        log: file for what it prints.
+        asked: address that answers once it is ready.
+        environment: further environment variables.
+    """
+    everything = {**os.environ, "PYTHONPATH": str(ROOT), **environment}
+    with log.open("wb") as stream:
+        process = subprocess.Popen(
+            [sys.executable, *words], cwd=ROOT, env=everything, stdout=stream, stderr=stream
+        )
+        try:
+            _wait(process, asked, log)
+            yield process
+        finally:
+            if process.poll() is None:
+                process.terminate()
+            process.wait(PATIENCE_S)
+
+
+def _wait(process: subprocess.Popen[bytes], asked: str, log: Path) -> None:
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        if process.poll() is not None:
+            raise RuntimeError(f"the program ended at its start: {log.read_text()}")
+        try:
+            with urllib.request.urlopen(asked, timeout=5.0):
+                return
+        except OSError:
+            time.sleep(0.1)
+    raise RuntimeError(f"nothing answers at {asked}: {log.read_text()}")

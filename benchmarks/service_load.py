@@ -1,0 +1,228 @@
+"""The service under load, asked by `wrk`:  python -m benchmarks.service_load
+
+One block by `GET /v1/predict`, with one and two processes that answer, in turn with an equivalent
+FastAPI operation that answers a constant under the same server. `--soak MINUTES` instead asks for
+so long and reports how the memory of the processes grew.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+import time
+import urllib.request
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from statistics import median
+
+from benchmarks.page import parser, report
+from benchmarks.running_service import free_port, running_program, running_service
+from rbfrag.campaign.bench.tables import markdown
+
+QUERY = "?p2=3&kr=0.1&pgv=0.6"
+
+_UNIT_MS = {"us": 1e-3, "ms": 1.0, "s": 1e3}
+
+
+@dataclass(frozen=True)
+class Load:
+    """What `wrk` found.
+
+    Args:
+        per_s: requests answered a second.
+        p50_ms: median time of an answer [ms].
+        p99_ms: time that one in a hundred takes longer than [ms].
+        bad: answers that were no success, or never came.
+        answers: how many came.
+        cpu_us: processor time of the server for one of them [µs].
+    """
+
+    per_s: float
+    p50_ms: float
+    p99_ms: float
+    bad: int
+    answers: int
+    cpu_us: float = math.nan
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure and report; the exit status is 1 if an answer was bad."""
+    options = parser(__doc__)
+    options.add_argument("--seconds", type=int, default=10, help="length of one measurement")
+    options.add_argument("--repeat", type=int, default=5, help="pairs of measurements")
+    options.add_argument("--connections", type=int, default=16)
+    options.add_argument("--soak", type=float, metavar="MINUTES", help="watch the memory instead")
+    chosen = options.parse_args(arguments)
+    if shutil.which("wrk") is None:
+        raise SystemExit("wrk is not installed: it is the client of this measurement")
+    with tempfile.TemporaryDirectory() as folder:
+        if chosen.soak is not None:
+            return soak(Path(folder), chosen.soak, chosen.connections, write=chosen.write)
+        rows, bad = [], 0
+        for workers in (1, 2):
+            found = compared(
+                Path(folder), workers, chosen.seconds, chosen.repeat, chosen.connections
+            )
+            bad += sum(load.bad for loads in found for load in loads)
+            rows += table_rows(workers, *found)
+        head = [
+            *("processes", "what", "requests a second", "p50", "p99", "processor time a request"),
+            *("ratio to it", "of pairs", "by processor time"),
+        ]
+        report("service-load", markdown((head, rows)), write=chosen.write)
+        return int(bad > 0)
+
+
+def compared(
+    folder: Path, workers: int, seconds: int, repeat: int, connections: int
+) -> tuple[list[Load], list[Load], list[Load]]:
+    """Return loads of the service, of the equivalent constant and of the bare one, in turn."""
+    port = free_port()
+    constant = [
+        *("-m", "uvicorn", "benchmarks.constant_service:app", "--port", str(port)),
+        *("--workers", str(workers), "--no-access-log", "--log-level", "warning"),
+    ]
+    address = f"http://127.0.0.1:{port}"
+    ours: list[Load] = []
+    equivalent: list[Load] = []
+    bare: list[Load] = []
+    with (
+        running_service(folder, workers=workers) as service,
+        running_program(constant, folder / "constant.log", f"{address}/bare", {}) as other,
+    ):
+        asked = (
+            (f"{service.address}/v1/predict{QUERY}", service.process.pid, ours),
+            (f"{address}/constant{QUERY}", other.pid, equivalent),
+            (f"{address}/bare", other.pid, bare),
+        )
+        for url, _, _ in asked:
+            wrk(url, 2, connections)
+        for _ in range(10 * workers):
+            # until every process for long work has come up, which takes processor time
+            upload(service.address)
+        for turn in range(repeat):
+            # the order alternates, so that whatever else the machine does hits each alike
+            for url, pid, loads in asked if turn % 2 == 0 else reversed(asked):
+                before = processor_s(pid)
+                found = wrk(url, seconds, connections)
+                spent = processor_s(pid) - before
+                loads.append(replace(found, cpu_us=1e6 * spent / max(found.answers, 1)))
+    return ours, equivalent, bare
+
+
+def wrk(url: str, seconds: int, connections: int) -> Load:
+    """Return what `wrk` finds at an address."""
+    words = ["wrk", "-t1", f"-c{connections}", f"-d{seconds}s", "--latency", url]
+    printed = subprocess.run(words, check=True, capture_output=True, text=True).stdout
+    errors = re.search(r"Socket errors: connect (\d+), read (\d+), write (\d+), timeout", printed)
+    refused = re.search(r"Non-2xx or 3xx responses: (\d+)", printed)
+    return Load(
+        per_s=float(_found(r"Requests/sec:\s+([\d.]+)", printed)[0]),
+        p50_ms=_milliseconds(printed, "50"),
+        p99_ms=_milliseconds(printed, "99"),
+        answers=int(_found(r"(\d+) requests in", printed)[0]),
+        bad=(int(refused[1]) if refused else 0) + (sum(map(int, errors.groups())) if errors else 0),
+    )
+
+
+def _found(pattern: str, text: str) -> tuple[str, ...]:
+    found = re.search(pattern, text)
+    if found is None:
+        raise SystemExit(f"wrk printed something else than expected:\n{text}")
+    return found.groups()
+
+
+def _milliseconds(printed: str, percent: str) -> float:
+    value, unit = _found(rf"\s{percent}%\s+([\d.]+)(us|ms|s)\b", printed)
+    return float(value) * _UNIT_MS[unit]
+
+
+def table_rows(
+    workers: int, ours: list[Load], equivalent: list[Load], bare: list[Load]
+) -> list[list[str]]:
+    """Return the rows of the table for one number of processes."""
+    rows = []
+    for name, loads in (
+        ("`GET /v1/predict`", ours),
+        ("a constant, the same parameters", equivalent),
+        ("a constant, no parameters", bare),
+    ):
+        ratios = [a.per_s / b.per_s for a, b in zip(ours, loads, strict=True)]
+        of_cpu = [b.cpu_us / a.cpu_us for a, b in zip(ours, loads, strict=True)]
+        rows.append(
+            [
+                str(workers),
+                name,
+                f"{median(load.per_s for load in loads):.0f}",
+                f"{median(load.p50_ms for load in loads):.2f} ms",
+                f"{median(load.p99_ms for load in loads):.1f} ms",
+                f"{median(load.cpu_us for load in loads):.0f} µs",
+                "" if loads is ours else f"{median(ratios):.2f}",
+                "" if loads is ours else f"{min(ratios):.2f} to {max(ratios):.2f}",
+                "" if loads is ours else f"{median(of_cpu):.2f}",
+            ]
+        )
+    return rows
+
+
+def soak(folder: Path, minutes: float, connections: int, *, write: bool) -> int:
+    """Ask for a long time; report memory at the start and the end."""
+    with running_service(folder, workers=1) as service:
+        url = f"{service.address}/v1/predict{QUERY}"
+        wrk(url, 20, connections)
+        upload(service.address)
+        first = memory_kb(service.process.pid)
+        end = time.monotonic() + 60.0 * minutes
+        answered, bad, most = 0.0, 0, first
+        while time.monotonic() < end:
+            seconds = max(1, min(20, int(end - time.monotonic())))
+            load = wrk(url, seconds, connections)
+            upload(service.address)
+            answered += load.per_s * seconds
+            bad += load.bad
+            most = max(most, memory_kb(service.process.pid))
+        last = memory_kb(service.process.pid)
+        size = service.log.stat().st_size
+    head = ["minutes", "answers", "bad", "memory at the start", "at the end", "most", "growth"]
+    row = [
+        f"{minutes:g}",
+        f"{answered:.0f}",
+        str(bad),
+        *(f"{kb / 1024:.1f} MiB" for kb in (first, last, most)),
+        f"{100.0 * (last / first - 1.0):+.1f} %",
+    ]
+    report("service-soak", markdown((head, [row])), write=write)
+    print(f"log: {size / 1e6:.0f} MB")
+    return int(bad > 0)
+
+
+def processor_s(pid: int) -> float:
+    """Return the processor time of a process and of those it started [s]."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    own = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return own + sum(processor_s(int(child)) for child in children)
+
+
+def upload(address: str) -> None:
+    """Ask for a spectrum once, so that the processes for long work are used too."""
+    from rbfrag.service.work import EXAMPLE
+
+    with urllib.request.urlopen(f"{address}/v1/spectrum?p2=3", EXAMPLE.encode()) as answer:
+        answer.read()
+
+
+def memory_kb(pid: int) -> int:
+    """Return the resident memory of a process that answers [KiB]."""
+    status = Path(f"/proc/{pid}/status").read_text()
+    return int(_found(r"VmRSS:\s+(\d+) kB", status)[0])
+
+
+if __name__ == "__main__":
+    os.environ.pop("WEB_CONCURRENCY", None)
+    raise SystemExit(main())
