@@ -203,6 +203,7 @@ class RockmassAnswer(_Document):
     modes: dict[str, dict[str, Any]]
     crossings: list[dict[str, Any]]
     scenario: dict[str, Any] | None
+    shaking: dict[str, Any] | None
     warnings: list[str]
 
 

@@ -121,7 +121,7 @@ def router(settings: Settings, bodies: Bodies, workshop: Workshop) -> APIRouter:
                 asked.get("n"),
                 asked.get("seed"),
                 asked.get("model"),
-                asked.get("level", 0.95),
+                asked.get("level"),
                 settings.row_limit,
                 settings.db,
             )

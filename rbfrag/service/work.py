@@ -38,7 +38,7 @@ def rock_mass(
     n: int | None,
     seed: int | None,
     model: str | None,
-    level: float,
+    level: float | None,
     row_limit: int,
     db: str | None,
 ) -> bytes:
@@ -51,7 +51,7 @@ def rock_mass(
         n: number of realisations; None for that of the description.
         seed: seed of the random numbers; None for that of the description.
         model: name of a stored model, or None.
-        level: confidence level of the interval.
+        level: confidence level of the interval, or None for 0.95.
         row_limit: most realisations.
         db: database of the models.
     """
@@ -77,12 +77,16 @@ def rock_mass(
             f"{wanted} realisations are more than the {row_limit} of one request: ask for fewer "
             "with n"
         )
-    if not measures and model is not None:
+    extra = "level" if model is None else "model"
+    if not measures and not (model is None and level is None):
         raise InputError(
-            "model goes with a measure of the motion: give pgv, pga and tm, or pgd and tm, too"
+            f"{extra} goes with a measure of the motion: give pgv, pga and tm, or pgd and tm, too"
         )
     made = described.realise(n, seed)
-    answer = scenario(made, **measures, model=model, level=level, db=db) if measures else None
+    answer = None
+    if measures:
+        level = 0.95 if level is None else level
+        answer = scenario(made, **measures, model=model, level=level, db=db)
     return json_text(as_dict(made, mode_counts(made), crossings(made), answer))
 
 
