@@ -108,10 +108,17 @@ def test_a_record_is_chosen_by_keyboard(open_page, tmp_path):
     opened = open_page()
     page = opened.page
     (tmp_path / "pulse.csv").write_text(pulse(), encoding="utf-8")
+    choosers = []
+    # before the key, so that the browser has been told
+    page.on("filechooser", lambda chooser: choosers.append(chooser))
     page.focus("#record-file")
-    with page.expect_file_chooser() as chooser:
-        page.keyboard.press("Enter")
-    chooser.value.set_files(tmp_path / "pulse.csv")
+    page.keyboard.press("Enter")
+    for _ in range(200):
+        if choosers:
+            break
+        page.wait_for_timeout(100)
+    [chooser] = choosers
+    chooser.set_files(tmp_path / "pulse.csv")
     expect(page.locator("#spectrum-part")).to_be_visible()
     page.focus("#drop-record")
     page.keyboard.press("Enter")
