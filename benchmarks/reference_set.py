@@ -11,12 +11,14 @@ from __future__ import annotations
 import argparse
 import csv
 import hashlib
+import json
 import os
 import sqlite3
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, Literal
 
 from sqlalchemy import Connection, ScalarSelect, Table, bindparam, delete, select, update
 
@@ -26,6 +28,7 @@ from rbfrag.campaign.bench.cases import RECORDS_VARIABLE
 from rbfrag.campaign.bench.tables import markdown
 from rbfrag.campaign.progress import CampaignProgress
 from rbfrag.campaign.simulate import CampaignSummary, simulate
+from rbfrag.campaign.simulate_kind import simulate_kind
 from rbfrag.db import schema
 from rbfrag.db.check import check_database
 from rbfrag.db.content import content_digest
@@ -33,8 +36,10 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_store import save_model
 from rbfrag.db.natural_key import canonical_json, combination_key
+from rbfrag.db.rows import ModelRow
 from rbfrag.db.stored_combination import stored_combination
 from rbfrag.fragility.fitting import fit
+from rbfrag.fragility.kind_fitting import fit_kind
 from rbfrag.fragility.report import FitReport
 from rbfrag.solver.results import NUMERICS_VERSION
 from rbfrag.version import __version__
@@ -45,7 +50,7 @@ MAP_DEPTH = 1e-3
 CLEARANCE = 1e-6
 """The critical island ends no further than this share above the critical value."""
 
-MOST_BYTES = 4_000_000
+MOST_BYTES = 5_500_000
 
 PAGE = ROOT / "docs" / "reference" / "reference-data.md"
 
@@ -62,6 +67,19 @@ MODELS = (
     ("logistic", "pgd_tm"),
 )
 """Method and term of the models that are shipped; the first one is the default."""
+
+
+KINDS: tuple[Literal["slumping", "sliding"], ...] = ("slumping", "sliding")
+
+KIND_MODELS: tuple[dict[str, Any], ...] = (
+    {"kind": "sliding", "term": "pgv_pga"},
+    {"kind": "sliding", "term": "pgv"},
+    {"kind": "slumping", "term": "pgv_pga", "rotation_deg": None},
+    {"kind": "slumping", "term": "pgv", "rotation_deg": None},
+    {"kind": "slumping", "term": "pgv_pga", "rotation_deg": 2.0},
+    {"kind": "slumping", "term": "pgv", "rotation_deg": 2.0},
+)
+"""The models of other kinds that are shipped; the first of each kind is its default."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -83,16 +101,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
         full, suite=SUITE, vertical="both", map_depth=MAP_DEPTH, jobs=chosen.jobs,
         on_progress=show,
     )  # fmt: skip
+    # of slumping only models are shipped
+    for kind in KINDS[1:] if chosen.without_models else KINDS:
+        simulate_kind(full, kind=kind, suite=SUITE, jobs=chosen.jobs, on_progress=show)
     made = chosen.work / "reference.db"
     reduce(full, made)
     models = [] if chosen.without_models else add_models(made)
+    kinds = [] if chosen.without_models else add_kind_models(full, made)
     examine(made)
     chosen.out.parent.mkdir(parents=True, exist_ok=True)
     # in place at once or not at all
     beside = chosen.out.with_name(f"{chosen.out.name}.new")
     beside.write_bytes(made.read_bytes())
     beside.replace(chosen.out)
-    chosen.page.write_text(provenance(made, manifest, added, summary, models), encoding="utf-8")
+    chosen.page.write_text(
+        provenance(made, manifest, added, summary, models, kinds), encoding="utf-8"
+    )
     print(f"{chosen.out}: {made.stat().st_size:,} bytes\n{chosen.page}")
 
 
@@ -113,6 +137,7 @@ def reduce(full: Path, made: Path) -> None:
     raw.close()
     with opened_database(made) as engine, engine.begin() as connection:
         connection.execute(update(schema.motion).values(samples=None))
+        keep_curves_alone(connection)
         connection.execute(delete(schema.response))
         interval, point = schema.outcome_interval, schema.simulation
 
@@ -128,12 +153,48 @@ def reduce(full: Path, made: Path) -> None:
         undecided = interval.c.outcome == "undecided"
         connection.execute(delete(interval).where(undecided | (narrow & below)))
         here = critical(point)
-        connection.execute(delete(point).where((point.c.kr_over_pga != here) | here.is_(None)))
+        slides = point.c.displacement_m.is_not(None)
+        unwanted = (point.c.kr_over_pga != here) | here.is_(None)
+        connection.execute(delete(point).where(unwanted, ~slides))
         rename(connection)
     raw = sqlite3.connect(made, isolation_level=None)
     raw.execute("PRAGMA journal_mode = DELETE")
     raw.execute("VACUUM")
     raw.close()
+
+
+def keep_curves_alone(connection: Connection) -> None:
+    """Of the other kinds, keep the displacements of sliding blocks.
+
+    The critical values of slumps are too many to be shipped; their models stay.
+    """
+    table = schema.combination
+    rows = connection.execute(
+        select(table.c.id, table.c.settings).where(table.c.kind != "toppling")
+    )
+    dropped = [row.id for row in rows if json.loads(row.settings).get("displacement_m") != 0.0]
+    some = 500
+    for start in range(0, len(dropped), some):
+        chosen = dropped[start : start + some]
+        for child in (schema.outcome_interval, schema.simulation):
+            connection.execute(delete(child).where(child.c.combination_id.in_(chosen)))
+        connection.execute(delete(table).where(table.c.id.in_(chosen)))
+
+
+def add_kind_models(full: Path, made: Path) -> list[ModelRow]:
+    """Fit the models of other kinds to the full database, and store them in what is shipped."""
+    rows = []
+    for asked in KIND_MODELS:
+        with opened_database(full, read_only=True) as engine, engine.connect() as connection:
+            row = fit_kind(connection, **asked).row
+        with opened_database(made) as engine, engine.begin() as connection:
+            rows.append(save_model(connection, row, replace=True))
+        print(f"fitted {row.name}", file=sys.stderr, flush=True)
+    raw = sqlite3.connect(made, isolation_level=None)
+    raw.execute("PRAGMA journal_mode = DELETE")
+    raw.execute("VACUUM")
+    raw.close()
+    return rows
 
 
 def add_models(made: Path) -> list[FitReport]:
@@ -161,7 +222,8 @@ def rename(connection: Connection) -> None:
         )
     }
     rows = []
-    for key in connection.scalars(select(schema.combination.c.natural_key)).all():
+    toppling = schema.combination.c.kind == "toppling"
+    for key in connection.scalars(select(schema.combination.c.natural_key).where(toppling)).all():
         stored = stored_combination(connection, key)
         settings = {**stored.settings, "map": "decided"}
         up = stored.vertical_motion_id
@@ -209,6 +271,7 @@ def provenance(
     added: AddReport,
     summary: CampaignSummary,
     models: Sequence[FitReport],
+    kinds: Sequence[ModelRow],
 ) -> str:
     """Return the page that says where the shipped data come from."""
     with manifest.open(encoding="utf-8", newline="") as file:
@@ -230,7 +293,11 @@ def provenance(
     headers = ["set", "format", "horizontal", "vertical", "earthquakes", "source repository"]
     with opened_database(made, read_only=True) as engine, engine.connect() as connection:
         digest = content_digest(connection)
-        status = Counter(connection.scalars(select(schema.combination.c.status)))
+        toppling = schema.combination.c.kind == "toppling"
+        status = Counter(connection.scalars(select(schema.combination.c.status).where(toppling)))
+        slid = schema.simulation.c.displacement_m.is_not(None)
+        curves = select(schema.simulation.c.kr_over_pga).where(slid)
+        displacements = len(connection.execute(curves).all())
         intervals = len(connection.execute(select(schema.outcome_interval.c.k_lo)).all())
         vertical = schema.combination.c.vertical_motion_id.is_not(None)
         shaken = len(connection.execute(select(schema.combination.c.id).where(vertical)).all())
@@ -259,12 +326,15 @@ builds the file and this page from the records.
   on to {MAP_DEPTH:g} of $k_r/\\mathrm{{PGA}}$, and intervals narrower than that are left out; the
   critical value itself is as exact as everywhere. The setting `map` is `decided`, and the natural
   keys say so too.
-- Of the simulations the critical block of each combination; the search itself was made with all.
+- {displacements:,} displacements of sliding blocks, of 23 strengths in both polarities of every
+  horizontal motion ([how](../theory/other-kinds.md)).
+- Of the simulations of toppling the critical block of each combination; the search itself was
+  made with all.
 - {len(added.added) + len(added.known)} motions with their intensity measures, the hash of their
   samples, their earthquake, and what was done to them: uncorrected records were filtered as
   `rbfrag motions add` does it.
 
-{model_section(models)}## Where the records come from
+{model_section(models)}{kind_section(kinds)}## Where the records come from
 
 {markdown((headers, cells))}
 
@@ -309,6 +379,39 @@ def model_section(models: Sequence[FitReport]) -> str:
 
 Fitted to what is shipped, without vertical motion ([how](../theory/fragility.md),
 [how well](../theory/model-choice.md)); `{models[0].name}` is the default.
+
+{markdown((columns, rows))}
+
+"""
+
+
+def kind_section(models: Sequence[ModelRow]) -> str:
+    """Return the part of the page on the models of other kinds, empty without any."""
+    if not models:
+        return ""
+    rows = []
+    for row in models:
+        told: dict[str, Any] = dict(row.diagnostics)
+        errors = told["standard_errors"]
+        rows.append(
+            [
+                f"`{row.name}`",
+                ", ".join(
+                    f"{name} = {value:.4g} ± {errors[name]:.2g}"
+                    for name, value in row.coefficients.items()
+                ),
+                f"{told['n']:,}",
+                f"{told['n_censored']:,}",
+                f"{told['scores']['held_out_log_loss']:.3f}",
+                f"{told['scores']['calibration_slope']:.2f}",
+            ]
+        )
+    columns = ["model", "coefficients ± standard error", "found", "censored", "held-out log loss",
+               "calibration slope"]  # fmt: skip
+    return f"""## Models of blocks that slide or slump
+
+Without vertical motion ([what they say](../theory/other-kinds.md)). Those of slumping are fitted to
+the critical values of the family of blocks, which are too many to be shipped.
 
 {markdown((columns, rows))}
 

@@ -8,6 +8,7 @@ import typer
 
 from rbfrag.cli import options
 from rbfrag.cli.output import cell, print_json, print_pairs, print_table, print_warnings
+from rbfrag.errors import InputError
 
 if TYPE_CHECKING:
     from rbfrag.fragility.report import FitReport
@@ -25,15 +26,31 @@ def fit(
             show_default=False,
         ),
     ],
-    method: Annotated[
+    kind: Annotated[
         str,
         typer.Option(
-            "--method",
-            help="Of critical values: wls (weighted least squares, the dissertation's), lognormal "
-            "(with censored motions). Of outcomes: logistic, weibull, bounded; of outcomes on xp: "
-            "record, power.",
+            "--kind",
+            help="What the blocks do: toppling; slumping or sliding, on the terms pgv and pgv_pga.",
         ),
-    ] = "wls",
+    ] = "toppling",
+    rotation: Annotated[
+        float | None,
+        typer.Option(
+            "--rotation",
+            help="Slumping: rotation that counts as failure [deg]. Default: failure past recovery.",
+            show_default=False,
+        ),
+    ] = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            "--method",
+            show_default=False,
+            help="Toppling. Of critical values: wls (weighted least squares, the dissertation's), "
+            "lognormal (with censored motions). Of outcomes: logistic, weibull, bounded; of "
+            "outcomes on xp: record, power. Default: wls.",
+        ),
+    ] = None,
     suite: options.Suite = None,
     vertical: Annotated[
         str,
@@ -67,8 +84,27 @@ def fit(
 ) -> None:
     """Fit a fragility model to the stored critical values or outcomes and store it.
 
-    The first model of a database becomes its default (rbfrag models default NAME changes it).
+    The first model of a kind becomes its default (rbfrag models default NAME changes it).
     """
+    if kind != "toppling":
+        _refuse_options_of_toppling(
+            kind,
+            {
+                "--method": method is not None,
+                "--free-m": free_m,
+                "--doubtful-pgd": doubtful_pgd,
+                "--seed": seed != 0,
+            },
+        )
+        from rbfrag.cli.fit_kind import fit_kind
+
+        fit_kind(
+            kind, term=term, rotation_deg=rotation, suite=suite, vertical=vertical, name=name,
+            replace=replace, db=db, json=json,
+        )  # fmt: skip
+        return
+    if rotation is not None:
+        raise InputError("--rotation goes with --kind slumping, not with toppling")
     from rbfrag.db.engine import opened_database
     from rbfrag.db.model_store import save_model
     from rbfrag.fragility.fitting import fit as run
@@ -80,7 +116,7 @@ def fit(
         report = run(
             connection,
             term=term,
-            method=method,
+            method=method or "wls",
             suite=suite,
             vertical=vertical,  # type: ignore[arg-type]
             name=name,
@@ -91,6 +127,12 @@ def fit(
     with opened_database(db) as engine, engine.begin() as connection:
         row = save_model(connection, report.model.row, replace=replace)
     print_report(FitReport.from_model(FragilityModel.from_row(row)), json=json)
+
+
+def _refuse_options_of_toppling(kind: str, given: dict[str, bool]) -> None:
+    for option, is_given in given.items():
+        if is_given:
+            raise InputError(f"{option} goes with --kind toppling, not with {kind}")
 
 
 def print_report(report: FitReport, *, json: bool) -> None:

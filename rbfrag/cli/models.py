@@ -33,8 +33,8 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
         print_json(listed)
         return
     print_table(
-        ("name", "term", "method", "default", "n", "earthquakes", "fitted"),
-        [tuple(each.values()) for each in listed],
+        ("name", "kind", "term", "method", "default", "n", "earthquakes", "fitted"),
+        [tuple(value for name, value in each.items() if name != "domain") for each in listed],
     )
 
 
@@ -42,6 +42,7 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
 def show_model(name: Name, db: options.Db = None, json: options.Json = False) -> None:
     """Print the report of a fitted model from its stored row."""
     from rbfrag.cli.fit import print_report
+    from rbfrag.cli.fit_kind import print_kind_report
     from rbfrag.db.engine import opened_database
     from rbfrag.db.model_store import load_model
     from rbfrag.fragility.model import FragilityModel
@@ -49,12 +50,15 @@ def show_model(name: Name, db: options.Db = None, json: options.Json = False) ->
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         row = load_model(connection, name)
+    if row.kind != "toppling":
+        print_kind_report(row, json=json)
+        return
     print_report(FitReport.from_model(FragilityModel.from_row(row)), json=json)
 
 
 @app.command("default", epilog="Example:  rbfrag models default wls-pgv")
 def set_default_model(name: Name, db: options.Db = None) -> None:
-    """Make a model the one that answers when none is named."""
+    """Make a model the one of its kind that answers when none is named."""
     from rbfrag.db.engine import opened_database
     from rbfrag.db.model_store import set_default
 

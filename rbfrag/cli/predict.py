@@ -1,8 +1,8 @@
-"""`rbfrag predict`: the probability that a block topples."""
+"""`rbfrag predict`: the probability that a block fails."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -14,10 +14,50 @@ from rbfrag.errors import InputError
 EXAMPLE = "Example:  rbfrag predict --p2 3 --kr 0.1 --pgv 0.6 --json"
 
 
+def _number(name: str, text: str) -> Any:
+    return typer.Option(name, help=text, show_default=False)
+
+
 def predict(
     p2: options.P2OrFile = None,
     kr: options.KrOrFile = None,
-    block: options.BlockFile = None,
+    block: Annotated[
+        str | None,
+        typer.Option(
+            "--block",
+            metavar="FILE",
+            help="Block file (.toml or .csv) with beta_deg and phi_deg, instead of numbers; "
+            "refused unless its mode is that of --kind.",
+            show_default=False,
+        ),
+    ] = None,
+    kind: Annotated[
+        str, typer.Option("--kind", help="How the block fails: toppling, slumping or sliding.")
+    ] = "toppling",
+    ky: Annotated[
+        float | None, _number("--ky", "Sliding: yield acceleration coefficient tan(phi - beta).")
+    ] = None,
+    beta: Annotated[
+        float | None,
+        _number("--beta", "Sliding, with --ky: dip of the base, out of the slope positive [deg]."),
+    ] = None,
+    displacement: Annotated[
+        float | None, _number("--displacement", "Sliding: the displacement that is too far [m].")
+    ] = None,
+    ks: Annotated[
+        float | None, _number("--ks", "Slumping: yield acceleration coefficient k_s, with --ps2.")
+    ] = None,
+    ps2: Annotated[
+        float | None, _number("--ps2", "Slumping: frequency parameter p_s² at rest [1/s²].")
+    ] = None,
+    rotation: Annotated[
+        float | None,
+        _number(
+            "--rotation",
+            "Slumping: rotation that counts as failure [deg]; there must be a model of it. "
+            "Default: failure past recovery.",
+        ),
+    ] = None,
     pgv: options.Pgv = None,
     pga: options.Pga = None,
     tm: options.Tm = None,
@@ -63,11 +103,40 @@ def predict(
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Print the probability that a block topples, with its confidence interval.
+    """Print the probability that a block fails, with its confidence interval.
 
     What is known of the motion decides which model answers: PGV; PGV and PGA; these and Tm; or
-    the motion itself. Where the measures suffice for several terms, each is answered.
+    the motion itself. Where the measures suffice for several terms, each is answered. With
+    --kind slumping or sliding, PGV, or better PGV and PGA.
     """
+    from rbfrag.cli.predict_kind import predict_kind, refuse_options_of_other_kinds
+
+    refuse_options_of_other_kinds(
+        kind,
+        {
+            "--p2": p2 is not None,
+            "--kr": kr is not None,
+            "--tm": tm is not None,
+            "--pgd": pgd is not None,
+            "--motion": motion is not None,
+            "--polarity": polarity != "both",
+            "--batch": batch is not None,
+            "--out": out is not None,
+            "--ky": ky is not None,
+            "--beta": beta is not None,
+            "--displacement": displacement is not None,
+            "--ks": ks is not None,
+            "--ps2": ps2 is not None,
+            "--rotation": rotation is not None,
+        },
+    )
+    if kind != "toppling":
+        predict_kind(
+            kind, block=block, ky=ky, beta_deg=beta, displacement_m=displacement, ks=ks, ps2=ps2,
+            rotation_deg=rotation, pgv_m_s=pgv, pga_g=pga, model=model, level=level, db=db,
+            json=json,
+        )  # fmt: skip
+        return
     given = {"pgv_m_s": pgv, "pga_g": pga, "tm_s": tm, "pgd_m": pgd}
     measures = {name: value for name, value in given.items() if value is not None}
     if batch is not None or out is not None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import FitError, InputError, ModelError
 from rbfrag.fragility.fit_data import fit_data
+from rbfrag.fragility.kind_data import sliding_data, slumping_data
+from rbfrag.fragility.kind_model import KindModel
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.source import FitSource, read_source
 
@@ -45,7 +47,10 @@ class ModelCheck:
 def check_models(connection: Connection, rows: list[ModelRow]) -> list[ModelCheck]:
     """Compare the fingerprint of each model with that of the data its fit would read today."""
     sources: dict[Selection, FitSource] = {}
-    return [_check(connection, row, sources) for row in rows]
+    return [
+        _check(connection, row, sources) if row.kind == "toppling" else _check_kind(connection, row)
+        for row in rows
+    ]
 
 
 def _check(
@@ -70,6 +75,29 @@ def _check(
         return ModelCheck(row.name, "no data", str(error))
     if data.fingerprint == row.data_fingerprint:
         return ModelCheck(row.name, "unchanged", "")
-    then, now = row.diagnostics.get("n"), int(data.found.sum())
+    return _changed(row, int(data.found.sum()))
+
+
+def _check_kind(connection: Connection, row: ModelRow) -> ModelCheck:
+    told = cast("dict[str, Any]", row.diagnostics)
+    selection = {"suite": told.get("suite"), "vertical": told.get("vertical", "without")}
+    try:
+        KindModel.from_row(row)
+        if row.kind == "sliding":
+            data = sliding_data(connection, **selection)
+        else:
+            rotation_deg = told.get("rotation_deg")
+            data = slumping_data(connection, rotation_deg=rotation_deg, **selection)
+    except ModelError as error:
+        return ModelCheck(row.name, "unreadable", str(error))
+    except (FitError, InputError) as error:
+        return ModelCheck(row.name, "no data", str(error))
+    if data.fingerprint == row.data_fingerprint:
+        return ModelCheck(row.name, "unchanged", "")
+    return _changed(row, int(data.found.sum()))
+
+
+def _changed(row: ModelRow, now: int) -> ModelCheck:
+    then = row.diagnostics.get("n")
     counts = f"fitted to {then} critical values, {now} today" if then != now else "other values"
     return ModelCheck(row.name, "changed", f"{counts}: fit it again with  rbfrag fit --replace")

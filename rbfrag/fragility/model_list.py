@@ -17,6 +17,7 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
     return [
         {
             "name": row.name,
+            "kind": row.kind,
             "term": row.term,
             "method": row.method,
             "is_default": row.is_default,

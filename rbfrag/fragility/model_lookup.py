@@ -166,6 +166,11 @@ def _named(name: str, db: str | PathLike[str] | None) -> FragilityModel:
     raise UnknownModelError(unknown_model(name, sorted(m.name for m in stored), place))
 
 
+def uses_reference(db: str | PathLike[str] | None) -> bool:
+    """Return whether the shipped reference answers for want of another database."""
+    return _place(db)[1]
+
+
 def stored_rows(db: str | PathLike[str] | None = None) -> list[ModelRow]:
     """Return the models of a database as they are stored, sorted by name.
 
@@ -188,7 +193,7 @@ def _stored(db: str | PathLike[str] | None) -> tuple[list[FragilityModel], str]:
     if isinstance(place, Path):
         return _stored_in_file(place, shipped), str(place)
     rows, label = _stored_on_server(place)
-    return [_of_row(row) for row in rows], label
+    return [_of_row(row) for row in rows if row.kind == "toppling"], label
 
 
 def _stored_on_server(url: str) -> tuple[list[ModelRow], str]:
@@ -208,7 +213,8 @@ def _stored_in_file(path: Path, shipped: bool) -> list[FragilityModel]:
         return kept[1]
     from rbfrag.db.model_file import read_models
 
-    models = [FragilityModel.from_row(row) for row in read_models(path)]
+    rows = [row for row in read_models(path) if row.kind == "toppling"]
+    models = [FragilityModel.from_row(row) for row in rows]
     if shipped:
         models = [replace(model, notes=(FROM_REFERENCE,)) for model in models]
     if stamp:

@@ -131,6 +131,7 @@ class ModelListed(_Document):
     """A stored model: what `rbfrag models list --json` prints."""
 
     name: str
+    kind: str
     term: str
     method: str
     is_default: bool

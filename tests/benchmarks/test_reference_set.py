@@ -58,8 +58,14 @@ def test_it_needs_no_journal_and_holds_no_samples(built: Path) -> None:
     raw = sqlite3.connect(f"{file.as_uri()}?mode=ro&immutable=1", uri=True)
     assert raw.execute("PRAGMA journal_mode").fetchone() == ("delete",)
     assert raw.execute("SELECT count(*), count(samples) FROM motion").fetchone() == (3, 0)
-    settings = raw.execute("SELECT DISTINCT settings FROM combination").fetchall()
+    settings = raw.execute(
+        "SELECT DISTINCT settings FROM combination WHERE kind = 'toppling'"
+    ).fetchall()
+    others = raw.execute("SELECT kind, count(*) FROM combination GROUP BY kind").fetchall()
+    curves = raw.execute("SELECT count(displacement_m) FROM simulation").fetchone()
     raw.close()
+    assert dict(others) == {"sliding": 4, "toppling": 36}
+    assert curves == (4 * 23,)
     assert settings == [('{"map":"decided","map_depth":0.001,"search_limit":0.01}',)]
 
 

@@ -21,12 +21,16 @@ from rbfrag.db.check import check_database
 from rbfrag.db.content import table_rows_by_natural_key
 from rbfrag.db.engine import open_database, opened_database
 from rbfrag.db.merge import merge_databases
+from rbfrag.db.model_store import model_rows, save_model
 from rbfrag.db.motion_store import add_motion, load_motion
 from rbfrag.db.outcome_maps import outcome_maps
 from rbfrag.db.queries import combination_table
 from rbfrag.db.rows import EarthquakeInfo
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.exchange.database_export import export_database
+from rbfrag.fragility.kind_fitting import fit_kind
+from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping
+from rbfrag.fragility.model_check import check_models
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.scaled_search import critical_scale
 from rbfrag.solver.shaken_mechanism import shaken_mechanism
@@ -255,3 +259,30 @@ def test_what_two_databases_found_is_merged_and_exported(
 def test_what_cannot_be_run_is_refused(database: Path, options: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         simulate_kind(database, **options)
+
+
+def test_models_are_fitted_stored_and_asked(tmp_path: Path) -> None:
+    place = tmp_path / "m.db"
+    fill(place, 5)
+    slump(place, rotations_deg=(1.0,))
+    simulate_kind(place, kind="sliding", jobs=1)
+    with opened_database(place) as engine:
+        for kind, rotation_deg in (("sliding", None), ("slumping", 1.0)):
+            for term in ("pgv_pga", "pgv"):
+                with engine.connect() as connection:
+                    fitted = fit_kind(connection, kind=kind, term=term, rotation_deg=rotation_deg)
+                with engine.begin() as connection:
+                    row = save_model(connection, fitted.row)
+                assert row.coefficients == fitted.row.coefficients
+                assert row.is_default == (term == "pgv_pga")
+        with engine.connect() as connection:
+            checks = check_models(connection, model_rows(connection))
+        assert [each.state for each in checks] == ["unchanged"] * 4
+    slid = predict_sliding(0.05, 0.02, pgv_m_s=0.5, pga_g=0.4, db=place)
+    assert slid.model == "sliding-pgv_pga"
+    assert 0.0 < slid.probability <= 1.0
+    assert predict_sliding(0.05, 0.02, pgv_m_s=0.5, db=place).model == "sliding-pgv"
+    fell = predict_slumping(0.1, 5.0, pgv_m_s=0.5, pga_g=0.4, rotation_deg=1.0, db=place)
+    assert fell.model == "slumping-1deg-pgv_pga"
+    with pytest.raises(UnknownModelError, match="rotation of 1°"):
+        predict_slumping(0.1, 5.0, pgv_m_s=0.5, pga_g=0.4, db=place)
