@@ -15,6 +15,7 @@ from rbfrag.version import __version__
 if TYPE_CHECKING:
     from rbfrag.campaign.add_motions import add_motions as add_motions
     from rbfrag.campaign.simulate import simulate as simulate
+    from rbfrag.campaign.simulate_kind import simulate_kind as simulate_kind
     from rbfrag.errors import DatabaseError as DatabaseError
     from rbfrag.errors import FitError as FitError
     from rbfrag.errors import InputError as InputError
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
     from rbfrag.fragility.hazard_answer import HazardAnswer as HazardAnswer
     from rbfrag.fragility.hazard_answer import hazard as hazard
     from rbfrag.fragility.hazard_curve import HazardCurve as HazardCurve
+    from rbfrag.fragility.kind_fitting import fit_kind as fit_kind
+    from rbfrag.fragility.kind_prediction import predict_sliding as predict_sliding
+    from rbfrag.fragility.kind_prediction import predict_slumping as predict_slumping
     from rbfrag.fragility.prediction import predict as predict
     from rbfrag.motions.ground_motion import GroundMotion as GroundMotion
     from rbfrag.motions.recognise import read_motions as read_motions
@@ -39,6 +43,9 @@ if TYPE_CHECKING:
     from rbfrag.solver.results import CriticalResult as CriticalResult
     from rbfrag.solver.results import Outcome as Outcome
     from rbfrag.solver.results import Response as Response
+    from rbfrag.solver.scaled_search import critical_scale as critical_scale
+    from rbfrag.solver.sliding_search import critical_sliding as critical_sliding
+    from rbfrag.solver.sliding_search import sliding_displacements as sliding_displacements
     from rbfrag.solver.stability import Stability as Stability
     from rbfrag.solver.stability import stability as stability
     from rbfrag.solver.stability_arrays import StabilityArray as StabilityArray
@@ -64,14 +71,21 @@ _HOME = {
     "WorkFailedError": "rbfrag.errors",
     "add_motions": "rbfrag.campaign.add_motions",
     "critical": "rbfrag.solver.critical",
+    "critical_scale": "rbfrag.solver.scaled_search",
+    "critical_sliding": "rbfrag.solver.sliding_search",
     "fit": "rbfrag.fragility.fitting",
+    "fit_kind": "rbfrag.fragility.kind_fitting",
     "hazard": "rbfrag.fragility.hazard_answer",
     "predict": "rbfrag.fragility.prediction",
+    "predict_sliding": "rbfrag.fragility.kind_prediction",
+    "predict_slumping": "rbfrag.fragility.kind_prediction",
     "read_hazard_curves": "rbfrag.exchange.hazard_file",
     "read_motions": "rbfrag.motions.recognise",
     "read_table": "rbfrag.exchange.read_table",
     "respond": "rbfrag.solver.response",
     "simulate": "rbfrag.campaign.simulate",
+    "simulate_kind": "rbfrag.campaign.simulate_kind",
+    "sliding_displacements": "rbfrag.solver.sliding_search",
     "stability": "rbfrag.solver.stability",
     "stability_arrays": "rbfrag.solver.stability_arrays",
     "toppling_spectrum": "rbfrag.motions.toppling_spectrum",

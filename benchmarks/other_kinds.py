@@ -1,0 +1,173 @@
+"""How well models of blocks that slide or slump do, and what y alone costs:
+
+    python -m benchmarks.other_kinds DATABASE [--write]
+
+reads the campaigns of a database (toppling, slumping by 2 degrees and past recovery, sliding), fits
+the models, compares them with published regressions, and writes the tables and the figure of
+docs/theory/other-kinds.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+from sqlalchemy import Connection
+
+from benchmarks.page import ROOT, replaced
+from rbfrag.campaign.bench.tables import markdown
+from rbfrag.db.engine import opened_database
+from rbfrag.db.queries import combination_table
+from rbfrag.fragility.kind_data import KindData, slumping_data
+from rbfrag.fragility.kind_fitting import (
+    Judged,
+    KindFit,
+    fit_kind,
+    judged_by,
+    probabilities,
+)
+from rbfrag.fragility.kind_formulas import FORMULAS
+from rbfrag.fragility.scores import brier, calibration, log_loss
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.plots.other_kinds import plot_other_kinds
+
+FloatArray = NDArray[np.float64]
+
+PAGE = ROOT / "docs" / "theory" / "other-kinds.md"
+FIGURE = ROOT / "docs" / "figures" / "other-kinds.svg"
+
+
+def jibson_2007(values: dict[str, FloatArray]) -> FloatArray:
+    """Return P(D > d) by eq. (6) of Jibson (2007): log10 D [cm] on the ratio alone, sd 0.510."""
+    r = values["ky"] / values["pga_g"]
+    mean = 0.215 + np.log10((1.0 - r) ** 2.341 * r**-1.438)
+    return np.asarray(ndtr((mean - np.log10(100.0 * values["displacement_m"])) / 0.510))
+
+
+def saygili_rathje_2008(values: dict[str, FloatArray]) -> FloatArray:
+    """Return P(D > d) by the model of Saygili & Rathje (2008) on PGA [g] and PGV [cm/s]."""
+    r = values["ky"] / values["pga_g"]
+    mean = -1.56 - 4.58 * r - 20.84 * r**2 + 44.75 * r**3 - 30.50 * r**4
+    mean = mean - 0.64 * np.log(values["pga_g"]) + 1.55 * np.log(100.0 * values["pgv_m_s"])
+    sigma = 0.405 + 0.524 * r
+    return np.asarray(ndtr((mean - np.log(100.0 * values["displacement_m"])) / sigma))
+
+
+def as_slide(judged: Judged, sliding: KindFit, rotation_deg: float) -> FloatArray:
+    """Return P of a slump as that of a slide: while theta is small, D = theta g/p_s²."""
+    values = dict(judged.values)
+    values["ky"] = values["ks"]
+    values["displacement_m"] = math.radians(rotation_deg) * STANDARD_GRAVITY_M_S2 / values["ps2"]
+    other = Judged(values, judged.failed, judged.event)
+    parameters = np.array(sliding.model.parameters)
+    return probabilities(FORMULAS["sliding", "pgv_pga"], parameters, other)
+
+
+def scored(name: str, p: FloatArray, judged: Judged) -> list[str]:
+    known = judged.known
+    return [
+        name,
+        f"{log_loss(p, judged.failed, known):.3f}",
+        f"{brier(p, judged.failed, known):.3f}",
+        f"{calibration(p, judged.failed, known).slope:.2f}",
+    ]
+
+
+def within_motion(residual: FloatArray, group: NDArray[np.intp]) -> tuple[float, float]:
+    """Return the scatter between blocks under one motion, and between motions."""
+    count = np.bincount(group)
+    mean = np.bincount(group, residual) / np.maximum(count, 1)
+    many = count[group] > 1
+    inside = residual[many] - mean[group[many]]
+    freedom = many.sum() - np.unique(group[many]).size
+    within = float(np.sqrt((inside**2).sum() / freedom))
+    return within, float(np.std(mean[count > 1]))
+
+
+def slumping_scatter(data: KindData) -> tuple[float, float]:
+    """Return both scatters of ln(y/PGV) at failure, found values alone."""
+    v = data.values
+    y = v["ks"] * STANDARD_GRAVITY_M_S2 / np.sqrt(v["ps2"])
+    found = data.found
+    return within_motion(np.log(y / v["pgv_m_s"])[found], data.group[found])
+
+
+def toppling_scatter(connection: Connection) -> tuple[float, float]:
+    """Return the same of toppling blocks of six sizes."""
+    table = combination_table(connection)
+    found = table.status == "found"
+    names = [f"{m} {p}" for m, p in zip(table.motion_id.tolist(), table.polarity, strict=True)]
+    group = np.unique(np.array(names)[found], return_inverse=True)[1]
+    return within_motion(np.log(table.y_m_s[found] / table.pgv_m_s[found]), group.astype(np.intp))
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("database")
+    options.add_argument("--toppling", help="database of the toppling campaign, if it is another")
+    options.add_argument("--write", action="store_true", help="write page and figure")
+    chosen = options.parse_args()
+    heads = ["model", "log loss", "Brier", "calibration slope"]
+    with opened_database(chosen.database, read_only=True) as engine, engine.connect() as c:
+        sliding = fit_kind(c, kind="sliding")
+        only_pgv = fit_kind(c, kind="sliding", term="pgv")
+        slumps = {
+            (rotation, term): fit_kind(c, kind="slumping", term=term, rotation_deg=rotation)
+            for rotation in (None, 2.0)
+            for term in ("pgv_pga", "pgv")
+        }
+        recovery = slumping_data(c, rotation_deg=None)
+        turned = slumping_data(c, rotation_deg=2.0)
+    place = chosen.toppling or chosen.database
+    with opened_database(place, read_only=True) as engine, engine.connect() as c:
+        topples = toppling_scatter(c)
+    rows = [
+        scored("`sliding-pgv_pga`, held out", sliding.held_out, sliding.judged),
+        scored("`sliding-pgv`, held out", only_pgv.held_out, only_pgv.judged),
+        scored(
+            "Saygili & Rathje (2008), PGA and PGV",
+            saygili_rathje_2008(sliding.judged.values),
+            sliding.judged,
+        ),
+        scored("Jibson (2007), k_y/PGA", jibson_2007(sliding.judged.values), sliding.judged),
+    ]
+    first = markdown((heads, rows))
+    rows = [
+        scored(f"`{fit.row.name}`, held out", fit.held_out, fit.judged) for fit in slumps.values()
+    ]
+    judged = judged_by(turned)
+    rows.append(scored("2 degrees as a slide of 2° g/p_s²", as_slide(judged, sliding, 2.0), judged))
+    second = markdown((heads, rows))
+    cells = [
+        [name, f"{within:.2f}", f"{between:.2f}"]
+        for name, (within, between) in (
+            ("toppling, six sizes", topples),
+            ("slumping past recovery, 18 blocks", slumping_scatter(recovery)),
+            ("slumping by 2 degrees, 18 blocks", slumping_scatter(turned)),
+        )
+    ]
+    third = markdown(
+        (["critical values", "between blocks under one motion", "between motions"], cells)
+    )
+    for name, table in (
+        ("sliding-scores", first),
+        ("slumping-scores", second),
+        ("y-scatter", third),
+    ):
+        print(name, table, sep="\n")
+        if chosen.write:
+            PAGE.write_text(
+                replaced(PAGE.read_text(encoding="utf-8"), name, table), encoding="utf-8"
+            )
+    if chosen.write:
+        slump = slumps[None, "pgv_pga"].model
+        plot_other_kinds(sliding.model, sliding.data, slump, recovery, FIGURE)
+        print(Path(FIGURE).relative_to(ROOT))
+
+
+if __name__ == "__main__":
+    main()
