@@ -1,0 +1,70 @@
+"""Connections whose headers do not come, and counts of several processes together."""
+
+import socket
+import threading
+import urllib.request
+from contextlib import contextmanager
+
+import pytest
+import uvicorn
+
+from benchmarks.running_service import running_service
+from rbfrag.service import protocol
+
+
+async def hello(scope, receive, send):
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+    await send({"type": "http.response.body", "body": b"hello"})
+
+
+@contextmanager
+def serving():
+    """Port of a server in a thread."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        config = uvicorn.Config(
+            hello, http=protocol.BoundedProtocol, lifespan="off", log_config=None
+        )
+        server = uvicorn.Server(config)
+        thread = threading.Thread(target=server.run, args=([listener],))
+        thread.start()
+        try:
+            yield listener.getsockname()[1]
+        finally:
+            server.should_exit = True
+            thread.join(30)
+
+
+@pytest.mark.parametrize(
+    "sent", [b"", b"GET / HTTP/1.1\r\nhost: x\r\n", b"GET / HTTP/1.1\r\nhost: x\r\n\r\nGET / HT"]
+)
+def test_headers_that_do_not_come_are_given_up(monkeypatch, sent):
+    monkeypatch.setattr(protocol, "HEADERS_S", 0.5)
+    with serving() as port, socket.create_connection(("127.0.0.1", port), 20) as wire:
+        wire.sendall(sent)
+        answer = wire.makefile("rb").read()
+    assert answer.count(b"hello") == sent.count(b"\r\n\r\n")
+    assert b"HTTP/1.1 408 " in answer
+
+
+def test_headers_that_are_too_long_are_refused():
+    with serving() as port, socket.create_connection(("127.0.0.1", port), 20) as wire:
+        wire.sendall(b"GET / HTTP/1.1\r\nx: " + b"y" * (protocol.HEADERS_BYTES + 1))
+        answer = wire.makefile("rb").read()
+    assert answer.startswith(b"HTTP/1.1 431 ")
+
+
+def test_headers_that_come_in_time_are_answered():
+    with serving() as port:
+        for _ in range(3):
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/") as answer:
+                assert answer.read() == b"hello"
+
+
+def test_processes_are_counted_together(tmp_path):
+    with running_service(tmp_path, workers=2, jobs=1) as running:
+        for _ in range(30):
+            with urllib.request.urlopen(f"{running.address}/v1/models") as answer:
+                answer.read()
+        with urllib.request.urlopen(f"{running.address}/v1/metrics") as answer:
+            text = answer.read().decode()
+    assert 'rbfrag_requests_total{method="GET",operation="/v1/models",status="200"} 30.0' in text
