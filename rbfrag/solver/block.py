@@ -321,7 +321,7 @@ def _parallelogram(
         outline=(heel, toe, front, back),
         is_parallelogram=True,
     )
-    extremes = (block.area_m2, block.inertia_m2, block.p2, block.r1_m)
+    extremes = (block.area_m2, block.inertia_m2, block.p2, block.r1_m) if h > 0.0 else (h,)
     if not all(math.isfinite(number) and number > 0.0 for number in extremes):
         raise InputError(
             f"a block with r3 = {block.r3_m:g} m and S1 = {2.0 * h:g} m is beyond arithmetic: "

@@ -34,6 +34,7 @@ def test_two_numbers_are_drawn_as_a_rectangle(client):
         ("p2=3&kr=-1", "kr"),
         ("p2=3&kr=0.1&beta=20", "p2"),
         ("alpha1=1&alpha3=20&r3=2&phi=30", "beta"),
+        ("alpha1=-89.999&alpha3=89.9999999&r3=1e-320&beta=0&phi=9", "arithmetic"),
         ("s1=1&s2=x&gamma=60&beta=20&phi=30", "s2"),
     ],
 )

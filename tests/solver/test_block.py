@@ -215,6 +215,7 @@ def test_contact_tolerance_is_a_thousandth_of_the_size() -> None:
         (10.0, 20.0, True, "r3_m = True"),
         (10.0, 20.0, 1e-200, "beyond arithmetic"),
         (10.0, 20.0, 1e200, "beyond arithmetic"),
+        (-89.999, 89.9999999, 1e-320, "beyond arithmetic"),
     ],
 )
 def test_angles_that_are_no_block(alpha1: Any, alpha3: Any, r3: Any, word: str) -> None:

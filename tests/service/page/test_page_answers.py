@@ -206,7 +206,7 @@ def test_a_shape_names_its_mode_and_answers_by_it(open_page, ask):
     page.fill("#phi", "15")
     expect(page.locator("#block .outline.slide")).to_have_count(1)
     expect(page.locator("#in-words")).to_contain_text(
-        "The fitted models answer for blocks that topple"
+        "The probability here is that of toppling alone"
     )
     page.fill("#phi", "38")
     expect(page.locator("#block .outline.topple")).to_have_count(1)
@@ -227,6 +227,7 @@ def test_a_model_can_be_chosen(open_page, ask):
     offered = page.eval_on_selector_all("#model option", "all => all.map((each) => each.value)")
     assert "record-xp" not in offered
     assert "wls-pgv" in offered
+    assert not [name for name in offered if name.startswith(("sliding", "slumping"))]
 
 
 def test_a_link_is_text_and_never_markup(open_page):

@@ -128,7 +128,7 @@ function notRefused(error) {
 /** @param {any} found answer of /v1/block */
 function whyNoAnswer(found) {
   if (found.mode === "topple" && found.state === "stable" && found.kr > 0) return "";
-  return `${blockInWords(found)} The fitted models answer for blocks that topple.`;
+  return `${blockInWords(found)} The probability here is that of toppling alone.`;
 }
 
 /** @param {string} why */

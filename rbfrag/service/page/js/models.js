@@ -3,6 +3,9 @@
 import { byId } from "./page.js";
 import { askModels } from "./service.js";
 
+/** The page asks for blocks that topple. */
+const KIND = "toppling";
+
 /** A model of this term needs the record itself, which /v1/predict is not given here. */
 const NEEDS_RECORD = "xp";
 
@@ -29,7 +32,7 @@ function offer() {
   const chosen = select.value;
   const [best] = select.options;
   const others = models
-    .filter((each) => each.term !== NEEDS_RECORD)
+    .filter((each) => each.kind === KIND && each.term !== NEEDS_RECORD)
     .map((each) => new Option(`${each.name}${each.is_default ? " (default)" : ""}`, each.name));
   select.replaceChildren(best, ...others);
   if (chosen && !others.some((each) => each.value === chosen)) {
