@@ -56,7 +56,8 @@ def rockmass(
         float | None,
         typer.Option(
             "--displacement",
-            help="A slide fails beyond this displacement [m]. Default: 0.05.",
+            help="A slide fails beyond this displacement [m]. Default with --motion: 0.05. With "
+            "--pgv, blocks that slide or slump are answered for where it is given.",
             show_default=False,
         ),
     ] = None,
@@ -135,8 +136,8 @@ def rockmass(
             "--vertical": vertical is not None,
             "--reverse": reverse,
             "--scales": scales is not None,
-            "--displacement": displacement is not None,
-            "--rotation": rotation is not None,
+            "--displacement": displacement is not None and not shaken,
+            "--rotation": rotation is not None and (not shaken or displacement is None),
             "--jobs": jobs is not None,
             "--units": units is not None,
             "--dt": dt is not None,
@@ -148,7 +149,10 @@ def rockmass(
     answer = fates = found = None
     about: list[str] = []
     if shaken:
-        answer = scenario(made, **measures, model=model, level=level, db=db)
+        answer = scenario(
+            made, **measures, model=model, level=level, db=db, displacement_m=displacement,
+            rotation_deg=rotation,
+        )  # fmt: skip
     if motion is not None:
         checked_level(level)
         fates, about = run_shaken(
@@ -192,7 +196,11 @@ def _refuse_options_without_their_cause(
             "under a motion, or a fragility model answers for measures of one"
         )
     if motion is None and (extra := [name for name, given in with_motion.items() if given]):
-        raise InputError(f"{extra[0]} goes with --motion: name the accelerogram, too")
+        also = {
+            "--displacement": ", or with --pgv",
+            "--rotation": ", or with --pgv and --displacement",
+        }.get(extra[0], "")
+        raise InputError(f"{extra[0]} goes with --motion{also}: name the accelerogram, too")
     if model is not None and not measured:
         raise InputError(
             "--model goes with a measure of the motion: give --pgv, --pga and --tm, or --pgd and "
@@ -249,7 +257,8 @@ def _print(document: dict[str, Any]) -> None:
 def _print_scenario(found: dict[str, Any]) -> None:
     print()
     names = ("pgv_m_s", "pga_g", "tm_s", "pgd_m", "model", "level")
-    print_pairs({name: found[name] for name in names if name in found})
+    others = {f"model of {_words(mode)}": name for mode, name in found["other_models"].items()}
+    print_pairs({**{name: found[name] for name in names if name in found}, **others})
     rows = [
         [mode, 100.0 * answer["share"], answer["covered"], *_probability(answer)]
         for mode, answer in found["modes"].items()

@@ -71,6 +71,7 @@ def _scenario(answer: Scenario) -> dict[str, Any]:
     return {
         **answer.measures,
         "model": answer.model,
+        "other_models": dict(answer.other_models),
         "term": answer.term,
         "method": answer.method,
         "level": answer.level,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 
 import numpy as np
@@ -17,6 +17,7 @@ from rbfrag.fragility.functions import normal_half_width
 from rbfrag.fragility.model_lookup import find_model
 from rbfrag.fragility.prediction import Model, predict
 from rbfrag.fragility.rockmass import Realisations
+from rbfrag.fragility.rockmass_other_modes import other_modes
 from rbfrag.solver.mechanism import MODES, STABLE, TOPPLE, UNSTABLE, ModeName
 
 FloatArray = NDArray[np.float64]
@@ -92,6 +93,7 @@ class Scenario:
         in_domain: True where a model answered in the range that was fitted, shape (n,).
         reason: why an answer is missing, ruled or to be doubted, shape (n,).
         warnings: sentences on the whole answer.
+        other_models: names of the models that answered for other modes than toppling, by mode.
     """
 
     measures: Mapping[str, float]
@@ -109,6 +111,7 @@ class Scenario:
     in_domain: NDArray[np.bool_]
     reason: NDArray[np.object_]
     warnings: tuple[str, ...]
+    other_models: Mapping[ModeName, str] = field(default_factory=dict)
 
 
 def scenario(
@@ -121,12 +124,15 @@ def scenario(
     model: Model | None = None,
     level: float = 0.95,
     db: str | PathLike[str] | None = None,
+    displacement_m: float | None = None,
+    rotation_deg: float | None = None,
 ) -> Scenario:
     """Return the probability of failure of the blocks in one motion, averaged by mode.
 
     A block that fails at rest has P = 1. A stable toppling block has the probability of the
-    fragility model. All others have no answer and are left out of every average; the answer
-    says how many they are.
+    fragility model. With `displacement_m` a stable block that slides has the probability of
+    sliding further than that, and one that slumps that of slumping past recovery. All others have
+    no answer and are left out of every average; the answer says how many they are.
 
     Args:
         made: blocks of a rock mass.
@@ -136,7 +142,11 @@ def scenario(
         pgd_m: peak ground displacement [m].
         model: as in :func:`rbfrag.fragility.prediction.predict`.
         level: confidence level of the intervals.
-        db: database of the model.
+        db: database of the models.
+        displacement_m: how far is too far for a block that slides [m]; None for an answer of
+            toppling alone.
+        rotation_deg: with it, the rotation that is failure of a block that slumps [deg]; None
+            for failure past recovery. There must be a model of it.
 
     Raises:
         InputError: a measure that cannot be used, measures that do not suffice, or a rock mass
@@ -187,6 +197,24 @@ def scenario(
         low[asked], high[asked] = answer.ci_low, answer.ci_high
         in_domain[asked], reason[asked] = answer.in_domain, answer.reason
 
+    modelled: set[ModeName] = set(MODELLED)
+    others: dict[ModeName, str] = {}
+    if displacement_m is not None:
+        for mode, name, chosen_blocks, answers in other_modes(
+            made,
+            measures,
+            displacement_m=displacement_m,
+            rotation_deg=rotation_deg,
+            level=level,
+            db=db,
+        ):
+            modelled.add(mode)
+            others[mode] = name
+            probability[chosen_blocks] = answers.probability
+            low[chosen_blocks], high[chosen_blocks] = answers.ci_low, answers.ci_high
+            in_domain[chosen_blocks] = answers.in_domain
+            reason[chosen_blocks] = answers.reason
+
     covered = np.isfinite(probability)
     modes = []
     for code, mode in enumerate(MODES):
@@ -198,7 +226,7 @@ def scenario(
                     mode=mode,
                     count=count,
                     share=count / made.n_blocks,
-                    has_model=mode in MODELLED,
+                    has_model=mode in modelled,
                     unstable=int(np.count_nonzero(here & falls)),
                     covered=_average(here & covered, probability, low, high),
                     in_domain=int(np.count_nonzero(here & in_domain)),
@@ -221,7 +249,8 @@ def scenario(
         ci_high=high,
         in_domain=in_domain,
         reason=reason,
-        warnings=tuple(_warnings(missing, reason[asked])),
+        warnings=tuple(_warnings(missing, reason[asked], modelled)),
+        other_models=others,
     )
 
 
@@ -242,10 +271,12 @@ def _average(
     )
 
 
-def _warnings(missing: Mapping[ModeName, float], reason: NDArray[np.object_]) -> list[str]:
+def _warnings(
+    missing: Mapping[ModeName, float], reason: NDArray[np.object_], modelled: set[ModeName]
+) -> list[str]:
     warnings = [
         f"{mode.replace('_', ' ')}: {100 * share:.3g} % of the blocks have no answer"
-        + ("" if mode in MODELLED else ", because there is no fragility model for this mode")
+        + ("" if mode in modelled else ", because there is no fragility model for this mode")
         for mode, share in missing.items()
     ]
     texts, counts = np.unique(reason.astype(str), return_counts=True)
