@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -65,15 +66,17 @@ def free_port() -> int:
 def running_service(
     folder: Path, *, environment: dict[str, str] | None = None, **told: Any
 ) -> Iterator[Running]:
-    """Start a service and end it.
+    """Start a service on the models that are shipped, and end it.
 
     Args:
-        folder: where its log goes.
+        folder: where its log and its database go.
         environment: further environment variables.
         told: options of `rbfrag serve`, underlines for dashes.
     """
     port = free_port()
-    settings = {"db": str(REFERENCE), "port": port, **told}
+    # a copy: the shipped one may be made anew meanwhile
+    database = shutil.copyfile(REFERENCE, folder / "models.db")
+    settings = {"db": str(database), "port": port, **told}
     with running_program(
         ["-m", "rbfrag.service"],
         folder / "service.log",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fastapi import APIRouter, Request, Response
+from fastapi.concurrency import run_in_threadpool
 
 from rbfrag.fragility.model_list import model_list
 from rbfrag.fragility.model_lookup import stored_rows
@@ -28,6 +29,7 @@ def router(settings: Settings) -> APIRouter:
         ),
     )
     async def models(request: Request) -> Response:  # noqa: ARG001
-        return json_answer(model_list(stored_rows(settings.db)))
+        # read anew each time, and from a server if there is one
+        return json_answer(model_list(await run_in_threadpool(stored_rows, settings.db)))
 
     return routes

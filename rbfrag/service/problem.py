@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import re
 from collections.abc import Mapping
@@ -18,6 +19,7 @@ from rbfrag.service.settings import Settings
 
 MEDIA_TYPE = "application/problem+json"
 
+_URL = re.compile(r"\b(sqlite|postgres(ql)?)(\+\w+)?://[^\s;,]*")
 _OPTION = re.compile(r"(?<![\w-])--([a-z][a-z0-9]*(?:-[a-z0-9]+)*)")
 
 
@@ -51,13 +53,17 @@ def refused(error: RbfragError, settings: Settings) -> Response:
     """
     if isinstance(error, RequestRefusedError):
         return problem(error.status, error.kind, str(error), error.headers)
+    if isinstance(error, DatabaseError):
+        # its words may name files, hosts and users
+        logging.getLogger(__name__).warning("%s", error)
+        return problem(
+            503, "database", "the database cannot be read; the log of the service says why"
+        )
     detail = in_parameters(str(error), settings)
     if isinstance(error, MalformedError):
         return problem(400, "malformed", detail)
     if isinstance(error, UnknownModelError):
         return problem(422, "unknown-model", detail)
-    if isinstance(error, DatabaseError):
-        return problem(503, "database", detail)
     return problem(422, "input", detail)
 
 
@@ -68,6 +74,7 @@ def in_parameters(words: str, settings: Settings) -> str:
     """
     for place in _places(settings):
         words = words.replace(place, "the database")
+    words = _URL.sub("the database", words)
     return _OPTION.sub(lambda found: found[1].replace("-", "_"), words)
 
 

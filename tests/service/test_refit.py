@@ -4,6 +4,9 @@ from dataclasses import replace
 
 from rbfrag.db.engine import opened_database
 from rbfrag.db.model_store import load_model, save_model
+from rbfrag.errors import DatabaseFailedError
+from rbfrag.service.problem import in_parameters, refused
+from rbfrag.service.settings import Settings
 
 
 def fitted_anew(database):
@@ -43,3 +46,12 @@ def test_a_database_that_is_gone_is_said_without_its_place(client, database):
     assert answer.json()["type"] == "urn:rbfrag:problem:database"
     assert str(database) not in answer.text
     assert str(database.parent) not in answer.text
+
+
+def test_a_server_is_not_named_in_an_answer():
+    told = Settings(db="postgresql://somebody:secret@db.example.org/rock")
+    words = "there is no model 'x' in postgresql+psycopg://somebody:***@db.example.org/rock; it"
+    assert in_parameters(words, told) == "there is no model 'x' in the database; it"
+    answer = refused(DatabaseFailedError("connection to db.example.org failed"), told)
+    assert answer.status_code == 503
+    assert b"example.org" not in answer.body
