@@ -157,11 +157,14 @@ class ScaledResult:
         """What was seen, by rising k/PGA: neighbours of one verdict, the gaps left out.
 
         Blocks that do not move, and those between them and the first that was looked at, are safe.
+        Where the model ended before the block failed, nothing is told of stronger records, even if
+        one of those that were looked at brought it down.
         """
         rows: list[tuple[float, float, IntervalOutcome]] = []
         before: ScaledRun | None = None
         still = () if self.starts is None else (_at_rest(self.starts),)
-        for run in sorted((*self.runs, *still), key=lambda each: -each.scale):
+        told = [run for run in self.runs if self.scale is not None or run.scale <= self.scale_limit]
+        for run in sorted((*told, *still), key=lambda each: -each.scale):
             word = _MAP_WORDS.get(run.verdict)
             if word is not None:
                 k = self.k_over_pga(run.scale)

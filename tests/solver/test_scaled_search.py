@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -195,3 +196,15 @@ def test_what_cannot_be_searched_is_refused(options: dict[str, object], words: s
 def test_a_block_that_slumps_at_rest_is_refused() -> None:
     with pytest.raises(InputError, match="no earthquake decides"):
         critical_scale(shaking(), slump(), beta_deg=29.0, phi_deg=30.0)
+
+
+def test_beyond_the_end_of_the_model_nothing_is_told() -> None:
+    found = search(shaking(), slump(), rotation_deg=2.0)
+    assert found.scale is not None
+    last = found.runs[0].scale
+    ended = replace(
+        found, scale=None, lower=None, upper=None, scale_limit=last, status="below_limit"
+    )
+    assert any(run.verdict == "fails" for run in ended.runs)
+    assert ended.intervals.outcome == ("safe",)
+    assert ended.intervals.k_lo[0] == ended.k_over_pga(last)
