@@ -1,0 +1,110 @@
+"""`predict --kind`, `fit --kind` and `simulate --kind`: as from Python, with clear refusals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping
+from rbfrag.solver.block import Block
+from rbfrag.solver.shaken_mechanism import shaken_mechanism
+from tests.cli.conftest import Refuses, Shell
+from tests.synthetic import write_suite
+
+SLUMP = "alpha1_deg = 56\nalpha3_deg = 76\nr3_m = 0.7\nbeta_deg = 22\nphi_deg = 30\n"
+SLIDE = "s1_m = 1\ns2_m = 0.6\ngamma_deg = 25\nbeta_deg = 20\nphi_deg = 40\n"
+MOTION = ("--pgv", "0.4", "--pga", "0.5")
+
+
+@pytest.fixture
+def block(tmp_path: Path) -> Path:
+    return tmp_path / "block.toml"
+
+
+def test_a_slide_is_answered_as_from_python(shell: Shell, block: Path) -> None:
+    asked = ("predict", "--kind", "sliding", "--displacement", "0.05", *MOTION)
+    told = shell.json(*asked, "--ky", "0.1", "--beta", "10")
+    answer = predict_sliding(0.1, 0.05, pgv_m_s=0.4, pga_g=0.5, beta_deg=10.0)
+    assert told == answer.as_dict()
+    assert any("reference" in text for text in told["warnings"])
+    block.write_text(SLIDE)
+    from_file = shell.json(*asked, "--block", block)
+    by_hand = predict_sliding(0.36397023, 0.05, pgv_m_s=0.4, pga_g=0.5, beta_deg=20.0)
+    assert from_file["probability"] == pytest.approx(by_hand.probability, rel=1e-5)
+    assert "median_displacement_m" in shell(*asked, "--ky", "0.1").stdout
+
+
+def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
+    block.write_text(SLUMP)
+    shaken = shaken_mechanism(
+        Block.from_angles(56, 76, 0.7), kind="slumping", beta_deg=22, phi_deg=30
+    )
+    for rotation_deg, option in ((None, ()), (2.0, ("--rotation", "2"))):
+        asked = ("predict", "--kind", "slumping", *MOTION, *option)
+        told = shell.json(*asked, "--block", block)
+        answer = predict_slumping(
+            shaken.yield_g, shaken.p2, pgv_m_s=0.4, pga_g=0.5, rotation_deg=rotation_deg
+        )
+        assert told["probability"] == answer.probability
+        numbers = shell.json(*asked, "--ks", str(shaken.yield_g), "--ps2", str(shaken.p2))
+        assert numbers["probability"] == answer.probability
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--kind", "sliding", "--ky", "0.1", *MOTION), "--displacement is missing"),
+        (("--kind", "sliding", "--displacement", "0.1", *MOTION), "--ky is missing"),
+        (("--kind", "sliding", "--ky", "0.1", "--displacement", "0.1"), "--pgv is missing"),
+        (("--kind", "slumping", "--ks", "0.1", *MOTION), "--ps2 is missing"),
+        (("--kind", "slumping", "--kr", "0.1", *MOTION), "--kr goes with --kind toppling"),
+        (("--p2", "3", "--kr", "0.1", "--ky", "1", *MOTION), "--ky goes with --kind sliding"),
+        (("--kind", "confined_toppling", *MOTION), "there are models of toppling, sliding"),
+        (
+            ("--kind", "slumping", "--ks", "0.1", "--ps2", "3", "--rotation", "7", *MOTION),
+            "no slumping model of a rotation of 7°",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_refused(
+    refuses: Refuses, options: tuple[str, ...], words: str
+) -> None:
+    assert words in refuses("predict", *options)
+
+
+def test_a_block_of_another_mode_is_refused(refuses: Refuses, block: Path) -> None:
+    block.write_text(SLIDE)
+    asked = ("predict", "--block", block, *MOTION)
+    assert "its mode is slide" in refuses(*asked, "--kind", "slumping")
+    block.write_text(SLUMP)
+    distance = ("--displacement", "0.1")
+    assert "its mode is slump" in refuses(*asked, "--kind", "sliding", *distance)
+
+
+def test_a_campaign_is_run_fitted_and_asked(shell: Shell, tmp_path: Path) -> None:
+    shell("motions", "add", write_suite(tmp_path / "records", 6), "--suite", "s")
+    summary = shell.json("simulate", "--kind", "sliding", "--displacement", "0.02", "--jobs", "1")
+    assert (summary["kind"], summary["combinations"]) == ("sliding", 6 * 2 * 2)
+    again = shell.json("simulate", "--kind", "sliding", "--displacement", "0.02", "--jobs", "1")
+    assert again["resumed"] == again["combinations"]
+    report = shell.json("fit", "--kind", "sliding", "--term", "pgv_pga")
+    assert report["is_default"]
+    assert report["events"] == 3
+    assert "calibration_slope" in shell("models", "show", "sliding-pgv_pga").stdout
+    (listed,) = shell.json("models", "list")
+    assert (listed["name"], listed["kind"]) == ("sliding-pgv_pga", "sliding")
+    assert "unchanged" in shell("models", "check").stdout
+    told = shell.json(
+        "predict", "--kind", "sliding", "--ky", "0.1", "--displacement", "0.05", *MOTION
+    )
+    assert told["model"] == "sliding-pgv_pga"
+    assert not any("reference" in text for text in told["warnings"])
+
+
+def test_options_of_one_kind_do_not_go_with_another(refuses: Refuses) -> None:
+    assert "--p2 goes with --kind toppling" in refuses("simulate", "--kind", "sliding", "--p2", "1")
+    assert "campaigns are of" in refuses("simulate", "--kind", "falling")
+    message = refuses("fit", "--kind", "sliding", "--term", "pgv", "--method", "wls")
+    assert "--method goes with --kind toppling" in message
+    assert "--rotation goes with" in refuses("fit", "--term", "pgv", "--rotation", "2")
