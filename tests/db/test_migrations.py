@@ -17,10 +17,12 @@ from sqlalchemy import Connection, Engine, create_engine, inspect, text
 
 import rbfrag.db.upgrade
 import rbfrag.migrations
+from rbfrag.db.content import table_rows_by_natural_key
 from rbfrag.db.engine import open_database, unchecked_engine
+from rbfrag.db.model_store import load_model, save_model
 from rbfrag.db.motion_store import add_motion, load_motion, motion_rows
 from rbfrag.db.revision import REVISIONS, SCHEMA_REVISION, VERSION_TABLE
-from rbfrag.db.rows import EarthquakeInfo
+from rbfrag.db.rows import EarthquakeInfo, ModelRow
 from rbfrag.db.schema import metadata
 from rbfrag.db.upgrade import migrate, upgrade_database
 from rbfrag.motions.ground_motion import GroundMotion
@@ -174,3 +176,31 @@ def test_motions_of_the_first_schema_keep_their_samples(
     again.dispose()
     assert back.sha256 == given.sha256 == row.source_sha256
     assert (back.processing_applied, back.start_time) == (None, None)
+
+
+def test_results_of_the_second_schema_stay_as_they_are(
+    place: str, fill: Callable[..., None], model: ModelRow
+) -> None:
+    open_database(place, create=True).dispose()
+    engine = unchecked_engine(Path(place) if "://" not in place else place, foreign_keys=False)
+    tables = ("combination", "simulation", "fragility_model")
+
+    def content(connection: Connection) -> list[list[tuple[object, ...]]]:
+        return [list(table_rows_by_natural_key(connection, table)) for table in tables]
+
+    with engine.begin() as connection:
+        fill(connection, [1, 2, 3])
+        save_model(connection, model)
+        before = content(connection)
+        config = _config()
+        config.attributes["connection"] = connection
+        command.downgrade(config, "0002")
+        assert "block" not in {c["name"] for c in inspect(connection).get_columns("combination")}
+    engine.dispose()
+    assert upgrade_database(place) == ("0002", SCHEMA_REVISION)
+    again = open_database(place)
+    with again.connect() as connection:
+        assert content(connection) == before
+        assert load_model(connection).kind == "toppling"
+    again.dispose()
+    assert all(before)
