@@ -37,7 +37,7 @@ class Load:
         per_s: requests answered a second.
         p50_ms: median time of an answer [ms].
         p99_ms: time that one in a hundred takes longer than [ms].
-        bad: answers that were no success, or never came.
+        bad: answers that were no success, or never came; late ones are in the p99.
         answers: how many came.
         cpu_us: processor time of the server for one of them [µs].
     """
