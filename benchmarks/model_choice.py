@@ -51,7 +51,12 @@ class Judged:
 def judged(source: FitSource, method: str, term: str, vertical: str, *, free_m: bool) -> Judged:
     """Fit one model and keep its held-out losses."""
     fitted = fit_source(
-        source, TERMS[term], method, estimate_m=free_m, selection={"vertical": vertical}
+        source,
+        TERMS[term],
+        method,
+        estimate_m=free_m,
+        selection={"vertical": vertical},
+        compared=False,
     )
     seen = outcomes_of(fitted.data)
     p = np.clip(fitted.result.held_out, scores.CLIP, 1.0 - scores.CLIP)

@@ -2,8 +2,8 @@
 
 Outcomes and critical values are drawn from known models, with scatter that earthquakes share,
 for as many earthquakes as the reference set has (47). Each method is fitted to each draw. The
-table counts how often the 95 % intervals (Student's t with 46 degrees of freedom times the
-clustered standard error) hold the truth.
+table counts how often the 95 % intervals (the clustered standard error times Student's t for the
+degrees of freedom that the fit reports) hold the truth.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from benchmarks.page import parser, report
 from rbfrag.campaign.bench.tables import markdown
-from rbfrag.fragility import formulas, outcome_method
-from rbfrag.fragility.censored_normal import CensoredData, jackknife_covariance, maximise
+from rbfrag.fragility import censored_normal, formulas, outcome_method
+from rbfrag.fragility.binomial import cr3, effective_freedom, jackknife_steps
+from rbfrag.fragility.censored_normal import CensoredData, maximise
 from rbfrag.fragility.fit_data import fit_data
 from rbfrag.fragility.quantiles import student_half_width
 from rbfrag.fragility.terms import TERMS
@@ -31,8 +32,11 @@ SHARED = 0.1
 FloatArray = NDArray[np.float64]
 
 
-def outcomes(method: str, term: str, seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return estimate, standard errors and truth of one draw of outcomes."""
+Draw = tuple[FloatArray, FloatArray, FloatArray, int]
+
+
+def outcomes(method: str, term: str, seed: int) -> Draw:
+    """Return estimate, standard errors, truth and degrees of freedom of one draw of outcomes."""
     truth = np.array(TRUTH[method, term])
     source = drawn_outcomes(
         method, term, TRUTH[method, term], events=EVENTS, motions=2, shared=SHARED, seed=seed
@@ -42,12 +46,12 @@ def outcomes(method: str, term: str, seed: int) -> tuple[FloatArray, FloatArray,
     rows = outcome_method.outcome_rows(data, shape, truth.size)
     link = outcome_method.LINKS_BY_CODE[formulas.LINKS[method]]
     b = outcome_method.maximum_likelihood(rows.data, link)
-    covariance = outcome_method.jackknife_covariance(rows.data, link, b)
-    return b, np.sqrt(np.diag(covariance)), truth
+    steps = jackknife_steps(rows.data, link, b)
+    return b, np.sqrt(np.diag(cr3(steps))), truth, effective_freedom(steps)
 
 
-def lognormal(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return estimate, standard errors and truth of one censored lognormal draw."""
+def lognormal(seed: int) -> Draw:
+    """Return the same of one censored lognormal draw."""
     random = np.random.default_rng(seed)
     truth = np.array([-0.4, 0.95, np.log(0.29)])
     event = np.repeat(np.arange(EVENTS), 24)
@@ -64,11 +68,12 @@ def lognormal(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         event.astype(np.intp),
     )
     b = maximise(points)
-    return b, np.sqrt(np.diag(jackknife_covariance(points, b))), truth
+    steps = censored_normal.jackknife_steps(points, b)
+    return b, np.sqrt(np.diag(cr3(steps))), truth, effective_freedom(steps)
 
 
-def straight_line(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return estimate, standard errors and truth of the line of one heteroscedastic draw."""
+def straight_line(seed: int) -> Draw:
+    """Return the same of the line of one heteroscedastic draw."""
     table = critical_values(events=EVENTS, motions=2, event_share=0.3, seed=seed)
     order = np.argsort(table.pgv_m_s)
     x, y = table.pgv_m_s[order], table.y_m_s[order]
@@ -76,7 +81,7 @@ def straight_line(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     fit = iterate(Bins.equal_count(x), y, np.ones(x.size), 1)
     weights = 1.0 / (fit.parameters[2] + fit.parameters[3] * x)
     line, covariance, _ = clustered_line(x, y, weights, events)
-    return line, np.sqrt(np.diag(covariance)), np.array([0.002, 0.72])
+    return line, np.sqrt(np.diag(covariance)), np.array([0.002, 0.72]), EVENTS - 1
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -84,19 +89,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser(__doc__)
     options.add_argument("--replications", type=int, default=500)
     chosen = options.parse_args(arguments)
-    half_width = student_half_width(0.95, EVENTS - 1)
     draws = {f"{method}-{term}": (method, term) for method, term in TRUTH}
     cells = []
     for name in ("wls-pgv", "lognormal", *draws):
-        found = []
+        found, reach = [], []
         for seed in range(chosen.replications):
             if name in draws:
-                b, error, truth = outcomes(*draws[name], seed)
+                b, error, truth, freedom = outcomes(*draws[name], seed)
             else:
-                b, error, truth = (straight_line if name == "wls-pgv" else lognormal)(seed)
+                b, error, truth, freedom = (straight_line if name == "wls-pgv" else lognormal)(seed)
             found.append((b - truth) / error)
+            reach.append(student_half_width(0.95, freedom))
         z = np.array(found)
-        covered = (np.abs(z) <= half_width).mean(axis=0)
+        covered = (np.abs(z) <= np.array(reach)[:, None]).mean(axis=0)
         cells.append([
             name,
             str(chosen.replications),

@@ -89,9 +89,16 @@ def newton(
 def jackknife_covariance(data: BinomialData, link: Link, parameters: FloatArray) -> FloatArray:
     """Return the covariance of the parameters from leaving out each earthquake (CR3).
 
-    (G-1)/G · Σ_e d_e d_eᵀ with d_e = (H - H_e)⁻¹ s_e, one Newton step from the fit to all data to
-    the one without earthquake e. With unequal earthquakes CR1 is too small; this is not (Bell and
-    McCaffrey 2002, Survey Methodology 28(2), 169-181).
+    (G-1)/G · Σ_e d_e d_eᵀ over the :func:`jackknife_steps`. With unequal earthquakes CR1 is too
+    small; this is not (Bell and McCaffrey 2002, Survey Methodology 28(2), 169-181).
+    """
+    return cr3(jackknife_steps(data, link, parameters))
+
+
+def jackknife_steps(data: BinomialData, link: Link, parameters: FloatArray) -> FloatArray:
+    """Return d_e = (H - H_e)⁻¹ s_e of each earthquake, shape (G, k).
+
+    One Newton step from the fit to all data to the one without earthquake e.
     """
     x, t, w = data.columns, data.outcome, data.weights
     eta = x @ parameters
@@ -101,13 +108,33 @@ def jackknife_covariance(data: BinomialData, link: Link, parameters: FloatArray)
         own = data.event == event
         score, part = _derivatives(x[own], eta[own], t[own], w[own], link)
         steps.append(np.linalg.lstsq(information - part, score, rcond=None)[0])
-    return cr3(np.array(steps))
+    return np.array(steps)
 
 
 def cr3(steps: FloatArray) -> FloatArray:
     """Return (G-1)/G · Σ d dᵀ for the G rows d of `steps`."""
     g = steps.shape[0]
     return np.asarray((g - 1.0) / g * (steps.T @ steps))
+
+
+def effective_freedom(steps: FloatArray) -> int:
+    """Return the degrees of freedom of a variance Σ d², of the parameter that has fewest.
+
+    The variance is a sum over G earthquakes, of which a few may make up most. It scatters like a
+    chi-square number of 2V²/Var(V) degrees of freedom (Satterthwaite 1946, Biometrics Bulletin
+    2(6), 110-114), with V = Σ d² and Var(V) = Σ d⁴ - V²/G from the steps themselves: G for normal
+    steps. No more than G - 1, and no less than 4.
+
+    Args:
+        steps: the d of each earthquake, shape (G, k).
+    """
+    g = steps.shape[0]
+    squares = steps * steps
+    total = squares.sum(axis=0)
+    spread = (squares * squares).sum(axis=0) - total * total / g
+    with np.errstate(divide="ignore", invalid="ignore"):
+        each = np.where(spread > 0.0, 2.0 * total * total / spread, np.inf)
+    return int(np.clip(each.min(), min(4, g - 1), g - 1))
 
 
 def maximum_likelihood(data: BinomialData, link: Link) -> FloatArray:

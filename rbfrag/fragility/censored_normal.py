@@ -97,6 +97,11 @@ def jackknife_covariance(data: CensoredData, parameters: FloatArray) -> FloatArr
 
     As :func:`rbfrag.fragility.binomial.jackknife_covariance`, with the observed information.
     """
+    return cr3(jackknife_steps(data, parameters))
+
+
+def jackknife_steps(data: CensoredData, parameters: FloatArray) -> FloatArray:
+    """Return the step of (beta, ln sigma) to the fit without each earthquake, shape (G, k)."""
     theta = _to_olsen(parameters)
     ones = np.ones(data.y.size)
     _, information = _derivatives(theta, data, ones)
@@ -105,8 +110,7 @@ def jackknife_covariance(data: CensoredData, parameters: FloatArray) -> FloatArr
         own = data.event == event
         scores, part = _derivatives(theta, data.only(own), ones[own])
         steps.append(np.linalg.lstsq(information - part, scores.sum(axis=0), rcond=None)[0])
-    jacobian = _to_natural(theta)
-    return np.asarray(jacobian @ cr3(np.array(steps)) @ jacobian.T)
+    return np.asarray(np.array(steps) @ _to_natural(theta).T)
 
 
 def _to_natural(theta: FloatArray) -> FloatArray:

@@ -123,8 +123,13 @@ def fit_source(
     seed: int = 0,
     estimate_m: bool = False,
     selection: Mapping[str, object] | None = None,
+    compared: bool = True,
 ) -> Fitted:
-    """Fit a model and keep its held-out probabilities; arguments as for :func:`fit`."""
+    """Fit a model and keep its held-out probabilities.
+
+    Arguments as for :func:`fit`; `compared` says whether the model gets its table of least widths,
+    for which those that know more are fitted too: a study of scores has no use for it.
+    """
     table = source.table
     data = fit_data(source, term)
     options = {"estimate_m": True} if estimate_m else {}
@@ -166,7 +171,8 @@ def fit_source(
         },
         created=datetime.now(UTC).isoformat(timespec="seconds"),
     )
-    row = _with_floor(row, source, str(with_vertical))
+    if compared:
+        row = _with_floor(row, source, str(with_vertical))
     return Fitted(FitReport.from_model(FragilityModel.from_row(row)), data, result)
 
 
@@ -213,10 +219,9 @@ def _richer_model(name: str, source: FitSource, vertical: str) -> FragilityModel
     method = "record" if name == "xp" else "bounded"
     try:
         data = fit_data(source, term)
-        names, parameters, covariance = fit_parameters(data, term, method)
+        names, parameters, covariance, freedom = fit_parameters(data, term, method)
     except FitError:
         return None
-    events = int(np.unique(data.event[data.found]).size)
     row = ModelRow(
         name=name,
         term=name,
@@ -225,7 +230,11 @@ def _richer_model(name: str, source: FitSource, vertical: str) -> FragilityModel
         covariance=tuple(tuple(line) for line in covariance.tolist()),
         domain={},
         data_fingerprint="",
-        diagnostics={"degrees_of_freedom": events - 1, "vertical": vertical},
+        diagnostics={
+            "degrees_of_freedom": freedom,
+            "events": int(np.unique(data.event[data.found]).size),
+            "vertical": vertical,
+        },
     )
     return FragilityModel.from_row(_with_floor(row, source, vertical))
 

@@ -166,7 +166,7 @@ def interval_floor(
             high,
         )
         widest = np.fmax(widest, (high - low) / half_width)
-    few = min(other.degrees_of_freedom for other in richer) < FEW_EARTHQUAKES - 1
+    few = min(_earthquakes(other) for other in richer) < FEW_EARTHQUAKES
     share = SHARE_OF_FEW if few else 1.0
     known = np.isfinite(eta)
     by_y = sample.y[known] / (2.0 * sample.intensity_m_s[model.term.name][known])
@@ -176,6 +176,11 @@ def interval_floor(
     )
     widest = widest[known] * MARGIN
     return [value for place in places for value in _table(place, widest, share)]
+
+
+def _earthquakes(model: FragilityModel) -> int:
+    events = model.row.diagnostics.get("events")
+    return events if isinstance(events, int) else model.degrees_of_freedom + 1
 
 
 def _table(place: FloatArray, width: FloatArray, share: float) -> list[float]:

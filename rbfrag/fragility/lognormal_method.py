@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from rbfrag.errors import FitError
+from rbfrag.fragility.binomial import cr3, effective_freedom
 from rbfrag.fragility.censored_normal import (
     CensoredData,
     clustered_covariance,
-    jackknife_covariance,
+    jackknife_steps,
     log_density,
     maximise,
     naive_covariance,
@@ -59,7 +60,8 @@ def fit_lognormal(
         )
     order = [0, 1, 3, 2] if estimate_m else [0, 1, 2]  # ln sigma stands before M - 1
     names = ["ln_median", "slope", "ln_sigma", "m_minus_1"][: parameters.size]
-    covariance = jackknife_covariance(points, parameters)[np.ix_(order, order)]
+    steps = jackknife_steps(points, parameters)[:, order]
+    covariance = cr3(steps)
     cr1 = np.sqrt(np.diag(clustered_covariance(points, parameters)))[order]
     naive = np.sqrt(np.diag(naive_covariance(points, parameters)))[order]
     samples = _bootstrap(points, parameters, seed)[:, order]
@@ -90,6 +92,7 @@ def fit_lognormal(
         },
         details={
             "judged_on": seen.kind,
+            "degrees_of_freedom": effective_freedom(steps),
             "score_intervals": score_intervals(data, seen, held_out, seed=seed),
             "sigma_ln": float(np.exp(parameters[-1])),
             "exponent_m_estimated": estimate_m,

@@ -56,7 +56,8 @@ class FragilityModel:
         limits_with_both: the same where PGV and PGA are both given, with the range of PGV/PGA
             that earthquakes have.
         vertical: whether it was fitted with vertical motion.
-        degrees_of_freedom: earthquakes less one, which the interval is widened by; 0 for none.
+        degrees_of_freedom: of the standard errors, which the interval is widened by, at most the
+            earthquakes less one; 0 for none.
         notes: what every answer says of the model, such as where it comes from.
     """
 

@@ -17,8 +17,10 @@ from rbfrag.errors import FitError
 from rbfrag.fragility import formulas
 from rbfrag.fragility.binomial import (
     BinomialData,
+    cr3,
+    effective_freedom,
     fit_by_statsmodels,
-    jackknife_covariance,
+    jackknife_steps,
     maximum_likelihood,
     newton,
 )
@@ -85,7 +87,8 @@ def fit_outcomes(
             "motions or more block sizes (p²)"
         )
     parameters, cr1, naive = fit_by_statsmodels(rows.data, link)
-    covariance = jackknife_covariance(rows.data, link, parameters)
+    steps = jackknife_steps(rows.data, link, parameters)
+    covariance = cr3(steps)
     in_sample = _on_grid(rows, link, parameters, data.topples.shape)
     held_out = _held_out(rows, link, parameters, data.topples.shape)
     samples = _bootstrap(rows.data, link, parameters, seed)
@@ -104,6 +107,7 @@ def fit_outcomes(
         scores=scores_of(seen, in_sample, held_out),
         details={
             "link": link.name,
+            "degrees_of_freedom": effective_freedom(steps),
             "judged_on": seen.kind,
             "score_intervals": score_intervals(data, seen, held_out, seed=seed),
             "n_outcomes": int(rows.data.outcome.size),
@@ -134,8 +138,8 @@ def fit_outcomes(
 
 def fit_parameters(
     data: FitData, term: Term, method: str
-) -> tuple[tuple[str, ...], FloatArray, FloatArray]:
-    """Return names and values of the parameters and their clustered covariance, nothing more.
+) -> tuple[tuple[str, ...], FloatArray, FloatArray, int]:
+    """Return names and values of the parameters, their covariance and its degrees of freedom.
 
     Raises:
         FitError: as for :func:`fit_outcomes`.
@@ -146,7 +150,8 @@ def fit_parameters(
     names = formulas.PARAMETERS[shape]
     rows = outcome_rows(data, shape, len(names))
     parameters = maximum_likelihood(rows.data, link)
-    return names, parameters, jackknife_covariance(rows.data, link, parameters)
+    steps = jackknife_steps(rows.data, link, parameters)
+    return names, parameters, cr3(steps), effective_freedom(steps)
 
 
 def outcome_rows(data: FitData, shape: int, k: int) -> OutcomeRows:

@@ -8,6 +8,7 @@ from scipy.optimize import minimize
 
 from rbfrag.fragility.binomial import (
     BinomialData,
+    effective_freedom,
     fit_by_statsmodels,
     jackknife_covariance,
     maximum_likelihood,
@@ -112,8 +113,9 @@ def test_the_jackknife_is_that_of_left_out_earthquakes(link):
 
 
 def test_a_published_logistic_regression():
-    # Spector and Mazzeo (1980), as Greene, Econometric Analysis, prints it (table 21.1 of the
-    # 5th edition): logit coefficients -13.021, 2.826, 0.095, 2.379; data from statsmodels.
+    # Spector and Mazzeo (1980), the example of Greene, Econometric Analysis, chapter 21 of the 5th
+    # edition. Coefficients as printed in the documentation of statsmodels, "Discrete Choice Models
+    # Overview"; standard errors from the covariance by Stata 11 that statsmodels' tests keep.
     from statsmodels.datasets import spector
 
     loaded = spector.load_pandas()
@@ -126,7 +128,7 @@ def test_a_published_logistic_regression():
     assert errors == [4.931, 1.263, 0.142, 1.065]
 
 
-@settings(max_examples=50)
+@settings(max_examples=50, deadline=None)
 @given(st.floats(-6, 6))
 def test_slopes_and_inverses_of_the_links(eta):
     for link in LINKS:
@@ -137,3 +139,22 @@ def test_slopes_and_inverses_of_the_links(eta):
         assert link.slope(at) == pytest.approx(slope, rel=1e-5, abs=1e-9)
         if 1e-9 < p[0] < 1 - 1e-9:
             assert link.eta(p) == pytest.approx(at, rel=1e-5, abs=1e-5)
+
+
+def test_normal_steps_have_as_many_freedoms_as_earthquakes():
+    steps = np.random.default_rng(1).normal(size=(4000, 3))
+    assert 0.85 * 4000 < effective_freedom(steps) < 4000
+
+
+def test_few_earthquakes_that_decide_leave_few_freedoms():
+    random = np.random.default_rng(2)
+    steps = random.normal(size=(50, 2))
+    assert effective_freedom(steps) > 30
+    steps[:6, 1] *= 20.0
+    assert effective_freedom(steps) < 12
+    # equal steps do not scatter, and there are never more freedoms than earthquakes less one
+    assert effective_freedom(np.ones((9, 2))) == 8
+    assert effective_freedom(np.ones((3, 1))) == 2
+    one = np.zeros((40, 1))
+    one[0] = 1.0
+    assert effective_freedom(one) == 4

@@ -8,6 +8,7 @@ import pytest
 
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility import formulas, outcome_method
+from rbfrag.fragility.binomial import jackknife_covariance
 from rbfrag.fragility.fit_data import fit_data
 from rbfrag.fragility.fitting import fit, fit_source
 from rbfrag.fragility.model import FragilityModel
@@ -43,7 +44,7 @@ def test_the_intervals_cover_as_often_as_they_say():
         # b_ln_p is not in the truth: the two-parameter form is what `logistic` fits by default
         rows = outcome_method.outcome_rows(data, formulas.RATIO, 2)
         b = outcome_method.maximum_likelihood(rows.data, outcome_method.LOGIT)
-        covariance = outcome_method.jackknife_covariance(rows.data, outcome_method.LOGIT, b)
+        covariance = jackknife_covariance(rows.data, outcome_method.LOGIT, b)
         hits += np.abs(b - truth) <= 2.013 * np.sqrt(np.diag(covariance))
     assert np.all(hits >= 34)
 
