@@ -88,10 +88,10 @@ def _check_kind(connection: Connection, row: ModelRow) -> ModelCheck:
         else:
             rotation_deg = told.get("rotation_deg")
             data = slumping_data(connection, rotation_deg=rotation_deg, **selection)
+    except (FitError, InputError) as error:  # a refused fit is one kind of ModelError
+        return ModelCheck(row.name, "no data", str(error))
     except ModelError as error:
         return ModelCheck(row.name, "unreadable", str(error))
-    except (FitError, InputError) as error:
-        return ModelCheck(row.name, "no data", str(error))
     if data.fingerprint == row.data_fingerprint:
         return ModelCheck(row.name, "unchanged", "")
     return _changed(row, int(data.found.sum()))

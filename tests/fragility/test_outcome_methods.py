@@ -86,7 +86,7 @@ def test_held_out_probabilities_are_those_of_separate_fits():
     own = fitted.data.event == 3
     names = [fitted.data.event_names[i] for i in fitted.data.event]
     rest = fit_data(source.only(source.table.event_id != names[int(np.argmax(own))]), TERMS["xp"])
-    _, b, _ = fit_parameters(rest, TERMS["xp"], "record")
+    _, b, _, _ = fit_parameters(rest, TERMS["xp"], "record")
     data = fitted.data
     i = int(np.flatnonzero(own)[0])
     for j in (0, 8, 15):
