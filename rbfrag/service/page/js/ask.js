@@ -1,6 +1,9 @@
 /** Questions to the service. The physics and the statistics are there; nothing is computed here. */
 
-const PATIENCE_MS = 20000;
+const PATIENCE_MS = 20_000;
+
+/** A service that has just been installed compiles its programs before its first spectrum. */
+const UPLOAD_PATIENCE_MS = 90_000;
 
 let token = "";
 
@@ -61,11 +64,8 @@ export function post(path, document) {
  * @returns {Promise<any>}
  */
 export function upload(path, query, file) {
-  return answer(path + search(query), {
-    method: "POST",
-    headers: { "Content-Type": "application/octet-stream" },
-    body: file,
-  });
+  const headers = { "Content-Type": "application/octet-stream" };
+  return answer(path + search(query), { method: "POST", headers, body: file }, UPLOAD_PATIENCE_MS);
 }
 
 /** @param {Record<string, string | number>} query */
@@ -78,14 +78,15 @@ function search(query) {
 /**
  * @param {string} path
  * @param {{method?: string, headers?: Record<string, string>, body?: BodyInit}} request
+ * @param {number} [patience_ms]
  */
-async function answer(path, request) {
+async function answer(path, request, patience_ms = PATIENCE_MS) {
   /** @type {Record<string, string>} */
   const headers = { Accept: "application/json", ...request.headers };
   if (token) headers.Authorization = `Bearer ${token}`;
   let response, text;
   try {
-    const signal = AbortSignal.timeout(PATIENCE_MS);
+    const signal = AbortSignal.timeout(patience_ms);
     response = await fetch(path, { ...request, headers, signal, credentials: "same-origin" });
     text = await response.text();
   } catch (error) {

@@ -37,6 +37,7 @@ export function recordPanel(tell) {
   let block = null;
 
   const ask = latest(async (/** @type {File} */ asked) => {
+    byId("record-said").textContent = `Waiting for the spectrum of ${asked.name} …`;
     const reading = Object.fromEntries(READING.map((id) => [id, textIn(id)]));
     try {
       const found = await askSpectrum(asked, reading, block?.p2 ?? NaN);
@@ -50,6 +51,8 @@ export function recordPanel(tell) {
       const words = error.message.replace(/^the file: /, "");
       sayWrong(`${asked.name}: ${words}`, byId("record-error"));
       show(null);
+    } finally {
+      byId("record-said").textContent = "";
     }
   });
   const askSoon = afterPause(PAUSE_MS, ask);
