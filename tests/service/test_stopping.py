@@ -3,6 +3,7 @@
 import http.client
 import threading
 import time
+from contextlib import closing
 
 import pytest
 
@@ -28,42 +29,45 @@ class Client(threading.Thread):
         self.lost = []
 
     def run(self):
-        connection = None
-        while True:
+        while self.ask_on_one_connection():
+            pass
+
+    def ask_on_one_connection(self):
+        """Return whether there may be another connection."""
+        with closing(http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)) as connection:
             try:
-                if connection is None:
-                    connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
-                    connection.connect()
+                connection.connect()
             except OSError:
-                return  # nobody listens any more
-            try:
-                connection.request("GET", PATH)
-                answer = connection.getresponse()
-                body = answer.read()
-            except (OSError, http.client.HTTPException) as error:
-                self.lost.append(repr(error))
-                return
-            assert answer.status == 200, body
-            assert body.endswith(b"}")
-            self.answered += 1
-            if not self.fresh and answer.will_close:
-                return  # told that it ends
-            if self.fresh:
-                connection.close()
-                connection = None
+                return False  # nobody listens any more
+            while True:
+                try:
+                    connection.request("GET", PATH)
+                    with connection.getresponse() as answer:
+                        body = answer.read()
+                except (OSError, http.client.HTTPException) as error:
+                    self.lost.append(repr(error))
+                    return False
+                assert answer.status == 200, body
+                assert body.endswith(b"}")
+                self.answered += 1
+                if self.fresh:
+                    return True
+                if answer.will_close:
+                    return False  # told that it ends
 
 
 def sent(port, found):
     """Ask for something that takes longer."""
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=120)
-    connection.request("POST", "/v1/spectrum?p2=3,1&polarity=both", RECORD.encode())
-    answer = connection.getresponse()
-    found.append((answer.status, answer.read()))
+    with closing(http.client.HTTPConnection("127.0.0.1", port, timeout=120)) as connection:
+        connection.request("POST", "/v1/spectrum?p2=3,1&polarity=both", RECORD.encode())
+        with connection.getresponse() as answer:
+            found.append((answer.status, answer.read()))
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_no_request_that_was_taken_is_lost(tmp_path, workers):
     with running_service(tmp_path, workers=workers, time_limit=120.0) as running:
+        sent(running.port, [])  # waits until the kernels are compiled
         clients = [Client(running.port, fresh=i % 2 == 1) for i in range(8)]
         for client in clients:
             client.start()
