@@ -177,9 +177,7 @@ def fly(
                 turned, u_end = span_step(g.spans, row, ph * rate, ph, s, c)
                 steps += 1
                 theta += turned
-                s_change, c_change = turn(s, c, turned)
-                s += s_change
-                c += c_change
+                s, c = turn(s, c, turned)
                 rate = u_end / ph
                 lifting = False
                 ph_now = -1.0
@@ -258,16 +256,16 @@ def fly(
                     rate = u_end * per_ph
                     u_now = u_end
                 else:
-                    s_change, c_change = turn(s, c, turned)
+                    s_end, c_end = turn(s, c, turned)
                     if check > 0:
                         tangent = kr_other if check == 1 else tail_min_q[i]
                         if order_lost(
-                            a0, da, v0, dw, s, c, s + s_change, c + c_change,
+                            a0, da, v0, dw, s, c, s_end, c_end,
                             ph * (abs(rate) + abs(u_end * per_ph)), tangent,
                         ):  # fmt: skip
                             return ORDER_LOST, i, at, theta, rate, s, c, steps
-                    s += s_change
-                    c += c_change
+                    s = s_end
+                    c = c_end
                     rate = u_end * per_ph
                     u_now = u_end
                 if s < 0.0 and rate > 0.0 and piece < pieces - 1 and s < c * tail_min_q[i]:

@@ -174,51 +174,64 @@ def span_step(
 ) -> tuple[float, float]:
     """Return theta(1) - theta(0) and U(1) of one span; arguments as of a single step."""
     big_p = ph * ph
-    pa0, pa1 = big_p * spans[row, 2], big_p * spans[row, 3]
-    pa2, pa3 = big_p * spans[row, 4], big_p * spans[row, 5]
-    pw0, pw1 = big_p * spans[row, 6], big_p * spans[row, 7]
-    pw2, pw3 = big_p * spans[row, 8], big_p * spans[row, 9]
-    u1 = pa0 * c0 - pw0 * s0
-    s1 = -(u0 * c0)
-    c1 = u0 * s0
-    u2 = 0.5 * ((pa1 * c0 - pw1 * s0) + pa0 * c1 - pw0 * s1)
-    s2 = -0.5 * (u0 * c1 + u1 * c0)
-    c2 = 0.5 * (u0 * s1 + u1 * s0)
-    u3 = (1.0 / 3.0) * ((pa2 * c0 - pw2 * s0) + (pa1 * c1 - pw1 * s1) + pa0 * c2 - pw0 * s2)
-    s3 = -(1.0 / 3.0) * (u1 * c1 + u0 * c2 + u2 * c0)
-    c3 = (1.0 / 3.0) * (u1 * s1 + u0 * s2 + u2 * s0)
-    u4 = 0.25 * (
-        (pa3 * c0 - pw3 * s0) + (pa2 * c1 - pw2 * s1) + (pa1 * c2 - pw1 * s2) + pa0 * c3 - pw0 * s3
+    a, w = spans[row, 2], spans[row, 6]
+    pa, pd = big_p * (a * c0 - w * s0), big_p * (a * s0 + w * c0)
+    a, w = spans[row, 3], spans[row, 7]
+    pa1, pd1 = big_p * (a * c0 - w * s0), big_p * (a * s0 + w * c0)
+    a, w = spans[row, 4], spans[row, 8]
+    pa2, pd2 = big_p * (a * c0 - w * s0), big_p * (a * s0 + w * c0)
+    a, w = spans[row, 5], spans[row, 9]
+    pa3, pd3 = big_p * (a * c0 - w * s0), big_p * (a * s0 + w * c0)
+    s2 = 0.5 * pa
+    c2 = -0.5 * (u0 * u0)
+    v2 = pa1 + pd * u0
+    s3 = (1.0 / 3.0) * (u0 * c2) + (1.0 / 6.0) * v2
+    u2 = 0.5 * v2
+    c3 = -(1.0 / 3.0) * (u0 * s2 + pa * u0)
+    v3 = pa2 + pd1 * u0 + pa * c2 + pd * s2
+    s4 = 0.25 * (pa * c2 + u0 * c3) + (1.0 / 12.0) * v3
+    u3 = (1.0 / 3.0) * v3
+    c4 = -0.25 * (u0 * s3 + pa * s2 + u2 * u0)
+    v4 = pa3 + pd2 * u0 + pa1 * c2 + pd1 * s2 + pa * c3 + pd * s3
+    s5 = 0.2 * (u2 * c2 + pa * c3 + u0 * c4) + 0.05 * v4
+    u4 = 0.25 * v4
+    c5 = -0.2 * (u0 * s4 + pa * s3 + u2 * s2 + u3 * u0)
+    v5 = pd3 * u0 + pa2 * c2 + pd2 * s2 + pa1 * c3 + pd1 * s3 + pa * c4 + pd * s4
+    s6 = (1.0 / 6.0) * (u2 * c3 + u3 * c2 + pa * c4 + u0 * c5) + (1.0 / 30.0) * v5
+    u5 = 0.2 * v5
+    c6 = -(1.0 / 6.0) * (u0 * s5 + pa * s4 + u2 * s3 + u3 * s2 + u4 * u0)
+    v6 = pa3 * c2 + pd3 * s2 + pa2 * c3 + pd2 * s3 + pa1 * c4 + pd1 * s4 + pa * c5 + pd * s5
+    s7 = (1.0 / 7.0) * (u3 * c3 + u2 * c4 + u4 * c2 + pa * c5 + u0 * c6) + (1.0 / 42.0) * v6
+    u6 = (1.0 / 6.0) * v6
+    c7 = -(1.0 / 7.0) * (u0 * s6 + pa * s5 + u2 * s4 + u3 * s3 + u4 * s2 + u5 * u0)
+    v7 = pa3 * c3 + pd3 * s3 + pa2 * c4 + pd2 * s4 + pa1 * c5 + pd1 * s5 + pa * c6 + pd * s6
+    s8 = 0.125 * (u3 * c4 + u4 * c3 + u2 * c5 + u5 * c2 + pa * c6 + u0 * c7) + (1.0 / 56.0) * v7
+    u7 = (1.0 / 7.0) * v7
+    c8 = -0.125 * (u0 * s7 + pa * s6 + u2 * s5 + u3 * s4 + u4 * s3 + u5 * s2 + u6 * u0)
+    v8 = pa3 * c4 + pd3 * s4 + pa2 * c5 + pd2 * s5 + pa1 * c6 + pd1 * s6 + pa * c7 + pd * s7
+    s9 = (1.0 / 9.0) * (u4 * c4 + u3 * c5 + u5 * c3 + u2 * c6 + u6 * c2 + pa * c7 + u0 * c8)
+    s9 += (1.0 / 72.0) * v8
+    c9 = -(1.0 / 9.0) * (
+        u0 * s8 + pa * s7 + u2 * s6 + u3 * s5 + u4 * s4 + u5 * s3 + u6 * s2 + u7 * u0
     )
-    s4 = -0.25 * (u1 * c2 + u2 * c1 + u0 * c3 + u3 * c0)
-    c4 = 0.25 * (u1 * s2 + u2 * s1 + u0 * s3 + u3 * s0)
-    u5 = (1.0 / 5.0) * (
-        (pa3 * c1 - pw3 * s1) + (pa2 * c2 - pw2 * s2) + (pa1 * c3 - pw1 * s3) + pa0 * c4 - pw0 * s4
-    )
-    s5 = -(1.0 / 5.0) * (u1 * c3 + u2 * c2 + u3 * c1 + u0 * c4 + u4 * c0)
-    c5 = (1.0 / 5.0) * (u1 * s3 + u2 * s2 + u3 * s1 + u0 * s4 + u4 * s0)
-    u6 = (1.0 / 6.0) * (
-        (pa3 * c2 - pw3 * s2) + (pa2 * c3 - pw2 * s3) + (pa1 * c4 - pw1 * s4) + pa0 * c5 - pw0 * s5
-    )
-    s6 = -(1.0 / 6.0) * (u1 * c4 + u2 * c3 + u3 * c2 + u4 * c1 + u0 * c5 + u5 * c0)
-    c6 = (1.0 / 6.0) * (u1 * s4 + u2 * s3 + u3 * s2 + u4 * s1 + u0 * s5 + u5 * s0)
-    u7 = (1.0 / 7.0) * (
-        (pa3 * c3 - pw3 * s3) + (pa2 * c4 - pw2 * s4) + (pa1 * c5 - pw1 * s5) + pa0 * c6 - pw0 * s6
-    )
-    u8 = 0.125 * ((pa3 * c4 - pw3 * s4) + (pa2 * c5 - pw2 * s5) + (pa1 * c6 - pw1 * s6))
-    u9 = (1.0 / 9.0) * ((pa3 * c5 - pw3 * s5) + (pa2 * c6 - pw2 * s6))
-    u10 = 0.1 * (pa3 * c6 - pw3 * s6)
+    v9 = pa3 * c5 + pd3 * s5 + pa2 * c6 + pd2 * s6 + pa1 * c7 + pd1 * s7 + pa * c8 + pd * s8
+    v10 = pa3 * c6 + pd3 * s6 + pa2 * c7 + pd2 * s7 + pa1 * c8 + pd1 * s8 + pa * c9 + pd * s9
     # what the cubics miss, with the angle at the middle of the span
-    s = s0 + 0.5 * s1
-    c = c0 + 0.5 * c1
+    s = s0 - 0.5 * u0 * c0
+    c = c0 + 0.5 * u0 * s0
     ss, sc, cc = s * s, s * c, c * c
     missed = big_p * big_p
     u_missed = missed * (
         sc * (spans[row, 10] - spans[row, 13]) - ss * spans[row, 11] + cc * spans[row, 12]
     )
     missed *= sc * (spans[row, 14] - spans[row, 17]) - ss * spans[row, 15] + cc * spans[row, 16]
-    turned = u7 * 0.125 + (u8 * (1.0 / 9.0) + (u9 * 0.1 + (u10 * (1.0 / 11.0) + missed)))
-    turned = u3 * 0.25 + (u4 * 0.2 + (u5 * (1.0 / 6.0) + (u6 * (1.0 / 7.0) + turned)))
-    turned = u0 + (u1 * 0.5 + (u2 * (1.0 / 3.0) + turned))
-    u_end = u4 + (u5 + (u6 + (u7 + (u8 + (u9 + (u10 + u_missed))))))
-    return turned, u0 + (u1 + (u2 + (u3 + u_end)))
+    turned = (
+        (1.0 / 12.0) * v3 + 0.05 * v4 + (1.0 / 30.0) * v5 + (1.0 / 42.0) * v6
+        + (1.0 / 56.0) * v7 + (1.0 / 72.0) * v8 + (1.0 / 90.0) * v9 + (1.0 / 110.0) * v10
+    )  # fmt: skip
+    u_end = (
+        (1.0 / 3.0) * v3 + 0.25 * v4 + 0.2 * v5 + (1.0 / 6.0) * v6
+        + (1.0 / 7.0) * v7 + 0.125 * v8 + (1.0 / 9.0) * v9 + 0.1 * v10
+    )  # fmt: skip
+    turned = (u0 + (0.5 * pa + (1.0 / 6.0) * v2)) + (turned + missed)
+    return turned, (u0 + (pa + 0.5 * v2)) + (u_end + u_missed)

@@ -99,47 +99,54 @@ def step8(
         theta(1) - theta(0), U(1), U'(1).
     """
     big_p = ph * ph
-    pa, pda, pw, pdw = big_p * a0, big_p * da, big_p * w0, big_p * dw
-    u1 = pa * c0 - pw * s0
-    s1 = -(u0 * c0)
-    c1 = u0 * s0
-    u2 = 0.5 * ((pda * c0 - pdw * s0) + pa * c1 - pw * s1)
-    s2 = -0.5 * (u0 * c1 + u1 * c0)
-    c2 = 0.5 * (u0 * s1 + u1 * s0)
-    u3 = (1.0 / 3.0) * ((pda * c1 - pdw * s1) + pa * c2 - pw * s2)
-    s3 = -(1.0 / 3.0) * (u1 * c1 + u0 * c2 + u2 * c0)
-    c3 = (1.0 / 3.0) * (u1 * s1 + u0 * s2 + u2 * s0)
-    u4 = 0.25 * ((pda * c2 - pdw * s2) + pa * c3 - pw * s3)
-    s4 = -0.25 * (u1 * c2 + u2 * c1 + u0 * c3 + u3 * c0)
-    c4 = 0.25 * (u1 * s2 + u2 * s1 + u0 * s3 + u3 * s0)
-    u5 = (1.0 / 5.0) * ((pda * c3 - pdw * s3) + pa * c4 - pw * s4)
-    s5 = -(1.0 / 5.0) * (u1 * c3 + u2 * c2 + u3 * c1 + u0 * c4 + u4 * c0)
-    c5 = (1.0 / 5.0) * (u1 * s3 + u2 * s2 + u3 * s1 + u0 * s4 + u4 * s0)
-    u6 = (1.0 / 6.0) * ((pda * c4 - pdw * s4) + pa * c5 - pw * s5)
-    s6 = -(1.0 / 6.0) * (u1 * c4 + u2 * c3 + u3 * c2 + u4 * c1 + u0 * c5 + u5 * c0)
-    c6 = (1.0 / 6.0) * (u1 * s4 + u2 * s3 + u3 * s2 + u4 * s1 + u0 * s5 + u5 * s0)
-    u7 = (1.0 / 7.0) * ((pda * c5 - pdw * s5) + pa * c6 - pw * s6)
-    s7 = -(1.0 / 7.0) * (u1 * c5 + u2 * c4 + u3 * c3 + u4 * c2 + u5 * c1 + u0 * c6 + u6 * c0)
-    c7 = (1.0 / 7.0) * (u1 * s5 + u2 * s4 + u3 * s3 + u4 * s2 + u5 * s1 + u0 * s6 + u6 * s0)
-    u8 = 0.125 * ((pda * c6 - pdw * s6) + pa * c7 - pw * s7)
+    pa, pa1 = big_p * (a0 * c0 - w0 * s0), big_p * (da * c0 - dw * s0)
+    pd, pd1 = big_p * (a0 * s0 + w0 * c0), big_p * (da * s0 + dw * c0)
+    s2 = 0.5 * pa
+    c2 = -0.5 * (u0 * u0)
+    v2 = pa1 + pd * u0
+    s3 = (1.0 / 3.0) * (u0 * c2) + (1.0 / 6.0) * v2
+    u2 = 0.5 * v2
+    c3 = -(1.0 / 3.0) * (u0 * s2 + pa * u0)
+    v3 = pd1 * u0 + pa * c2 + pd * s2
+    s4 = 0.25 * (pa * c2 + u0 * c3) + (1.0 / 12.0) * v3
+    u3 = (1.0 / 3.0) * v3
+    c4 = -0.25 * (u0 * s3 + pa * s2 + u2 * u0)
+    v4 = pa1 * c2 + pd1 * s2 + pa * c3 + pd * s3
+    s5 = 0.2 * (u2 * c2 + pa * c3 + u0 * c4) + 0.05 * v4
+    u4 = 0.25 * v4
+    c5 = -0.2 * (u0 * s4 + pa * s3 + u2 * s2 + u3 * u0)
+    v5 = pa1 * c3 + pd1 * s3 + pa * c4 + pd * s4
+    s6 = (1.0 / 6.0) * (u2 * c3 + u3 * c2 + pa * c4 + u0 * c5) + (1.0 / 30.0) * v5
+    u5 = 0.2 * v5
+    c6 = -(1.0 / 6.0) * (u0 * s5 + pa * s4 + u2 * s3 + u3 * s2 + u4 * u0)
+    v6 = pa1 * c4 + pd1 * s4 + pa * c5 + pd * s5
+    s7 = (1.0 / 7.0) * (u3 * c3 + u2 * c4 + u4 * c2 + pa * c5 + u0 * c6) + (1.0 / 42.0) * v6
+    u6 = (1.0 / 6.0) * v6
+    c7 = -(1.0 / 7.0) * (u0 * s6 + pa * s5 + u2 * s4 + u3 * s3 + u4 * s2 + u5 * u0)
+    v7 = pa1 * c5 + pd1 * s5 + pa * c6 + pd * s6
+    u7 = (1.0 / 7.0) * v7
+    v8 = pa1 * c6 + pd1 * s6 + pa * c7 + pd * s7
     u[0] = u0
-    u[1] = u1
+    u[1] = pa
     u[2] = u2
     u[3] = u3
     u[4] = u4
     u[5] = u5
     u[6] = u6
     u[7] = u7
-    u[8] = u8
-    middle = u2 * (1.0 / 3.0) + (
-        u3 * 0.25 + (u4 * (1.0 / 5.0) + (u5 * (1.0 / 6.0) + (u6 * (1.0 / 7.0))))
+    u[8] = 0.125 * v8
+    turned = (u0 + (0.5 * pa + (1.0 / 6.0) * v2)) + (
+        (1.0 / 12.0) * v3
+        + 0.05 * v4
+        + (1.0 / 30.0) * v5
+        + (1.0 / 42.0) * v6
+        + (1.0 / 56.0) * v7
+        + (1.0 / 72.0) * v8
     )
-    turned = u0 + (u1 * 0.5 + (middle + (u7 * 0.125 + u8 * (1.0 / 9.0))))
-    middle = u2 + (u3 + (u4 + (u5 + (u6))))
-    u_end = u0 + (u1 + (middle + (u7 + u8)))
-    v_end = u1 + (
-        2.0 * u2 + (3.0 * u3 + (4.0 * u4 + (5.0 * u5 + (6.0 * u6 + (7.0 * u7 + (8.0 * u8))))))
+    u_end = (u0 + (pa + 0.5 * v2)) + (
+        (1.0 / 3.0) * v3 + 0.25 * v4 + 0.2 * v5 + (1.0 / 6.0) * v6 + (1.0 / 7.0) * v7 + 0.125 * v8
     )
+    v_end = pa + v2 + v3 + v4 + v5 + v6 + v7 + v8
     return turned, u_end, v_end
 
 
@@ -157,37 +164,39 @@ def step6(
 ) -> tuple[float, float, float]:
     """One non-linear step of order 6, the higher coefficients zero; else as :func:`step8`."""
     big_p = ph * ph
-    pa, pda, pw, pdw = big_p * a0, big_p * da, big_p * w0, big_p * dw
-    u1 = pa * c0 - pw * s0
-    s1 = -(u0 * c0)
-    c1 = u0 * s0
-    u2 = 0.5 * ((pda * c0 - pdw * s0) + pa * c1 - pw * s1)
-    s2 = -0.5 * (u0 * c1 + u1 * c0)
-    c2 = 0.5 * (u0 * s1 + u1 * s0)
-    u3 = (1.0 / 3.0) * ((pda * c1 - pdw * s1) + pa * c2 - pw * s2)
-    s3 = -(1.0 / 3.0) * (u1 * c1 + u0 * c2 + u2 * c0)
-    c3 = (1.0 / 3.0) * (u1 * s1 + u0 * s2 + u2 * s0)
-    u4 = 0.25 * ((pda * c2 - pdw * s2) + pa * c3 - pw * s3)
-    s4 = -0.25 * (u1 * c2 + u2 * c1 + u0 * c3 + u3 * c0)
-    c4 = 0.25 * (u1 * s2 + u2 * s1 + u0 * s3 + u3 * s0)
-    u5 = (1.0 / 5.0) * ((pda * c3 - pdw * s3) + pa * c4 - pw * s4)
-    s5 = -(1.0 / 5.0) * (u1 * c3 + u2 * c2 + u3 * c1 + u0 * c4 + u4 * c0)
-    c5 = (1.0 / 5.0) * (u1 * s3 + u2 * s2 + u3 * s1 + u0 * s4 + u4 * s0)
-    u6 = (1.0 / 6.0) * ((pda * c4 - pdw * s4) + pa * c5 - pw * s5)
+    pa, pa1 = big_p * (a0 * c0 - w0 * s0), big_p * (da * c0 - dw * s0)
+    pd, pd1 = big_p * (a0 * s0 + w0 * c0), big_p * (da * s0 + dw * c0)
+    s2 = 0.5 * pa
+    c2 = -0.5 * (u0 * u0)
+    v2 = pa1 + pd * u0
+    s3 = (1.0 / 3.0) * (u0 * c2) + (1.0 / 6.0) * v2
+    u2 = 0.5 * v2
+    c3 = -(1.0 / 3.0) * (u0 * s2 + pa * u0)
+    v3 = pd1 * u0 + pa * c2 + pd * s2
+    s4 = 0.25 * (pa * c2 + u0 * c3) + (1.0 / 12.0) * v3
+    u3 = (1.0 / 3.0) * v3
+    c4 = -0.25 * (u0 * s3 + pa * s2 + u2 * u0)
+    v4 = pa1 * c2 + pd1 * s2 + pa * c3 + pd * s3
+    s5 = 0.2 * (u2 * c2 + pa * c3 + u0 * c4) + 0.05 * v4
+    u4 = 0.25 * v4
+    c5 = -0.2 * (u0 * s4 + pa * s3 + u2 * s2 + u3 * u0)
+    v5 = pa1 * c3 + pd1 * s3 + pa * c4 + pd * s4
+    u5 = 0.2 * v5
+    v6 = pa1 * c4 + pd1 * s4 + pa * c5 + pd * s5
     u[0] = u0
-    u[1] = u1
+    u[1] = pa
     u[2] = u2
     u[3] = u3
     u[4] = u4
     u[5] = u5
-    u[6] = u6
+    u[6] = (1.0 / 6.0) * v6
     u[7] = 0.0
     u[8] = 0.0
-    middle = u2 * (1.0 / 3.0) + (u3 * 0.25 + (u4 * (1.0 / 5.0)))
-    turned = u0 + (u1 * 0.5 + (middle + (u5 * (1.0 / 6.0) + u6 * (1.0 / 7.0))))
-    middle = u2 + (u3 + (u4))
-    u_end = u0 + (u1 + (middle + (u5 + u6)))
-    v_end = u1 + (2.0 * u2 + (3.0 * u3 + (4.0 * u4 + (5.0 * u5 + (6.0 * u6)))))
+    turned = (u0 + (0.5 * pa + (1.0 / 6.0) * v2)) + (
+        (1.0 / 12.0) * v3 + 0.05 * v4 + (1.0 / 30.0) * v5 + (1.0 / 42.0) * v6
+    )
+    u_end = (u0 + (pa + 0.5 * v2)) + ((1.0 / 3.0) * v3 + 0.25 * v4 + 0.2 * v5 + (1.0 / 6.0) * v6)
+    v_end = pa + v2 + v3 + v4 + v5 + v6
     return turned, u_end, v_end
 
 
@@ -205,34 +214,35 @@ def step5(
 ) -> tuple[float, float, float]:
     """One non-linear step of order 5, the higher coefficients zero; else as :func:`step8`."""
     big_p = ph * ph
-    pa, pda, pw, pdw = big_p * a0, big_p * da, big_p * w0, big_p * dw
-    u1 = pa * c0 - pw * s0
-    s1 = -(u0 * c0)
-    c1 = u0 * s0
-    u2 = 0.5 * ((pda * c0 - pdw * s0) + pa * c1 - pw * s1)
-    s2 = -0.5 * (u0 * c1 + u1 * c0)
-    c2 = 0.5 * (u0 * s1 + u1 * s0)
-    u3 = (1.0 / 3.0) * ((pda * c1 - pdw * s1) + pa * c2 - pw * s2)
-    s3 = -(1.0 / 3.0) * (u1 * c1 + u0 * c2 + u2 * c0)
-    c3 = (1.0 / 3.0) * (u1 * s1 + u0 * s2 + u2 * s0)
-    u4 = 0.25 * ((pda * c2 - pdw * s2) + pa * c3 - pw * s3)
-    s4 = -0.25 * (u1 * c2 + u2 * c1 + u0 * c3 + u3 * c0)
-    c4 = 0.25 * (u1 * s2 + u2 * s1 + u0 * s3 + u3 * s0)
-    u5 = (1.0 / 5.0) * ((pda * c3 - pdw * s3) + pa * c4 - pw * s4)
+    pa, pa1 = big_p * (a0 * c0 - w0 * s0), big_p * (da * c0 - dw * s0)
+    pd, pd1 = big_p * (a0 * s0 + w0 * c0), big_p * (da * s0 + dw * c0)
+    s2 = 0.5 * pa
+    c2 = -0.5 * (u0 * u0)
+    v2 = pa1 + pd * u0
+    s3 = (1.0 / 3.0) * (u0 * c2) + (1.0 / 6.0) * v2
+    u2 = 0.5 * v2
+    c3 = -(1.0 / 3.0) * (u0 * s2 + pa * u0)
+    v3 = pd1 * u0 + pa * c2 + pd * s2
+    s4 = 0.25 * (pa * c2 + u0 * c3) + (1.0 / 12.0) * v3
+    u3 = (1.0 / 3.0) * v3
+    c4 = -0.25 * (u0 * s3 + pa * s2 + u2 * u0)
+    v4 = pa1 * c2 + pd1 * s2 + pa * c3 + pd * s3
+    u4 = 0.25 * v4
+    v5 = pa1 * c3 + pd1 * s3 + pa * c4 + pd * s4
     u[0] = u0
-    u[1] = u1
+    u[1] = pa
     u[2] = u2
     u[3] = u3
     u[4] = u4
-    u[5] = u5
+    u[5] = 0.2 * v5
     u[6] = 0.0
     u[7] = 0.0
     u[8] = 0.0
-    middle = u2 * (1.0 / 3.0) + (u3 * 0.25)
-    turned = u0 + (u1 * 0.5 + (middle + (u4 * (1.0 / 5.0) + u5 * (1.0 / 6.0))))
-    middle = u2 + (u3)
-    u_end = u0 + (u1 + (middle + (u4 + u5)))
-    v_end = u1 + (2.0 * u2 + (3.0 * u3 + (4.0 * u4 + (5.0 * u5))))
+    turned = (u0 + (0.5 * pa + (1.0 / 6.0) * v2)) + (
+        (1.0 / 12.0) * v3 + 0.05 * v4 + (1.0 / 30.0) * v5
+    )
+    u_end = (u0 + (pa + 0.5 * v2)) + ((1.0 / 3.0) * v3 + 0.25 * v4 + 0.2 * v5)
+    v_end = pa + v2 + v3 + v4 + v5
     return turned, u_end, v_end
 
 
@@ -261,18 +271,18 @@ def lean_step(
 
 @fused_kernel
 def turn(s: float, c: float, angle: float) -> tuple[float, float]:
-    """Changes of s = sin(phi) and c = cos(phi) when phi falls by `angle`."""
+    """Return s = sin(phi) and c = cos(phi) after phi has fallen by `angle`."""
     if abs(angle) <= 0.125:  # series exact to rounding
         x = angle * angle
-        sine = angle - angle * x * (
-            1.0 / 6.0 - x * (1.0 / 120.0 - x * (1.0 / 5040.0 - x * (1.0 / 362880.0)))
+        sine = angle + (angle * x) * (
+            (x * (1.0 / 120.0) - 1.0 / 6.0) + (x * x) * (x * (1.0 / 362880.0) - 1.0 / 5040.0)
         )
-        versine = x * (0.5 - x * (1.0 / 24.0 - x * (1.0 / 720.0 - x * (1.0 / 40320.0))))
+        versine = x * ((0.5 - x * (1.0 / 24.0)) + (x * x) * (1.0 / 720.0 - x * (1.0 / 40320.0)))
     else:
         sine = math.sin(angle)
         half = math.sin(0.5 * angle)
         versine = 2.0 * half * half
-    return -s * versine - c * sine, s * sine - c * versine
+    return (s - s * versine) - c * sine, (c - c * versine) + s * sine
 
 
 @kernel

@@ -285,9 +285,7 @@ def run_toppling(
                 if linear:
                     s[0] -= turned
                 else:
-                    s_change, c_change = turn(s[0], c[0], turned)
-                    s[0] += s_change
-                    c[0] += c_change
+                    s[0], c[0] = turn(s[0], c[0], turned)
                 if piece < pieces - 1 and not decided:
                     # in a long interval the block could swing right round before its end
                     least = tail_min_q[i]

@@ -39,8 +39,7 @@ def flown(
             )
         theta += turned
         rate = u_end / ph
-        change = turn(s, c, turned)
-        s, c = s + change[0], c + change[1]
+        s, c = turn(s, c, turned)
     return theta, rate
 
 
