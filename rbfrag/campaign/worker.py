@@ -14,7 +14,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
 from rbfrag.solver.certified import MAP_DEPTH
 from rbfrag.solver.critical import critical
-from rbfrag.solver.excitation import excitation
+from rbfrag.solver.excitation import kept_excitation
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, SearchPoints
 
@@ -114,7 +114,7 @@ def _run_task(work: MotionWork, task: Task) -> TaskResult:
         critical_kr_over_pga = search.kr_over_pga
     grid = None
     if task.grid:
-        drive = excitation(work.motion, vertical, case.polarity)
+        drive = kept_excitation(work.motion, vertical, case.polarity)
         grid = run_grid(drive, case.p2, task.grid)
     wanted = list(task.histories)
     if task.critical_history and critical_kr_over_pga is not None:

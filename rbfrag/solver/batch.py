@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.solver.compiled import kernel
 from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.lanes import run_in_lanes
 from rbfrag.solver.taylor import ORDER, PH_MAX
 from rbfrag.solver.toppling import run_toppling
 
@@ -73,13 +74,15 @@ def run_blocks(
         real: filled with peak, start, verdict and error, shape (4, m).
     """
     nothing = np.empty((4, 0))
+    to_the_end = np.empty(0)
+    work = np.empty((3, order + 1))
     for j in range(kr.size):
         (
             whole[0, j], real[0, j], real[1, j], real[2, j], real[3, j],
             whole[1, j], whole[2, j], _,
         ) = run_toppling(
             time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, jump_node, kr[j], p[j],
-            linear, order, ph_max, 0, False, nothing,
+            linear, order, ph_max, nothing, to_the_end, work,
         )  # fmt: skip
 
 
@@ -116,23 +119,15 @@ def simulate_many(drive: Excitation, *, p2: ArrayLike, kr: ArrayLike, linear: bo
     flat_kr = np.ascontiguousarray(strengths).reshape(-1)
     whole = np.empty((3, flat_kr.size), dtype=np.int64)
     real = np.empty((4, flat_kr.size))
-    run_blocks(
-        drive.time_s,
-        drive.interval_s,
-        drive.k_h,
-        drive.w,
-        drive.q,
-        drive.tail_min_q,
+    arrays = (
+        drive.time_s, drive.interval_s, drive.k_h, drive.w, drive.q, drive.tail_min_q,
         drive.block_max_q,
-        drive.jump_node,
-        flat_kr,
-        np.sqrt(sizes).reshape(-1),
-        linear,
-        ORDER,
-        PH_MAX,
-        whole,
-        real,
-    )
+    )  # fmt: skip
+    p = np.sqrt(sizes).reshape(-1)
+    if linear:
+        run_blocks(*arrays, drive.jump_node, flat_kr, p, True, ORDER, PH_MAX, whole, real)
+    else:
+        run_in_lanes(*arrays, drive.jump_node, flat_kr, p, PH_MAX, whole, real)
     theta_c = flat_kr if linear else np.arctan(flat_kr)
     return Runs(
         outcome=whole[0].reshape(shape),

@@ -22,7 +22,7 @@ from rbfrag.solver.certified import (
     certified_map,
     surely_topples_below,
 )
-from rbfrag.solver.excitation import Excitation, excitation
+from rbfrag.solver.excitation import Excitation, kept_excitation
 from rbfrag.solver.ground import ground_of
 from rbfrag.solver.islands import islands_by_blocks, islands_of_map, outcome_intervals
 from rbfrag.solver.respond import positive, refuse_endless
@@ -77,7 +77,7 @@ def critical(
     p2 = positive(p2, "p2", "1/s²")
     search_limit = positive(search_limit, "search_limit", "the smallest k_r/PGA looked at")
     map_depth = positive(map_depth, "map_depth", "a width of k_r/PGA")
-    drive = excitation(motion, vertical, polarity)
+    drive = kept_excitation(motion, vertical, polarity)
     refuse_endless(drive, p2)
     said = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion)), *drive.warnings]
     if vertical is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,6 +162,17 @@ def excitation(
         pga_g=float(np.abs(motion.acceleration_g).max()),
         warnings=tuple(warnings),
     )
+
+
+@lru_cache(maxsize=8)
+def kept_excitation(
+    motion: GroundMotion, vertical: GroundMotion | None, polarity: Polarity
+) -> Excitation:
+    """Return :func:`excitation`, the same object for the last few motions.
+
+    What a search works out about a record serves the next size of block too.
+    """
+    return excitation(motion, vertical, polarity)
 
 
 def _twice(values: FloatArray, n: int) -> FloatArray:

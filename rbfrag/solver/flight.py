@@ -37,6 +37,12 @@ def rest_state(kr: float, linear: bool) -> tuple[float, float]:
 def first_touch(theta: float, u: FloatArray, theta_end: float, u_end: float, v_end: float) -> float:
     """Fraction of a step at which theta returns to 0, or -1."""
     v_start = u[1]
+    if theta_end > 0.0:
+        # theta is above its ends where it is concave, above its tangents where it is convex
+        if v_start < 0.0 and v_end < 0.0:
+            return -1.0
+        if v_start > 0.0 and v_end > 0.0 and max(theta + u[0], theta_end - u_end) > 0.0:
+            return -1.0
     u_start = u[0] if u[0] != 0.0 else v_start
     first = -1.0
     second = -1.0

@@ -145,6 +145,7 @@ def march(
     side = TOPPLES if inside else SAFE
     share = 0.6
     patience = 2.0
+    halved = False
     edge_high = top  # a border known by two blocks: one of `side` above, one of the other below
     edge_low = top
     edge_point = top
@@ -216,7 +217,9 @@ def march(
         topples_at = math.nan
         if what in (ALL_SAFE, ALL_TOPPLE):
             answer = SAFE if what == ALL_SAFE else TOPPLES
-            width = min(2.0 * (hi - lo), 0.2 * lo)
+            # soon after a width that was too much the next one is tried with care
+            width = min((1.3 if halved else 2.0) * (hi - lo), 0.2 * lo)
+            halved = False
             share = min(1.3 * share, 0.9)
             if not (edge_high < hi):
                 steady = width
@@ -243,6 +246,7 @@ def march(
                     share = 0.6
                     continue
             width = 0.5 * (hi - lo)
+            halved = True
             share *= 0.5
             continue
         else:

@@ -21,6 +21,7 @@ Kind = Literal["toppling"]
 OUTCOMES = (Outcome.STABLE, Outcome.TOPPLED, Outcome.UNDETERMINED, Outcome.JUMP)
 """Outcome of each kernel code."""
 
+_TO_THE_END = np.empty(0)
 _NO_HISTORY = np.empty((4, 0))
 
 MOST_STEPS = 1e8
@@ -154,9 +155,9 @@ def _kernel_call(
         linear,
         order,
         ph_max,
-        0,
-        False,
         history,
+        _TO_THE_END,
+        np.empty((3, order + 1)),
     )
 
 

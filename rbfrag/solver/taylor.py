@@ -335,11 +335,19 @@ def bracketed_root(
         low: end of the bracket where the function has one sign.
         high: end where it has the other (or is zero).
 
-    Bisection takes over whenever Newton leaves the bracket or gains too little, so the
-    bracket always shrinks to rounding and no iterate is ever mistaken for a root.
+    Newton starts where the chord crosses zero. Bisection takes over whenever it leaves the
+    bracket or gains too little, so the bracket always shrinks to rounding and no iterate is ever
+    mistaken for a root. Convergence being quadratic, three steps in a row tell the next one, and
+    the search ends when that is below rounding.
     """
     at_low = _at(kind, theta, u, order, low)
+    at_high = _at(kind, theta, u, order, high)
     tau = 0.5 * (low + high)
+    if (at_low > 0.0) != (at_high > 0.0):
+        chord = low + (high - low) * (at_low / (at_low - at_high))
+        if low < chord < high:
+            tau = chord
+    before = 0.0  # size of the last step of Newton
     for _ in range(200):
         f = _at(kind, theta, u, order, tau)
         if f == 0.0:
@@ -355,10 +363,15 @@ def bracketed_root(
         else:
             d = curvature(u, order, tau)
         following = tau - f / d if d != 0.0 else low - 1.0
-        if not (low < following < high):
+        newton = low < following < high
+        if not newton:
             following = 0.5 * (low + high)
-        if abs(following - tau) <= MACHINE_EPSILON * tau or high - low <= MACHINE_EPSILON * high:
+        step = abs(following - tau)
+        if step <= MACHINE_EPSILON * tau or high - low <= MACHINE_EPSILON * high:
             return following
+        if newton and step < 0.01 * before and step**3 <= 0.01 * MACHINE_EPSILON * tau * before**2:
+            return following
+        before = step if newton else 0.0
         tau = following
     return 0.5 * (low + high)
 

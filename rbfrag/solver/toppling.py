@@ -34,6 +34,16 @@ FloatArray = NDArray[np.float64]
 
 STABLE, TOPPLED, UNDETERMINED, JUMP = 0, 1, 2, 3
 
+PENDING = 4
+"""Outcome of a run that is handed over before its end: its state is to be carried on."""
+
+AT_INTERVAL, THETA, RATE, SIN, COS, ERROR, DRIFT = 0, 1, 2, 3, 4, 5, 6
+PEAK, PEAK_ERROR, STARTED, LOST, STEPS, SAMPLES = 7, 8, 9, 10, 11, 12
+TO_THE_END = 13
+STATE_SIZE = 14
+"""Fields of the state of a run that moves at a node. An interval below 0 means the beginning;
+TO_THE_END above 0 that the run is not handed over again."""
+
 
 class Run(NamedTuple):
     """What the kernel returns.
@@ -90,9 +100,9 @@ def run_toppling(
     linear: bool,
     order: int,
     ph_max: float,
-    first_interval: int,
-    one_excursion: bool,
     history: FloatArray,
+    state: FloatArray,
+    work: FloatArray,
 ) -> tuple[int, float, float, float, float, int, int, int]:
     """Run one block over one record; the fields of :class:`Run` in order.
 
@@ -110,11 +120,12 @@ def run_toppling(
         linear: the linear verification model.
         order: degree of the Taylor step.
         ph_max: greatest p·h of one step.
-        first_interval: interval that the block enters at rest; 0 for the whole record.
-        one_excursion: stop, with outcome stable, when the block first re-seats.
         history: shape (4, m) to be filled with time, theta, theta' and node (-1 for an event
             between nodes); (4, 0) for none. With a
             history the run goes on after the verdict until the block lies beyond 90 degrees.
+        state: shape (STATE_SIZE,) to go on from there and to hand over with PENDING as soon as
+            the block moves at a node beyond; (0,) to run to the end.
+        work: work, shape (3, order + 1).
     """
     n = k_h.size
     last = min(n, jump_node) - 1
@@ -126,9 +137,9 @@ def run_toppling(
         theta_c = math.atan(kr)
         c_rest = 1.0 / math.sqrt(1.0 + kr * kr)
         s_rest = kr * c_rest
-    u = np.empty(order + 1)
-    s = np.empty(order + 1)
-    c = np.empty(order + 1)
+    u = work[0]
+    s = work[1]
+    c = work[2]
 
     room = history.shape[1]
     filled = 0
@@ -142,7 +153,7 @@ def run_toppling(
     decided = False
     verdict_error = 0.0
 
-    i = first_interval
+    i = 0
     tau = 0.0  # position inside interval i
     moving = False
     fresh = False  # starting at an upward crossing: no re-seat is possible in the first step
@@ -151,8 +162,41 @@ def run_toppling(
     error = 0.0  # bound on |error of theta| + |error of theta'/p|
     drift = 0.0  # closer bound on the error of theta alone, which times a re-seat
     lost = False  # whether a re-seat may as well have been a fall: the error hid the difference
+    hands_over = state.size > 0 and state[TO_THE_END] <= 0.0
+    entered = -1  # interval at which a state was taken over
+    if state.size > 0 and state[AT_INTERVAL] >= 0.0:
+        i = int(state[AT_INTERVAL])
+        entered = i
+        moving = True
+        theta = state[THETA]
+        rate = state[RATE]
+        s[0] = state[SIN]
+        c[0] = state[COS]
+        error = state[ERROR]
+        drift = state[DRIFT]
+        peak = state[PEAK]
+        peak_error = state[PEAK_ERROR]
+        started_s = state[STARTED]
+        lost = state[LOST] > 0.0
+        steps = int(state[STEPS])
+        moved = int(state[SAMPLES])
 
     while i < last:
+        if hands_over and moving and tau == 0.0 and not fresh and i > entered:
+            state[AT_INTERVAL] = i
+            state[THETA] = theta
+            state[RATE] = rate
+            state[SIN] = s[0]
+            state[COS] = c[0]
+            state[ERROR] = error
+            state[DRIFT] = drift
+            state[PEAK] = peak
+            state[PEAK_ERROR] = peak_error
+            state[STARTED] = started_s
+            state[LOST] = 1.0 if lost else 0.0
+            state[STEPS] = steps
+            state[SAMPLES] = moved
+            return PENDING, math.nan, started_s, math.nan, error, steps, moved, 0
         g0 = k_h[i] - w[i] * kr
         g1 = k_h[i + 1] - w[i + 1] * kr
         if not moving and interval_s[i] == 0.0:  # nothing lifts in no time
@@ -259,8 +303,16 @@ def run_toppling(
                         look = look or (v_start < 0.0 and v_end > 0.0 and u_start + v_start <= 0.0)
                     elif u_start < 0.0 and u_end < 0.0:
                         look = look or (v_start > 0.0 and v_end < 0.0 and u_start + v_start >= 0.0)
-                    else:
+                    elif room > 0:
                         look = True
+                    elif u_start > 0.0:
+                        # a peak below its two tangents: of interest if it may be the highest
+                        top = min(theta + u_start, theta_end - u_end)
+                        look = look or v_start >= 0.0 or v_end >= 0.0 or top > peak
+                    else:
+                        # a dip above its two tangents: of interest if it may touch
+                        low = max(theta + u_start, theta_end - u_end)
+                        look = look or v_start <= 0.0 or v_end <= 0.0 or low <= drift
                     if look:
                         x, top, top_at, low = examine_step(theta, u, order, theta_end, u_end, v_end)
                         if top > peak:
@@ -300,8 +352,6 @@ def run_toppling(
                             )  # fmt: skip
 
         if reseat_at >= 0.0:
-            if one_excursion:
-                return STABLE, peak, started_s, math.nan, peak_error, steps, moved, filled
             moving = False
             stuck = reseat_at <= tau
             tau = min(reseat_at, 1.0)
@@ -409,52 +459,3 @@ def run_toppling(
             peak = theta_c - x_top
             peak_error = error * amplification
     return STABLE, peak, started_s, math.nan, peak_error, steps, moved, filled
-
-
-@kernel
-def fresh_starts_that_topple(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    kr: float,
-    p: float,
-    linear: bool,
-    order: int,
-    ph_max: float,
-    windows: NDArray[np.int64],
-) -> NDArray[np.int64]:
-    """Run one excursion from every rise of q above k_r that lies in the given windows.
-
-    Args:
-        time_s: as in :func:`run_toppling`; likewise the arguments up to `ph_max`.
-        windows: node ranges [first, end) to look in, shape (m, 2), ascending.
-
-    Returns:
-        The node ranges (stretches of q > k_r) whose fresh excursion does not come back
-        for certain, shape (number, 2).
-    """
-    n = q.size
-    nothing = np.empty((4, 0))
-    found = np.empty((n, 2), dtype=np.int64)
-    count = 0
-    for m in range(windows.shape[0]):
-        stop = windows[m, 1]
-        node = next_lifting_node(q, block_max_q, windows[m, 0], stop, kr)
-        while node < stop:
-            end = node
-            while end < n and q[end] > kr:
-                end += 1
-            result = run_toppling(
-                time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, n, kr, p, linear,
-                order, ph_max, max(node - 1, 0), True, nothing,
-            )  # fmt: skip
-            if result[0] != STABLE:
-                found[count, 0] = node
-                found[count, 1] = end
-                count += 1
-            node = next_lifting_node(q, block_max_q, end, stop, kr)
-    return found[:count].copy()
