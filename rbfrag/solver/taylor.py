@@ -8,6 +8,10 @@ acceleration and w(tau) = w0 + dw tau the effective gravity, both in g::
     s[k+1] = -sum_j U[j] c[k-j]/(k+1),    c[k+1] = sum_j U[j] s[k-j]/(k+1)
     theta(tau) = theta + sum_k U[k] tau^(k+1)/(k+1)
 
+The steps that are written out (`step8` and the lower orders) take the same series in the angle
+delta turned since the start, whose sine and cosine begin with 0 and 1: with A = a c - w s and
+D = a s + w c, linear in tau like a and w, the drive is A cos(delta) + D sin(delta).
+
 The record is linear between samples, so no step crosses a kink. s and c are carried from
 step to step by turning through the small increment of theta: the loop calls no sine or
 cosine, and s² + c² stays 1. (Summing the truncated series of s and c instead loses all

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from benchmarks import (
     campaign_scale,
+    batch_runs,
     critical_search,
     main_job,
     page,
@@ -117,7 +118,9 @@ def test_without_the_peer_it_is_named_and_left_out(
     assert missing_peers() == ("scikit-sundae",)
     assert not [m for m in methods() if "CVODE" in m.family]
     rows = compare_searches(choose_combinations(records, 1))
-    assert [row.name for row in rows] == ["critical search", "23 runs, rbfrag"]
+    assert [row.name for row in rows] == [
+        "critical search", "23 runs, rbfrag, side by side", "23 runs, rbfrag, one by one",
+    ]  # fmt: skip
     assert rows[0].over_search == rows[1].over_runs == 1.0
 
 
@@ -127,8 +130,8 @@ def test_with_the_peer_it_runs_the_same_values(records: Records) -> None:
     motion, polarity, p2 = choose_combinations(records, 1)[0]
     assert len(search_runs(motion, polarity, p2)) == 23
     rows = compare_searches([(motion, polarity, p2)], tolerances=(1e-6,))
-    assert len(rows) == (3 if installed else 2)
-    for row in rows[2:]:
+    assert len(rows) == (4 if installed else 3)
+    for row in rows[3:]:
         assert row.wrong is not None
         assert row.wrong <= 3  # the last bisections lie closer to critical than its error
 
@@ -187,6 +190,7 @@ def test_command_prints_tables_writes_files_and_json(
     ("script", "arguments", "places"),
     [
         (work_precision.main, ["--cases", "2", "--quick"], ["work-precision"]),
+        (batch_runs.main, ["--combinations", "1"], ["batch-runs"]),
         (critical_search.main, ["--combinations", "1", "--rtol", "1e-5"], ["critical-search"]),
         (
             scaling.main,

@@ -1,0 +1,94 @@
+"""Runs side by side against the same runs one by one:  python -m benchmarks.batch_runs
+
+Both are compiled calls over the same blocks, and their results are compared bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from benchmarks.page import parser, report
+from rbfrag.campaign.bench.cases import choose_combinations, find_records
+from rbfrag.campaign.bench.critical_search import search_runs
+from rbfrag.campaign.bench.tables import markdown
+from rbfrag.campaign.bench.timing import timed
+from rbfrag.solver.batch import run_blocks
+from rbfrag.solver.excitation import Excitation, excitation
+from rbfrag.solver.lanes import run_in_lanes
+from rbfrag.solver.taylor import ORDER, PH_MAX
+
+READINGS = 5
+
+MANY = 400
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    options = parser(__doc__)
+    options.add_argument("--combinations", type=int, default=60)
+    options.add_argument("--seed", type=int, default=1)
+    chosen = options.parse_args(arguments)
+    records = find_records(chosen.records)
+    combinations = choose_combinations(records, chosen.combinations, seed=chosen.seed)
+    searches, grids = [], []
+    for motion, polarity, p2 in combinations:
+        drive = excitation(motion, None, polarity)
+        runs = np.array([case.kr for case in search_runs(motion, polarity, p2)])
+        searches.append(compare(drive, p2, runs))
+        grids.append(compare(drive, p2, np.geomspace(0.01, 0.99, MANY) * drive.pga_g))
+    headers = [
+        "runs of one call", "calls", "a step, one by one", "a step, side by side",
+        "one by one over side by side, all", "median of the calls", "least", "greatest",
+        "results that differ",
+    ]  # fmt: skip
+    cells = []
+    for name, rows in (("23 of a critical search", searches), (f"{MANY} of a grid", grids)):
+        table = np.array(rows)
+        one, beside, steps, differ = table.T
+        ratio = one / beside
+        cells.append(
+            [
+                name,
+                str(len(rows)),
+                f"{1e9 * one.sum() / steps.sum():.0f} ns",
+                f"{1e9 * beside.sum() / steps.sum():.0f} ns",
+                f"{one.sum() / beside.sum():.2f}×",
+                f"{np.median(ratio):.2f}×",
+                f"{ratio.min():.2f}×",
+                f"{ratio.max():.2f}×",
+                f"{int(differ.sum())}",
+            ]
+        )
+    about = f"{len(combinations)} combinations of {records.source}, seed {chosen.seed}."
+    report("batch-runs", f"{markdown((headers, cells))}\n\n{about}", write=chosen.write)
+
+
+def compare(drive: Excitation, p2: float, kr: np.ndarray) -> tuple[float, float, float, int]:
+    """Return the least times of both ways [s], the steps, and the number of runs that differ."""
+    arrays = (
+        drive.time_s, drive.interval_s, drive.k_h, drive.w, drive.q, drive.tail_min_q,
+        drive.block_max_q,
+    )  # fmt: skip
+    p = np.full(kr.size, np.sqrt(p2))
+    whole = [np.empty((3, kr.size), dtype=np.int64) for _ in range(2)]
+    real = [np.empty((4, kr.size)) for _ in range(2)]
+    ways: list[Callable[[], None]] = [
+        lambda: run_blocks(
+            *arrays, drive.jump_node, kr, p, False, ORDER, PH_MAX, whole[0], real[0]
+        ),
+        lambda: run_in_lanes(*arrays, drive.jump_node, kr, p, PH_MAX, whole[1], real[1]),
+    ]
+    least = [np.inf, np.inf]
+    for way in ways:
+        way()  # compiles
+    for _ in range(READINGS):
+        for number, way in enumerate(ways):
+            least[number] = min(least[number], timed(way)[1])
+    same = (whole[0] == whole[1]).all(axis=0)
+    same &= ((real[0] == real[1]) | (np.isnan(real[0]) & np.isnan(real[1]))).all(axis=0)
+    return least[0], least[1], float(whole[0][1].sum()), int(np.count_nonzero(~same))
+
+
+if __name__ == "__main__":
+    main()
