@@ -44,6 +44,14 @@ def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
     return cast("Callable[P, R]", njit(**_OPTIONS, forceinline=True)(function))
 
 
+def within(function: Callable[P, R]) -> Callable[P, R]:
+    """Put the operations of a function into every kernel that calls it.
+
+    They are then compiled with that kernel, by its rules and in the lanes of its loops.
+    """
+    return cast("Callable[P, R]", njit(inline="always", error_model="numpy")(function))
+
+
 def _compile(function: Callable[P, R], extra: dict[str, Any]) -> Callable[P, R]:
     options: dict[str, Any] = {**_OPTIONS, **extra}
     try:

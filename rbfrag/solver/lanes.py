@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.solver.compiled import fused_kernel, kernel
-from rbfrag.solver.taylor import MACHINE_EPSILON, ORDER
+from rbfrag.solver.taylor import MACHINE_EPSILON, ORDER, SMALL_TURN, series8, small_turn
 from rbfrag.solver.toppling import (
     AT_INTERVAL,
     COS,
@@ -65,68 +65,18 @@ def _steps(x: FloatArray, y: FloatArray, lanes: int) -> None:
         da = x[_DA * LANES + j]
         w0 = x[_W0 * LANES + j]
         dw = x[_DW * LANES + j]
-        big_p = ph * ph
-        pa, pa1 = big_p * (a0 * c0 - w0 * s0), big_p * (da * c0 - dw * s0)
-        pd, pd1 = big_p * (a0 * s0 + w0 * c0), big_p * (da * s0 + dw * c0)
-        s2 = 0.5 * pa
-        c2 = -0.5 * (u0 * u0)
-        v2 = pa1 + pd * u0
-        s3 = (1.0 / 3.0) * (u0 * c2) + (1.0 / 6.0) * v2
-        u2 = 0.5 * v2
-        c3 = -(1.0 / 3.0) * (u0 * s2 + pa * u0)
-        v3 = pd1 * u0 + pa * c2 + pd * s2
-        s4 = 0.25 * (pa * c2 + u0 * c3) + (1.0 / 12.0) * v3
-        u3 = (1.0 / 3.0) * v3
-        c4 = -0.25 * (u0 * s3 + pa * s2 + u2 * u0)
-        v4 = pa1 * c2 + pd1 * s2 + pa * c3 + pd * s3
-        s5 = 0.2 * (u2 * c2 + pa * c3 + u0 * c4) + 0.05 * v4
-        u4 = 0.25 * v4
-        c5 = -0.2 * (u0 * s4 + pa * s3 + u2 * s2 + u3 * u0)
-        v5 = pa1 * c3 + pd1 * s3 + pa * c4 + pd * s4
-        s6 = (1.0 / 6.0) * (u2 * c3 + u3 * c2 + pa * c4 + u0 * c5) + (1.0 / 30.0) * v5
-        u5 = 0.2 * v5
-        c6 = -(1.0 / 6.0) * (u0 * s5 + pa * s4 + u2 * s3 + u3 * s2 + u4 * u0)
-        v6 = pa1 * c4 + pd1 * s4 + pa * c5 + pd * s5
-        s7 = (1.0 / 7.0) * (u3 * c3 + u2 * c4 + u4 * c2 + pa * c5 + u0 * c6) + (1.0 / 42.0) * v6
-        u6 = (1.0 / 6.0) * v6
-        c7 = -(1.0 / 7.0) * (u0 * s6 + pa * s5 + u2 * s4 + u3 * s3 + u4 * s2 + u5 * u0)
-        v7 = pa1 * c5 + pd1 * s5 + pa * c6 + pd * s6
-        u7 = (1.0 / 7.0) * v7
-        v8 = pa1 * c6 + pd1 * s6 + pa * c7 + pd * s7
-        turned = (u0 + (0.5 * pa + (1.0 / 6.0) * v2)) + (
-            (1.0 / 12.0) * v3
-            + 0.05 * v4
-            + (1.0 / 30.0) * v5
-            + (1.0 / 42.0) * v6
-            + (1.0 / 56.0) * v7
-            + (1.0 / 72.0) * v8
-        )
-        u_end = (u0 + (pa + 0.5 * v2)) + (
-            (1.0 / 3.0) * v3
-            + 0.25 * v4
-            + 0.2 * v5
-            + (1.0 / 6.0) * v6
-            + (1.0 / 7.0) * v7
-            + 0.125 * v8
-        )
-        v_end = pa + v2 + v3 + v4 + v5 + v6 + v7 + v8
-        x2 = turned * turned
-        sine = turned + (turned * x2) * (
-            (x2 * (1.0 / 120.0) - 1.0 / 6.0) + (x2 * x2) * (x2 * (1.0 / 362880.0) - 1.0 / 5040.0)
-        )
-        versine = x2 * (
-            (0.5 - x2 * (1.0 / 24.0)) + (x2 * x2) * (1.0 / 720.0 - x2 * (1.0 / 40320.0))
-        )
+        turned, u_end, v_end, u1, _, _, _, _, u6, u7, u8 = series8(u0, ph, s0, c0, a0, da, w0, dw)
+        s_end, c_end = small_turn(s0, c0, turned)
         y[_TURNED * LANES + j] = turned
         y[_U0 * LANES + j] = u0
         y[_U_END * LANES + j] = u_end
         y[_V_END * LANES + j] = v_end
-        y[_U1 * LANES + j] = pa
+        y[_U1 * LANES + j] = u1
         y[_U6 * LANES + j] = u6
         y[_U7 * LANES + j] = u7
-        y[_U8 * LANES + j] = 0.125 * v8
-        y[_S_END * LANES + j] = (s0 - s0 * versine) - c0 * sine
-        y[_C_END * LANES + j] = (c0 - c0 * versine) + s0 * sine
+        y[_U8 * LANES + j] = u8
+        y[_S_END * LANES + j] = s_end
+        y[_C_END * LANES + j] = c_end
 
 
 @kernel
@@ -168,7 +118,7 @@ def _judge(x: FloatArray, y: FloatArray, lanes: int) -> None:
         bounces = (u_start < 0.0) & (u_end >= 0.0) & (v_start > 0.0) & (v_end > 0.0)
         bounces = bounces & (max(theta + u_start, theta_end - u_end) > drift)
         plain = (up & ~dips) | (down & ~rises) | rounds | bounces
-        alone = (theta_end <= 0.0) | ~plain | (growth > 1.0) | (abs(turned) > 0.125)
+        alone = (theta_end <= 0.0) | ~plain | (growth > 1.0) | (abs(turned) > SMALL_TURN)
         alone = alone | (x[_APART * LANES + j] > 0.0)
         rate = u_end / ph
         s_end = y[_S_END * LANES + j]

@@ -25,7 +25,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.solver.compiled import fused_kernel, kernel
+from rbfrag.solver.compiled import fused_kernel, kernel, within
 
 FloatArray = NDArray[np.float64]
 
@@ -71,9 +71,8 @@ def fill_coefficients(
             c[k + 1] = sum_c / (k + 1)
 
 
-@fused_kernel
-def step8(
-    u: FloatArray,
+@within
+def series8(
     u0: float,
     ph: float,
     s0: float,
@@ -82,25 +81,14 @@ def step8(
     da: float,
     w0: float,
     dw: float,
-) -> tuple[float, float, float]:
-    """One non-linear step of order 8, the recurrence written out.
+) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
+    """The series of a step of order 8; arguments as of :func:`step8`.
 
     Sums begin with the terms that are known first: the time of a step is that of its longest
     chain of dependent operations.
 
-    Args:
-        u: filled with the coefficients of U, for whoever has to look inside the step, shape (9,).
-        u0: U at the start, p times the step length times theta'/p.
-        ph: p times the step length.
-        s0: sin(phi) at the start.
-        c0: cos(phi) at the start.
-        a0: driving acceleration at the start [g].
-        da: its change over the step.
-        w0: effective gravity at the start.
-        dw: its change over the step.
-
     Returns:
-        theta(1) - theta(0), U(1), U'(1).
+        theta(1) - theta(0), U(1), U'(1), and the coefficients of U from the first to the eighth.
     """
     big_p = ph * ph
     pa, pa1 = big_p * (a0 * c0 - w0 * s0), big_p * (da * c0 - dw * s0)
@@ -130,15 +118,7 @@ def step8(
     v7 = pa1 * c5 + pd1 * s5 + pa * c6 + pd * s6
     u7 = (1.0 / 7.0) * v7
     v8 = pa1 * c6 + pd1 * s6 + pa * c7 + pd * s7
-    u[0] = u0
-    u[1] = pa
-    u[2] = u2
-    u[3] = u3
-    u[4] = u4
-    u[5] = u5
-    u[6] = u6
-    u[7] = u7
-    u[8] = 0.125 * v8
+    u8 = 0.125 * v8
     turned = (u0 + (0.5 * pa + (1.0 / 6.0) * v2)) + (
         (1.0 / 12.0) * v3
         + 0.05 * v4
@@ -151,6 +131,47 @@ def step8(
         (1.0 / 3.0) * v3 + 0.25 * v4 + 0.2 * v5 + (1.0 / 6.0) * v6 + (1.0 / 7.0) * v7 + 0.125 * v8
     )
     v_end = pa + v2 + v3 + v4 + v5 + v6 + v7 + v8
+    return turned, u_end, v_end, pa, u2, u3, u4, u5, u6, u7, u8
+
+
+@fused_kernel
+def step8(
+    u: FloatArray,
+    u0: float,
+    ph: float,
+    s0: float,
+    c0: float,
+    a0: float,
+    da: float,
+    w0: float,
+    dw: float,
+) -> tuple[float, float, float]:
+    """One non-linear step of order 8, the recurrence written out.
+
+    Args:
+        u: filled with the coefficients of U, for whoever has to look inside the step, shape (9,).
+        u0: U at the start, p times the step length times theta'/p.
+        ph: p times the step length.
+        s0: sin(phi) at the start.
+        c0: cos(phi) at the start.
+        a0: driving acceleration at the start [g].
+        da: its change over the step.
+        w0: effective gravity at the start.
+        dw: its change over the step.
+
+    Returns:
+        theta(1) - theta(0), U(1), U'(1).
+    """
+    turned, u_end, v_end, u1, u2, u3, u4, u5, u6, u7, u8 = series8(u0, ph, s0, c0, a0, da, w0, dw)
+    u[0] = u0
+    u[1] = u1
+    u[2] = u2
+    u[3] = u3
+    u[4] = u4
+    u[5] = u5
+    u[6] = u6
+    u[7] = u7
+    u[8] = u8
     return turned, u_end, v_end
 
 
@@ -273,19 +294,29 @@ def lean_step(
     return step8(u, u0, ph, s0, c0, a0, da, w0, dw)
 
 
+SMALL_TURN = 0.125
+"""Greatest angle [rad] for which the series of :func:`small_turn` is exact to rounding."""
+
+
+@within
+def small_turn(s: float, c: float, angle: float) -> tuple[float, float]:
+    """As :func:`turn`, for angles up to SMALL_TURN."""
+    x = angle * angle
+    sine = angle + (angle * x) * (
+        (x * (1.0 / 120.0) - 1.0 / 6.0) + (x * x) * (x * (1.0 / 362880.0) - 1.0 / 5040.0)
+    )
+    versine = x * ((0.5 - x * (1.0 / 24.0)) + (x * x) * (1.0 / 720.0 - x * (1.0 / 40320.0)))
+    return (s - s * versine) - c * sine, (c - c * versine) + s * sine
+
+
 @fused_kernel
 def turn(s: float, c: float, angle: float) -> tuple[float, float]:
     """Return s = sin(phi) and c = cos(phi) after phi has fallen by `angle`."""
-    if abs(angle) <= 0.125:  # series exact to rounding
-        x = angle * angle
-        sine = angle + (angle * x) * (
-            (x * (1.0 / 120.0) - 1.0 / 6.0) + (x * x) * (x * (1.0 / 362880.0) - 1.0 / 5040.0)
-        )
-        versine = x * ((0.5 - x * (1.0 / 24.0)) + (x * x) * (1.0 / 720.0 - x * (1.0 / 40320.0)))
-    else:
-        sine = math.sin(angle)
-        half = math.sin(0.5 * angle)
-        versine = 2.0 * half * half
+    if abs(angle) <= SMALL_TURN:
+        return small_turn(s, c, angle)
+    sine = math.sin(angle)
+    half = math.sin(0.5 * angle)
+    versine = 2.0 * half * half
     return (s - s * versine) - c * sine, (c - c * versine) + s * sine
 
 

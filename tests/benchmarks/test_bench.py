@@ -13,8 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 from benchmarks import (
-    campaign_scale,
     batch_runs,
+    campaign_scale,
     critical_search,
     main_job,
     page,
