@@ -29,6 +29,9 @@ from rbfrag.motions.quality import quality_flags
 
 AS_SUPPLIED = "as supplied"
 
+DOCUMENTS = frozenset({".md", ".rst", ".pdf", ".htm", ".html", ".doc", ".docx"})
+"""Endings of files about records: passed over in a folder, read when named."""
+
 
 @dataclass(frozen=True)
 class FailedFile:
@@ -118,7 +121,8 @@ def add_motions(
     been read.
 
     Args:
-        paths: files, or folders that are searched with all folders below them.
+        paths: files, or folders that are searched with all folders below them, texts about
+            the records (DOCUMENTS) passed over.
         db: the database (path, URL, or None for the default).
         suite: suite to put the motions into.
         metadata: CSV that states, by file and trace, earthquake, units and direction.
@@ -210,7 +214,10 @@ def _files(
             below = sorted(
                 file
                 for file in path.rglob("*")
-                if file.is_file() and not file.name.startswith(".") and file.name != INDEX
+                if file.is_file()
+                and not file.name.startswith(".")
+                and file.name != INDEX
+                and file.suffix.lower() not in DOCUMENTS
             )
         elif path.exists():
             below = [path]

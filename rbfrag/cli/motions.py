@@ -67,7 +67,8 @@ def add(
     Butterworth high-pass of order 2 at 0.1 Hz forward and backward. Corrected records are
     stored as they are. Vertical components called DOWN are turned upward.
 
-    Formats are recognised by content. A file that cannot be read is listed with its reason,
+    Formats are recognised by content. In a folder, texts about the records (.md, .pdf, .html,
+    .rst, .doc) are passed over. A file that cannot be read is listed with its reason,
     the others are added, and the exit status is 1. Without --metadata an earthquake is only a
     guess from the file's header, flagged, and never merged with one that was stated.
     """

@@ -47,6 +47,18 @@ def pairs(db: Path, suite: str | None = None) -> dict[int, VerticalPair]:
         return vertical_pairs(connection, suite=suite)
 
 
+def test_texts_about_the_records_are_passed_over_in_a_folder_only(
+    tmp_path: Path, db: Path
+) -> None:
+    volume_1(tmp_path / "records" / "a.V1", "L1")
+    about = tmp_path / "records" / "README.md"
+    about.write_text("# Where these come from\n")
+    report = add_motions([tmp_path / "records"], db=db)
+    assert (report.added, report.failed) == ((1,), ())
+    named = add_motions([about], db=db)
+    assert [bad.path for bad in named.failed] == [str(about)]
+
+
 def test_uncorrected_records_are_processed(tmp_path: Path, db: Path) -> None:
     path = volume_1(tmp_path / "a.V1", "L1", "V2", "T3")
     report = add_motions([path], db=db)
