@@ -327,7 +327,7 @@ def everything(
 def test_the_real_set(everything: tuple[Path, AddReport]) -> None:
     db, report = everything
     assert (len(report.added), len(report.processed), report.known) == (341, 123, ())
-    assert {Path(bad.path).suffix for bad in report.failed} == {".md", ".csv"}
+    assert {Path(bad.path).suffix for bad in report.failed} == {".csv"}
     assert report.warnings == ()
     stored = rows(db)
     horizontals = [row for row in stored if not row.is_vertical]
