@@ -47,9 +47,7 @@ def pairs(db: Path, suite: str | None = None) -> dict[int, VerticalPair]:
         return vertical_pairs(connection, suite=suite)
 
 
-def test_texts_about_the_records_are_passed_over_in_a_folder_only(
-    tmp_path: Path, db: Path
-) -> None:
+def test_texts_about_the_records_are_passed_over_in_a_folder_only(tmp_path: Path, db: Path) -> None:
     volume_1(tmp_path / "records" / "a.V1", "L1")
     about = tmp_path / "records" / "README.md"
     about.write_text("# Where these come from\n")
