@@ -146,6 +146,8 @@ def interval_floor(
         sample.tm_s,
         eta,
     )
+    # what a width is multiplied by when this model answers, which has degrees of freedom of its own
+    reach = student_half_width(LEVEL, model.degrees_of_freedom)
     for other in richer:
         middle, low, high = np.empty((3, sample.y.size))
         half_width = student_half_width(LEVEL, other.degrees_of_freedom)
@@ -165,7 +167,7 @@ def interval_floor(
             low,
             high,
         )
-        widest = np.fmax(widest, (high - low) / half_width)
+        widest = np.fmax(widest, (high - low) / reach)
     few = min(_earthquakes(other) for other in richer) < FEW_EARTHQUAKES
     share = SHARE_OF_FEW if few else 1.0
     known = np.isfinite(eta)
