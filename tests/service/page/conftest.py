@@ -50,7 +50,8 @@ def chromium() -> str:
     return str(found)
 
 
-@pytest.fixture(scope="session")
+# Not for the session: while a player is there its event loop runs, and no other test may have one.
+@pytest.fixture(scope="module")
 def browser(chromium: str) -> Iterator[Browser]:
     expect.set_options(timeout=PATIENCE_MS)
     with sync_playwright() as player:
