@@ -26,7 +26,7 @@ FROM_REFERENCE = (
 )
 
 _Stamp = tuple[int, ...]
-_stored_before: dict[str, tuple[_Stamp, list[FragilityModel]]] = {}
+_stored_before: dict[tuple[str, bool], tuple[_Stamp, list[FragilityModel]]] = {}
 _rows_before: dict[int, tuple[ModelRow, FragilityModel]] = {}
 _MOST_ROWS = 64
 
@@ -208,7 +208,7 @@ def _stored_in_file(path: Path, shipped: bool) -> list[FragilityModel]:
     """Return the models of a file, read again only when the file has changed."""
     key = os.path.abspath(path)  # noqa: PTH100  (Path takes ten times as long)
     stamp = _stamp(key)
-    kept = _stored_before.get(key)
+    kept = _stored_before.get((key, shipped))
     if kept is not None and stamp and kept[0] == stamp:
         return kept[1]
     from rbfrag.db.model_file import read_models
@@ -218,7 +218,7 @@ def _stored_in_file(path: Path, shipped: bool) -> list[FragilityModel]:
     if shipped:
         models = [replace(model, notes=(FROM_REFERENCE,)) for model in models]
     if stamp:
-        _stored_before[key] = (stamp, models)
+        _stored_before[key, shipped] = (stamp, models)
     return models
 
 

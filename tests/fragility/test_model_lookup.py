@@ -5,9 +5,10 @@ import sys
 import pytest
 
 from rbfrag.db.engine import opened_database
+from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_store import load_model, save_model, set_default
 from rbfrag.errors import DatabaseNotFoundError, InputError, UnknownModelError
-from rbfrag.fragility.model_lookup import find_model
+from rbfrag.fragility.model_lookup import FROM_REFERENCE, find_model
 from rbfrag.fragility.prediction import predict
 
 
@@ -103,3 +104,11 @@ print(sorted(heavy & set(sys.modules)))
         )
         assert done.returncode == 0, done.stderr
         assert done.stdout.split("\n")[:2] == ["wls-pgv", "[]"]
+
+
+def test_the_reference_named_as_a_database_is_no_stopgap(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("RBFRAG_DB", raising=False)
+    for _ in range(2):
+        assert FROM_REFERENCE in predict(3.0, 0.1, pgv_m_s=0.6).warnings
+        assert predict(3.0, 0.1, pgv_m_s=0.6, db=REFERENCE).warnings == ()

@@ -61,7 +61,8 @@ def test_displacement_falls_with_strength_and_is_convex(seed: int, with_vertical
     tiny = 1e-12 * slid[0]
     assert np.all(np.diff(slid) <= tiny)
     assert np.all(np.diff(slid, 2) >= -tiny)
-    assert slid[-1] == 0.0 or with_vertical
+    # at k_y = PGA rounding of the product may leave a sample above it by one unit
+    assert slid[-1] <= tiny or with_vertical
 
 
 @pytest.mark.parametrize("with_vertical", [False, True])
