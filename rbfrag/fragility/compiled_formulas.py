@@ -27,7 +27,9 @@ _PARTS = (
     "features",
     "score",
     "standard_error",
-    "_between",
+    "_place",
+    "floor_places",
+    "less_between",
     "least_width",
     "widened",
     "_faded",
@@ -83,7 +85,8 @@ _interval, _answer = _parts.interval, _parts.answer
 _inlined = _compiled_parts(inlined_kernel)
 _score_of_one, _standard_error_of_one = _inlined.score, _inlined.standard_error
 _interval_of_one, _is_plain_of_one = _inlined.interval, _inlined.is_plain
-_least_width_of_one, _widened_of_one = _inlined.least_width, _inlined.widened
+_floor_places_of_one, _less_between_of_one = _inlined.floor_places, _inlined.less_between
+_widened_of_one = _inlined.widened
 
 
 @kernel
@@ -207,9 +210,10 @@ def etas(
 ROWS = 512
 """Rows that are worked on at a time: their columns fit the processor's first cache."""
 
-_SIZE, _STRENGTH, _X, _PGV, _PGA, _TM, _PGD, _P, _Y, _ETA, _REACH, _MIDDLE, _LOW, _HIGH, _PLAIN = (
-    ROWS * column for column in range(15)
-)
+_COLUMNS = 20
+_SIZE, _STRENGTH, _X, _PGV, _PGA, _TM, _PGD, _P, _Y, _ETA = (ROWS * i for i in range(10))
+_REACH, _MIDDLE, _LOW, _HIGH, _PLAIN = (ROWS * i for i in range(10, 15))
+_NODE, _BEYOND, _SHARE_NODE, _SHARE_BEYOND, _LEAST = (ROWS * i for i in range(15, _COLUMNS))
 
 
 @cache
@@ -246,7 +250,7 @@ def plain_answers(shape: int, link: int) -> Callable[..., None]:
         high: FloatArray,
         plain: NDArray[np.bool_],
     ) -> None:
-        s = np.ones(15 * ROWS)
+        s = np.ones(_COLUMNS * ROWS)
         for start in range(0, y.size, ROWS):
             n = min(ROWS, y.size - start)
             _take(p2, start, n, s, _SIZE)
@@ -272,9 +276,23 @@ def plain_answers(shape: int, link: int) -> Callable[..., None]:
                 s[_LOW + i] = down
                 s[_HIGH + i] = up
             for i in range(ROWS):
-                least = half_width * _least_width_of_one(
-                    floor, s[_ETA + i], s[_Y + i] / (2.0 * s[_X + i])
+                node, beyond, share_node, share_beyond = _floor_places_of_one(
+                    s[_ETA + i], s[_Y + i] / (2.0 * s[_X + i])
                 )
+                s[_NODE + i] = node
+                s[_BEYOND + i] = beyond
+                s[_SHARE_NODE + i] = share_node
+                s[_SHARE_BEYOND + i] = share_beyond
+            for i in range(ROWS):  # row by row, for each looks elsewhere in the tables
+                s[_LEAST + i] = _less_between_of_one(
+                    floor,
+                    int(s[_NODE + i]),
+                    s[_BEYOND + i],
+                    int(s[_SHARE_NODE + i]),
+                    s[_SHARE_BEYOND + i],
+                )
+            for i in range(ROWS):
+                least = half_width * s[_LEAST + i]
                 down, up = _widened_of_one(least, s[_MIDDLE + i], s[_LOW + i], s[_HIGH + i])
                 s[_LOW + i] = down
                 s[_HIGH + i] = up

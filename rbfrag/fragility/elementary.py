@@ -10,6 +10,7 @@ polynomials are those of fdlibm (Sun Microsystems 1993, e_log.c and e_exp.c).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 ROOT_HALF = math.sqrt(0.5)
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
@@ -38,9 +39,8 @@ MOST = 700.0
 """Beyond ±700 the exponential is taken for that of ±700: 1e304 and 1e-304."""
 
 
-def split(x: float) -> tuple[float, float]:
-    """Return m in [0.5, 1) and the whole number k with x = m 2^k; x > 0."""
-    return math.frexp(x)
+split: Callable[[float], tuple[float, float]] = math.frexp
+"""``split(x)`` is m in [0.5, 1) and the whole number k with x = m 2^k; x > 0."""
 
 
 def scaled(m: float, k: float) -> float:

@@ -222,18 +222,33 @@ def least_width(floor: Sequence[float], eta: float, share: float) -> float:
     """
     if len(floor) == 0:
         return 0.0
-    by_eta = _between(floor, 0, (eta - FLOOR_FROM) / FLOOR_STEP)
-    by_share = _between(floor, FLOOR_NODES, share / FLOOR_SHARE_STEP)
-    return by_eta if by_eta < by_share else by_share
+    node, beyond, share_node, share_beyond = floor_places(eta, share)
+    return less_between(floor, int(node), beyond, int(share_node), share_beyond)
 
 
-def _between(floor: Sequence[float], first: int, place: float) -> float:
+def floor_places(eta: float, share: float) -> tuple[float, float, float, float]:
+    """Return the node before eta, how far beyond it eta is, and the same of y/2x."""
+    node, beyond = _place((eta - FLOOR_FROM) / FLOOR_STEP)
+    share_node, share_beyond = _place(share / FLOOR_SHARE_STEP)
+    return node, beyond, share_node + FLOOR_NODES, share_beyond
+
+
+def _place(at: float) -> tuple[float, float]:
     last = FLOOR_NODES - 1.0
-    place = place if place > 0.0 else 0.0
-    place = place if place < last else last
-    node = int(place if place < last - 1.0 else last - 1.0)
-    value = floor[first + node]
-    return value + (place - node) * (floor[first + node + 1] - value)
+    at = at if at > 0.0 else 0.0
+    at = at if at < last else last
+    node = float(math.floor(at))
+    node = node if node < last else last - 1.0
+    return node, at - node
+
+
+def less_between(
+    floor: Sequence[float], node: int, beyond: float, share_node: int, share_beyond: float
+) -> float:
+    """Return the less of the two tables, each on the line from its node to the next."""
+    by_eta = floor[node] + beyond * (floor[node + 1] - floor[node])
+    by_share = floor[share_node] + share_beyond * (floor[share_node + 1] - floor[share_node])
+    return by_eta if by_eta < by_share else by_share
 
 
 def widened(least: float, middle: float, low: float, high: float) -> tuple[float, float]:

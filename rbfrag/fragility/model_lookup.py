@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from os import PathLike
 from pathlib import Path
 
-from rbfrag.db.location import locate, reference_file
+from rbfrag.db.location import DEFAULT_NAME, REFERENCE, locate, reference_file
 from rbfrag.db.model_record import unknown_model
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError, UnknownModelError
@@ -26,7 +27,27 @@ FROM_REFERENCE = (
 )
 
 _Stamp = tuple[int, ...]
-_stored_before: dict[tuple[str, bool], tuple[_Stamp, list[FragilityModel]]] = {}
+
+
+@dataclass(frozen=True, eq=False)
+class _Store:
+    """The models of one place.
+
+    Args:
+        place: its name in messages.
+        stamp: what tells whether the file has changed since; () where nothing can.
+        models: the models of toppling.
+        suited: those that have been found to suit some measures, by the names of these.
+    """
+
+    place: str
+    stamp: _Stamp
+    models: list[FragilityModel]
+    suited: dict[tuple[str, ...], list[FragilityModel]] = field(default_factory=dict)
+
+
+_SHIPPED = str(REFERENCE)
+_stores_before: dict[tuple[str, bool], _Store] = {}
 _rows_before: dict[int, tuple[ModelRow, FragilityModel]] = {}
 _MOST_ROWS = 64
 
@@ -56,7 +77,7 @@ def find_model(
     if type(model) is FragilityModel:
         chosen = model
     elif model is None:
-        return suited_models(given, db)[0]
+        return _suited(tuple(given), db)[0]
     elif isinstance(model, str):
         chosen = _named(model, db)
     else:
@@ -81,22 +102,38 @@ def suited_models(
         UnknownModelError: the database holds no model.
         DatabaseError: the database cannot be read.
     """
-    possible = terms_from(given)
+    return list(_suited(tuple(given), db))
+
+
+_terms_from = lru_cache(terms_from)
+
+
+def _suited(given: tuple[str, ...], db: str | PathLike[str] | None) -> list[FragilityModel]:
+    possible = _terms_from(given)
     if not possible:
         wanted = ", or ".join(" and ".join(TERMS[name].inputs) for name in _ASKED)
         raise InputError(
             f"{_known(_measures(given))} is given: a prediction needs {wanted}, or a motion"
         )
-    stored, place = _stored(db)
-    if not stored:
-        raise UnknownModelError(unknown_model(None, [], place))
+    store = _store(db)
+    before = store.suited.get(given)
+    if before is None:
+        before = store.suited[given] = _suited_in(store, given, possible)
+    return before
+
+
+def _suited_in(
+    store: _Store, given: tuple[str, ...], possible: tuple[str, ...]
+) -> list[FragilityModel]:
+    if not store.models:
+        raise UnknownModelError(unknown_model(None, [], store.place))
     best: dict[str, FragilityModel] = {}
-    for model in stored:
+    for model in store.models:
         name = model.term.name
         if name in possible and (name not in best or _merit(model) > _merit(best[name])):
             best[name] = model
     if not best:
-        have = ", ".join(f"{model.name} ({model.term.name})" for model in stored)
+        have = ", ".join(f"{model.name} ({model.term.name})" for model in store.models)
         raise InputError(
             f"no stored model works with {_known(_measures(given))}; stored are {have}: give the "
             "measures that one of them needs, or fit another with  rbfrag fit --term "
@@ -159,11 +196,12 @@ def _place(db: str | PathLike[str] | None) -> tuple[Path | str, bool]:
 
 
 def _named(name: str, db: str | PathLike[str] | None) -> FragilityModel:
-    stored, place = _stored(db)
-    for model in stored:
+    store = _store(db)
+    for model in store.models:
         if model.name == name:
             return model
-    raise UnknownModelError(unknown_model(name, sorted(m.name for m in stored), place))
+    known = sorted(model.name for model in store.models)
+    raise UnknownModelError(unknown_model(name, known, store.place))
 
 
 def uses_reference(db: str | PathLike[str] | None) -> bool:
@@ -188,12 +226,40 @@ def stored_rows(db: str | PathLike[str] | None = None) -> list[ModelRow]:
     return _stored_on_server(place)[0]
 
 
-def _stored(db: str | PathLike[str] | None) -> tuple[list[FragilityModel], str]:
+def _store(db: str | PathLike[str] | None) -> _Store:
+    """Return the models of a database; those of a file are read again only when it has changed."""
+    named = db if db is not None else os.environ.get("RBFRAG_DB") or None
+    if named is None and not _stamp(DEFAULT_NAME, False):
+        kept = _unchanged(_SHIPPED, True)
+    else:
+        kept = _unchanged(DEFAULT_NAME if named is None else os.fspath(named), False)
+    if kept is not None:
+        return kept
     place, shipped = _place(db)
     if isinstance(place, Path):
-        return _stored_in_file(place, shipped), str(place)
+        return _unchanged(str(place), shipped) or _read_again(place, shipped)
     rows, label = _stored_on_server(place)
-    return [_of_row(row) for row in rows if row.kind == "toppling"], label
+    return _Store(label, (), [_of_row(row) for row in rows if row.kind == "toppling"])
+
+
+def _unchanged(path: str, shipped: bool) -> _Store | None:
+    kept = _stores_before.get((path, shipped))
+    return kept if kept is not None and kept.stamp == _stamp(path, shipped) else None
+
+
+def _read_again(path: Path, shipped: bool) -> _Store:
+    from rbfrag.db.model_file import read_models
+
+    key = str(path)
+    stamp = _stamp(key, shipped)
+    rows = [row for row in read_models(path) if row.kind == "toppling"]
+    models = [FragilityModel.from_row(row) for row in rows]
+    if shipped:
+        models = [replace(model, notes=(FROM_REFERENCE,)) for model in models]
+    store = _Store(key, stamp, models)
+    if stamp:
+        _stores_before[key, shipped] = store
+    return store
 
 
 def _stored_on_server(url: str) -> tuple[list[ModelRow], str]:
@@ -204,30 +270,17 @@ def _stored_on_server(url: str) -> tuple[list[ModelRow], str]:
         return model_rows(connection), str(engine.url)
 
 
-def _stored_in_file(path: Path, shipped: bool) -> list[FragilityModel]:
-    """Return the models of a file, read again only when the file has changed."""
-    key = os.path.abspath(path)  # noqa: PTH100  (Path takes ten times as long)
-    stamp = _stamp(key)
-    kept = _stored_before.get((key, shipped))
-    if kept is not None and stamp and kept[0] == stamp:
-        return kept[1]
-    from rbfrag.db.model_file import read_models
-
-    rows = [row for row in read_models(path) if row.kind == "toppling"]
-    models = [FragilityModel.from_row(row) for row in rows]
-    if shipped:
-        models = [replace(model, notes=(FROM_REFERENCE,)) for model in models]
-    if stamp:
-        _stored_before[key, shipped] = (stamp, models)
-    return models
-
-
-def _stamp(path: str) -> _Stamp:
+def _stamp(path: str, shipped: bool) -> _Stamp:
+    """Return what tells this content of a file from another: a name alone does not, for a
+    relative one means another file in another folder.
+    """
     try:
-        file = os.stat(path)  # noqa: PTH116
+        file = os.stat(path)  # noqa: PTH116  (Path takes ten times as long)
     except OSError:
         return ()
-    stamp = (file.st_mtime_ns, file.st_size, file.st_ino)
+    stamp = (file.st_mtime_ns, file.st_size, file.st_ino, file.st_dev)
+    if shipped:  # nobody writes into that one
+        return stamp
     try:
         log = os.stat(path + "-wal")  # noqa: PTH116
     except OSError:

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 Model = ModelRow | FragilityModel | str
 Polarity = Literal["forward", "reverse", "both"]
 
+_SINGLE_TYPES = (float, int, str, bytes)
+
 MEASURES = ("pgv_m_s", "pga_g", "tm_s", "pgd_m")
 """What may be known of a motion."""
 
@@ -160,8 +162,12 @@ def answer_given(
 ) -> Prediction | PredictionArray:
     """Return the answer of one model for values by name; see :func:`predict`."""
     half_width = half_width_of(model, level)
-    if all(is_single(value) for value in given.values()):
-        singles = {name: single(name, value) for name, value in given.items()}
+    singles: dict[str, float] = {}
+    for name, value in given.items():
+        if not is_single(value):
+            break
+        singles[name] = single(name, value)
+    else:
         return _predict_one(model, singles, level, half_width)
     # Kept apart so that single numbers do not load numpy.
     from rbfrag.fragility.prediction_array import predict_many
@@ -185,7 +191,7 @@ def half_width_of(model: FragilityModel, level: float) -> float:
 
 def is_single(value: object) -> bool:
     """Return whether a value is one number (or something else that is no array)."""
-    if isinstance(value, float | int | str | bytes):
+    if isinstance(value, _SINGLE_TYPES):
         return True
     shape = getattr(value, "shape", None)
     if shape is not None:
