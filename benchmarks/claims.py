@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 
 from benchmarks.page import ROOT, parser, report
+from benchmarks.reference_agreement import agreement_with_reference
 from rbfrag.campaign.bench.tables import markdown
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motion_store import motion_rows, suite_names
@@ -40,12 +41,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
             claim.claim,
             claim.statistic,
             f"{claim.value:.3g} ({claim.low:.3g} … {claim.high:.3g})",
+            claim.rule,
             f"**{claim.verdict}**",
             f"{claim.n}, {claim.clusters}",
         ]
         for claim in claims
     ]
-    headers = ["claim", "statistic", "value (95 % interval)", "verdict", "n, clusters"]
+    headers = ["claim", "statistic", "value (95 % interval)", "rule", "verdict", "n, clusters"]
     report("claims", f"{markdown((headers, rows))}\n\n{about}", write=chosen.write, page=PAGE)
 
 
@@ -75,7 +77,8 @@ def tested(db: str, seed: int) -> tuple[list[Claim], str]:
     motions, events = len(set(table.motion_id)), len(set(table.event_id))
     return claims, (
         f"{motions} horizontal motions of {events} earthquakes, both polarities, p² of "
-        f"{', '.join(f'{p2:g}' for p2 in sorted(set(table.p2), reverse=True))} 1/s²; seed {seed}."
+        f"{', '.join(f'{p2:g}' for p2 in sorted(set(table.p2), reverse=True))} 1/s²; seed {seed}. "
+        f"{agreement_with_reference(db)}"
     )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.page import ROOT, parser, report
+from benchmarks.reference_agreement import agreement_with_reference
 from rbfrag.campaign.bench.tables import markdown
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motion_store import load_motion
@@ -63,7 +64,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ]  # fmt: skip
     about = (
         f"{int(found.sum())} critical values of {len(motions)} motions, "
-        f"{len(set(event))} earthquakes; intervals draw whole earthquakes, seed {chosen.seed}."
+        f"{len(set(event))} earthquakes; intervals draw whole earthquakes, seed {chosen.seed}. "
+        f"{agreement_with_reference(chosen.db)}"
     )
     report(
         "spectrum-and-pgv", f"{markdown((headers, rows))}\n\n{about}", write=chosen.write, page=PAGE

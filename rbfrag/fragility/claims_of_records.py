@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from rbfrag.fragility.claims import (
 from rbfrag.fragility.fitting import fit
 from rbfrag.fragility.lobes import lobe_line
 from rbfrag.fragility.quantiles import student_half_width
-from rbfrag.fragility.terms import SINGLE_TERMS, TERMS
+from rbfrag.fragility.terms import TERMS
 
 FEWEST_EVENTS = 5
 
@@ -31,22 +32,23 @@ _PERMUTATIONS = 2000
 
 
 class Points:
-    """The found critical values for which all terms are defined, with logarithms.
+    """The found critical values for which some terms are defined, with logarithms.
 
     Args:
         table: the critical values.
+        names: of the terms; a motion whose PGD is in doubt has no `pgd_tm`.
 
     Raises:
         FitError: fewer than five earthquakes.
     """
 
-    def __init__(self, table: CombinationTable) -> None:
+    def __init__(self, table: CombinationTable, names: Sequence[str] = ("pgv", "pga_tm")) -> None:
         terms = {
             name: np.asarray(
                 TERMS[name].intensity_m_s({key: getattr(table, key) for key in TERMS[name].inputs}),
                 dtype=np.float64,
             )
-            for name in SINGLE_TERMS
+            for name in names
         }
         used = (table.status == "found") & np.isfinite(table.y_m_s)
         for values in terms.values():
@@ -97,9 +99,10 @@ def one_to_one(table: CombinationTable, *, seed: int) -> list[Claim]:
     )
     claim = "critical velocity y and PGV are virtually 1:1"
     rule = "confirmed if the interval holds 1, refuted if not"
+    words = "slope of the weighted straight line of y on PGV"
     held = [
-        (slope, slope - reach, slope + reach, "slope of the weighted straight line of y on PGV"),
-        (middle, low, high, "median of y/PGV"),
+        (slope, slope - reach, slope + reach, words, report.n),
+        (middle, low, high, "median of y/PGV", points.n),
     ]
     return [
         Claim(
@@ -110,20 +113,22 @@ def one_to_one(table: CombinationTable, *, seed: int) -> list[Claim]:
             above,
             rule,
             verdict_of(below <= 1.0 <= above, not below <= 1.0 <= above),
-            points.n,
+            n,
             points.clusters,
         )
-        for value, below, above, words in held
+        for value, below, above, words, n in held
     ]
 
 
 def rank_of_terms(table: CombinationTable, *, seed: int) -> list[Claim]:
     """Test that PGV predicts better than PGA·Tm, and that better than PGD/Tm."""
-    points = Points(table)
     claims = []
     for better, worse in (("pgv", "pga_tm"), ("pga_tm", "pgd_tm")):
+        points = Points(table, (better, worse))
 
-        def gain(i: IntArray, better: str = better, worse: str = worse) -> float:
+        def gain(
+            i: IntArray, better: str = better, worse: str = worse, points: Points = points
+        ) -> float:
             return residual_sd(points.ln_x[worse][i], points.ln_y[i]) - residual_sd(
                 points.ln_x[better][i], points.ln_y[i]
             )

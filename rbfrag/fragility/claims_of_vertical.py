@@ -91,7 +91,8 @@ def vertical_is_irrelevant(
     value, low, high = cluster_interval(event, lambda i: float(d[i].mean()), seed=seed)
     mean = Claim(
         "vertical motion does not change critical blocks on average",
-        "mean of ln(y with / y without) of the same motion, polarity and p²",
+        "mean of ln(y with / y without) of the same motion, polarity and p²; "
+        f"{pairs.one_sided} pairs of which only one was found are left out",
         value,
         low,
         high,

@@ -102,6 +102,16 @@ def test_rank_of_terms() -> None:
     assert rank_of_terms(turned, seed=1)[0].verdict == "refuted"
 
 
+def test_doubtful_displacements_cost_only_the_claim_about_them() -> None:
+    data = table()
+    doubtful = replace(data, pgd_m=np.where(data.motion_id < 10, np.nan, data.pgd_m))
+    by_pgv, by_pgd = rank_of_terms(doubtful, seed=1)
+    assert (by_pgv.n, by_pgd.n) == (data.p2.size, data.p2.size - 10 * P2.size)
+    assert by_pgv == rank_of_terms(data, seed=1)[0]
+    for claims in (one_to_one, exponent_one, variance_linear, lobes_as_bounds):
+        assert claims(doubtful, seed=1) == claims(data, seed=1)
+
+
 def test_exponent() -> None:
     large, small = exponent_one(table(seed=2), seed=1)
     assert large.verdict == small.verdict == "confirmed"
@@ -170,6 +180,10 @@ def test_vertical_verdicts() -> None:
 
     little = vertical_is_irrelevant(without, shaken(np.exp(0.02 * random)), seed=1)
     assert [c.verdict for c in little] == ["confirmed", "confirmed"]
+    lost = np.where(np.arange(n) < 7, "below_limit", "found").astype(object)
+    some = vertical_is_irrelevant(without, replace(without, status=lost), seed=1)
+    assert "7 pairs of which only one was found" in some[0].statistic
+    assert some[0].n == n - 7
     stronger = vertical_is_irrelevant(without, shaken(np.exp(0.1 + 0.2 * random)), seed=1)
     assert [c.verdict for c in stronger] == ["refuted", "refuted"]
 
