@@ -85,16 +85,28 @@ def calibration(
     if not 0.0 < w @ t < w.sum() or np.ptp(x) == 0.0:
         return Calibration(np.nan, np.nan)
     b = np.array([0.0, 1.0])
+    loss = _logistic_loss(b, x, t, w)
     for _ in range(50):
         fitted = 0.5 * (1.0 + np.tanh(0.5 * (b[0] + b[1] * x)))
         v = w * fitted * (1.0 - fitted)
         r = w * (t - fitted)
         information = np.array([[v.sum(), v @ x], [v @ x, v @ (x * x)]])
         step = np.linalg.lstsq(information, np.array([r.sum(), r @ x]), rcond=None)[0]
-        b = b + step
+        # where most probabilities are clipped a whole step may go too far and never come back
+        for _ in range(30):
+            reached = _logistic_loss(b + step, x, t, w)
+            if reached <= loss * (1.0 + 1e-14):
+                break
+            step = 0.5 * step
+        b, loss = b + step, reached
         if np.abs(step).max() < 1e-12:
             break
     return Calibration(float(b[0]), float(b[1]))
+
+
+def _logistic_loss(b: FloatArray, x: FloatArray, t: FloatArray, w: FloatArray) -> float:
+    eta = b[0] + b[1] * x
+    return float(w @ (np.logaddexp(0.0, eta) - t * eta))
 
 
 def sharpness(probability: FloatArray, known: NDArray[np.bool_]) -> float:

@@ -3,7 +3,14 @@ import math
 import numpy as np
 import pytest
 
-from rbfrag.fragility.scores import CLIP, brier, critical_outcomes, log_loss, normal_log_density
+from rbfrag.fragility.scores import (
+    CLIP,
+    brier,
+    calibration,
+    critical_outcomes,
+    log_loss,
+    normal_log_density,
+)
 
 
 def test_outcomes_of_found_and_censored_points():
@@ -35,3 +42,23 @@ def test_normal_density():
     density = np.exp(normal_log_density(np.linspace(-4, 6, 2001), np.array(1.0), np.array(0.25)))
     assert density.sum() * 0.005 == pytest.approx(1.0, abs=1e-9)
     assert density.max() == pytest.approx(1 / math.sqrt(2 * math.pi * 0.25))
+
+
+@pytest.mark.parametrize("between", [0, 5, 50])
+def test_calibration_of_a_model_that_is_far_too_sure(between):
+    from scipy.optimize import minimize
+
+    # nearly all probabilities are 0 or 1 and many of them wrong: whole Newton steps run away
+    rng = np.random.default_rng(0)
+    p = np.concatenate([np.zeros(500), np.ones(500), rng.uniform(size=between)])
+    toppled = (rng.uniform(size=p.size) < np.repeat([0.02, 0.9, 0.5], [500, 500, between])) * 1.0
+    found = calibration(p[None], toppled[None], np.ones((1, p.size), dtype=bool))
+    x = np.log(np.clip(p, CLIP, 1 - CLIP) / (1 - np.clip(p, CLIP, 1 - CLIP)))
+
+    def loss(b):
+        eta = b[0] + b[1] * x
+        return float(np.sum(np.logaddexp(0.0, eta) - toppled * eta))
+
+    best = minimize(loss, [0.0, 0.3], method="BFGS", tol=1e-10)
+    assert loss([found.intercept, found.slope]) <= best.fun + 1e-9
+    assert (found.intercept, found.slope) == pytest.approx(best.x, abs=1e-4)
