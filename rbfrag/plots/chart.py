@@ -14,6 +14,7 @@ from rbfrag.plots.canvas import new_figure, plot_path, save_figure
 from rbfrag.plots.failure_lines import failure_line
 from rbfrag.plots.held_measures import MORE_TERMS, HeldMeasures, held_measures
 from rbfrag.plots.numbers import plain_numbers
+from rbfrag.plots.spread import spread_out
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,8 +23,12 @@ CONTOURS = (0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
 
 _BOLD = (0.05, 0.5, 0.95)
 
-_DIAGONALS = (0.55, 0.8, 1.05, 1.3)
-"""Where labels stand, in turn: the sum of their distances from the left and lower edge."""
+_LABEL_AT = 1.035
+"""Abscissa of the labels, of the width of the sheet."""
+
+_LABEL_APART = 0.026
+"""Least distance of labels, of the height of the sheet."""
+
 _POINTS = 300
 _SPAN = 1.6
 """Factor by which the sheet goes beyond the fitted range."""
@@ -68,11 +73,10 @@ def plot_chart(
     axes.set_xlim(x[0], x[-1])
     axes.set_ylim(bottom, top)
     axes.set_aspect("equal")
-    for number, (probability, y) in enumerate(lines.items()):
+    for probability, y in lines.items():
         width = 1.9 if probability in _BOLD else 0.9
         axes.plot(x, y, color="#1f4e79", lw=width)
-        diagonal = _DIAGONALS[number % len(_DIAGONALS)]
-        _write_on(axes, x, y, f"{100.0 * probability:g} %", diagonal)
+    _write_beside(axes, x, lines)
     _shade_outside(axes, held.fitted_range(model, low, high), domain.get("y_m_s"))
     axes.set_xlabel(TERMS["pgv"].label if model.term.name in MORE_TERMS else model.term.label)
     axes.set_ylabel("toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
@@ -93,27 +97,40 @@ def _vertical_range(x: np.ndarray, weak: np.ndarray, strong: np.ndarray) -> tupl
     return 0.8 * max(bottom, 0.1 * float(x[0])), top
 
 
-def _write_on(axes: Axes, x: np.ndarray, y: np.ndarray, words: str, diagonal: float) -> None:
-    """Write the probability on its line, where the line crosses a falling diagonal."""
+def _write_beside(axes: Axes, x: np.ndarray, lines: dict[float, np.ndarray]) -> None:
+    """Write the probabilities right of the sheet, each joined to the end of its line."""
     left, right = np.log(axes.get_xlim())
     bottom, top = np.log(axes.get_ylim())
-    across = (np.log(x) - left) / (right - left)
-    with np.errstate(invalid="ignore"):
-        up = (np.log(y) - bottom) / (top - bottom)
-    beside = np.where(np.isfinite(up), np.abs(across + up - diagonal), np.inf)
-    at = int(np.argmin(beside))
-    if not np.isfinite(beside[at]) or not 0.0 < up[at] < 1.0:
-        return
-    axes.text(
-        x[at],
-        y[at],
-        words,
-        fontsize=7.5,
-        ha="center",
-        va="center",
-        color="#1f4e79",
-        bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none"},
-    )
+    ends = []
+    for probability, y in lines.items():
+        inside = np.flatnonzero(np.isfinite(y) & (y > np.exp(bottom)) & (y < np.exp(top)))
+        if inside.size:
+            at = inside[-1]
+            across = float((np.log(x[at]) - left) / (right - left))
+            ends.append((float((np.log(y[at]) - bottom) / (top - bottom)), across, probability))
+    ends.sort()
+    places = spread_out([up for up, *_ in ends], _LABEL_APART, 0.01, 0.99)
+    for place, (up, across, probability) in zip(places, ends, strict=True):
+        words = f"{100.0 * probability:g} %"
+        axes.plot(
+            [across, _LABEL_AT - 0.005],
+            [up, place],
+            color="#1f4e79",
+            lw=0.5,
+            transform=axes.transAxes,
+            clip_on=False,
+            label=f"_{words}",
+        )
+        axes.text(
+            _LABEL_AT,
+            place,
+            words,
+            fontsize=8,
+            fontweight="bold" if probability in _BOLD else "normal",
+            va="center",
+            color="#1f4e79",
+            transform=axes.transAxes,
+        )
 
 
 def _shade_outside(axes: Axes, across: tuple[float, float], up: tuple[float, float] | None) -> None:

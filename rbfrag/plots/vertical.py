@@ -43,7 +43,7 @@ def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
     edges = 0.85 * float(values.min()), 1.2 * float(values.max())
     axes.set_xscale("log")
     axes.set_yscale("log")
-    density(figure, axes, pairs.without, pairs.with_vertical, edges, edges, beside=[beside])
+    density(figure, axes, pairs.without, pairs.with_vertical, edges, edges)
     axes.plot(edges, edges, color="#b2182b", lw=1.2, label="no change")
     plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
     plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
