@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from benchmarks import reference_set
+from benchmarks.all_outcomes import with_all_outcomes
 from rbfrag.db.engine import opened_database
 from rbfrag.db.outcome_maps import outcome_maps
 from rbfrag.db.queries import combination_table
 from rbfrag.db.spectrum_store import spectrum_values
+from rbfrag.fragility.source import kr_over_pga_of_grid, read_source
 from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.respond import respond
 from tests.synthetic import shaking, write_at2
@@ -90,6 +92,30 @@ def test_the_maps_still_tell_what_a_block_does(built: Path) -> None:
                 motion, p2=table.p2[i], kr=value * motion.pga_g, polarity=table.polarity[i]
             )
             assert np.isnan(topples) or (run.outcome == "toppled") == bool(topples)
+
+
+def test_what_the_maps_leave_open_is_simulated(built: Path) -> None:
+    with (
+        opened_database(built / "out" / "reference.db", read_only=True) as engine,
+        engine.connect() as connection,
+    ):
+        shipped = read_source(connection)
+    every = with_all_outcomes(shipped, built / "reference-full.db")
+    decided = np.isfinite(shipped.topples)
+    assert 0.5 < decided.mean() < 1.0
+    assert np.isfinite(every.topples).all()
+    np.testing.assert_array_equal(every.topples[decided], shipped.topples[decided])
+    motions = {m.pga_g: m for f in built.glob("records/*.AT2") for m in read_motions(f)}
+    k = kr_over_pga_of_grid(shipped.table)
+    for i, j in np.argwhere(~decided)[::7]:
+        motion = motions[shipped.table.pga_g[i]]
+        run = respond(
+            motion,
+            p2=shipped.table.p2[i],
+            kr=k[i, j] * motion.pga_g,
+            polarity=shipped.table.polarity[i],
+        )
+        assert (run.outcome == "toppled") == bool(every.topples[i, j])
 
 
 def test_the_page_says_where_it_comes_from(built: Path) -> None:

@@ -1,0 +1,40 @@
+"""Outcomes of the grid that maps leave open, each block simulated for itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from rbfrag.db.engine import opened_database
+from rbfrag.db.motion_store import load_motion
+from rbfrag.fragility.source import FitSource, kr_over_pga_of_grid
+from rbfrag.solver.excitation import excitation
+from rbfrag.solver.respond import runner
+from rbfrag.solver.toppling import STABLE, TOPPLED
+
+KNOWN = {TOPPLED: 1.0, STABLE: 0.0}
+
+
+def with_all_outcomes(source: FitSource, samples: Path) -> FitSource:
+    """Return a source whose outcomes are all known, but for those closer than the error of a run.
+
+    Blocks below the search limit are simulated too.
+
+    Args:
+        source: critical values without vertical motion and what their maps decide.
+        samples: database with the samples of its motions, under the same ids.
+    """
+    table, topples = source.table, source.topples.copy()
+    kr = kr_over_pga_of_grid(table) * table.pga_g[:, None]
+    with opened_database(samples, read_only=True) as engine, engine.connect() as connection:
+        motion_id, motion = -1, None
+        for i in np.argsort(table.motion_id, kind="stable"):
+            if motion is None or motion_id != table.motion_id[i]:
+                motion_id = int(table.motion_id[i])
+                motion = load_motion(connection, motion_id)
+            drive = excitation(motion, None, table.polarity[i])
+            run = runner(drive, p2=float(table.p2[i]), linear=False)
+            for j in np.flatnonzero(np.isnan(topples[i])):
+                topples[i, j] = KNOWN.get(run(float(kr[i, j])).outcome, np.nan)
+    return FitSource(table, source.xp_m_s, topples)
