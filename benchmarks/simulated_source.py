@@ -19,6 +19,7 @@ from rbfrag.db.vertical_pairs import load_vertical
 from rbfrag.fragility.scores import GRID_OF_Y0_OVER_PGV
 from rbfrag.fragility.source import FitSource
 from rbfrag.motions.polarity import Polarity
+from rbfrag.motions.quality import PGD_IN_DOUBT
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.critical import critical
@@ -74,7 +75,7 @@ def simulated_source(database: str, *, vertical: bool, cache: Path | None = None
                         "y_m_s": found.y_m_s,
                         "pga_g": row.pga_g,
                         "pgv_m_s": row.pgv_m_s,
-                        "pgd_m": row.pgd_m,
+                        "pgd_m": None if PGD_IN_DOUBT & set(row.flags) else row.pgd_m,
                         "tm_s": row.tm_s,
                         "natural_key": f"{row.sha256} {polarity} {p2:g} {vertical}",
                     }

@@ -1,0 +1,65 @@
+"""What the models have to reach, and what they reach."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rbfrag.campaign.bench.tables import markdown
+
+
+@dataclass(frozen=True)
+class Mark:
+    """One number that was asked for.
+
+    Args:
+        model: whose number it is.
+        words: what it is.
+        low: least value that is accepted.
+        high: greatest value that is accepted.
+        value: of the model fitted to all outcomes.
+        shipped: of the model fitted to the outcomes that the shipped maps decide; None for models
+            of critical values, which do not read outcomes.
+        also: a further condition, in words, with whether it holds.
+    """
+
+    model: str
+    words: str
+    low: float
+    high: float
+    value: float
+    shipped: float | None = None
+    also: tuple[str, bool] | None = None
+
+    @property
+    def asked(self) -> str:
+        """The range in words."""
+        if math.isinf(self.low):
+            words = f"≤ {self.high:g}"
+        elif math.isinf(self.high):
+            words = f"≥ {self.low:g}"
+        else:
+            words = f"{self.low:g} to {self.high:g}"
+        return words if self.also is None else f"{words}, {self.also[0]}"
+
+    def cell(self, value: float | None) -> str:
+        """Return a value with whether it was reached."""
+        if value is None:
+            return "the same"
+        reached = self.low <= value <= self.high and (self.also is None or self.also[1])
+        return f"{value:.4g}" if reached else f"**{value:.4g}, missed**"
+
+
+def acceptance_table(marks: Sequence[Mark]) -> str:
+    """Return the table of the page."""
+    head = [
+        "model",
+        "what",
+        "asked",
+        "fitted to all outcomes",
+        "fitted to what the shipped maps decide",
+    ]
+    return markdown(
+        (head, [[m.model, m.words, m.asked, m.cell(m.value), m.cell(m.shipped)] for m in marks])
+    )
