@@ -136,12 +136,13 @@ def interval_floor(
     if not richer:
         return []
     eta, widest = np.empty(sample.y.size), np.zeros(sample.y.size)
+    x = sample.intensity_m_s[model.term.name]
     etas(
         model.shape,
         np.array(model.padded),
         sample.y,
         sample.p,
-        sample.intensity_m_s[model.term.name],
+        x,
         sample.pga_g,
         sample.tm_s,
         eta,
@@ -167,11 +168,13 @@ def interval_floor(
             low,
             high,
         )
-        widest = np.fmax(widest, (high - low) / reach)
+        told = np.isfinite(sample.intensity_m_s[other.term.name])
+        widest = np.where(told, np.fmax(widest, (high - low) / reach), widest)
     few = min(_earthquakes(other) for other in richer) < FEW_EARTHQUAKES
     share = SHARE_OF_FEW if few else 1.0
-    known = np.isfinite(eta)
-    by_y = sample.y[known] / (2.0 * sample.intensity_m_s[model.term.name][known])
+    # eta of an intensity that is not known is a number like any other
+    known = np.isfinite(eta) & np.isfinite(x)
+    by_y = sample.y[known] / (2.0 * x[known])
     places = (
         (eta[known] - formulas.FLOOR_FROM) / formulas.FLOOR_STEP,
         by_y / formulas.FLOOR_SHARE_STEP,
