@@ -11,7 +11,7 @@ from rbfrag.solver.certified import MARGIN, keeps_order
 from rbfrag.solver.envelopes import ALL_SAFE, ALL_TOPPLE, decide
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.ground import ground_of
-from rbfrag.solver.renewal import fresh_starts
+from rbfrag.solver.renewal import begin, no_starts
 from rbfrag.solver.respond import runner
 from rbfrag.solver.toppling import STABLE, TOPPLED
 
@@ -64,10 +64,8 @@ def verdict_on(drive: Excitation, p2: float, low: float, high: float) -> bool | 
     """Ask the rules of the search for one interval of k_r: all topple, none does, or None."""
     n = drive.q.size
     check = not keeps_order(drive, False)
-    stretches = np.empty((4, n), dtype=np.int64)
+    starts = no_starts(n)
     ground = ground_of(drive, p2=p2, linear=False)
-    count, _, _ = fresh_starts(
-        ground, low, low * (1.0 - MARGIN), high * (1.0 + MARGIN), check, 0, n, stretches
-    )
-    what, *_ = decide(ground, low, high, MARGIN, check, stretches, count, 0)
+    begin(starts, low, low * (1.0 - MARGIN), high * (1.0 + MARGIN), check, 0, n)
+    what, *_ = decide(ground, low, high, MARGIN, check, starts, 0)
     return {ALL_SAFE: False, ALL_TOPPLE: True}.get(what)

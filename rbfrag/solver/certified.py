@@ -136,11 +136,10 @@ def certified_map(
         map_depth: width of k_r/PGA that may be left undecided below the first toppling interval
             as wide as RESOLUTION.
     """
-    n = drive.q.size
     check = not keeps_order(drive, linear)
     ground = ground_of(drive, p2=p2, linear=linear)
     code, _, k_up, runs, steps = upper_bound(
-        ground, bottom, drive.max_q, MARGIN, 0.1 * DEPTH, check, np.empty((4, n), dtype=np.int64)
+        ground, bottom, drive.max_q, MARGIN, 0.1 * DEPTH, check
     )
     if code == AT_THE_TOP:
         k_up = drive.max_q

@@ -27,12 +27,11 @@ from rbfrag.solver.flight import (
     rest_state,
 )
 from rbfrag.solver.ground import Ground
-from rbfrag.solver.renewal import last_failing_end, last_rest
+from rbfrag.solver.renewal import Starts, fails_after, last_rest
 from rbfrag.solver.rises import APART, TURNED_BACK, common_start, next_start, restart_floor
 from rbfrag.solver.taylor import bracketed_root
 
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 ALL_SAFE, ALL_TOPPLE, SPLIT, NO_ORDER = 0, 1, 2, 3
 
@@ -44,8 +43,7 @@ def decide(
     k2: float,
     margin: float,
     check: bool,
-    stretches: IntArray,
-    n_stretches: int,
+    starts: Starts,
     at_rest: int,
 ) -> tuple[int, float, int, int]:
     """Decide whether all blocks with k_r in [k1, k2] topple, or none, if that can be told.
@@ -56,9 +54,8 @@ def decide(
         k2: greatest k_r.
         margin: the enclosing motions are flown with k1 (1 - margin) and k2 (1 + margin).
         check: check D >= 0 on the way.
-        stretches: fresh starts at a k_r <= k1 (:func:`rbfrag.solver.renewal.fresh_starts`).
-        n_stretches: their number.
-        at_rest: node at which all blocks are at rest, and from which on the stretches count.
+        starts: fresh excursions of a k_r <= k1.
+        at_rest: node at which all blocks are at rest, and from which on the excursions count.
 
     Returns:
         Verdict, a k_r to split at (NaN for anywhere), flights, steps.
@@ -80,8 +77,7 @@ def decide(
     sa0, ca0 = rest_state(ka, linear)
     sb0, cb0 = rest_state(kb, linear)
 
-    failing_end = last_failing_end(stretches, n_stretches)
-    rest, _ = last_rest(stretches, n_stretches, at_rest, at_rest, at_rest)
+    rest, _ = last_rest(g, starts, at_rest, at_rest, at_rest)
     ib = rest  # first and last re-seat
     tb = 0.0
     ia = rest
@@ -99,7 +95,7 @@ def decide(
 
     for _ in range(4 * n + 16):
         ie, te = next_start(k_h, w, q, block_max_q, k1, ib, tb)
-        if ie >= n or ie >= failing_end:
+        if ie >= n or not fails_after(g, starts, ie):
             return ALL_SAFE, math.nan, flights, steps
         code = APART
         il = 0
@@ -202,7 +198,7 @@ def decide(
                 rate_a = max(rate_a, rate, 0.0)
             else:
                 rest_from = 2 * n if in_air else (ia + 1 if ta > 0.0 else ia)
-                rest, failing = last_rest(stretches, n_stretches, ib, rest_from, -1)
+                rest, failing = last_rest(g, starts, ib, rest_from, -1)
                 if failing < 0:
                     return ALL_SAFE, math.nan, flights, steps
                 if rest > ib:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rbfrag.solver.compiled import kernel
 from rbfrag.solver.flight import RESEATED, TOPPLED, fly, rest_state
 from rbfrag.solver.ground import Ground
+from rbfrag.solver.renewal import Starts, fails_after, no_starts
 from rbfrag.solver.rises import next_start
 
 FloatArray = NDArray[np.float64]
@@ -58,7 +59,8 @@ def follow(
     g: Ground,
     kr: float,
     node: int,
-    failing_end: int,
+    starts: Starts,
+    use: bool,
 ) -> tuple[float, int]:
     """Follow a block at rest at a node; return its distance from toppling and the steps taken.
 
@@ -66,7 +68,8 @@ def follow(
         g: the ground under a block.
         kr: rocking acceleration coefficient.
         node: node of rest.
-        failing_end: node after which no start topples.
+        starts: fresh excursions of a k_r <= kr: where none is left that fails, no more is flown.
+        use: False to do without them.
     """
     k_h = g.k_h
     w = g.w
@@ -81,7 +84,7 @@ def follow(
     tau = 0.0
     for _ in range(4 * n + 16):
         i, tau = next_start(k_h, w, q, block_max_q, kr, i, tau)
-        if i >= n or i >= failing_end:
+        if i >= n or (use and not fails_after(g, starts, i)):
             break
         event, at, fraction, _, rate, s, c, made = fly(
             g,
@@ -124,7 +127,8 @@ def first_turn(g: Ground, kr: FloatArray, first: int, topples: bool) -> int:
     Returns:
         The number, m where there is none.
     """
+    unknown = no_starts(0)
     for j in range(first, kr.size):
-        if (follow(g, kr[j], 0, g.q.size)[0] > 0.0) != topples:
+        if (follow(g, kr[j], 0, unknown, False)[0] > 0.0) != topples:
             return j
     return kr.size

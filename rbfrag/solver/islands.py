@@ -11,6 +11,7 @@ from rbfrag.solver.certified import CertifiedMap
 from rbfrag.solver.follow import first_turn
 from rbfrag.solver.ground import Ground
 from rbfrag.solver.march import SAFE, TOPPLES, border
+from rbfrag.solver.renewal import no_starts
 from rbfrag.solver.results import OutcomeIntervals
 from rbfrag.solver.scan import BlockScan
 
@@ -145,6 +146,7 @@ def islands_by_blocks(
     # the island of the critical value itself may be narrower than the spacing
     near = lower - resolution * np.array([0.25, 1.0])
     kr = np.concatenate([[lower], near[near > kr[1]], kr[1:]])
+    unknown = no_starts(0)
     runs = 0
     at = 1
     inside = True  # of an island
@@ -161,7 +163,7 @@ def islands_by_blocks(
         else:
             low_side, high_side, made, _ = border(
                 ground, float(kr[turn]), -1.0 if inside else 1.0, float(kr[turn - 1]), BORDER,
-                0, ground.q.size,
+                0, unknown, False,
             )  # fmt: skip
             runs += made
             edge = high_side if inside else low_side

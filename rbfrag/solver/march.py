@@ -11,7 +11,7 @@ from rbfrag.solver.compiled import kernel
 from rbfrag.solver.envelopes import ALL_SAFE, ALL_TOPPLE, NO_ORDER, SPLIT, decide
 from rbfrag.solver.follow import follow
 from rbfrag.solver.ground import Ground
-from rbfrag.solver.renewal import fresh_starts, last_failing_end, last_rest
+from rbfrag.solver.renewal import Starts, begin, last_rest, no_starts, work_of
 from rbfrag.solver.upper_bound import between
 
 FloatArray = NDArray[np.float64]
@@ -33,7 +33,8 @@ def border(
     hi: float,
     width: float,
     rest: int,
-    failing_end: int,
+    starts: Starts,
+    use: bool,
 ) -> tuple[float, float, int, int]:
     """Close in on a border between two k_r of which one topples and the other does not.
 
@@ -51,7 +52,7 @@ def border(
     side = 0
     while hi - lo > width * hi:
         k = between(lo, hi, at_lo, at_hi, side, 0.25 * width * hi, slow)
-        far, made = follow(g, k, rest, failing_end)
+        far, made = follow(g, k, rest, starts, use)
         runs += 1
         steps += made
         if (far > 0.0) == low_topples:
@@ -120,20 +121,17 @@ def march(
     Returns:
         Number of intervals, k_r reached, runs, steps.
     """
-    q = g.q
-    n = q.size
+    n = g.q.size
     # fresh starts over the whole record at one k_r, and over the part of it that they leave
     # open at a greater one
-    coarse = np.empty((4, n), dtype=np.int64)
-    n_coarse = 0
+    coarse = no_starts(n)
     coarse_k = math.inf
     coarse_other = 0.0
-    fine = np.empty((4, n), dtype=np.int64)
-    n_fine = 0
+    fine = no_starts(n)
     fine_k = math.inf
-    n_failing = 0
+    fine_rest = -1
+    fine_fails = -1
     window = 0
-    window_end = 0
     runs = 0
     steps = 0
     count = 0
@@ -150,10 +148,7 @@ def march(
     edge_low = top
     edge_point = top
     if not inside:
-        far, made = follow(
-            g,
-            top * (1.0 - depth), 0, n,
-        )  # fmt: skip
+        far, made = follow(g, top * (1.0 - depth), 0, coarse, False)
         runs += 1
         steps += made
         if far > 0.0:  # K_up itself is the border
@@ -187,32 +182,25 @@ def march(
         if lo < coarse_k or (check and hi > coarse_other):
             coarse_k = max(bottom, lo - 0.5 * (hi - lo) - 0.1 * hi)
             coarse_other = hi * (1.0 + margin)
-            n_coarse, _, made = fresh_starts(
-                g, coarse_k,
-                coarse_k * (1.0 - margin), coarse_other, check, 0, n, coarse,
-            )  # fmt: skip
-            runs += n_coarse
-            steps += made
+            runs, steps = runs + work_of(coarse)[0], steps + work_of(coarse)[1]
+            begin(coarse, coarse_k, coarse_k * (1.0 - margin), coarse_other, check, 0, n)
             fine_k = math.inf
-            window, _ = last_rest(coarse, n_coarse, 0, 0, 0)
-            window_end = last_failing_end(coarse, n_coarse)
+            window, _ = last_rest(g, coarse, 0, 0, 0)
         if lo >= fine_k:
-            what, peak, made_runs, made = decide(g, lo, hi, margin, check, fine, n_fine, window)
+            what, peak, made_runs, made = decide(g, lo, hi, margin, check, fine, window)
         else:
-            what, peak, made_runs, made = decide(g, lo, hi, margin, check, coarse, n_coarse, 0)
+            what, peak, made_runs, made = decide(g, lo, hi, margin, check, coarse, 0)
         runs += made_runs
         steps += made
         scanned = fine_k if lo >= fine_k else coarse_k
         if what == SPLIT and not (lo < peak < hi) and lo - scanned > patience * (hi - lo):
-            before = n_fine + n * n_failing
             fine_k = max(lo - 0.5 * (hi - lo), coarse_k)
-            n_fine, n_failing, made = fresh_starts(
-                g, fine_k,
-                fine_k * (1.0 - margin), coarse_other, check, window, window_end, fine,
-            )  # fmt: skip
-            runs += n_fine
-            steps += made
-            patience = patience * 8.0 if before == n_fine + n * n_failing else 2.0
+            runs, steps = runs + work_of(fine)[0], steps + work_of(fine)[1]
+            begin(fine, fine_k, fine_k * (1.0 - margin), coarse_other, check, window, n)
+            rest, failing = last_rest(g, fine, window, window, window)
+            gained = rest != fine_rest or failing != fine_fails
+            patience = 2.0 if gained else patience * 8.0
+            fine_rest, fine_fails = rest, failing
             continue
         topples_at = math.nan
         if what in (ALL_SAFE, ALL_TOPPLE):
@@ -230,14 +218,13 @@ def march(
         elif hi - lo > (max(order_depth * hi, finest) if what == NO_ORDER else finest):
             if what == SPLIT and not (lo <= edge_high < hi):
                 # is a border the reason? then verdicts can go as far as that
-                far, made = follow(g, lo, window, window_end)
+                far, made = follow(g, lo, window, coarse, True)
                 runs += 1
                 steps += made
                 if (far > 0.0) == (side == SAFE):
                     edge_point, edge_high, made_runs, made = border(
-                        g, lo, far, hi, max(BORDER, 0.1 * least / hi),
-                        window, window_end,
-                    )  # fmt: skip
+                        g, lo, far, hi, max(BORDER, 0.1 * least / hi), window, coarse, True
+                    )
                     runs += made_runs
                     steps += made
                     edge_low = max(edge_point - clear, lo)
@@ -253,7 +240,7 @@ def march(
             answer = ORDERLESS if what == NO_ORDER else UNKNOWN
             width = hi - lo
             if not found:
-                far, made = follow(g, lo, window, window_end)
+                far, made = follow(g, lo, window, coarse, True)
                 runs += 1
                 steps += made
                 if far > 0.0:
@@ -275,4 +262,6 @@ def march(
         hi = lo
         if found and (goal == TO_BRACKET or (goal == TO_ISLAND and island > resolution)):
             break
+    runs += work_of(coarse)[0] + work_of(fine)[0]
+    steps += work_of(coarse)[1] + work_of(fine)[1]
     return count, hi, runs, steps

@@ -11,12 +11,11 @@ from rbfrag.solver.compiled import kernel
 from rbfrag.solver.flight import TOPPLED, fly, rest_state
 from rbfrag.solver.follow import linear_distance
 from rbfrag.solver.ground import Ground
-from rbfrag.solver.renewal import END, FAILS, FIRST, fresh_starts
+from rbfrag.solver.renewal import END, FAILS, FIRST, all_known, begin, no_starts, work_of
 from rbfrag.solver.rises import next_start
 from rbfrag.solver.toppling import next_lifting_node
 
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 NOTHING_FAILS, FOUND, AT_THE_TOP = 0, 1, 2
 
@@ -175,7 +174,6 @@ def upper_bound(
     margin: float,
     width: float,
     check: bool,
-    stretches: IntArray,
 ) -> tuple[int, float, float, int, int]:
     """Find K_up between two k_r.
 
@@ -186,7 +184,6 @@ def upper_bound(
         margin: the excursions are flown with k_r (1 - margin).
         width: relative width to which K_up is bisected.
         check: check D >= 0; where it fails the answer is `top`.
-        stretches: work, shape (4, n).
 
     Returns:
         NOTHING_FAILS (no fresh excursion at `bottom` topples), FOUND or AT_THE_TOP;
@@ -198,12 +195,11 @@ def upper_bound(
     node = g.still_node
     flights = 0
     steps = 0
-    count, failing, made = fresh_starts(
-        g, top,
-        top * (1.0 - margin), top, check, 0, n, stretches,
-    )  # fmt: skip
-    steps += made
+    starts = no_starts(n)
+    begin(starts, top, top * (1.0 - margin), top, check, 0, n)
+    count, failing = all_known(g, starts)
     flights += count
+    steps += work_of(starts)[1]
     if failing > 0:
         return AT_THE_TOP, top, top, flights, steps
     high = top
@@ -228,12 +224,10 @@ def upper_bound(
         high = bottom
     while True:
         # no other stretch may fail at `high`
-        count, failing, made = fresh_starts(
-            g, high,
-            high * (1.0 - margin), top, check, 0, n, stretches,
-        )  # fmt: skip
+        begin(starts, high, high * (1.0 - margin), top, check, 0, n)
+        count, failing = all_known(g, starts)
         flights += count
-        steps += made
+        steps += work_of(starts)[1]
         if failing == 0:
             return FOUND if known else NOTHING_FAILS, low, high, flights, steps
         if high >= top:
@@ -242,9 +236,9 @@ def upper_bound(
         first = n
         stop = 0
         for m in range(count):
-            if stretches[FAILS, m] == 1:
-                first = min(first, stretches[FIRST, m])
-                stop = max(stop, stretches[END, m])
+            if starts.stretches[FAILS, m] == 1:
+                first = min(first, starts.stretches[FIRST, m])
+                stop = max(stop, starts.stretches[END, m])
         before = high
         low, high, _, made_flights, made = border_of(
             g,

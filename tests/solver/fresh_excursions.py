@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.ground import ground_of
-from rbfrag.solver.renewal import fresh_starts
+from rbfrag.solver.renewal import all_known, begin, no_starts
 
 
 def fails(drive: Excitation, p2: float, linear: bool, kr: float) -> bool:
     """Whether a block that starts from rest at any rise of the drive above k_r topples."""
     n = drive.q.size
     ground = ground_of(drive, p2=p2, linear=linear)
-    stretches = np.empty((4, n), dtype=np.int64)
-    _, failing, _ = fresh_starts(ground, kr, kr, kr, False, 0, n, stretches)
-    return failing > 0
+    starts = no_starts(n)
+    begin(starts, kr, kr, kr, False, 0, n)
+    return all_known(ground, starts)[1] > 0
 
 
 def largest_failing(drive: Excitation, p2: float, linear: bool, width: float = 1e-12) -> float:
