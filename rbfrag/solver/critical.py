@@ -186,12 +186,13 @@ class _Search:
         resolution = RESOLUTION * pga
         lower = self.lower * pga
         if full_map and found.complete:
-            islands = islands_of_map(found, scan, lower, resolution)
+            ground = ground_of(drive, p2=self.p2, linear=self.linear)
+            islands, made = islands_of_map(found, ground, lower, resolution)
         else:
             ground = ground_of(drive, p2=self.p2, linear=self.linear, span_ph=MAP_SPAN_PH)
             floor = surely_topples_below(ground, drive, bottom, lower)
             islands, made = islands_by_blocks(ground, lower, floor, bottom, resolution)
-            self.n_runs += made
+        self.n_runs += made
         self.island_width = islands.width / pga
         self.resolved = None if islands.resolved is None else islands.resolved / pga
         self.reentrant = islands.reentrant

@@ -13,7 +13,6 @@ from rbfrag.solver.ground import Ground
 from rbfrag.solver.march import SAFE, TOPPLES, border
 from rbfrag.solver.renewal import no_starts
 from rbfrag.solver.results import OutcomeIntervals
-from rbfrag.solver.scan import BlockScan
 
 FloatArray = NDArray[np.float64]
 
@@ -79,8 +78,8 @@ def outcome_intervals(
 
 
 def islands_of_map(
-    found: CertifiedMap, scan: BlockScan, lower: float, resolution: float
-) -> Islands:
+    found: CertifiedMap, ground: Ground, lower: float, resolution: float
+) -> tuple[Islands, int]:
     """Read the islands off a full map.
 
     Undecided slivers count to the interval above them; the lower end of the deciding island,
@@ -89,10 +88,15 @@ def islands_of_map(
 
     Args:
         found: the map, in k_r.
-        scan: the blocks.
+        ground: the ground under the blocks.
         lower: greatest k_r that topples.
         resolution: width of k_r below which islands are ignored.
+
+    Returns:
+        What was read, and the number of blocks.
     """
+    unknown = no_starts(0)
+    runs = 0
     width: float | None = None
     resolved: float | None = None
     reentrant = False
@@ -108,7 +112,8 @@ def islands_of_map(
             if gap_top is None:
                 gap_top = high
             if width is None:
-                width = lower - scan.border(min(bottom, lower), high)[0]
+                _, floor, runs, _ = border(ground, high, -1.0, bottom, BORDER, 0, unknown, False)
+                width = lower - floor
             if gap_top - low > resolution:
                 reentrant = True
         elif verdict == TOPPLES:
@@ -122,7 +127,7 @@ def islands_of_map(
         width = lower - found.reached
         if resolved is None and width >= resolution:
             resolved = lower
-    return Islands(width, resolved, reentrant)
+    return Islands(width, resolved, reentrant), runs
 
 
 def islands_by_blocks(

@@ -51,12 +51,18 @@ def test_only_the_governing_yield_and_that_of_sliding_are_given() -> None:
         assert found.ky == pytest.approx(math.tan(math.radians(35.0)), rel=1e-14)
 
 
-@given(angle_pairs, frictions, dips)
+@given(frictions, st.floats(0.01, 0.99), st.floats(0.01, 0.99), dips, st.booleans())
 def test_slumps_and_topples_start_before_sliding_with_equal_friction(
-    pair: list[float], phi: float, beta: float
+    phi: float, one: float, other: float, beta: float, steep: bool
 ) -> None:
-    found = at(*pair, phi, beta)
-    assume(found.mode in ("slump", "topple"))
+    if steep:  # both angles above that of friction
+        a1 = phi + one * (85.0 - phi)
+        a3 = a1 + other * (85.0 - a1)
+    else:
+        a3 = one * phi
+        a1 = a3 * (2.0 * other - 1.0)
+    found = at(a1, a3, phi, beta)
+    assert found.mode == ("slump" if steep else "topple")
     assert found.yield_acceleration <= found.ky + 1e-12 * (1.0 + abs(found.ky))
 
 
