@@ -52,7 +52,7 @@ MAP_DEPTH = 1e-3
 CLEARANCE = 1e-6
 """The critical island ends no further than this share above the critical value."""
 
-MOST_BYTES = 5_500_000
+MOST_BYTES = 4_000_000
 
 PAGE = ROOT / "docs" / "reference" / "reference-data.md"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,14 @@ from rbfrag.solver.excitation import kept_excitation
 from rbfrag.solver.results import POLARITIES, SEARCH_LIMIT, Polarity
 
 
+class Done(NamedTuple):
+    """Whether the answer is proven, and the work it took; steps where they are counted."""
+
+    certified: bool
+    flights: int
+    steps: int | None
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     options = parser(__doc__)
     options.add_argument("--every", type=int, default=1, help="take one record in so many")
@@ -24,60 +33,78 @@ def main(arguments: Sequence[str] | None = None) -> None:
     records = find_records(chosen.records)
     motions = records.motions[:: chosen.every]
     lines = [
-        "| work | p² | combinations | median | mean | 90 % | 99 % | certified |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| work | p² | combinations | median | mean | 90 % | 99 % | certified | flights, mean "
+        "| steps, median | steps, mean |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    works: tuple[tuple[str, Callable[[GroundMotion, Polarity, float], bool]], ...] = (
+    works: tuple[tuple[str, Callable[[GroundMotion, Polarity, float], Done]], ...] = (
         ("certified bracket", bracket_alone),
+        ("bracket and map", bracket_with_map),
         ("critical search", search),
         ("search and map", search_with_map),
     )
     for name, work in works:
         work(motions[0], "forward", 3.0)  # compiles
         seconds: dict[float, list[float]] = {p2: [] for p2 in DEFAULT_P2}
-        certified = dict.fromkeys(DEFAULT_P2, 0)
+        done: dict[float, list[Done]] = {p2: [] for p2 in DEFAULT_P2}
         for motion in motions:
             for polarity in POLARITIES:
                 for p2 in DEFAULT_P2:
                     started = time.thread_time()
-                    proven = work(motion, polarity, p2)
+                    made = work(motion, polarity, p2)
                     seconds[p2].append(time.thread_time() - started)
-                    certified[p2] += proven
+                    done[p2].append(made)
         for label, sizes in (*((f"{p2:g}", (p2,)) for p2 in DEFAULT_P2), ("all", DEFAULT_P2)):
             ms = 1e3 * np.concatenate([seconds[p2] for p2 in sizes])
             middle, high, highest = np.quantile(ms, (0.5, 0.9, 0.99))
+            all_done = [each for p2 in sizes for each in done[p2]]
+            flights = np.mean([each.flights for each in all_done])
+            steps = [each.steps for each in all_done if each.steps is not None]
+            counts = [f"{np.median(steps):,.0f}", f"{np.mean(steps):,.0f}"] if steps else ["", ""]
             lines.append(
                 f"| {name} | {label} | {ms.size} | {middle:.3g} ms | {ms.mean():.3g} ms "
-                f"| {high:.3g} ms | {highest:.3g} ms | {sum(certified[p2] for p2 in sizes)} |"
+                f"| {high:.3g} ms | {highest:.3g} ms | {sum(each.certified for each in all_done)} "
+                f"| {flights:,.0f} | {' | '.join(counts)} |"
             )
     about = f"{len(motions)} of {records.source}, both polarities, as the files have them."
     report("search-times", "\n".join([*lines, "", about]), write=chosen.write)
 
 
-def bracket_alone(motion: GroundMotion, polarity: Polarity, p2: float) -> bool:
-    """Give verdicts from K_up to the critical value; whether nothing is left undecided."""
+def bracket_alone(motion: GroundMotion, polarity: Polarity, p2: float) -> Done:
+    """Give verdicts from K_up to the critical value."""
+    return _verdicts(motion, polarity, p2, full=False)
+
+
+def bracket_with_map(motion: GroundMotion, polarity: Polarity, p2: float) -> Done:
+    """Give verdicts from K_up to the search limit."""
+    return _verdicts(motion, polarity, p2, full=True)
+
+
+def _verdicts(motion: GroundMotion, polarity: Polarity, p2: float, *, full: bool) -> Done:
     drive = kept_excitation(motion, None, polarity)
     if drive.max_q <= SEARCH_LIMIT * drive.pga_g:
-        return True
+        return Done(True, 0, 0)
     bottom = SEARCH_LIMIT * drive.pga_g
-    found = certified_map(drive, p2=p2, linear=False, bottom=bottom, full=False)
+    found = certified_map(drive, p2=p2, linear=False, bottom=bottom, full=full)
     bracket = bracket_of(found)
     undecided = (
         float((found.high - found.low)[found.undecided].sum()) + max(found.reached - bottom, 0.0)
         if bracket is None
         else bracket[2]
     )
-    return undecided <= SLIVERS * drive.pga_g
+    return Done(undecided <= SLIVERS * drive.pga_g, found.runs, found.steps)
 
 
-def search(motion: GroundMotion, polarity: Polarity, p2: float) -> bool:
-    """Make the whole search; whether its answer is certified."""
-    return critical(motion, p2=p2, polarity=polarity).certified
+def search(motion: GroundMotion, polarity: Polarity, p2: float) -> Done:
+    """Make the whole search."""
+    found = critical(motion, p2=p2, polarity=polarity)
+    return Done(found.certified, found.n_runs, None)
 
 
-def search_with_map(motion: GroundMotion, polarity: Polarity, p2: float) -> bool:
-    """Make the whole search with the map; whether its answer is certified."""
-    return critical(motion, p2=p2, polarity=polarity, full_map=True).certified
+def search_with_map(motion: GroundMotion, polarity: Polarity, p2: float) -> Done:
+    """Make the whole search with the map."""
+    found = critical(motion, p2=p2, polarity=polarity, full_map=True)
+    return Done(found.certified, found.n_runs, None)
 
 
 if __name__ == "__main__":
