@@ -1,4 +1,4 @@
-"""Outcomes of the grid that maps leave open, each block simulated for itself."""
+"""Outcomes of the grid that a database leaves open, each block simulated for itself."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def with_all_outcomes(source: FitSource, samples: Path) -> FitSource:
         samples: database with the samples of its motions, under the same ids.
     """
     table, topples = source.table, source.topples.copy()
-    kr = kr_over_pga_of_grid(table) * table.pga_g[:, None]
+    kr = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g) * table.pga_g[:, None]
     with opened_database(samples, read_only=True) as engine, engine.connect() as connection:
         motion_id, motion = -1, None
         for i in np.argsort(table.motion_id, kind="stable"):

@@ -20,7 +20,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-from sqlalchemy import Connection, ScalarSelect, Table, bindparam, delete, select, update
+import numpy as np
+from sqlalchemy import Connection, bindparam, delete, select, update
 
 from benchmarks.all_outcomes import with_all_outcomes
 from benchmarks.page import ROOT
@@ -37,20 +38,27 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_store import save_model
 from rbfrag.db.natural_key import canonical_json, combination_key
+from rbfrag.db.outcome_maps import SAME_BLOCK
 from rbfrag.db.rows import ModelRow
 from rbfrag.db.stored_combination import stored_combination
 from rbfrag.fragility.fitting import fit
 from rbfrag.fragility.kind_fitting import fit_kind
 from rbfrag.fragility.report import FitReport
-from rbfrag.fragility.source import read_source
+from rbfrag.fragility.source import kr_over_pga_of_grid, read_source
 from rbfrag.solver.results import NUMERICS_VERSION
 from rbfrag.version import __version__
 
 MAP_DEPTH = 1e-3
-"""Width of kr/PGA that the shipped maps leave undecided at a border: finer ones are too large."""
+"""Width of kr/PGA that the maps leave undecided at a border."""
 
 CLEARANCE = 1e-6
 """The critical island ends no further than this share above the critical value."""
+
+NARROWEST = 1e-2
+"""Width of kr/PGA below which intervals are left out: with them the file is too large."""
+
+OF_THE_RECORD = ("the record ends at ", "the record starts at ")
+"""How the warnings begin that are flags of the motion."""
 
 MOST_BYTES = 4_000_000
 
@@ -127,12 +135,7 @@ def show(progress: CampaignProgress) -> None:
 
 
 def reduce(full: Path, made: Path) -> None:
-    """Copy the full database without samples, and with no more of each combination than it needs.
-
-    Of the maps the decided intervals are kept, below the critical value those that are no
-    narrower than MAP_DEPTH; what lies between them is undecided. Of the simulations the critical
-    block stays.
-    """
+    """Copy the full database without samples, and with no more of each combination than needed."""
     made.unlink(missing_ok=True)
     raw = sqlite3.connect(full)
     raw.execute("VACUUM INTO ?", (str(made),))
@@ -141,28 +144,77 @@ def reduce(full: Path, made: Path) -> None:
         connection.execute(update(schema.motion).values(samples=None))
         keep_curves_alone(connection)
         connection.execute(delete(schema.response))
-        interval, point = schema.outcome_interval, schema.simulation
-
-        def critical(row: Table) -> ScalarSelect[float]:
-            return (
-                select(schema.combination.c.kr_over_pga)
-                .where(schema.combination.c.id == row.c.combination_id)
-                .scalar_subquery()
-            )
-
-        narrow = interval.c.k_hi - interval.c.k_lo < MAP_DEPTH
-        below = interval.c.k_hi < (1.0 - CLEARANCE) * critical(interval)
-        undecided = interval.c.outcome == "undecided"
-        connection.execute(delete(interval).where(undecided | (narrow & below)))
-        here = critical(point)
-        slides = point.c.displacement_m.is_not(None)
-        unwanted = (point.c.kr_over_pga != here) | here.is_(None)
-        connection.execute(delete(point).where(unwanted, ~slides))
+        keep_what_is_asked_for(connection)
+        keep_what_is_not_of_the_record(connection)
         rename(connection)
     raw = sqlite3.connect(made, isolation_level=None)
     raw.execute("PRAGMA journal_mode = DELETE")
     raw.execute("VACUUM")
     raw.close()
+
+
+def keep_what_is_asked_for(connection: Connection) -> None:
+    """Keep every outcome of the blocks that fits look at, and of the maps what is wide.
+
+    Of the maps the decided intervals are kept, below the critical value those that hold such a
+    block and those that are no narrower than NARROWEST; what lies between them is undecided. Of
+    the simulations the critical block stays, and the blocks that the map left open.
+    """
+    table, interval, point = schema.combination, schema.outcome_interval, schema.simulation
+    query = (
+        select(table.c.id, table.c.kr_over_pga, table.c.p2, schema.motion.c.pgv_m_s,
+               schema.motion.c.pga_g)
+        .join(schema.motion, schema.motion.c.id == table.c.motion_id)
+        .where(table.c.kind == "toppling")
+    )  # fmt: skip
+    for number, critical, p2, pgv_m_s, pga_g in connection.execute(query).all():
+        blocks = kr_over_pga_of_grid(p2, pgv_m_s, pga_g)
+        rows = connection.execute(
+            select(interval.c.k_lo, interval.c.k_hi, interval.c.outcome).where(
+                interval.c.combination_id == number
+            )
+        ).all()
+        unwanted = []
+        for low, high, outcome in rows:
+            narrow = critical is not None and high < (1.0 - CLEARANCE) * critical
+            narrow = narrow and high - low < NARROWEST
+            asked_for = ((low <= blocks) & (blocks <= high)).any()
+            if outcome == "undecided" or (narrow and not asked_for):
+                unwanted.append({"lo": low})
+        if unwanted:
+            gone = delete(interval).where(
+                interval.c.combination_id == number, interval.c.k_lo == bindparam("lo")
+            )
+            connection.execute(gone, unwanted)
+        own = select(point.c.kr_over_pga).where(
+            point.c.combination_id == number, point.c.displacement_m.is_(None)
+        )
+        run = np.array(connection.scalars(own).all(), dtype=np.float64)
+        asked = np.abs(run[:, None] / blocks - 1.0).min(axis=1, initial=np.inf) <= SAME_BLOCK
+        asked &= np.array(run != critical)
+        spare = run[~asked & (run != critical)]
+        if spare.size:
+            gone = delete(point).where(
+                point.c.combination_id == number, point.c.kr_over_pga == bindparam("k")
+            )
+            connection.execute(gone, [{"k": k} for k in spare.tolist()])
+
+
+def keep_what_is_not_of_the_record(connection: Connection) -> None:
+    """Of the warnings of each combination, leave out what its motions say themselves."""
+    table = schema.combination
+    told = select(schema.motion.c.remarks)
+    remarks = {text for row in connection.scalars(told) for text in json.loads(row)}
+    for number, said in connection.execute(select(table.c.id, table.c.warnings)).all():
+        kept = [
+            sentence
+            for sentence in json.loads(said)
+            if not sentence.removeprefix("vertical: ").startswith(OF_THE_RECORD)
+            and sentence not in remarks
+        ]
+        if len(kept) < len(json.loads(said)):
+            row = update(table).where(table.c.id == number)
+            connection.execute(row.values(warnings=canonical_json(kept)))
 
 
 def keep_curves_alone(connection: Connection) -> None:
@@ -202,8 +254,8 @@ def add_kind_models(full: Path, made: Path) -> list[ModelRow]:
 def add_models(full: Path, made: Path) -> list[FitReport]:
     """Fit the models that are shipped, without vertical motion.
 
-    To the critical values that are shipped and to all outcomes of the grid: those that the maps
-    decide are not a random part of them.
+    To what is shipped and to the outcomes of the grid below the search limit: which blocks lie
+    there does not depend on the outcome, yet they are a part of what is asked.
     """
     reports = []
     with opened_database(made, read_only=True) as engine, engine.connect() as connection:
@@ -304,7 +356,9 @@ def provenance(
         status = Counter(connection.scalars(select(schema.combination.c.status).where(toppling)))
         slid = schema.simulation.c.displacement_m.is_not(None)
         curves = select(schema.simulation.c.kr_over_pga).where(slid)
+        curves_of_none = select(schema.simulation.c.kr_over_pga).where(~slid)
         displacements = len(connection.execute(curves).all())
+        runs = len(connection.execute(curves_of_none).all()) - status["found"]
         intervals = len(connection.execute(select(schema.outcome_interval.c.k_lo)).all())
         vertical = schema.combination.c.vertical_motion_id.is_not(None)
         shaken = len(connection.execute(select(schema.combination.c.id).where(vertical)).all())
@@ -330,13 +384,14 @@ builds the file and this page from the records.
   polarities, for $p^2$ = 30, 10, 3, 1, 0.3 and 0.1 1/s². {summary.certified:,} are certified.
 - {intervals:,} intervals of their maps: toppling and safe ones. What lies between two of them is
   undecided, and so is what lies below the lowest. Borders below the critical value were closed in
-  on to {MAP_DEPTH:g} of $k_r/\\mathrm{{PGA}}$, and intervals narrower than that are left out; the
-  critical value itself is as exact as everywhere. The setting `map` is `decided`, and the natural
-  keys say so too.
+  on to {MAP_DEPTH:g} of $k_r/\\mathrm{{PGA}}$; intervals narrower than {NARROWEST:g} are left
+  out, unless they hold a block of the grid that fits look at. The critical value itself is as
+  exact as everywhere. The setting `map` is `decided`, and the natural keys say so too.
 - {displacements:,} displacements of sliding blocks, of 23 strengths in both polarities of every
   horizontal motion ([how](../theory/other-kinds.md)).
-- Of the simulations of toppling the critical block of each combination; the search itself was
-  made with all.
+- Of the simulations of toppling the critical block of each combination, and the blocks of that grid
+  which its map leaves open: {runs:,} of them, so that no outcome above the search limit is missing
+  from a fit. The search itself was made with all.
 - {len(added.added) + len(added.known)} motions with their intensity measures, the hash of their
   samples, their earthquake, and what was done to them: uncorrected records were filtered as
   `rbfrag motions add` does it.
@@ -385,9 +440,8 @@ def model_section(models: Sequence[FitReport]) -> str:
     return f"""## Models
 
 Fitted without vertical motion ([how](../theory/fragility.md), [how
-well](../theory/model-choice.md)) to what is shipped and, since that is [not a random
-part](../theory/model-choice.md#outcomes-that-maps-leave-open), to all other outcomes of the grid,
-each simulated for itself; `{models[0].name}` is the default.
+well](../theory/model-choice.md)) to what is shipped, and to the blocks of the grid below the search
+limit, each simulated for itself; `{models[0].name}` is the default.
 
 {markdown((columns, rows))}
 

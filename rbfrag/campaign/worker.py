@@ -6,10 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rbfrag.campaign.grid import run_grid
+from rbfrag.campaign.open_blocks import open_blocks
 from rbfrag.campaign.plan import Case
 from rbfrag.campaign.spectra import SpectrumPart, spectrum_parts
 from rbfrag.db.natural_key import response_key
 from rbfrag.db.response_store import ResponseRecord
+from rbfrag.fragility.source import kr_over_pga_of_grid
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
 from rbfrag.solver.certified import MAP_DEPTH
@@ -112,10 +114,14 @@ def _run_task(work: MotionWork, task: Task) -> TaskResult:
             map_depth=work.map_depth,
         )
         critical_kr_over_pga = search.kr_over_pga
+    strengths = set(task.grid)
+    if search is not None:
+        blocks = kr_over_pga_of_grid(case.p2, work.motion.pgv_m_s, work.motion.pga_g)
+        strengths.update(open_blocks(search, blocks))
     grid = None
-    if task.grid:
+    if strengths:
         drive = kept_excitation(work.motion, vertical, case.polarity)
-        grid = run_grid(drive, case.p2, task.grid)
+        grid = run_grid(drive, case.p2, sorted(strengths, reverse=True))
     wanted = list(task.histories)
     if task.critical_history and critical_kr_over_pga is not None:
         wanted.append(critical_kr_over_pga)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sqlalchemy import Connection, case, select
 
-from rbfrag.db.schema import combination, outcome_interval
+from rbfrag.db.schema import combination, outcome_interval, simulation
 from rbfrag.errors import InputError
 
 FloatArray = NDArray[np.float64]
@@ -20,10 +20,13 @@ SAFE = 0.0
 # What the quotient of a k_r and a PGA may be off where it stands for the search limit itself.
 _ROUNDING = 1e-12
 
+SAME_BLOCK = 1e-9
+"""Relative difference of k_r/PGA up to which a block that was run is the one asked about."""
+
 
 @dataclass(frozen=True, eq=False)
 class OutcomeMaps:
-    """The certified maps of many combinations.
+    """The certified maps of many combinations, and the single blocks that were run beside them.
 
     Args:
         combination_id: row ids, shape (n,), in the order that was asked for.
@@ -34,6 +37,9 @@ class OutcomeMaps:
         outcome: 1 every block of the interval topples, 0 none does, NaN undecided.
         known_from: least k_r/PGA for which anything is known, shape (n,): the search limit, or
             more where a search was given up; inf where nothing is known (``outside_model``).
+        run_start: where the single blocks of each begin, shape (n + 1,).
+        run_k: their k_r/PGA, rising within a combination.
+        run_outcome: 1 topples, 0 does not.
     """
 
     combination_id: NDArray[np.int64]
@@ -42,15 +48,19 @@ class OutcomeMaps:
     k_hi: FloatArray
     outcome: FloatArray
     known_from: FloatArray
+    run_start: NDArray[np.int64]
+    run_k: FloatArray
+    run_outcome: FloatArray
 
     def outcomes(self, kr_over_pga: ArrayLike) -> FloatArray:
         """Return what becomes of blocks of any strength: 1 topples, 0 safe, NaN not known.
 
         Above the uppermost interval (and so above K_up) every block is safe: no drive lifts it.
-        Below the search limit nothing is known: NaN. NaN too inside an undecided interval (a
-        border between the others is one, some 1e-9 wide), below the point where a search was
-        given up, for ``outside_model``, and for a NaN asked about. An end that an undecided and
-        a decided interval share is decided: the decided ones are closed.
+        Where a map has no answer, that of a single block of this strength stands for it, if one
+        was run. Otherwise nothing is known, NaN: below the search limit, inside an undecided
+        interval (a border between the others is one, some 1e-9 wide), below the point where a
+        search was given up, for ``outside_model``, and for a NaN asked about. An end that an
+        undecided and a decided interval share is decided: the decided ones are closed.
 
         Args:
             kr_over_pga: block strength over PGA, shape (m,) for the same of all combinations,
@@ -70,8 +80,23 @@ class OutcomeMaps:
             )
         answer = np.full((n, asked.shape[-1]), np.nan)
         for i in range(n):
-            self._look_up(i, asked if asked.ndim == 1 else asked[i], answer[i])
+            strengths = asked if asked.ndim == 1 else asked[i]
+            self._look_up(i, strengths, answer[i])
+            self._look_up_runs(i, strengths, answer[i])
         return answer
+
+    def _look_up_runs(self, i: int, k: FloatArray, answer: FloatArray) -> None:
+        mine = slice(self.run_start[i], self.run_start[i + 1])
+        run_k, outcome = self.run_k[mine], self.run_outcome[mine]
+        lacking = np.flatnonzero(np.isnan(answer) & np.isfinite(k))
+        if not run_k.size or not lacking.size or np.isinf(self.known_from[i]):
+            return
+        asked = k[lacking]
+        at = np.searchsorted(run_k, asked)
+        before, after = np.maximum(at - 1, 0), np.minimum(at, run_k.size - 1)
+        nearest = np.where(asked - run_k[before] < run_k[after] - asked, before, after)
+        same = np.abs(run_k[nearest] - asked) <= SAME_BLOCK * asked
+        answer[lacking[same]] = outcome[nearest[same]]
 
     def _look_up(self, i: int, k: FloatArray, answer: FloatArray) -> None:
         mine = slice(self.start[i], self.start[i + 1])
@@ -105,16 +130,16 @@ def outcome_maps(connection: Connection, combination_id: ArrayLike) -> OutcomeMa
     wanted = np.atleast_1d(np.asarray(combination_id, dtype=np.int64))
     if not wanted.size:
         none, nothing = np.empty(0, dtype=np.int64), np.empty(0)
-        return OutcomeMaps(none, np.zeros(1, dtype=np.int64), *[nothing] * 4)
+        start = np.zeros(1, dtype=np.int64)
+        four = nothing, nothing, nothing, nothing
+        return OutcomeMaps(none, start, *four, start, nothing, nothing)
     owner, low, high, outcome = _intervals(connection, wanted)
-    begin = np.searchsorted(owner, wanted, side="left")
-    count = np.searchsorted(owner, wanted, side="right") - begin
-    start = np.concatenate([[0], np.cumsum(count)])
-    # number of each interval wanted, those of one combination after those of another
-    number = np.repeat(begin - start[:-1], count) + np.arange(start[-1])
+    start, number = _of_each(owner, wanted)
     known_from = _known_from(connection, wanted)
-    first = begin[count > 0]
-    known_from[count > 0] = low[first]
+    mapped = np.diff(start) > 0
+    known_from[mapped] = low[number[start[:-1][mapped]]]
+    run_owner, run_k, run_outcome = _runs(connection, wanted)
+    run_start, run_number = _of_each(run_owner, wanted)
     return OutcomeMaps(
         combination_id=wanted,
         start=start,
@@ -122,6 +147,41 @@ def outcome_maps(connection: Connection, combination_id: ArrayLike) -> OutcomeMa
         k_hi=high[number],
         outcome=outcome[number],
         known_from=known_from,
+        run_start=run_start,
+        run_k=run_k[run_number],
+        run_outcome=run_outcome[run_number],
+    )
+
+
+def _of_each(
+    owner: NDArray[np.int64], wanted: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return where the rows of each one wanted begin, and their numbers one after the other."""
+    begin = np.searchsorted(owner, wanted, side="left")
+    count = np.searchsorted(owner, wanted, side="right") - begin
+    start = np.concatenate([[0], np.cumsum(count)])
+    return start, np.repeat(begin - start[:-1], count) + np.arange(start[-1])
+
+
+def _runs(
+    connection: Connection, wanted: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
+    column = simulation.c
+    code = case((column.outcome == "toppled", TOPPLES), else_=SAFE)
+    query = (
+        select(column.combination_id, column.kr_over_pga, code)
+        .where(
+            column.combination_id.between(int(wanted.min()), int(wanted.max())),
+            column.outcome.in_(("toppled", "stable")),
+        )
+        .order_by(column.combination_id, column.kr_over_pga)
+    )
+    rows = connection.execute(query).all()
+    columns: list[Any] = list(zip(*rows, strict=True)) if rows else [()] * 3
+    return (
+        np.array(columns[0], dtype=np.int64),
+        np.array(columns[1], dtype=np.float64),
+        np.array(columns[2], dtype=np.float64),
     )
 
 

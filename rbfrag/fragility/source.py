@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.scores import GRID_OF_Y0_OVER_PGV
@@ -73,11 +73,22 @@ def read_source(
     keys = zip(table.motion_id.tolist(), table.polarity, table.p2.tolist(), strict=True)
     xp_m_s = np.array([spectra.get(key, np.nan) for key in keys], dtype=np.float64)
     maps = outcome_maps(connection, table.combination_id)
-    return FitSource(table, xp_m_s, maps.outcomes(kr_over_pga_of_grid(table)))
+    blocks = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
+    return FitSource(table, xp_m_s, maps.outcomes(blocks))
 
 
-def kr_over_pga_of_grid(table: CombinationTable) -> FloatArray:
-    """Return k_r/PGA of the blocks that outcomes are asked for, shape (n, 25)."""
+def kr_over_pga_of_grid(p2: ArrayLike, pgv_m_s: ArrayLike, pga_g: ArrayLike) -> FloatArray:
+    """Return k_r/PGA of the blocks that outcomes are asked for.
+
+    Args:
+        p2: frequency parameter p² [1/s²], shape (n,).
+        pgv_m_s: PGV [m/s], shape (n,).
+        pga_g: PGA [g], shape (n,).
+
+    Returns:
+        Shape (n, 25); not finite where PGA is 0.
+    """
+    pgv, ground = np.asarray(pgv_m_s), np.asarray(pga_g) * STANDARD_GRAVITY_M_S2
     with np.errstate(divide="ignore", invalid="ignore"):
-        z = np.sqrt(table.p2) * table.pgv_m_s / (table.pga_g * STANDARD_GRAVITY_M_S2)
-    return np.asarray(z[:, None] * GRID_OF_Y0_OVER_PGV)
+        z = np.sqrt(np.asarray(p2)) * pgv / ground
+    return np.asarray(z[..., None] * GRID_OF_Y0_OVER_PGV)

@@ -94,26 +94,35 @@ def test_the_maps_still_tell_what_a_block_does(built: Path) -> None:
             assert np.isnan(topples) or (run.outcome == "toppled") == bool(topples)
 
 
-def test_what_the_maps_leave_open_is_simulated(built: Path) -> None:
+def test_no_outcome_that_fits_look_at_is_missing(built: Path) -> None:
+    with (
+        opened_database(built / "out" / "reference.db", read_only=True) as engine,
+        engine.connect() as connection,
+    ):
+        for vertical in ("without", "with"):
+            source = read_source(connection, vertical=vertical)
+            table = source.table
+            blocks = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
+            assert np.isfinite(source.topples)[blocks >= 0.01].all()
+
+
+def test_blocks_below_the_search_limit_are_simulated(built: Path) -> None:
     with (
         opened_database(built / "out" / "reference.db", read_only=True) as engine,
         engine.connect() as connection,
     ):
         shipped = read_source(connection)
     every = with_all_outcomes(shipped, built / "reference-full.db")
-    decided = np.isfinite(shipped.topples)
+    table, decided = shipped.table, np.isfinite(shipped.topples)
     assert 0.5 < decided.mean() < 1.0
     assert np.isfinite(every.topples).all()
     np.testing.assert_array_equal(every.topples[decided], shipped.topples[decided])
     motions = {m.pga_g: m for f in built.glob("records/*.AT2") for m in read_motions(f)}
-    k = kr_over_pga_of_grid(shipped.table)
+    k = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
     for i, j in np.argwhere(~decided)[::7]:
-        motion = motions[shipped.table.pga_g[i]]
+        motion = motions[table.pga_g[i]]
         run = respond(
-            motion,
-            p2=shipped.table.p2[i],
-            kr=k[i, j] * motion.pga_g,
-            polarity=shipped.table.polarity[i],
+            motion, p2=table.p2[i], kr=k[i, j] * motion.pga_g, polarity=table.polarity[i]
         )
         assert (run.outcome == "toppled") == bool(every.topples[i, j])
 

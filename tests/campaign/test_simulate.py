@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sqlalchemy import select
 
 from rbfrag.campaign.add_motions import add_motions
 from rbfrag.campaign.progress import CampaignProgress
@@ -20,8 +21,10 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.motion_store import load_motion
 from rbfrag.db.outcome_maps import outcome_maps
 from rbfrag.db.queries import combination_table, database_info
+from rbfrag.db.schema import combination, simulation
 from rbfrag.db.spectrum_store import spectrum_values
 from rbfrag.errors import InputError
+from rbfrag.fragility.source import kr_over_pga_of_grid, read_source
 from rbfrag.solver.respond import respond
 from tests.synthetic import write_suite
 
@@ -78,6 +81,30 @@ def test_the_stored_maps_tell_what_every_block_does(database: Path) -> None:
                 motion, p2=table.p2[i], kr=value * motion.pga_g, polarity=table.polarity[i]
             )
             assert (run.outcome == "toppled") == bool(toppling)
+
+
+def test_what_a_coarse_map_leaves_open_is_run(database: Path) -> None:
+    simulate(database, p2=P2, map_depth=0.03, jobs=1)
+    with opened_database(database, read_only=True) as engine, engine.connect() as connection:
+        source = read_source(connection)
+        table = source.table
+        below = simulation.c.kr_over_pga < combination.c.kr_over_pga
+        runs = select(simulation.c.outcome).join(combination).where(below)
+        assert len(connection.execute(runs).all()) > 5
+        motions = {int(i): load_motion(connection, int(i)) for i in set(table.motion_id)}
+    blocks = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
+    above_limit = blocks >= 0.01
+    assert np.isfinite(source.topples[above_limit]).all()
+    for i in range(0, table.p2.size, 3):
+        motion = motions[int(table.motion_id[i])]
+        for k in np.flatnonzero(above_limit[i]):
+            run = respond(
+                motion,
+                p2=table.p2[i],
+                kr=blocks[i, k] * motion.pga_g,
+                polarity=table.polarity[i],
+            )
+            assert (run.outcome == "toppled") == bool(source.topples[i, k])
 
 
 def test_progress_is_told_after_each_motion(database: Path) -> None:
