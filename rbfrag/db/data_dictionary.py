@@ -172,7 +172,8 @@ _MEANINGS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
         },
     ),
     "simulation": (
-        "Single blocks that were run: the critical one, and those of a requested grid.",
+        "Single blocks that were run: the critical one, those of a requested grid, and those that "
+        "fits look at where the map leaves them open.",
         {
             "combination_id": ("", "the combination"),
             "kr_over_pga": ("k_r/PGA", "strength of the block"),
