@@ -121,9 +121,7 @@ def test_blocks_below_the_search_limit_are_simulated(built: Path) -> None:
     k = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
     for i, j in np.argwhere(~decided)[::7]:
         motion = motions[table.pga_g[i]]
-        run = respond(
-            motion, p2=table.p2[i], kr=k[i, j] * motion.pga_g, polarity=table.polarity[i]
-        )
+        run = respond(motion, p2=table.p2[i], kr=k[i, j] * motion.pga_g, polarity=table.polarity[i])
         assert (run.outcome == "toppled") == bool(every.topples[i, j])
 
 
