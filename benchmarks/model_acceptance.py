@@ -19,7 +19,7 @@ class Mark:
         low: least value that is accepted.
         high: greatest value that is accepted.
         value: of the model fitted to all outcomes.
-        shipped: of the model fitted to the outcomes that the shipped maps decide; None for models
+        by_maps: of the model fitted to the outcomes that the shipped maps decide; None for models
             of critical values, which do not read outcomes.
         also: a further condition, in words, with whether it holds.
     """
@@ -29,7 +29,7 @@ class Mark:
     low: float
     high: float
     value: float
-    shipped: float | None = None
+    by_maps: float | None = None
     also: tuple[str, bool] | None = None
 
     @property
@@ -57,9 +57,9 @@ def acceptance_table(marks: Sequence[Mark]) -> str:
         "model",
         "what",
         "asked",
-        "fitted to all outcomes",
-        "fitted to what the shipped maps decide",
+        "fitted to all outcomes, as shipped",
+        "fitted to what the maps decide",
     ]
     return markdown(
-        (head, [[m.model, m.words, m.asked, m.cell(m.value), m.cell(m.shipped)] for m in marks])
+        (head, [[m.model, m.words, m.asked, m.cell(m.value), m.cell(m.by_maps)] for m in marks])
     )

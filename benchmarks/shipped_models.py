@@ -3,9 +3,9 @@
 python -m benchmarks.shipped_models --db DATABASE
 
 Which outcomes the maps decide depends on how hard they are to decide, and so on the outcome. Here
-each shipped outcome model is fitted to them, every earthquake left out in turn, and judged on every
-block of the grid, simulated for itself, those below the search limit too; beside it the same model
-fitted to all outcomes.
+each shipped outcome model is fitted to them alone, every earthquake left out in turn, and judged on
+every block of the grid, simulated for itself, those below the search limit too; beside it the same
+model fitted to all outcomes, as it is shipped.
 
 The database needs the samples of the motions of the reference, as for benchmarks.model_choice.
 With --write the table of docs/theory/model-choice.md is replaced.
@@ -14,7 +14,7 @@ With --write the table of docs/theory/model-choice.md is replaced.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,11 +25,12 @@ from rbfrag.campaign.bench.tables import markdown
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.motion_store import motion_rows
+from rbfrag.db.outcome_maps import outcome_maps
 from rbfrag.fragility import formulas, scores
 from rbfrag.fragility.binomial import maximum_likelihood, newton
 from rbfrag.fragility.fit_data import FitData, fit_data
 from rbfrag.fragility.outcome_method import LINKS_BY_CODE, outcome_rows
-from rbfrag.fragility.source import FitSource, read_source
+from rbfrag.fragility.source import FitSource, kr_over_pga_of_grid, read_source
 from rbfrag.fragility.terms import TERMS
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -68,13 +69,14 @@ class HeldOut:
 
 
 def with_shipped_outcomes(simulated: FitSource) -> FitSource:
-    """Return the same combinations with the outcomes that the shipped maps decide.
+    """Return the same combinations with the outcomes that the shipped maps alone decide.
 
     Raises:
         SystemExit: combinations, critical values or outcomes are not those of the reference.
     """
     with opened_database(str(REFERENCE), read_only=True) as engine, engine.connect() as connection:
         shipped = read_source(connection)
+        maps = outcome_maps(connection, shipped.table.combination_id)
         sha256 = {row.id: row.sha256 for row in motion_rows(connection)}
     table = shipped.table
     place = {
@@ -94,7 +96,10 @@ def with_shipped_outcomes(simulated: FitSource) -> FitSource:
             f"{len(place)} combinations in the reference, {order.size} here, of which "
             f"{int((~same).sum())} have another critical value"
         )
-    topples = shipped.topples[order]
+    none = np.empty(0)
+    alone = replace(maps, run_start=np.zeros_like(maps.run_start), run_k=none, run_outcome=none)
+    blocks = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
+    topples = alone.outcomes(blocks)[order]
     known = np.isfinite(topples)
     wrong = int((topples[known] != simulated.topples[known]).sum())
     if wrong:
@@ -158,7 +163,7 @@ def table(simulated: FitSource) -> str:
     shipped = with_shipped_outcomes(simulated)
     cells = []
     for method, term in MODELS:
-        for words, source in (("what the shipped maps decide", shipped), ("all", simulated)):
+        for words, source in (("what the maps decide", shipped), ("all", simulated)):
             seen = held_out(source, simulated, method, term)
             cells.append([f"{method}-{term}", words, *scores_in_words(seen)])
     head = ["model", "fitted to outcomes", "log loss", "Brier", "calibration slope", "intercept",
@@ -169,13 +174,12 @@ def table(simulated: FitSource) -> str:
 def selection(shipped: FitSource, simulated: FitSource) -> str:
     """Say how many outcomes the shipped maps leave open, and how these differ from the others."""
     t = simulated.table
-    z = np.sqrt(t.p2) * t.pgv_m_s / (t.pga_g * STANDARD_GRAVITY_M_S2)
-    k = z[:, None] * scores.GRID_OF_Y0_OVER_PGV
+    k = kr_over_pga_of_grid(t.p2, t.pgv_m_s, t.pga_g)
     below = (k >= 0.01) & (k < np.nan_to_num(t.kr_over_pga)[:, None])
     known = np.isfinite(shipped.topples)
     safe = simulated.topples == 0.0
     return (
-        f"Of {known.size:,} blocks the shipped maps decide {int(known.sum()):,}. Of the "
+        f"Of {known.size:,} blocks the maps decide {int(known.sum()):,}. Of the "
         f"{int(below.sum()):,} between search limit and critical value they leave "
         f"{int((below & ~known).sum()):,} open, of which {safe[below & ~known].mean():.1%} are "
         f"safe, against {safe[below & known].mean():.1%} of those decided; "

@@ -53,7 +53,7 @@ def test_hidden_outcomes_matter_only_where_the_outcome_decides_which() -> None:
 def test_a_mark_says_where_it_is_missed() -> None:
     mark = Mark("a", "slope", 0.93, 1.07, 1.0, 0.925)
     assert mark.asked == "0.93 to 1.07"
-    assert (mark.cell(mark.value), mark.cell(mark.shipped)) == ("1", "**0.925, missed**")
+    assert (mark.cell(mark.value), mark.cell(mark.by_maps)) == ("1", "**0.925, missed**")
     assert mark.cell(math.nan) == "**nan, missed**"
     assert Mark("a", "gain", 0.02, math.inf, 0.03, also=("above 0", False)).cell(0.03) != "0.03"
     assert Mark("a", "loss", -math.inf, 0.1, 0.1).asked == "≤ 0.1"

@@ -144,6 +144,21 @@ def test_motion_set() -> None:
     assert motion_set(data, dict.fromkeys(range(96), "a"), seed=1) == []
 
 
+def test_motion_set_does_not_depend_on_the_order_of_rows() -> None:
+    # an earthquake whose motions lie in two sets counts with the set of most of them
+    data = table()
+    sets = {
+        motion: "abc"[motion // 24 % 3 if motion % 24 < 9 else motion % 3] for motion in range(96)
+    }
+    order = np.random.default_rng(5).permutation(data.p2.size)
+    turned = CombinationTable(
+        **{name: getattr(data, name)[order] for name in data.__dataclass_fields__}
+    )
+    (here,), (there,) = motion_set(data, sets, seed=1), motion_set(turned, sets, seed=1)
+    assert here.statistic == there.statistic
+    assert here.value == pytest.approx(there.value)
+
+
 def test_lobes_as_bounds() -> None:
     data = table()
     ratio = 2.0 * np.pi / (data.tm_s * np.sqrt(data.p2))
