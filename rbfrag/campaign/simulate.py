@@ -181,7 +181,7 @@ class _Run:
         for result in done.results:
             self._done += 1
             self._runs += result.runs
-            self._grid_runs += 0 if result.grid is None else len(result.grid.outcome)
+            self._grid_runs += result.grid_runs
             self._responses += len(result.responses)
             if result.search is not None:
                 found = result.search
@@ -266,7 +266,9 @@ def _store(
         for each in done.results
         if each.search is not None
     ]
-    points = {each.case.natural_key: each.grid for each in done.results if each.grid is not None}
+    points = {
+        each.case.natural_key: each.blocks for each in done.results if each.blocks is not None
+    }
     responses = [record for each in done.results for record in each.responses]
     with engine.begin() as connection:
         insert_combinations(connection, campaign_id, records)

@@ -44,11 +44,20 @@ class Task:
 
 @dataclass(frozen=True, eq=False)
 class TaskResult:
-    """What a task gave; None and () where nothing was asked for."""
+    """What a task gave; None and () where nothing was asked for.
+
+    Args:
+        case: the combination.
+        search: its search.
+        blocks: blocks run for themselves: of the requested grid, and those that the map left open.
+        grid_runs: how many of them were requested.
+        responses: histories.
+    """
 
     case: Case
     search: CriticalResult | None
-    grid: SearchPoints | None
+    blocks: SearchPoints | None
+    grid_runs: int
     responses: tuple[ResponseRecord, ...]
 
     @property
@@ -56,7 +65,7 @@ class TaskResult:
         """How many simulations were made."""
         return (
             (0 if self.search is None else self.search.n_runs)
-            + (0 if self.grid is None else len(self.grid.outcome))
+            + (0 if self.blocks is None else len(self.blocks.outcome))
             + len(self.responses)
         )
 
@@ -118,15 +127,15 @@ def _run_task(work: MotionWork, task: Task) -> TaskResult:
     if search is not None:
         blocks = kr_over_pga_of_grid(case.p2, work.motion.pgv_m_s, work.motion.pga_g)
         strengths.update(open_blocks(search, blocks))
-    grid = None
+    alone = None
     if strengths:
         drive = kept_excitation(work.motion, vertical, case.polarity)
-        grid = run_grid(drive, case.p2, sorted(strengths, reverse=True))
+        alone = run_grid(drive, case.p2, sorted(strengths, reverse=True))
     wanted = list(task.histories)
     if task.critical_history and critical_kr_over_pga is not None:
         wanted.append(critical_kr_over_pga)
     responses = tuple(_history(work, case, vertical, ratio) for ratio in dict.fromkeys(wanted))
-    return TaskResult(case, search, grid, responses)
+    return TaskResult(case, search, alone, len(task.grid), responses)
 
 
 def _history(
