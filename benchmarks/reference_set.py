@@ -45,7 +45,7 @@ from rbfrag.fragility.fitting import fit
 from rbfrag.fragility.kind_fitting import fit_kind
 from rbfrag.fragility.report import FitReport
 from rbfrag.fragility.source import kr_over_pga_of_grid, read_source
-from rbfrag.solver.results import NUMERICS_VERSION
+from rbfrag.solver.results import NUMERICS_VERSION, SEARCH_LIMIT
 from rbfrag.version import __version__
 
 MAP_DEPTH = 1e-3
@@ -163,7 +163,8 @@ def keep_what_is_asked_for(connection: Connection) -> None:
 
     Of the maps the decided intervals are kept, below the critical value those that hold such a
     block and those that are no narrower than NARROWEST; what lies between them is undecided. Of
-    the simulations the critical block stays, and the blocks that the map left open.
+    the simulations the critical block stays, and the blocks that the map left open above the
+    search limit; those below are too many.
     """
     table, interval, point = schema.combination, schema.outcome_interval, schema.simulation
     query = (
@@ -196,8 +197,7 @@ def keep_what_is_asked_for(connection: Connection) -> None:
         )
         run = np.array(connection.scalars(own).all(), dtype=np.float64)
         asked = np.abs(run[:, None] / blocks - 1.0).min(axis=1, initial=np.inf) <= SAME_BLOCK
-        asked &= np.array(run != critical)
-        spare = run[~asked & (run != critical)]
+        spare = run[(~asked | (run < SEARCH_LIMIT)) & (run != critical)]
         if spare.size:
             gone = delete(point).where(
                 point.c.combination_id == number, point.c.kr_over_pga == bindparam("k")
