@@ -7,15 +7,12 @@ import sqlite3
 from functools import cache
 from itertools import pairwise
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbfrag.db.location import REFERENCE
 from rbfrag.fragility.prediction import predict
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-
-pytestmark = pytest.mark.skipif(not REFERENCE.is_file(), reason="no reference is shipped")
 
 
 @cache
