@@ -1,8 +1,20 @@
-"""What FastAPI and uvicorn themselves need: `/constant` answers without looking."""
+"""What FastAPI and uvicorn themselves need: `/constant` answers without looking.
+
+python -m benchmarks.constant_service PORT PROCESSES
+
+It listens as `rbfrag serve` does: uvicorn's own socket of several processes lets the client's
+delayed acknowledgement hold every answer back.
+"""
 
 from __future__ import annotations
 
+import sys
+
+import uvicorn
 from fastapi import FastAPI
+
+from rbfrag.service.run import listener
+from rbfrag.service.workers import Workers
 
 ANSWER = {
     "probability": 0.11795834662937416,
@@ -25,3 +37,20 @@ async def constant(p2: float, kr: float, pgv: float) -> dict[str, float | str]: 
 async def bare() -> dict[str, float | str]:
     """Answer without even reading the question."""
     return ANSWER
+
+
+def main() -> None:
+    """Answer until told to end."""
+    port, workers = map(int, sys.argv[1:])
+    config = uvicorn.Config(
+        "benchmarks.constant_service:app", workers=workers, access_log=False, log_level="warning"
+    )
+    with listener("127.0.0.1", port) as found:
+        if workers == 1:
+            uvicorn.Server(config).run(sockets=[found])
+        else:
+            Workers(config, sockets=[found]).run()
+
+
+if __name__ == "__main__":
+    main()

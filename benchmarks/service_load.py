@@ -83,10 +83,7 @@ def compared(
 ) -> tuple[list[Load], list[Load], list[Load]]:
     """Return loads of the service, of the equivalent constant and of the bare one, in turn."""
     port = free_port()
-    constant = [
-        *("-m", "uvicorn", "benchmarks.constant_service:app", "--port", str(port)),
-        *("--workers", str(workers), "--no-access-log", "--log-level", "warning"),
-    ]
+    constant = ["-m", "benchmarks.constant_service", str(port), str(workers)]
     address = f"http://127.0.0.1:{port}"
     ours: list[Load] = []
     equivalent: list[Load] = []
