@@ -49,7 +49,7 @@ def jibson_2007(values: dict[str, FloatArray]) -> FloatArray:
 
 
 def saygili_rathje_2008(values: dict[str, FloatArray]) -> FloatArray:
-    """Return P(D > d) by the model of Saygili & Rathje (2008) on PGA [g] and PGV [cm/s]."""
+    """Return P(D > d) by eq. (6) of Saygili & Rathje (2008), on PGA [g] and PGV [cm/s]."""
     r = values["ky"] / values["pga_g"]
     mean = -1.56 - 4.58 * r - 20.84 * r**2 + 44.75 * r**3 - 30.50 * r**4
     mean = mean - 0.64 * np.log(values["pga_g"]) + 1.55 * np.log(100.0 * values["pgv_m_s"])
