@@ -8,7 +8,14 @@ from dataclasses import dataclass
 
 from playwright.sync_api import Page
 
+from rbfrag.db.location import REFERENCE
+from rbfrag.fragility.prediction import predict
+
 PERCENT = re.compile(r"([<>]?)\s*([\d.]+)\s*%")
+
+
+FIRST_ANSWER = f"{100.0 * predict(3.0, 0.1, pgv_m_s=0.6, db=REFERENCE).probability:.2g} %"
+"""What the page shows when it is opened: p² = 3 1/s², k_r = 0.1, PGV 0.6 m/s."""
 
 
 def probability_shown(page: Page) -> str:

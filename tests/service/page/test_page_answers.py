@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.service.page.reading import agrees, probability_shown
+from tests.service.page.reading import FIRST_ANSWER, agrees, probability_shown
 
 REFUSED = "Failed to load resource: the server responded with a status of 422"
 
@@ -82,7 +82,7 @@ def test_what_is_wrong_is_said_beside_its_field(open_page, field, text, words):
     page.fill(f"#{field}", {"pgv": "0.6", "kr": "0.1", "p2": "3", "level": "0.95"}[field])
     expect(page.locator(f"#{field}-error")).to_have_text("")
     opened.settled()
-    assert probability_shown(page) == "12 %"
+    assert probability_shown(page) == FIRST_ANSWER
     forgive(opened, REFUSED)
 
 
@@ -150,7 +150,7 @@ def test_a_busy_service_is_asked_again(open_page):
     busy = False
     expect(page.locator("#unreachable")).to_be_hidden()
     opened.settled()
-    assert probability_shown(page) != "12 %"
+    assert probability_shown(page) != FIRST_ANSWER
     forgive(opened, "503")
 
 
@@ -163,11 +163,11 @@ def test_a_service_out_of_reach_is_said_and_asked_again(open_page):
     )
     page.fill("#pgv", "1.2")
     expect(page.locator("#unreachable")).to_contain_text("does not answer")
-    assert probability_shown(page) == "12 %"
+    assert probability_shown(page) == FIRST_ANSWER
     out_of_reach = False
     expect(page.locator("#unreachable")).to_be_hidden()
     opened.settled()
-    assert probability_shown(page) != "12 %"
+    assert probability_shown(page) != FIRST_ANSWER
     forgive(opened, "net::ERR_FAILED")
 
 
@@ -188,7 +188,7 @@ def test_a_token_is_asked_for_and_kept_out_of_the_link(open_page):
     page.press("#token", "Enter")
     expect(page.locator("#token-form")).to_be_hidden()
     opened.settled()
-    assert probability_shown(page) != "12 %"
+    assert probability_shown(page) != FIRST_ANSWER
     assert "sesame" not in page.url
     forgive(opened, "401")
 
