@@ -54,4 +54,4 @@ def test_a_map_that_is_given_up_says_from_where(monkeypatch: pytest.MonkeyPatch)
     (said,) = (s for s in part.warnings if "given up at" in s)
     # what it left undecided just above belongs to the same interval
     # (the sentence has six digits)
-    assert float(said.split("given up at ")[1].split(" PGA")[0]) <= given_up * (1.0 + 5e-6)
+    assert float(said.split("given up at ")[1].split(" PGA")[0]) <= float(f"{given_up:.6g}")
