@@ -35,11 +35,6 @@ class BlockScan:
         self._tried: dict[float, Run] = {}
         self._ratio: dict[float, float] = {}
 
-    @property
-    def runs(self) -> int:
-        """Number of blocks that were run."""
-        return len(self._tried)
-
     def outcome(self, kr: float) -> int:
         """Return the kernel's outcome code of one block, run once and kept."""
         run = self._tried.get(kr)
