@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -176,13 +177,8 @@ def _runs(
         )
         .order_by(column.combination_id, column.kr_over_pga)
     )
-    rows = connection.execute(query).all()
-    columns: list[Any] = list(zip(*rows, strict=True)) if rows else [()] * 3
-    return (
-        np.array(columns[0], dtype=np.int64),
-        np.array(columns[1], dtype=np.float64),
-        np.array(columns[2], dtype=np.float64),
-    )
+    owner, (k, outcome) = _columns(connection.execute(query).all(), 2)
+    return owner, k, outcome
 
 
 def _intervals(
@@ -195,14 +191,15 @@ def _intervals(
         .where(column.combination_id.between(int(wanted.min()), int(wanted.max())))
         .order_by(column.combination_id, column.k_lo)
     )
-    rows = connection.execute(query).all()
-    columns: list[Any] = list(zip(*rows, strict=True)) if rows else [()] * 4
-    return (
-        np.array(columns[0], dtype=np.int64),
-        np.array(columns[1], dtype=np.float64),
-        np.array(columns[2], dtype=np.float64),
-        np.array(columns[3], dtype=np.float64),
-    )
+    owner, (low, high, outcome) = _columns(connection.execute(query).all(), 3)
+    return owner, low, high, outcome
+
+
+def _columns(rows: Sequence[Any], numbers: int) -> tuple[NDArray[np.int64], list[FloatArray]]:
+    """Return the combination of each row, and its further numbers by column."""
+    columns: list[Any] = list(zip(*rows, strict=True)) if rows else [()] * (1 + numbers)
+    owner = np.array(columns[0], dtype=np.int64)
+    return owner, [np.array(column, dtype=np.float64) for column in columns[1:]]
 
 
 def _known_from(connection: Connection, wanted: NDArray[np.int64]) -> FloatArray:
