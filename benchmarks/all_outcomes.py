@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import load_motion
-from rbfrag.fragility.source import FitSource, kr_over_pga_of_grid
+from rbfrag.db.motions import load_motion
+from rbfrag.fragility.fit.source import FitSource, kr_over_pga_of_grid
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.respond import runner
-from rbfrag.solver.toppling import STABLE, TOPPLED
+from rbfrag.solver.integrator.single_run import STABLE, TOPPLED
+from rbfrag.solver.toppling_run import runner
 
 KNOWN = {TOPPLED: 1.0, STABLE: 0.0}
 

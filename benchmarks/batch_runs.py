@@ -10,14 +10,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from benchmarks.page import parser, report
-from rbfrag.campaign.bench.cases import choose_combinations, find_records
-from rbfrag.campaign.bench.critical_search import search_runs
-from rbfrag.campaign.bench.tables import markdown
-from rbfrag.campaign.bench.timing import timed
-from rbfrag.solver.batch import run_blocks
+from rbfrag.bench.cases import choose_combinations, find_records
+from rbfrag.bench.critical_search import search_runs
+from rbfrag.bench.tables import markdown
+from rbfrag.bench.timing import timed
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.lanes import run_in_lanes
-from rbfrag.solver.taylor import ORDER, PH_MAX
+from rbfrag.solver.integrator.batch import run_blocks
+from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
+from rbfrag.solver.integrator.vectorised import run_in_lanes
 
 READINGS = 5
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from sqlalchemy import select
 
 from rbfrag.db import schema
-from rbfrag.db.campaign_store import CombinationRecord, insert_combinations
+from rbfrag.db.campaigns import CombinationRecord, insert_combinations
 from rbfrag.db.engine import opened_database
 from rbfrag.db.sqlite_file import connect_sqlite
 from rbfrag.db.stored_combination import stored_combination

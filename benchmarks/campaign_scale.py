@@ -18,12 +18,12 @@ import numpy as np
 from benchmarks import bulk_insert
 from benchmarks.one_campaign import run_campaign
 from benchmarks.page import parser, report
+from rbfrag.bench.cases import RECORDS_VARIABLE
+from rbfrag.bench.tables import markdown
 from rbfrag.campaign.add_motions import add_motions
-from rbfrag.campaign.bench.cases import RECORDS_VARIABLE
-from rbfrag.campaign.bench.tables import markdown
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import motion_rows
-from rbfrag.db.suite_store import add_to_suite
+from rbfrag.db.motions import motion_rows
+from rbfrag.db.suites import add_to_suite
 
 RECORDS = (50, 100, 265)
 """Numbers of records at which the memory is looked at."""

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from benchmarks.page import ROOT, parser, report
 from benchmarks.reference_agreement import agreement_with_reference
-from rbfrag.campaign.bench.tables import markdown
+from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import motion_rows, suite_names
+from rbfrag.db.motions import motion_rows, suite_names
 from rbfrag.db.queries import combination_table
 from rbfrag.fragility.claims import Claim
 from rbfrag.fragility.claims_of_pulses import pulses_scatter_like_records

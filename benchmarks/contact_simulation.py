@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.page import ROOT, parser, report
-from rbfrag.campaign.bench.cases import RECORDS_VARIABLE
-from rbfrag.campaign.bench.tables import markdown
+from rbfrag.bench.cases import RECORDS_VARIABLE
+from rbfrag.bench.tables import markdown
 from rbfrag.motions.recognise import read_motions
 from rbfrag.plots.canvas import new_figure, save_figure
 from rbfrag.solver.results import Outcome, Response

@@ -6,9 +6,9 @@ import sys
 from collections.abc import Sequence
 
 from benchmarks.page import parser, report
-from rbfrag.campaign.bench import tables
-from rbfrag.campaign.bench.cases import choose_combinations, find_records
-from rbfrag.campaign.bench.critical_search import compare_searches
+from rbfrag.bench import tables
+from rbfrag.bench.cases import choose_combinations, find_records
+from rbfrag.bench.critical_search import compare_searches
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -25,10 +25,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rbfrag.db.check import check_database
+from rbfrag.db.check.database import check_database
 from rbfrag.db.content import content_digest
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import add_motion
+from rbfrag.db.motions import add_motion
 from rbfrag.db.queries import database_info
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.motions.ground_motion import GroundMotion

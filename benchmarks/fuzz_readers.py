@@ -25,7 +25,7 @@ import numpy as np
 
 from benchmarks.damage import damaged
 from rbfrag.errors import InputError, RbfragError
-from rbfrag.motions import rbfrag_csv
+from rbfrag.motions.formats import rbfrag_csv
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.metadata import read_metadata
 from rbfrag.motions.processing import processed

@@ -15,9 +15,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.page import ROOT, parser, report
-from rbfrag.campaign.bench.cases import RECORDS_VARIABLE
-from rbfrag.campaign.bench.tables import markdown, seconds
-from rbfrag.campaign.demo_motions import sample_folder
+from rbfrag.bench.cases import RECORDS_VARIABLE
+from rbfrag.bench.tables import markdown, seconds
+from rbfrag.motions.sample_motions import sample_folder
 
 FOLDERS = ("peer_at2_opensees", "nga_at2_misc", "slammer_csv", "geonet_v2a")
 """Folders of a collection that the main job is run on; others are left out."""

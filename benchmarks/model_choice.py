@@ -20,12 +20,13 @@ from benchmarks.model_acceptance import Mark, acceptance_table
 from benchmarks.page import ROOT, parser, replaced
 from benchmarks.shipped_models import HeldOut, held_out, with_shipped_outcomes
 from benchmarks.simulated_source import simulated_source
-from rbfrag.campaign.bench.tables import markdown
-from rbfrag.fragility import formulas, scores
-from rbfrag.fragility.fitting import Fitted, fit_source
-from rbfrag.fragility.judgement import outcomes_of
-from rbfrag.fragility.source import FitSource
-from rbfrag.fragility.terms import TERMS
+from rbfrag.bench.tables import markdown
+from rbfrag.fragility import formulas
+from rbfrag.fragility.fit import scores
+from rbfrag.fragility.fit.fitting import Fitted, fit_source
+from rbfrag.fragility.fit.judgement import outcomes_of
+from rbfrag.fragility.fit.source import FitSource
+from rbfrag.fragility.measures import TERMS
 
 FloatArray = NDArray[np.float64]
 

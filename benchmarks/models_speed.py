@@ -14,15 +14,15 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from benchmarks.page import parser, report
-from rbfrag.campaign.bench.cases import find_records
-from rbfrag.campaign.bench.tables import markdown
-from rbfrag.solver.block import Block
+from rbfrag.bench.cases import find_records
+from rbfrag.bench.tables import markdown
+from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation
+from rbfrag.solver.integrator.one_freedom.equation import Mechanism
+from rbfrag.solver.integrator.one_freedom.follow import follow
+from rbfrag.solver.kind import BlockOnPlanes
 from rbfrag.solver.models import confined_toppling, sliding, slumping
-from rbfrag.solver.one_freedom.equation import Mechanism
-from rbfrag.solver.one_freedom.follow import follow
-from rbfrag.solver.respond import runner
-from rbfrag.solver.response_model import BlockOnPlanes
+from rbfrag.solver.toppling_run import runner
 
 REPEATS = 7
 

@@ -19,19 +19,19 @@ from scipy.special import ndtr
 from sqlalchemy import Connection
 
 from benchmarks.page import ROOT, replaced
-from rbfrag.campaign.bench.tables import markdown
+from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
 from rbfrag.db.queries import combination_table
-from rbfrag.fragility.kind_data import KindData, slumping_data
-from rbfrag.fragility.kind_fitting import (
+from rbfrag.fragility.fit.kind_data import KindData, slumping_data
+from rbfrag.fragility.fit.kind_fitting import (
     Judged,
     KindFit,
     fit_kind,
     judged_by,
     probabilities,
 )
+from rbfrag.fragility.fit.scores import brier, calibration, log_loss
 from rbfrag.fragility.kind_formulas import FORMULAS
-from rbfrag.fragility.scores import brier, calibration, log_loss
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.other_kinds import plot_other_kinds
 

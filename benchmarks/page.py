@@ -6,7 +6,7 @@ import argparse
 import re
 from pathlib import Path
 
-from rbfrag.campaign.bench.machine import machine
+from rbfrag.campaign.machine import machine
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "performance.md"

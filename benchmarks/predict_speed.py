@@ -20,9 +20,9 @@ import numpy as np
 from scipy.special import ndtr
 
 from benchmarks.page import ROOT, parser, report
-from rbfrag.campaign.bench.tables import markdown
-from rbfrag.fragility.model_lookup import suited_models
-from rbfrag.fragility.prediction import predict
+from rbfrag.bench.tables import markdown
+from rbfrag.fragility.lookup import suited_models
+from rbfrag.fragility.predict import predict
 
 BLOCK = {"p2": 3.0, "kr": 0.1}
 REPEATS = 11

@@ -14,15 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.page import parser, report
-from rbfrag.campaign.bench.tables import markdown
-from rbfrag.fragility import censored_normal, formulas, outcome_method
-from rbfrag.fragility.binomial import cr3, effective_freedom, jackknife_steps
-from rbfrag.fragility.censored_normal import CensoredData, maximise
-from rbfrag.fragility.fit_data import fit_data
+from rbfrag.bench.tables import markdown
+from rbfrag.fragility import formulas
+from rbfrag.fragility.fit import censored_normal
+from rbfrag.fragility.fit.binomial import cr3, effective_freedom, jackknife_steps
+from rbfrag.fragility.fit.censored_normal import CensoredData, maximise
+from rbfrag.fragility.fit.data import fit_data
+from rbfrag.fragility.fit.variance import Bins
+from rbfrag.fragility.fit.wls import clustered_line, iterate
+from rbfrag.fragility.measures import TERMS
+from rbfrag.fragility.methods import outcome as outcome_method
 from rbfrag.fragility.quantiles import student_half_width
-from rbfrag.fragility.terms import TERMS
-from rbfrag.fragility.variance import Bins
-from rbfrag.fragility.wls import clustered_line, iterate
 from tests.fragility.conftest import critical_values
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
 

@@ -6,7 +6,7 @@ import math
 
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
-from rbfrag.db.motion_store import motion_rows
+from rbfrag.db.motions import motion_rows
 from rbfrag.db.queries import Vertical, combination_table
 
 AGREES = 1e-9

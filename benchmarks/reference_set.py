@@ -25,26 +25,26 @@ from sqlalchemy import Connection, bindparam, delete, select, update
 
 from benchmarks.all_outcomes import with_all_outcomes
 from benchmarks.page import ROOT
+from rbfrag.bench.cases import RECORDS_VARIABLE
+from rbfrag.bench.tables import markdown
 from rbfrag.campaign.add_motions import AddReport, add_motions
-from rbfrag.campaign.bench.cases import RECORDS_VARIABLE
-from rbfrag.campaign.bench.tables import markdown
 from rbfrag.campaign.progress import CampaignProgress
 from rbfrag.campaign.simulate import CampaignSummary, simulate
 from rbfrag.campaign.simulate_kind import simulate_kind
 from rbfrag.db import schema
-from rbfrag.db.check import check_database
+from rbfrag.db.check.database import check_database
 from rbfrag.db.content import content_digest
 from rbfrag.db.engine import opened_database
+from rbfrag.db.keys import canonical_json, combination_key
 from rbfrag.db.location import REFERENCE
-from rbfrag.db.model_store import save_model
-from rbfrag.db.natural_key import canonical_json, combination_key
+from rbfrag.db.models import save_model
 from rbfrag.db.outcome_maps import SAME_BLOCK
 from rbfrag.db.rows import ModelRow
 from rbfrag.db.stored_combination import stored_combination
-from rbfrag.fragility.fitting import fit
-from rbfrag.fragility.kind_fitting import fit_kind
-from rbfrag.fragility.report import FitReport
-from rbfrag.fragility.source import kr_over_pga_of_grid, read_source
+from rbfrag.fragility.fit.fitting import fit
+from rbfrag.fragility.fit.kind_fitting import fit_kind
+from rbfrag.fragility.fit.report import FitReport
+from rbfrag.fragility.fit.source import kr_over_pga_of_grid, read_source
 from rbfrag.solver.results import NUMERICS_VERSION, SEARCH_LIMIT
 from rbfrag.version import __version__
 

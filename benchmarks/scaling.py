@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from benchmarks.page import parser, report
-from rbfrag.campaign.bench import tables
-from rbfrag.campaign.bench.cases import find_records
-from rbfrag.campaign.bench.scaling import record_length, workers
+from rbfrag.bench import tables
+from rbfrag.bench.cases import find_records
+from rbfrag.bench.scaling import record_length, workers
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -9,13 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.page import parser, report
-from rbfrag.campaign.bench.cases import find_records
-from rbfrag.campaign.plan import DEFAULT_P2
+from rbfrag.bench.cases import find_records
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.certified import bracket_of, certified_map
-from rbfrag.solver.critical import SLIVERS, critical
 from rbfrag.solver.excitation import kept_excitation
-from rbfrag.solver.results import POLARITIES, SEARCH_LIMIT, Polarity
+from rbfrag.solver.results import DEFAULT_P2, POLARITIES, SEARCH_LIMIT, Polarity
+from rbfrag.solver.search.certified import bracket_of, certified_map
+from rbfrag.solver.search.critical import SLIVERS, critical
 
 
 class Done(NamedTuple):

@@ -22,7 +22,7 @@ from statistics import median
 
 from benchmarks.page import parser, report
 from benchmarks.running_service import free_port, running_program, running_service
-from rbfrag.campaign.bench.tables import markdown
+from rbfrag.bench.tables import markdown
 
 QUERY = "?p2=3&kr=0.1&pgv=0.6"
 

@@ -21,17 +21,18 @@ from numpy.typing import NDArray
 
 from benchmarks.page import ROOT, parser, replaced
 from benchmarks.simulated_source import simulated_source
-from rbfrag.campaign.bench.tables import markdown
+from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
-from rbfrag.db.motion_store import motion_rows
+from rbfrag.db.motions import motion_rows
 from rbfrag.db.outcome_maps import outcome_maps
-from rbfrag.fragility import formulas, scores
-from rbfrag.fragility.binomial import maximum_likelihood, newton
-from rbfrag.fragility.fit_data import FitData, fit_data
-from rbfrag.fragility.outcome_method import LINKS_BY_CODE, outcome_rows
-from rbfrag.fragility.source import FitSource, kr_over_pga_of_grid, read_source
-from rbfrag.fragility.terms import TERMS
+from rbfrag.fragility import formulas
+from rbfrag.fragility.fit import scores
+from rbfrag.fragility.fit.binomial import maximum_likelihood, newton
+from rbfrag.fragility.fit.data import FitData, fit_data
+from rbfrag.fragility.fit.source import FitSource, kr_over_pga_of_grid, read_source
+from rbfrag.fragility.measures import TERMS
+from rbfrag.fragility.methods.outcome import LINKS_BY_CODE, outcome_rows
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]

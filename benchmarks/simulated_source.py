@@ -11,21 +11,21 @@ from pathlib import Path
 
 import numpy as np
 
-from rbfrag.campaign.plan import DEFAULT_P2
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import load_motion, motion_rows
+from rbfrag.db.motions import load_motion, motion_rows
 from rbfrag.db.rows import CombinationTable
 from rbfrag.db.vertical_pairs import load_vertical
-from rbfrag.fragility.scores import GRID_OF_Y0_OVER_PGV
-from rbfrag.fragility.source import FitSource
+from rbfrag.fragility.fit.scores import GRID_OF_Y0_OVER_PGV
+from rbfrag.fragility.fit.source import FitSource
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.quality import PGD_IN_DOUBT
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.respond import runner
-from rbfrag.solver.toppling import TOPPLED
+from rbfrag.solver.integrator.single_run import TOPPLED
+from rbfrag.solver.results import DEFAULT_P2
+from rbfrag.solver.search.critical import critical
+from rbfrag.solver.toppling_run import runner
 
 POLARITIES: tuple[Polarity, ...] = ("forward", "reverse")
 

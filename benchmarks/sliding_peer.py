@@ -16,10 +16,10 @@ from importlib import import_module
 import numpy as np
 
 from benchmarks.page import ROOT, parser, report
-from rbfrag.campaign.bench.cases import find_records
-from rbfrag.campaign.bench.tables import markdown
+from rbfrag.bench.cases import find_records
+from rbfrag.bench.tables import markdown
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.response import respond
+from rbfrag.solver.respond import respond
 
 PAGE = ROOT / "docs" / "theory" / "sliding.md"
 

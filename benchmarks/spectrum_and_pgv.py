@@ -8,9 +8,9 @@ import numpy as np
 
 from benchmarks.page import ROOT, parser, report
 from benchmarks.reference_agreement import agreement_with_reference
-from rbfrag.campaign.bench.tables import markdown
+from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import load_motion
+from rbfrag.db.motions import load_motion
 from rbfrag.db.queries import combination_table
 from rbfrag.fragility.claims import IntArray, cluster_interval
 from rbfrag.motions.toppling_spectrum import toppling_spectrum

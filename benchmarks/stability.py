@@ -15,8 +15,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rbfrag.solver.block_arrays import BlockArray
-from rbfrag.solver.stability_arrays import stability_arrays
+from rbfrag.solver.block.arrays import BlockArray
+from rbfrag.solver.stability.arrays import stability_arrays
 
 
 def best_s(run: Callable[[], object], repeats: int = 9) -> float:

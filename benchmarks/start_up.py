@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from statistics import median
 
 from benchmarks.page import ROOT, parser, report
-from rbfrag.campaign.bench.tables import markdown, seconds
+from rbfrag.bench.tables import markdown, seconds
 
 PULSE = "from rbfrag.motions.pulses import reversal_pulse; m = reversal_pulse(0.4, 0.5, 1.0, 0.005)"
-RESPOND = f"from rbfrag.solver.respond import respond; {PULSE}; respond(m, p2=3, kr=0.1)"
-CRITICAL = f"from rbfrag.solver.critical import critical; {PULSE}; critical(m, p2=3)"
+RESPOND = f"from rbfrag.solver.toppling_run import respond; {PULSE}; respond(m, p2=3, kr=0.1)"
+CRITICAL = f"from rbfrag.solver.search.critical import critical; {PULSE}; critical(m, p2=3)"
 NUMBA = "import numba"
 
 STEPS = (

@@ -9,16 +9,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.page import ROOT, parser, report
-from rbfrag.campaign.bench.cases import Records, find_records
-from rbfrag.campaign.bench.tables import markdown
-from rbfrag.campaign.bench.timing import spread, timed
-from rbfrag.campaign.plan import DEFAULT_P2
+from rbfrag.bench.cases import Records, find_records
+from rbfrag.bench.tables import markdown
+from rbfrag.bench.timing import spread, timed
 from rbfrag.motions.polarity import POLARITIES
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.respond import runner
-from rbfrag.solver.toppling import TOPPLED
+from rbfrag.solver.integrator.single_run import TOPPLED
+from rbfrag.solver.results import DEFAULT_P2
+from rbfrag.solver.toppling_run import runner
 from tests.solver.fresh_excursions import fails
 
 PAGE = ROOT / "docs" / "theory" / "toppling-spectrum.md"

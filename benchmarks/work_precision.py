@@ -6,10 +6,10 @@ import sys
 from collections.abc import Sequence
 
 from benchmarks.page import FIGURE, parser, report
-from rbfrag.campaign.bench import tables
-from rbfrag.campaign.bench.cases import choose_cases, find_records
-from rbfrag.campaign.bench.methods import methods, missing_peers
-from rbfrag.campaign.bench.work_precision import measure
+from rbfrag.bench import tables
+from rbfrag.bench.cases import choose_cases, find_records
+from rbfrag.bench.methods import methods, missing_peers
+from rbfrag.bench.work_precision import measure
 from rbfrag.plots.work_precision import plot_work_precision
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.critical import critical
+from rbfrag.solver.search.critical import critical
 from tests.physics import test_closed_forms as closed
 from tests.physics import test_reversal_pulses as reversal
 from tests.physics.pulses import sine_lobes

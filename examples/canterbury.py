@@ -17,11 +17,11 @@ import numpy as np
 import pandas as pd
 
 import rbfrag
-from rbfrag.fragility.rockmass_file import read_rock_mass
-from rbfrag.fragility.rockmass_table import toppling_blocks
-from rbfrag.solver.batch import simulate_many
+from rbfrag.rockmass.file import read_rock_mass
+from rbfrag.rockmass.table import toppling_blocks
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.toppling import TOPPLED
+from rbfrag.solver.integrator.batch import simulate_many
+from rbfrag.solver.integrator.single_run import TOPPLED
 
 HERE = Path(__file__).parent
 FILES = ("*HVSC*.0[09]0", "*PARS*.0[09]0", "*DFHS*.0[09]0")

@@ -23,71 +23,71 @@ if TYPE_CHECKING:
     from rbfrag.errors import RbfragError as RbfragError
     from rbfrag.errors import UnknownModelError as UnknownModelError
     from rbfrag.errors import WorkFailedError as WorkFailedError
-    from rbfrag.exchange.hazard_file import read_hazard_curves as read_hazard_curves
+    from rbfrag.exchange.curves.file import read_hazard_curves as read_hazard_curves
     from rbfrag.exchange.read_table import read_table as read_table
-    from rbfrag.fragility.fitting import fit as fit
-    from rbfrag.fragility.hazard_answer import HazardAnswer as HazardAnswer
-    from rbfrag.fragility.hazard_answer import hazard as hazard
-    from rbfrag.fragility.hazard_curve import HazardCurve as HazardCurve
-    from rbfrag.fragility.kind_fitting import fit_kind as fit_kind
+    from rbfrag.fragility.fit.fitting import fit as fit
+    from rbfrag.fragility.fit.kind_fitting import fit_kind as fit_kind
     from rbfrag.fragility.kind_prediction import predict_sliding as predict_sliding
     from rbfrag.fragility.kind_prediction import predict_slumping as predict_slumping
-    from rbfrag.fragility.prediction import predict as predict
+    from rbfrag.fragility.predict import predict as predict
+    from rbfrag.hazard.answer import HazardAnswer as HazardAnswer
+    from rbfrag.hazard.answer import hazard as hazard
+    from rbfrag.hazard.curve import HazardCurve as HazardCurve
     from rbfrag.motions.ground_motion import GroundMotion as GroundMotion
     from rbfrag.motions.recognise import read_motions as read_motions
     from rbfrag.motions.toppling_spectrum import toppling_spectrum as toppling_spectrum
-    from rbfrag.solver.block import Block as Block
-    from rbfrag.solver.block_arrays import BlockArray as BlockArray
-    from rbfrag.solver.critical import critical as critical
-    from rbfrag.solver.response import respond as respond
+    from rbfrag.solver.block.arrays import BlockArray as BlockArray
+    from rbfrag.solver.block.geometry import Block as Block
+    from rbfrag.solver.respond import respond as respond
     from rbfrag.solver.results import CriticalResult as CriticalResult
     from rbfrag.solver.results import Outcome as Outcome
     from rbfrag.solver.results import Response as Response
-    from rbfrag.solver.scaled_search import critical_scale as critical_scale
-    from rbfrag.solver.sliding_search import critical_sliding as critical_sliding
-    from rbfrag.solver.sliding_search import sliding_displacements as sliding_displacements
-    from rbfrag.solver.stability import Stability as Stability
-    from rbfrag.solver.stability import stability as stability
-    from rbfrag.solver.stability_arrays import StabilityArray as StabilityArray
-    from rbfrag.solver.stability_arrays import stability_arrays as stability_arrays
+    from rbfrag.solver.search.critical import critical as critical
+    from rbfrag.solver.search.displacement import critical_sliding as critical_sliding
+    from rbfrag.solver.search.displacement import sliding_displacements as sliding_displacements
+    from rbfrag.solver.search.scale import critical_scale as critical_scale
+    from rbfrag.solver.stability.arrays import StabilityArray as StabilityArray
+    from rbfrag.solver.stability.arrays import stability_arrays as stability_arrays
+    from rbfrag.solver.stability.single import Stability as Stability
+    from rbfrag.solver.stability.single import stability as stability
 
 _HOME = {
-    "Block": "rbfrag.solver.block",
-    "BlockArray": "rbfrag.solver.block_arrays",
+    "Block": "rbfrag.solver.block.geometry",
+    "BlockArray": "rbfrag.solver.block.arrays",
     "CriticalResult": "rbfrag.solver.results",
     "DatabaseError": "rbfrag.errors",
     "FitError": "rbfrag.errors",
     "GroundMotion": "rbfrag.motions.ground_motion",
-    "HazardAnswer": "rbfrag.fragility.hazard_answer",
-    "HazardCurve": "rbfrag.fragility.hazard_curve",
+    "HazardAnswer": "rbfrag.hazard.answer",
+    "HazardCurve": "rbfrag.hazard.curve",
     "InputError": "rbfrag.errors",
     "MotionFileError": "rbfrag.errors",
     "Outcome": "rbfrag.solver.results",
     "RbfragError": "rbfrag.errors",
     "Response": "rbfrag.solver.results",
-    "Stability": "rbfrag.solver.stability",
-    "StabilityArray": "rbfrag.solver.stability_arrays",
+    "Stability": "rbfrag.solver.stability.single",
+    "StabilityArray": "rbfrag.solver.stability.arrays",
     "UnknownModelError": "rbfrag.errors",
     "WorkFailedError": "rbfrag.errors",
     "add_motions": "rbfrag.campaign.add_motions",
-    "critical": "rbfrag.solver.critical",
-    "critical_scale": "rbfrag.solver.scaled_search",
-    "critical_sliding": "rbfrag.solver.sliding_search",
-    "fit": "rbfrag.fragility.fitting",
-    "fit_kind": "rbfrag.fragility.kind_fitting",
-    "hazard": "rbfrag.fragility.hazard_answer",
-    "predict": "rbfrag.fragility.prediction",
+    "critical": "rbfrag.solver.search.critical",
+    "critical_scale": "rbfrag.solver.search.scale",
+    "critical_sliding": "rbfrag.solver.search.displacement",
+    "fit": "rbfrag.fragility.fit.fitting",
+    "fit_kind": "rbfrag.fragility.fit.kind_fitting",
+    "hazard": "rbfrag.hazard.answer",
+    "predict": "rbfrag.fragility.predict",
     "predict_sliding": "rbfrag.fragility.kind_prediction",
     "predict_slumping": "rbfrag.fragility.kind_prediction",
-    "read_hazard_curves": "rbfrag.exchange.hazard_file",
+    "read_hazard_curves": "rbfrag.exchange.curves.file",
     "read_motions": "rbfrag.motions.recognise",
     "read_table": "rbfrag.exchange.read_table",
-    "respond": "rbfrag.solver.response",
+    "respond": "rbfrag.solver.respond",
     "simulate": "rbfrag.campaign.simulate",
     "simulate_kind": "rbfrag.campaign.simulate_kind",
-    "sliding_displacements": "rbfrag.solver.sliding_search",
-    "stability": "rbfrag.solver.stability",
-    "stability_arrays": "rbfrag.solver.stability_arrays",
+    "sliding_displacements": "rbfrag.solver.search.displacement",
+    "stability": "rbfrag.solver.stability.single",
+    "stability_arrays": "rbfrag.solver.stability.arrays",
     "toppling_spectrum": "rbfrag.motions.toppling_spectrum",
 }
 

@@ -17,7 +17,9 @@ LEVELS = (
     {"solver"},
     {"db"},
     {"fragility"},
+    {"hazard", "rockmass"},
     {"plots", "exchange", "campaign"},
+    {"bench"},
     {"cli", "service"},
 )
 """Lowest first: a room imports only from levels below its own."""

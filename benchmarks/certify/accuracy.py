@@ -11,11 +11,10 @@ import numpy as np
 
 from benchmarks.certify.recordings import Recording
 from benchmarks.extended.toppling import truth
-from rbfrag.campaign.bench.cases import STRENGTHS
-from rbfrag.campaign.plan import DEFAULT_P2
+from rbfrag.bench.cases import STRENGTHS
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.respond import OUTCOMES, simulate
-from rbfrag.solver.results import POLARITIES
+from rbfrag.solver.results import DEFAULT_P2, POLARITIES
+from rbfrag.solver.toppling_run import OUTCOMES, simulate
 
 
 def study(

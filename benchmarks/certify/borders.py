@@ -9,9 +9,9 @@ import numpy as np
 
 from benchmarks.certify.recordings import MAP_DEPTH, Combination
 from benchmarks.extended.toppling import truth
-from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.respond import OUTCOMES, runner
+from rbfrag.solver.search.critical import critical
+from rbfrag.solver.toppling_run import OUTCOMES, runner
 
 DISTANCES = tuple(10.0**-n for n in range(3, 14))
 """Relative distances from critical. Nothing is promised below 1e-10."""

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.solver.certified import MARGIN, keeps_order
-from rbfrag.solver.envelopes import ALL_SAFE, ALL_TOPPLE, decide
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.ground import ground_of
-from rbfrag.solver.renewal import begin, no_starts
-from rbfrag.solver.respond import runner
-from rbfrag.solver.toppling import STABLE, TOPPLED
+from rbfrag.solver.integrator.block_excitation import ground_of
+from rbfrag.solver.integrator.single_run import STABLE, TOPPLED
+from rbfrag.solver.search.certified import MARGIN, keeps_order
+from rbfrag.solver.search.envelopes import ALL_SAFE, ALL_TOPPLE, decide
+from rbfrag.solver.search.renewal import begin, no_starts
+from rbfrag.solver.toppling_run import runner
 
 FloatArray = NDArray[np.float64]
 

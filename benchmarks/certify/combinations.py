@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.certify.recordings import Combination
-from rbfrag.solver.certified import keeps_order
-from rbfrag.solver.critical import critical
+from rbfrag.solver.search.certified import keeps_order
+from rbfrag.solver.search.critical import critical
 
 
 def study(combinations: Sequence[Combination]) -> dict[str, Any]:

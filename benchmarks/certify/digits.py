@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.certify.recordings import Combination
-from rbfrag.solver.critical import critical
+from rbfrag.solver.search.critical import critical
 
 ROUNDED_TO_G = 1e-6
 """To about this the samples of published records are rounded [g]."""

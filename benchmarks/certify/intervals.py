@@ -12,9 +12,9 @@ from benchmarks.certify.checking import Count, inner_values, verdict_on
 from benchmarks.certify.made_up import MAKERS, vertical_of
 from benchmarks.certify.recordings import MAP_DEPTH, Combination
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.results import Polarity
+from rbfrag.solver.search.critical import critical
 
 OF_ONE_MAP = 60
 """Intervals taken from one map, and asked for directly on the same motion."""

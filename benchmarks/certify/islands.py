@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.certify.recordings import MAP_DEPTH, Combination
-from rbfrag.solver.critical import critical
-from rbfrag.solver.respond import runner
+from rbfrag.solver.integrator.single_run import STABLE, TOPPLED
 from rbfrag.solver.results import CriticalResult
-from rbfrag.solver.toppling import STABLE, TOPPLED
+from rbfrag.solver.search.critical import critical
+from rbfrag.solver.toppling_run import runner
 
 WIDE = 1e-6
 """Least width of k_r/PGA of an island that makes a combination one with islands."""

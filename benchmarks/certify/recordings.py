@@ -8,14 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rbfrag.campaign.bench.cases import RECORDS_VARIABLE
-from rbfrag.campaign.plan import DEFAULT_P2
+from rbfrag.bench.cases import RECORDS_VARIABLE
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.metadata import read_metadata
 from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.results import POLARITIES, Polarity
+from rbfrag.solver.results import DEFAULT_P2, POLARITIES, Polarity
 
 MAP_DEPTH = 1e-9
 """Width of k_r/PGA to which maps are made: as fine as the search goes, to be tried hardest."""

@@ -12,7 +12,7 @@ import math
 
 from numba import njit
 
-from rbfrag.solver.compiled import kernel
+from rbfrag.solver.integrator.compiled import kernel
 
 Pair = tuple[float, float]
 

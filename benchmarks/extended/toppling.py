@@ -27,8 +27,8 @@ from benchmarks.extended.double_double import (
     sine_versine,
     sub,
 )
-from rbfrag.solver.compiled import kernel
 from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.integrator.compiled import kernel
 
 FloatArray = NDArray[np.float64]
 

@@ -12,12 +12,11 @@ from sqlalchemy import Connection, Engine
 
 from rbfrag.campaign.traced_file import Trace, missing_files, read_traces
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import add_motion, motion_row, same_source
+from rbfrag.db.motions import add_motion, motion_row, same_source
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.vertical_pairs import recordings_of_mixed_dt
 from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions.companions import upward
-from rbfrag.motions.dt_index import INDEX
 from rbfrag.motions.metadata import read_metadata
 from rbfrag.motions.processing import (
     DEFAULT_HIGH_PASS,
@@ -26,6 +25,7 @@ from rbfrag.motions.processing import (
     processed,
 )
 from rbfrag.motions.quality import quality_flags
+from rbfrag.motions.text.dt_index import INDEX
 
 AS_SUPPLIED = "as supplied"
 

@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.solver.batch import simulate_many
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.respond import OUTCOMES, positive
+from rbfrag.solver.integrator.batch import simulate_many
 from rbfrag.solver.results import SEARCH_LIMIT, SearchPoints
+from rbfrag.solver.toppling_run import OUTCOMES, positive
 
 GRID_TOP = 0.99
 """Largest k_r/PGA of a grid given by its number of values: the dissertation's first."""

@@ -9,16 +9,16 @@ from sqlalchemy import Connection
 
 from rbfrag.campaign.plan import chosen_motions, excitations
 from rbfrag.campaign.slumping_family import FAMILY, BlockClass
-from rbfrag.db.natural_key import combination_key
+from rbfrag.db.keys import combination_key
 from rbfrag.db.queries import Vertical
 from rbfrag.db.rows import MotionRow
 from rbfrag.db.vertical_pairs import VerticalPair
 from rbfrag.errors import InputError
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import NUMERICS_VERSION, POLARITIES, SEARCH_LIMIT, Polarity
-from rbfrag.solver.scaled_search import BRACKET, SCAN_RATIO
+from rbfrag.solver.search.displacement import THRESHOLDS_M, TOLERANCE
+from rbfrag.solver.search.scale import BRACKET, SCAN_RATIO
 from rbfrag.solver.shaken_mechanism import shaken_mechanism
-from rbfrag.solver.sliding_search import THRESHOLDS_M, TOLERANCE
 
 LEVEL_PLANE: Mapping[str, object] = {"plane": "level"}
 """The block of a sliding campaign: on a base that dips a displacement is a factor times its."""

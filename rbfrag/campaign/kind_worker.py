@@ -12,13 +12,13 @@ from rbfrag.campaign.kind_plan import KindCase
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, Outcome, SearchPoints
-from rbfrag.solver.scaled_search import as_critical_result, critical_scales
-from rbfrag.solver.sliding_search import (
+from rbfrag.solver.search.displacement import (
     KY_OVER_PGA,
     SlidingBlocks,
     SlidingResult,
     critical_of,
 )
+from rbfrag.solver.search.scale import as_critical_result, critical_scales
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rbfrag.campaign.bench.machine import machine
+from rbfrag.campaign.machine import machine
 
 
 def made_on() -> str:

@@ -7,18 +7,15 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
-from rbfrag.db.campaign_store import combination_key
-from rbfrag.db.motion_store import motion_rows
+from rbfrag.db.campaigns import combination_key
+from rbfrag.db.motions import motion_rows
 from rbfrag.db.queries import Vertical
 from rbfrag.db.rows import MotionRow
 from rbfrag.db.vertical_pairs import VerticalPair, vertical_pairs
 from rbfrag.errors import InputError
-from rbfrag.solver.certified import MAP_DEPTH
-from rbfrag.solver.respond import positive
 from rbfrag.solver.results import NUMERICS_VERSION, POLARITIES, SEARCH_LIMIT, Polarity
-
-DEFAULT_P2 = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1)
-"""The dissertation's block sizes, as p² [1/s²]: 0.25 m to 74 m from centroid to toe."""
+from rbfrag.solver.search.certified import MAP_DEPTH
+from rbfrag.solver.toppling_run import positive
 
 SETTINGS = {"search_limit": SEARCH_LIMIT, "map": "full", "map_depth": MAP_DEPTH}
 """What else decides an answer, as it goes into the natural key: how far down the search goes,

@@ -9,7 +9,7 @@ from sqlalchemy import Connection
 from rbfrag.campaign.kind_plan import KindCase
 from rbfrag.campaign.kind_worker import KindWork, run_kind_work
 from rbfrag.campaign.slumping_family import BlockClass
-from rbfrag.db.motion_store import load_motion
+from rbfrag.db.motions import load_motion
 from rbfrag.db.stored_combination import StoredCombination
 from rbfrag.errors import InputError
 from rbfrag.solver.results import CriticalResult

@@ -13,8 +13,8 @@ from rbfrag.campaign.compare_results import SingleRun, deviations, differences
 from rbfrag.campaign.grid import run_grid
 from rbfrag.campaign.made_on import made_on
 from rbfrag.campaign.recompute_kind import recompute_kind
-from rbfrag.db.finding import COMPUTE_AGAIN, Finding
-from rbfrag.db.motion_store import load_motion
+from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
+from rbfrag.db.motions import load_motion
 from rbfrag.db.stored_combination import (
     StoredCombination,
     keys_with_samples,
@@ -22,11 +22,11 @@ from rbfrag.db.stored_combination import (
 )
 from rbfrag.errors import InputError, RbfragError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.certified import MAP_DEPTH
-from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.respond import respond
 from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult
+from rbfrag.solver.search.certified import MAP_DEPTH
+from rbfrag.solver.search.critical import critical
+from rbfrag.solver.toppling_run import respond
 
 
 @dataclass(frozen=True)

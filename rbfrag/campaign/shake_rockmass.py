@@ -8,13 +8,13 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from rbfrag.campaign.local_executor import run_locally
+from rbfrag.campaign.executors.local import run_locally
 from rbfrag.errors import InputError
-from rbfrag.fragility.rockmass import Realisations
-from rbfrag.fragility.rockmass_shaken import CHUNK, ShakenMass, plan_shaking
-from rbfrag.fragility.rockmass_shaking import BlockFates, FailureLimits, run_blocks
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
+from rbfrag.rockmass.joint_sets import Realisations
+from rbfrag.rockmass.response import CHUNK, ShakenMass, plan_shaking
+from rbfrag.rockmass.shaking import BlockFates, FailureLimits, run_blocks
 
 WORTH_A_PROCESS = 500
 """Blocks below which a worker process takes longer to start than to work."""
@@ -65,7 +65,7 @@ def shake(
         on_progress: called at the beginning and after each piece of work.
 
     Raises:
-        InputError: as for :func:`rbfrag.fragility.rockmass_shaken.plan_shaking`; `jobs` below 1;
+        InputError: as for :func:`rbfrag.rockmass.response.plan_shaking`; `jobs` below 1;
             a block that cannot be run.
         WorkFailedError: a worker died.
     """

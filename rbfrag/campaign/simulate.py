@@ -10,14 +10,14 @@ from typing import Literal
 
 from sqlalchemy import Engine
 
-from rbfrag.campaign.executor import CLUSTER, check_workers, executor
+from rbfrag.campaign.executors.choice import CLUSTER, check_workers, executor
 from rbfrag.campaign.grid import checked_ratios, grid_of
 from rbfrag.campaign.made_on import made_on
-from rbfrag.campaign.plan import DEFAULT_P2, CampaignPlan, plan_campaign
+from rbfrag.campaign.plan import CampaignPlan, plan_campaign
 from rbfrag.campaign.progress import CampaignProgress
 from rbfrag.campaign.todo import MotionTasks, Todo, Wanted, still_to_do
 from rbfrag.campaign.worker import MotionResults, MotionWork, run_work
-from rbfrag.db.campaign_store import (
+from rbfrag.db.campaigns import (
     CombinationRecord,
     KnownCombination,
     finish_campaign,
@@ -26,13 +26,13 @@ from rbfrag.db.campaign_store import (
     start_campaign,
 )
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import load_motion
+from rbfrag.db.motions import load_motion
 from rbfrag.db.queries import Vertical
-from rbfrag.db.response_store import insert_responses
-from rbfrag.db.spectrum_store import store_spectrum
+from rbfrag.db.responses import insert_responses
+from rbfrag.db.spectra import store_spectrum
 from rbfrag.errors import WorkFailedError
-from rbfrag.solver.certified import MAP_DEPTH
-from rbfrag.solver.results import NUMERICS_VERSION
+from rbfrag.solver.results import DEFAULT_P2, NUMERICS_VERSION
+from rbfrag.solver.search.certified import MAP_DEPTH
 
 
 @dataclass(frozen=True)

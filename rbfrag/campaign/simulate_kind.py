@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from sqlalchemy import Engine
 
-from rbfrag.campaign.executor import CLUSTER, check_workers, executor
+from rbfrag.campaign.executors.choice import CLUSTER, check_workers, executor
 from rbfrag.campaign.kind_plan import (
     ROTATIONS_DEG,
     Criterion,
@@ -25,7 +25,7 @@ from rbfrag.campaign.kind_worker import KindResults, KindWork, run_kind_work
 from rbfrag.campaign.made_on import made_on
 from rbfrag.campaign.progress import CampaignProgress
 from rbfrag.campaign.slumping_family import FAMILY, BlockClass
-from rbfrag.db.campaign_store import (
+from rbfrag.db.campaigns import (
     CombinationRecord,
     KnownCombination,
     finish_campaign,
@@ -34,11 +34,11 @@ from rbfrag.db.campaign_store import (
     start_campaign,
 )
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import load_motion
+from rbfrag.db.motions import load_motion
 from rbfrag.db.queries import Vertical
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.solver.results import NUMERICS_VERSION
-from rbfrag.solver.sliding_search import THRESHOLDS_M
+from rbfrag.solver.search.displacement import THRESHOLDS_M
 
 
 @dataclass(frozen=True)

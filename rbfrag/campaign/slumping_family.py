@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from itertools import product
 
-from rbfrag.solver.block import Block
+from rbfrag.solver.block.geometry import Block
 
 
 @dataclass(frozen=True)

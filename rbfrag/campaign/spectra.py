@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
-from rbfrag.db.spectrum_store import SpectrumKey
+from rbfrag.db.spectra import SpectrumKey
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES, Polarity
 from rbfrag.motions.toppling_spectrum import toppling_spectrum

@@ -10,14 +10,14 @@ from sqlalchemy import Connection
 from rbfrag.campaign.plan import CampaignPlan, Case, MotionPlan
 from rbfrag.campaign.spectra import missing_sizes
 from rbfrag.campaign.worker import Task
-from rbfrag.db.campaign_store import (
+from rbfrag.db.campaigns import (
     KnownCombination,
     combinations_with_points,
     known_combinations,
 )
-from rbfrag.db.natural_key import response_key
-from rbfrag.db.response_store import known_responses
-from rbfrag.db.spectrum_store import spectrum_values
+from rbfrag.db.keys import response_key
+from rbfrag.db.responses import known_responses
+from rbfrag.db.spectra import spectrum_values
 from rbfrag.motions.polarity import Polarity
 from rbfrag.solver.results import NUMERICS_VERSION
 

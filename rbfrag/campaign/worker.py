@@ -9,16 +9,16 @@ from rbfrag.campaign.grid import run_grid
 from rbfrag.campaign.open_blocks import open_blocks
 from rbfrag.campaign.plan import Case
 from rbfrag.campaign.spectra import SpectrumPart, spectrum_parts
-from rbfrag.db.natural_key import response_key
-from rbfrag.db.response_store import ResponseRecord
-from rbfrag.fragility.source import kr_over_pga_of_grid
+from rbfrag.db.keys import response_key
+from rbfrag.db.responses import ResponseRecord
+from rbfrag.fragility.fit.source import kr_over_pga_of_grid
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
-from rbfrag.solver.certified import MAP_DEPTH
-from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import kept_excitation
-from rbfrag.solver.respond import respond
 from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, SearchPoints
+from rbfrag.solver.search.certified import MAP_DEPTH
+from rbfrag.solver.search.critical import critical
+from rbfrag.solver.toppling_run import respond
 
 
 @dataclass(frozen=True)

@@ -12,16 +12,17 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from rbfrag.cli import bench as bench_command
-from rbfrag.cli import block as block_command
-from rbfrag.cli import critical, database, demo, fit, models, motions, plot, predict, respond
-from rbfrag.cli import export as export_command
-from rbfrag.cli import hazard as hazard_command
-from rbfrag.cli import rockmass as rockmass_command
-from rbfrag.cli import serve as serve_command
-from rbfrag.cli import shakemap as shakemap_command
-from rbfrag.cli import simulate as simulate_command
-from rbfrag.cli import spectrum as spectrum_command
+from rbfrag.cli.commands import bench as bench_command
+from rbfrag.cli.commands import block as block_command
+from rbfrag.cli.commands import critical, demo, fit, models, motions, plot, predict, respond
+from rbfrag.cli.commands import db as database
+from rbfrag.cli.commands import export as export_command
+from rbfrag.cli.commands import hazard as hazard_command
+from rbfrag.cli.commands import rockmass as rockmass_command
+from rbfrag.cli.commands import serve as serve_command
+from rbfrag.cli.commands import shakemap as shakemap_command
+from rbfrag.cli.commands import simulate as simulate_command
+from rbfrag.cli.commands import spectrum as spectrum_command
 from rbfrag.errors import RbfragError
 from rbfrag.version import __version__
 

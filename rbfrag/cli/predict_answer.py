@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from rbfrag.cli.block_argument import toppling_block
 from rbfrag.cli.output import print_json, print_pairs, print_table, print_warnings
+from rbfrag.cli.parameters.block import toppling_block
 
 
 def answer_one(
@@ -28,7 +28,7 @@ def answer_one(
     p2, kr, remarks = toppling_block(p2, kr, block)
     found = None
     if motion is not None:
-        from rbfrag.cli.motion_argument import find_motion
+        from rbfrag.cli.parameters.motion import find_motion
 
         found = find_motion(motion, db=db, units=units, dt_s=dt)
     document = prediction_document(

@@ -12,7 +12,7 @@ from sqlalchemy import Connection, and_, select
 
 from rbfrag.db.queries import Vertical
 from rbfrag.db.schema import combination, earthquake, motion, recording, simulation, suite_motion
-from rbfrag.db.suite_store import require_suite
+from rbfrag.db.suites import require_suite
 from rbfrag.solver.results import NUMERICS_VERSION
 
 

@@ -21,7 +21,7 @@ from rbfrag.db.schema import (
     simulation,
     suite_motion,
 )
-from rbfrag.db.suite_store import require_suite
+from rbfrag.db.suites import require_suite
 from rbfrag.errors import InputError
 from rbfrag.motions.quality import PGD_IN_DOUBT
 from rbfrag.solver.results import NUMERICS_VERSION, SearchPoints

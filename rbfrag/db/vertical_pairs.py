@@ -10,7 +10,7 @@ from typing import Any
 
 from sqlalchemy import Connection, func, select
 
-from rbfrag.db.motion_store import load_motion, motion_row, motion_rows
+from rbfrag.db.motions import load_motion, motion_row, motion_rows
 from rbfrag.db.rows import MotionRow
 from rbfrag.db.schema import motion, recording
 from rbfrag.errors import InputError

@@ -18,9 +18,9 @@ from rbfrag.exchange.batch_reading import csv_parts, parquet_parts
 from rbfrag.exchange.batch_writing import csv_writer, parquet_writer
 from rbfrag.exchange.block_table import table_path
 from rbfrag.fragility.answers import PredictionArray
+from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.model_lookup import find_model
-from rbfrag.fragility.prediction import answer_given
+from rbfrag.fragility.predict import answer_given
 
 FloatArray = NDArray[np.float64]
 

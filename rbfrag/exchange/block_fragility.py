@@ -14,8 +14,8 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import FragilityFunction
 from rbfrag.exchange.intensity_type import IntensityType
 from rbfrag.fragility.answers import PredictionArray
-from rbfrag.fragility.model_lookup import find_model
-from rbfrag.fragility.prediction import Model, predict
+from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.predict import Model, predict
 
 FloatArray = NDArray[np.float64]
 

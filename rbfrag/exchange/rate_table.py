@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.fragility.hazard_answer import HazardAnswer
-from rbfrag.fragility.hazard_curve import HazardCurve
+from rbfrag.hazard.answer import HazardAnswer
+from rbfrag.hazard.curve import HazardCurve
 
 
 def rate_columns(

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic
 
-from rbfrag.fragility import straight_line
+from rbfrag.fragility.fit import straight_line
 from rbfrag.fragility.formulas import ABOVE_SPECTRUM, ABOVE_TWICE_PGV, LINE, NOT_LIFTED
 from rbfrag.fragility.functions import Functions, N
 from rbfrag.fragility.model import FragilityModel

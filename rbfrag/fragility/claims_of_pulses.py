@@ -19,7 +19,7 @@ from rbfrag.motions.pulses import (
     sine_cycle,
     triangle,
 )
-from rbfrag.solver.critical import critical
+from rbfrag.solver.search.critical import critical
 
 PERIODS = 12
 """Periods from the least to the greatest mean period of the records, equally spaced in ln T."""

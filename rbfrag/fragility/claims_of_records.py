@@ -18,10 +18,10 @@ from rbfrag.fragility.claims import (
     cluster_interval,
     verdict_of,
 )
-from rbfrag.fragility.fitting import fit
+from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.lobes import lobe_line
+from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.quantiles import student_half_width
-from rbfrag.fragility.terms import TERMS
 
 FEWEST_EVENTS = 5
 

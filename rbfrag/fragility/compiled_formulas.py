@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rbfrag.fragility import elementary, formulas
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.compiled import inlined_kernel, kernel
+from rbfrag.solver.integrator.compiled import inlined_kernel, kernel
 
 FloatArray = NDArray[np.float64]
 

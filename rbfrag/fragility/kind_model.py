@@ -9,7 +9,7 @@ from os import PathLike
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError, ModelError, UnknownModelError
 from rbfrag.fragility.kind_formulas import FORMULAS, METHODS, Formula
-from rbfrag.fragility.model_lookup import FROM_REFERENCE, stored_rows, uses_reference
+from rbfrag.fragility.lookup import FROM_REFERENCE, stored_rows, uses_reference
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def find_kind_model(
         with_pga: whether PGA is known beside PGV: the model that reads both is the better one.
         rotation_deg: slumping: the rotation that counts as failure [deg]; None past recovery.
         model: a model, the name of a stored one, or None.
-        db: database, as for :func:`rbfrag.fragility.prediction.predict`.
+        db: database, as for :func:`rbfrag.fragility.predict.predict`.
 
     Raises:
         UnknownModelError: none that fits; the message says what there is.

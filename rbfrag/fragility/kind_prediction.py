@@ -83,7 +83,7 @@ def predict_sliding(
         beta_deg: dip of the base, out of the slope positive [deg].
         model: a model, the name of a stored one, or None for the best that is suited.
         level: confidence level of the interval.
-        db: database, as for :func:`rbfrag.fragility.prediction.predict`.
+        db: database, as for :func:`rbfrag.fragility.predict.predict`.
 
     Raises:
         InputError: a value that cannot be used.
@@ -147,7 +147,7 @@ def predict_slumping(
             the answer warns.
         model: a model, the name of a stored one, or None for the best that is suited.
         level: confidence level of the interval.
-        db: database, as for :func:`rbfrag.fragility.prediction.predict`.
+        db: database, as for :func:`rbfrag.fragility.predict.predict`.
 
     Raises:
         InputError: a value that cannot be used.

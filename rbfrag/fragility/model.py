@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import ModelError
 from rbfrag.fragility import formulas
-from rbfrag.fragility.terms import TERMS, Term
+from rbfrag.fragility.measures import TERMS, Term
 
 _OF_CRITICAL = (
     "probability that the critical toppling velocity of the motion is at least the block's; "

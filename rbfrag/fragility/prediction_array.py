@@ -16,9 +16,9 @@ from rbfrag.fragility import formulas
 from rbfrag.fragility.answers import PredictionArray, Reasons
 from rbfrag.fragility.checks import BOUNDS, doubts, not_lifted, outside_domain, refusals, unstable
 from rbfrag.fragility.functions import array_functions
+from rbfrag.fragility.measures import toppling_velocity_m_s
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction_values import NEUTRAL, derived, neutral_tm_s
-from rbfrag.fragility.terms import toppling_velocity_m_s
 
 FloatArray = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ def predict_many(
     *,
     refuse_nan: bool,
 ) -> PredictionArray:
-    """Return the answers for broadcast arrays; see :func:`rbfrag.fragility.prediction.predict`.
+    """Return the answers for broadcast arrays; see :func:`rbfrag.fragility.predict.predict`.
 
     Args:
         model: the model that answers.

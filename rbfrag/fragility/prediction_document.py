@@ -7,8 +7,8 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.fragility.answers import Prediction
-from rbfrag.fragility.model_lookup import suited_models
-from rbfrag.fragility.prediction import answer_given, predict
+from rbfrag.fragility.lookup import suited_models
+from rbfrag.fragility.predict import answer_given, predict
 
 if TYPE_CHECKING:
     from rbfrag.motions.ground_motion import GroundMotion

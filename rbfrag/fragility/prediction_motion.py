@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError
 from rbfrag.fragility.answers import MotionPrediction, Prediction, PredictionArray
+from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.model_lookup import find_model
-from rbfrag.fragility.prediction import answer_given
+from rbfrag.fragility.predict import answer_given
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 
 if TYPE_CHECKING:

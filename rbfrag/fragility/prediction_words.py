@@ -17,9 +17,9 @@ from rbfrag.fragility.checks import (
     unstable,
 )
 from rbfrag.fragility.functions import SCALAR
+from rbfrag.fragility.measures import toppling_velocity_m_s
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction_values import NEUTRAL, derived
-from rbfrag.fragility.terms import toppling_velocity_m_s
 
 
 def predict_with_words(

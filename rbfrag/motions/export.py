@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rbfrag.errors import InputError
-from rbfrag.motions import peer_at2, rbfrag_csv
+from rbfrag.motions.formats import peer_at2, rbfrag_csv
 from rbfrag.motions.ground_motion import GroundMotion
 
 FORMATS = ("csv", "at2")

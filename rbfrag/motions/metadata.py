@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rbfrag.errors import InputError, MotionFileError
-from rbfrag.motions.text_file import read_text
+from rbfrag.motions.text.file import read_text
 from rbfrag.motions.units import acceleration_unit
 
 COLUMNS = (

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 from rbfrag.errors import InputError, MotionFileError, UnknownFormatError
-from rbfrag.motions import (
+from rbfrag.motions.formats import (
     bhrc_v1,
     cdmg_v1,
     cosmos,
@@ -27,7 +27,7 @@ from rbfrag.motions import (
     usgs_smc,
 )
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text_file import cut_number, decoded, read_text
+from rbfrag.motions.text.file import cut_number, decoded, read_text
 from rbfrag.motions.units import acceleration_unit
 
 READERS: tuple[ModuleType, ...] = (

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 from rbfrag.plots.block_lines import BlockLines, block_lines
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
 from rbfrag.plots.mode_style import COLOURS, words
-from rbfrag.solver.block import Block
-from rbfrag.solver.polygon import Point
-from rbfrag.solver.stability import Stability
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.block.polygon import Point
+from rbfrag.solver.stability.single import Stability
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

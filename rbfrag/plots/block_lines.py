@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rbfrag.solver.block import Block
-from rbfrag.solver.polygon import Point
-from rbfrag.solver.stability import Stability
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.block.polygon import Point
+from rbfrag.solver.stability.single import Stability
 
 _BAND, _REACH, _ARROW = 0.09, 0.30, 0.45
 """Thickness of the rock, reach of the planes and length of the arrow, over the block's size."""

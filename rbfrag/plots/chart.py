@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.terms import TERMS
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
 from rbfrag.plots.failure_lines import failure_line
 from rbfrag.plots.held_measures import MORE_TERMS, HeldMeasures, held_measures

@@ -15,7 +15,7 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.plots.canvas import new_figure
 from rbfrag.plots.response import BLOCK, GROUND, STRENGTH
-from rbfrag.solver.block import Block
+from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.results import FloatArray, Response, ResponseHistory
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.plots.canvas import new_figure, save_figure
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.respond import runner
 from rbfrag.solver.results import CriticalResult
+from rbfrag.solver.toppling_run import runner
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rbfrag.solver.mechanism import ModeName
+from rbfrag.solver.stability.modes import ModeName
 
 # Told apart by people who do not see red and green alike, and in grey.
 COLOURS: dict[ModeName, str] = {

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import predict
+from rbfrag.fragility.predict import predict
 
 FloatArray = NDArray[np.float64]
 

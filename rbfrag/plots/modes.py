@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
 from rbfrag.plots.mode_style import COLOURS, words
-from rbfrag.solver.block_arrays import BlockArray
-from rbfrag.solver.mechanism import LOCKED, MODES, STABLE, UNSTABLE
-from rbfrag.solver.stability_arrays import StabilityArray, stability_arrays
+from rbfrag.solver.block.arrays import BlockArray
+from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
+from rbfrag.solver.stability.modes import LOCKED, MODES, STABLE, UNSTABLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

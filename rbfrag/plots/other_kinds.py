@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from rbfrag.fragility.kind_data import KindData
-from rbfrag.fragility.kind_fitting import ARRAYS
+from rbfrag.fragility.fit.kind_data import KindData
+from rbfrag.fragility.fit.kind_fitting import ARRAYS
 from rbfrag.fragility.kind_model import KindModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import answer_given
+from rbfrag.fragility.predict import answer_given
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]

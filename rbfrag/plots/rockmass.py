@@ -8,16 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from rbfrag.fragility.rockmass import Realisations
-from rbfrag.fragility.rockmass_counts import (
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.mode_style import COLOURS, LINES, words
+from rbfrag.rockmass.counts import (
     Crossing,
     crossings,
     cumulative_counts,
     mode_counts,
     sorted_yields,
 )
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure
-from rbfrag.plots.mode_style import COLOURS, LINES, words
+from rbfrag.rockmass.joint_sets import Realisations
 
 _POINTS = 600
 _SHOWN = 0.997

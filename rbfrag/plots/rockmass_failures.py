@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rbfrag.fragility.rockmass_failures import ModeFailures, ScaleFailures, failures
-from rbfrag.fragility.rockmass_shaken import ShakenMass
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
 from rbfrag.plots.mode_style import COLOURS, LINES, words
-from rbfrag.solver.mechanism import ModeName
+from rbfrag.rockmass.failures import ModeFailures, ScaleFailures, failures
+from rbfrag.rockmass.response import ShakenMass
+from rbfrag.solver.stability.modes import ModeName
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,18 +13,7 @@ from fastapi.middleware.cors import CORSMiddleware
 from fastapi.openapi.utils import get_openapi
 
 from rbfrag.errors import RbfragError
-from rbfrag.service import (
-    block_api,
-    drawing_api,
-    hazard_api,
-    health_api,
-    metrics_api,
-    models_api,
-    motion_api,
-    predict_api,
-    rockmass_api,
-    work,
-)
+from rbfrag.service import work
 from rbfrag.service.body import Bodies
 from rbfrag.service.documents import Problem
 from rbfrag.service.guard import Guard
@@ -32,6 +21,17 @@ from rbfrag.service.metrics import Metrics
 from rbfrag.service.page_files import PageFiles
 from rbfrag.service.problem import problem, refused
 from rbfrag.service.request_log import RequestLog
+from rbfrag.service.routes import (
+    block,
+    drawing,
+    hazard,
+    health,
+    metrics,
+    models,
+    motion,
+    predict,
+    rockmass,
+)
 from rbfrag.service.settings import Settings
 from rbfrag.service.workshop import Workshop
 from rbfrag.version import __version__
@@ -66,23 +66,23 @@ def make_app(settings: Settings) -> FastAPI:
         lifespan=lifespan,
     )
     for each in (
-        predict_api.router(settings, bodies, workshop),
-        block_api.router(),
-        drawing_api.router(),
-        rockmass_api.router(settings, bodies, workshop),
-        motion_api.router(bodies, workshop),
-        hazard_api.router(settings, bodies, workshop),
-        models_api.router(settings),
-        health_api.router(),
+        predict.router(settings, bodies, workshop),
+        block.router(),
+        drawing.router(),
+        rockmass.router(settings, bodies, workshop),
+        motion.router(bodies, workshop),
+        hazard.router(settings, bodies, workshop),
+        models.router(settings),
+        health.router(),
     ):
         # one flat list: looking through routers in routers takes longer than an answer
         app.router.routes.extend(each.routes)
     document = _document(app)
     app.openapi = lambda: document  # type: ignore[method-assign]
-    metrics = Metrics([*document["paths"], "/v1/metrics", "/v1/openapi.json"])
-    app.router.routes.extend(metrics_api.router(metrics).routes)
+    counts = Metrics([*document["paths"], "/v1/metrics", "/v1/openapi.json"])
+    app.router.routes.extend(metrics.router(counts).routes)
     app.mount("/", PageFiles(), name="page")
-    app.add_middleware(Guard, settings=settings, metrics=metrics, log=RequestLog())
+    app.add_middleware(Guard, settings=settings, metrics=counts, log=RequestLog())
     if settings.allowed_origins:
         app.add_middleware(
             CORSMiddleware,

@@ -55,14 +55,14 @@ def rock_mass(
         row_limit: most realisations.
         db: database of the models.
     """
-    from rbfrag.fragility.rockmass_counts import crossings, mode_counts
-    from rbfrag.fragility.rockmass_file import (
+    from rbfrag.rockmass.counts import crossings, mode_counts
+    from rbfrag.rockmass.file import (
         rock_mass_of_csv,
         rock_mass_of_tables,
         rock_mass_of_toml,
     )
-    from rbfrag.fragility.rockmass_report import as_dict
-    from rbfrag.fragility.rockmass_scenario import scenario
+    from rbfrag.rockmass.report import as_dict
+    from rbfrag.rockmass.scenario import scenario
 
     if form == "json":
         document = read_json(body)
@@ -139,8 +139,8 @@ def critical(
         linear: the linear model.
         full_map: map all outcomes.
     """
-    from rbfrag.solver.critical import critical as search
-    from rbfrag.solver.critical_report import as_dict
+    from rbfrag.solver.search.critical import critical as search
+    from rbfrag.solver.search.report import as_dict
 
     result = search(
         _motion(body, trace, units, dt_s),
@@ -172,10 +172,10 @@ def hazard(
         given: further arguments of :func:`rbfrag.hazard`.
         db: database of the models.
     """
-    from rbfrag.exchange.hazard_file import hazard_curves_in, suited_curves
-    from rbfrag.fragility.hazard_answer import hazard as answer
-    from rbfrag.fragility.hazard_report import as_dict
-    from rbfrag.fragility.velocity_conversion import velocity_conversion
+    from rbfrag.exchange.curves.file import hazard_curves_in, suited_curves
+    from rbfrag.hazard.answer import hazard as answer
+    from rbfrag.hazard.report import as_dict
+    from rbfrag.hazard.velocity_conversion import velocity_conversion
     from rbfrag.solver.quantity import positive
 
     p2, kr = positive(p2, "p2", "1/s²"), positive(kr, "kr", "g")

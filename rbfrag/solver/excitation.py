@@ -29,7 +29,7 @@ class Excitation:
         w: effective gravity 1 + k_v [-], shape (n,).
         pga_g: PGA of the horizontal motion, over both signs [g].
         warnings: sentences about how the two components were brought together.
-        span_tables: tables of `rbfrag.solver.spans` by length, kept for the next search.
+        span_tables: tables of `rbfrag.solver.integrator.spans` by length, kept for the next search.
     """
 
     time_s: FloatArray

@@ -8,9 +8,9 @@ import numpy as np
 
 from rbfrag.motions.quality import quality_flags
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.one_freedom.equation import Mechanism
-from rbfrag.solver.one_freedom.follow import Course, Travel, follow
-from rbfrag.solver.response_model import Shaking
+from rbfrag.solver.integrator.one_freedom.equation import Mechanism
+from rbfrag.solver.integrator.one_freedom.follow import Course, Travel, follow
+from rbfrag.solver.kind import Shaking
 from rbfrag.solver.results import ModeChange, Outcome, Response, ResponseHistory
 
 

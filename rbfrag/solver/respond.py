@@ -1,229 +1,220 @@
-"""One block under one motion: the public form of the toppling kernel."""
+"""What a block does under a ground motion: the one function that every model answers through."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Literal
-
-import numpy as np
+from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.quality import quality_flags
-from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.results import FloatArray, Outcome, Polarity, Response, ResponseHistory
-from rbfrag.solver.taylor import ORDER, PH_MAX
-from rbfrag.solver.toppling import TOPPLED, Run, run_toppling
-
-Kind = Literal["toppling"]
-
-OUTCOMES = (Outcome.STABLE, Outcome.TOPPLED, Outcome.UNDETERMINED, Outcome.JUMP)
-"""Outcome of each kernel code."""
-
-_TO_THE_END = np.empty(0)
-_NO_HISTORY = np.empty((4, 0))
-
-MOST_STEPS = 1e8
-"""Steps of one run beyond which p² cannot be meant: a real record takes some thousands."""
-
-TAIL_PERIODS = 12.0
-"""Length of the free motion shown after the record, in units of 1/p."""
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.kind import BlockOnPlanes, ResponseModel, Shaking
+from rbfrag.solver.kinds import model_of_kind, model_of_mode
+from rbfrag.solver.quantity import angle, positive
+from rbfrag.solver.results import Polarity, Response
+from rbfrag.solver.stability.single import Stability, stability
 
 
 def respond(
     motion: GroundMotion,
     *,
-    p2: float,
-    kr: float,
+    p2: float | None = None,
+    kr: float | None = None,
+    ky: float | None = None,
+    block: Block | None = None,
+    beta_deg: float | None = None,
+    phi_deg: float | None = None,
+    phi_back_deg: float | None = None,
+    back_fracture: bool = True,
+    cohesion_pa: float = 0.0,
+    density_kg_m3: float | None = None,
     vertical: GroundMotion | None = None,
     polarity: Polarity = "forward",
-    kind: Kind = "toppling",
+    kind: str | None = None,
     linear: bool = False,
+    two_way: bool = False,
+    horizontal: bool = False,
     history: bool = False,
 ) -> Response:
-    """Return what a toppling block does under a ground motion.
+    """Return what a block does under a ground motion.
+
+    The block is given in one of three ways: `p2` and `kr` (it topples), `ky` (it slides), or
+    `block` with `beta_deg` and `phi_deg`, whose failure mode chooses the model.
 
     Args:
         motion: horizontal ground motion.
-        p2: frequency parameter p² of the block [1/s²], > 0.
-        kr: rocking acceleration coefficient k_r = tan(critical angle), > 0; with
+        p2: frequency parameter p² of a toppling block [1/s²], > 0.
+        kr: its rocking acceleration coefficient k_r = tan(critical angle), > 0; with
             `linear` the critical angle itself [rad].
+        ky: yield acceleration coefficient tan(φ - β) of a block that slides, whatever its
+            shape, on a plane that dips by `beta_deg` (default 0), > 0.
+        block: shape and size.
+        beta_deg: dip of the base, out of the slope positive [deg].
+        phi_deg: friction angle of the base [deg].
+        phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
+        back_fracture: False for a block without a plane behind it.
+        cohesion_pa: cohesion of the base [Pa]; only a block that topples may have any.
+        density_kg_m3: density of the rock [kg/m³], needed with a cohesion.
         vertical: vertical motion of the same recording, upward positive.
-        polarity: ``forward`` (positive samples drive forward rotation) or ``reverse``.
-        kind: the response model; ``toppling``.
-        linear: the linear model, for verification against closed forms only.
+        polarity: ``forward`` (positive samples drive forward motion) or ``reverse``.
+        kind: ``toppling``, ``sliding``, ``slumping`` or ``confined_toppling``; None for the
+            model of the failure mode.
+        linear: toppling by the linear model, for verification against closed forms only.
+        two_way: sliding up the base too, where the ground drives the block that way.
+        horizontal: sliding without the factor cos(φ - β)/cos φ, as Newmark's horizontal block.
         history: keep the motion in time.
 
     Raises:
-        InputError: a value that is not a positive finite number, an unknown kind or
-            polarity, components that cannot be brought together.
-
-    The model is eq. (4.2) of Gibson's dissertation with the vertical motion of (4.13).
+        InputError: a value outside its range, a block given in no way or in two, a block that
+            fails at rest or that nothing moves, an unknown kind or polarity, an option of
+            another model, components that cannot be brought together.
     """
-    if kind != "toppling":
-        raise InputError(f"unknown kind {kind!r}: use 'toppling'")
-    p2 = positive(p2, "p2", "1/s²")
-    kr = positive(kr, "kr", "the rocking acceleration coefficient")
-    drive = excitation(motion, vertical, polarity)
-    refuse_endless(drive, p2)
-    run = simulate(drive, p2=p2, kr=kr, linear=linear)
-    outcome = OUTCOMES[run.outcome]
-    theta_c = kr if linear else math.atan(kr)
-    known = math.isfinite(run.peak_rad)
-    return Response(
-        kind=kind,
-        outcome=outcome,
-        peak_theta_n=run.peak_rad / theta_c if known else None,
-        peak_theta_rad=run.peak_rad if known else None,
-        critical_angle_deg=math.degrees(theta_c),
-        started_s=_time_or_none(run.started_s),
-        toppled_s=_time_or_none(run.verdict_s) if outcome is Outcome.TOPPLED else None,
-        error_estimate=run.error_rad,
-        steps=run.steps,
-        samples_moved=run.samples_moved,
-        samples_total=int(np.count_nonzero(drive.interval_s)),
-        warnings=_warnings(motion, vertical, drive, outcome, run),
-        history=_history(drive, p2=p2, kr=kr, linear=linear) if history else None,
+    settings = {"linear": linear, "two_way": two_way, "horizontal": horizontal}
+    conditions = {
+        "beta_deg": beta_deg,
+        "phi_deg": phi_deg,
+        "phi_back_deg": phi_back_deg,
+        "density_kg_m3": density_kg_m3,
+    }
+    given = [name for name, value in conditions.items() if value is not None]
+    if block is not None:
+        for name, value in (("p2", p2), ("kr", kr), ("ky", ky)):
+            if value is not None:
+                raise InputError(f"{name} does not go with a block, which is given by its shape")
+        if beta_deg is None or phi_deg is None:
+            name = "beta_deg" if beta_deg is None else "phi_deg"
+            raise InputError(f"{name} is missing: the mode of a block depends on dip and friction")
+        found = stability(
+            block,
+            beta_deg=beta_deg,
+            phi_deg=phi_deg,
+            phi_back_deg=phi_back_deg,
+            back_fracture=back_fracture,
+            cohesion_pa=cohesion_pa,
+            density_kg_m3=density_kg_m3,
+        )
+        return _by_mode(block, found, kind, settings, Shaking(motion, vertical, polarity, history))
+    if ky is not None:
+        if p2 is not None or kr is not None:
+            raise InputError("ky belongs to sliding, p2 and kr to toppling: give one or the other")
+        if extra := [name for name in given if name != "beta_deg"]:
+            raise InputError(f"{extra[0]} does not go with ky: it follows from ky and beta_deg")
+        model = _asked_for(kind, "slide", "ky")
+        site = _sliding_site(ky, beta_deg or 0.0, _known(model, settings))
+        return model.respond(site, Shaking(motion, vertical, polarity, history))
+    if p2 is None or kr is None:
+        missing = "p2" if p2 is None else "kr"
+        raise InputError(
+            f"{missing} is missing: give p2 and kr, or ky, or a block with beta_deg and phi_deg"
+        )
+    if given:
+        raise InputError(f"{given[0]} does not go with p2 and kr, which say all about the block")
+    model = _asked_for(kind, "topple", "p2 and kr")
+    _known(model, settings)
+    from rbfrag.solver.toppling_run import respond as toppling
+
+    return toppling(
+        motion,
+        p2=p2,
+        kr=kr,
+        vertical=vertical,
+        polarity=polarity,
+        linear=linear,
+        history=history,
     )
 
 
-def simulate(
-    drive: Excitation,
-    *,
-    p2: float,
-    kr: float,
-    linear: bool = False,
-    order: int = ORDER,
-    ph_max: float = PH_MAX,
-) -> Run:
-    """Run the kernel once; `order` and `ph_max` are there for convergence studies."""
-    return Run(*_kernel_call(drive, kr, math.sqrt(p2), linear, order, ph_max, _NO_HISTORY))
+def _by_mode(
+    block: Block,
+    found: Stability,
+    kind: str | None,
+    settings: dict[str, bool],
+    shaking: Shaking,
+) -> Response:
+    """Run the model that a block's mode calls for, or the one that was asked for."""
+    model = model_of_mode(found.mode) if kind is None else model_of_kind(kind)
+    _refuse_what_no_motion_decides(found)
+    remarks = found.warnings
+    if model.mode != found.mode:
+        remarks = (
+            *remarks,
+            f"the mode of the block is {_words(found.mode)}: by it, {model.kind} is not what it "
+            "would do",
+        )
+    site = BlockOnPlanes(
+        block=block,
+        beta_rad=math.radians(found.beta_deg),
+        phi_rad=math.radians(found.phi_deg),
+        phi_back_rad=math.radians(found.phi_back_deg),
+        back_fracture=found.back_fracture,
+        cohesive=found.cohesion is not None,
+        yield_g=found.yield_acceleration if model.mode == found.mode else None,
+        settings=_known(model, settings),
+    )
+    return model.respond(
+        site, Shaking(shaking.motion, shaking.vertical, shaking.polarity, shaking.history, remarks)
+    )
 
 
-def runner(drive: Excitation, *, p2: float, linear: bool) -> Callable[[float], Run]:
-    """Return a function of k_r that runs the block of size p2 [1/s²] under one excitation."""
-    p = math.sqrt(p2)
-
-    def run(kr: float) -> Run:
-        return Run(*_kernel_call(drive, kr, p, linear, ORDER, PH_MAX, _NO_HISTORY))
-
-    return run
-
-
-def refuse_endless(drive: Excitation, p2: float) -> None:
-    """Refuse a block so small that one run would not end in reasonable time."""
-    steps = math.sqrt(p2) * float(drive.time_s[-1] - drive.time_s[0]) / PH_MAX
-    if steps > MOST_STEPS:
+def _sliding_site(ky: float, beta_deg: float, settings: dict[str, Any]) -> BlockOnPlanes:
+    """Return a plane of which only the yield acceleration is known."""
+    ky = positive(ky, "ky", "the yield acceleration coefficient of sliding, in g")
+    beta_deg = angle(beta_deg, "beta_deg", -90.0, 90.0)
+    phi_rad = math.radians(beta_deg) + math.atan(ky)
+    if not 0.0 <= phi_rad < 0.5 * math.pi:
         raise InputError(
-            f"p2 = {p2:g} 1/s² would take {steps:.1g} steps over this record: a block of 1 mm "
-            "has p2 = 7000 1/s²; check its unit"
+            f"ky = {ky:g} on a plane of beta_deg = {beta_deg:g} means a friction angle of "
+            f"{math.degrees(phi_rad):.4g} degrees: it must be from 0 to below 90"
+        )
+    return BlockOnPlanes(
+        block=None,
+        beta_rad=math.radians(beta_deg),
+        phi_rad=phi_rad,
+        phi_back_rad=phi_rad,
+        back_fracture=False,
+        cohesive=False,
+        yield_g=ky,
+        settings=settings,
+    )
+
+
+def _asked_for(kind: str | None, mode: Any, numbers: str) -> ResponseModel:
+    """Return the model that numbers alone suffice for, unless another was asked for."""
+    model = model_of_mode(mode)
+    if kind is not None and model_of_kind(kind) is not model:
+        raise InputError(
+            f"{kind} needs the shape of the block: give a block with beta_deg and phi_deg instead "
+            f"of {numbers}, which mean {model.kind}"
+        )
+    return model
+
+
+def _known(model: ResponseModel, settings: dict[str, bool]) -> dict[str, Any]:
+    given = {name: value for name, value in settings.items() if value}
+    unknown = sorted(set(given) - set(model.settings))
+    if unknown:
+        understood = " and ".join(model.settings) or "no such option"
+        raise InputError(
+            f"{unknown[0]} does not go with {model.kind}, the model of this block, which knows "
+            f"{understood}"
+        )
+    return given
+
+
+def _refuse_what_no_motion_decides(found: Stability) -> None:
+    k = found.yield_acceleration
+    if found.state == "locked":
+        raise InputError(
+            f"the block is locked in its mode, {_words(found.mode)}: no horizontal acceleration "
+            "moves it"
+        )
+    if found.state == "unstable" or k <= 0.0:
+        name = {"topple": "k_r", "slide": "k_y", "slump": "k_s"}.get(found.mode, "k_ct")
+        raise InputError(
+            f"the block is {found.state} at rest (mode {_words(found.mode)}, {name} = {k:.4g} g): "
+            "no earthquake decides about it"
         )
 
 
-def positive(number: float, name: str, what: str) -> float:
-    """Return `number` as a float, refusing anything that is not positive and finite."""
-    try:
-        result = float(number)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be a number ({what}), not {number!r}") from None
-    if not math.isfinite(result) or result <= 0.0:
-        raise InputError(f"{name} must be a positive finite number ({what}), not {result:g}")
-    return result
-
-
-def _kernel_call(
-    drive: Excitation,
-    kr: float,
-    p: float,
-    linear: bool,
-    order: int,
-    ph_max: float,
-    history: np.ndarray,
-) -> tuple[int, float, float, float, float, int, int, int]:
-    return run_toppling(
-        drive.time_s,
-        drive.interval_s,
-        drive.k_h,
-        drive.w,
-        drive.q,
-        drive.tail_min_q,
-        drive.block_max_q,
-        drive.jump_node,
-        kr,
-        p,
-        linear,
-        order,
-        ph_max,
-        history,
-        _TO_THE_END,
-        np.empty((3, order + 1)),
-    )
-
-
-def _history(drive: Excitation, *, p2: float, kr: float, linear: bool) -> ResponseHistory:
-    """Run again over the record and a stretch of rest after it, keeping every node."""
-    p = math.sqrt(p2)
-    end = drive.time_s[-1]
-    n_tail = 400
-    tail_s = end + TAIL_PERIODS / p * np.arange(1, n_tail + 1) / n_tail
-    longer = Excitation(
-        time_s=np.concatenate([drive.time_s, [end], tail_s]),
-        interval_s=np.concatenate([drive.interval_s, [0.0], np.diff(tail_s, prepend=end)]),
-        k_h=np.concatenate([drive.k_h, np.zeros(n_tail + 1)]),
-        w=np.concatenate([drive.w, np.ones(n_tail + 1)]),
-        pga_g=drive.pga_g,
-    )
-    # nodes, and at most a start, a peak and a re-seat twice in an interval
-    store = np.empty((4, 7 * longer.time_s.size + 8))
-    run = Run(*_kernel_call(longer, kr, p, linear, ORDER, PH_MAX, store))
-    store = store[:, : run.history_length]
-    # The kernel skips rest. Its nodes are put back, as far as the record goes.
-    at_node = store[3] >= 0.0
-    theta = np.zeros(longer.time_s.size)
-    rate = np.zeros(longer.time_s.size)
-    moved = store[3, at_node].astype(np.int64)
-    theta[moved] = store[1, at_node]
-    rate[moved] = store[2, at_node]
-    shown = max(drive.time_s.size, int(moved[-1]) + 1) if moved.size else drive.time_s.size
-    if run.outcome == TOPPLED and moved.size:
-        shown = int(moved[-1]) + 1
-    event = store[:3, ~at_node]
-    time_s = np.concatenate([longer.time_s[:shown], event[0]])
-    order = np.argsort(time_s, kind="stable")
-
-    def merged(at_nodes: FloatArray, at_events: FloatArray) -> FloatArray:
-        return np.concatenate([at_nodes[:shown], at_events])[order]
-
-    def between(values: FloatArray) -> FloatArray:
-        there: FloatArray = np.interp(event[0], longer.time_s, values)
-        return there
-
-    return ResponseHistory(
-        time_s=time_s[order],
-        theta_rad=merged(theta, event[1]),
-        theta_dot_rad_s=merged(rate, event[2]),
-        k_h=merged(longer.k_h, between(longer.k_h)),
-        k_v=merged(longer.w - 1.0, between(longer.w - 1.0)),
-    )
-
-
-def _time_or_none(time_s: float) -> float | None:
-    return time_s if math.isfinite(time_s) else None
-
-
-def _warnings(
-    motion: GroundMotion,
-    vertical: GroundMotion | None,
-    drive: Excitation,
-    outcome: Outcome,
-    run: Run,
-) -> tuple[str, ...]:
-    said = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion)), *drive.warnings]
-    if vertical is not None:
-        said += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
-    if outcome is Outcome.UNDETERMINED:
-        said.append(outcome.advice)
-    if outcome is Outcome.JUMP:
-        said.append(f"at {run.verdict_s:.3f} s: {outcome.advice}")
-    return tuple(said)
+def _words(mode: str) -> str:
+    return mode.replace("_", " ")

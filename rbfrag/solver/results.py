@@ -22,6 +22,9 @@ Status = Literal["found", "below_limit", "no_motion", "outside_model"]
 SEARCH_LIMIT = 0.01
 """Smallest k_r/PGA that the critical search looks at (the dissertation's)."""
 
+DEFAULT_P2 = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1)
+"""The dissertation's block sizes, as p² [1/s²]: 0.25 m to 74 m from centroid to toe."""
+
 RESOLUTION = 1e-6
 """Islands of k_r/PGA narrower than this are below the rounding of a recorded accelerogram."""
 

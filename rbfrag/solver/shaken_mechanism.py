@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 
 from rbfrag.errors import InputError
-from rbfrag.solver.block import Block
-from rbfrag.solver.mechanism import ModeName
-from rbfrag.solver.one_freedom.equation import Mechanism
-from rbfrag.solver.response_model import BlockOnPlanes, MechanismModel
-from rbfrag.solver.response_models import model_of_kind
-from rbfrag.solver.stability import stability
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.integrator.one_freedom.equation import Mechanism
+from rbfrag.solver.kind import BlockOnPlanes, MechanismModel
+from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.stability.modes import ModeName
+from rbfrag.solver.stability.single import stability
 
 KINDS = ("slumping", "confined_toppling")
 """Kinds whose blocks are searched by scaling the record: shape, friction and dip fix their motion,

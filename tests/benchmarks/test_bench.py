@@ -23,20 +23,20 @@ from benchmarks import (
     start_up,
     work_precision,
 )
-from rbfrag.campaign.bench import cvode_peer, run
-from rbfrag.campaign.bench.cases import (
+from rbfrag.bench import cvode_peer, run
+from rbfrag.bench.cases import (
     RECORDS_VARIABLE,
     Records,
     choose_cases,
     choose_combinations,
     find_records,
 )
-from rbfrag.campaign.bench.critical_search import compare_searches, search_runs
-from rbfrag.campaign.bench.free_motion import Answer
-from rbfrag.campaign.bench.methods import Method, methods, missing_peers, taylor_run
-from rbfrag.campaign.bench.reference import reference
-from rbfrag.campaign.bench.tables import ratio, seconds
-from rbfrag.campaign.bench.work_precision import measure
+from rbfrag.bench.critical_search import compare_searches, search_runs
+from rbfrag.bench.free_motion import Answer
+from rbfrag.bench.methods import Method, methods, missing_peers, taylor_run
+from rbfrag.bench.reference import reference
+from rbfrag.bench.tables import ratio, seconds
+from rbfrag.bench.work_precision import measure
 from rbfrag.cli.main import app
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
@@ -151,7 +151,7 @@ def test_records_are_found_or_refused(
     monkeypatch.setenv(RECORDS_VARIABLE, str(folder))
     assert len(find_records().motions) == FILES
     monkeypatch.delenv(RECORDS_VARIABLE)
-    monkeypatch.setattr("rbfrag.campaign.bench.cases.sample_folder", lambda: None)
+    monkeypatch.setattr("rbfrag.bench.cases.sample_folder", lambda: None)
     assert "pulses" in find_records().source
     empty = tmp_path / "empty"
     empty.mkdir()

@@ -14,10 +14,10 @@ from benchmarks.all_outcomes import with_all_outcomes
 from rbfrag.db.engine import opened_database
 from rbfrag.db.outcome_maps import outcome_maps
 from rbfrag.db.queries import combination_table
-from rbfrag.db.spectrum_store import spectrum_values
-from rbfrag.fragility.source import kr_over_pga_of_grid, read_source
+from rbfrag.db.spectra import spectrum_values
+from rbfrag.fragility.fit.source import kr_over_pga_of_grid, read_source
 from rbfrag.motions.recognise import read_motions
-from rbfrag.solver.respond import respond
+from rbfrag.solver.toppling_run import respond
 from tests.synthetic import shaking, write_at2
 
 

@@ -9,10 +9,10 @@ import pytest
 
 from benchmarks.model_acceptance import Mark
 from benchmarks.shipped_models import HeldOut, held_out
-from rbfrag.fragility import scores
-from rbfrag.fragility.fitting import fit_source
-from rbfrag.fragility.source import FitSource
-from rbfrag.fragility.terms import TERMS
+from rbfrag.fragility.fit import scores
+from rbfrag.fragility.fit.fitting import fit_source
+from rbfrag.fragility.fit.source import FitSource
+from rbfrag.fragility.measures import TERMS
 from tests.fragility.outcome_draws import drawn_outcomes
 
 WEIBULL = (-1.0, 2.4)

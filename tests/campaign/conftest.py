@@ -9,7 +9,7 @@ import pytest
 
 from rbfrag.db.content import content_digest
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import add_motion
+from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.motions.ground_motion import GroundMotion
 from tests.synthetic import shaking

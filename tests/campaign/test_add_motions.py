@@ -11,7 +11,7 @@ import pytest
 
 from rbfrag.campaign.add_motions import AddReport, add_motions
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import load_motion, motion_row, motion_rows
+from rbfrag.db.motions import load_motion, motion_row, motion_rows
 from rbfrag.db.rows import MotionRow
 from rbfrag.db.vertical_pairs import VerticalPair, load_vertical, vertical_pairs
 from rbfrag.motions.processing import HighPass, processed

@@ -14,16 +14,16 @@ from rbfrag.campaign.grid import grid_of
 from rbfrag.campaign.resimulate import resimulate
 from rbfrag.campaign.simulate import simulate
 from rbfrag.db import schema
-from rbfrag.db.check import check_database
+from rbfrag.db.check.database import check_database
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import add_motion, load_motion, motion_rows
+from rbfrag.db.motions import add_motion, load_motion, motion_rows
 from rbfrag.db.queries import combination_table, simulation_points
-from rbfrag.db.response_store import stored_history
+from rbfrag.db.responses import stored_history
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.critical import critical
-from rbfrag.solver.respond import respond
+from rbfrag.solver.search.critical import critical
+from rbfrag.solver.toppling_run import respond
 from tests.synthetic import shaking
 
 P2 = (10.0, 1.0)

@@ -18,14 +18,14 @@ from rbfrag.campaign.progress import CampaignProgress
 from rbfrag.campaign.simulate import simulate
 from rbfrag.db.content import content_digest
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import load_motion
+from rbfrag.db.motions import load_motion
 from rbfrag.db.outcome_maps import outcome_maps
 from rbfrag.db.queries import combination_table, database_info
 from rbfrag.db.schema import combination, simulation
-from rbfrag.db.spectrum_store import spectrum_values
+from rbfrag.db.spectra import spectrum_values
 from rbfrag.errors import InputError
-from rbfrag.fragility.source import kr_over_pga_of_grid, read_source
-from rbfrag.solver.respond import respond
+from rbfrag.fragility.fit.source import kr_over_pga_of_grid, read_source
+from rbfrag.solver.toppling_run import respond
 from tests.synthetic import write_suite
 
 P2 = (10.0, 1.0)

@@ -17,24 +17,24 @@ from rbfrag.campaign.simulate import simulate
 from rbfrag.campaign.simulate_kind import KindSummary, simulate_kind
 from rbfrag.campaign.slumping_family import FAMILY, BlockClass
 from rbfrag.db import schema
-from rbfrag.db.check import check_database
+from rbfrag.db.check.database import check_database
 from rbfrag.db.content import table_rows_by_natural_key
 from rbfrag.db.engine import open_database, opened_database
-from rbfrag.db.merge import merge_databases
-from rbfrag.db.model_store import model_rows, save_model
-from rbfrag.db.motion_store import add_motion, load_motion
+from rbfrag.db.merge.databases import merge_databases
+from rbfrag.db.models import model_rows, save_model
+from rbfrag.db.motions import add_motion, load_motion
 from rbfrag.db.outcome_maps import outcome_maps
 from rbfrag.db.queries import combination_table
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.exchange.database_export import export_database
-from rbfrag.fragility.kind_fitting import fit_kind
+from rbfrag.fragility.fit.kind_fitting import fit_kind
+from rbfrag.fragility.fit.model_check import check_models
 from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping
-from rbfrag.fragility.model_check import check_models
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.scaled_search import critical_scale
+from rbfrag.solver.search.displacement import KY_OVER_PGA, critical_sliding, sliding_displacements
+from rbfrag.solver.search.scale import critical_scale
 from rbfrag.solver.shaken_mechanism import shaken_mechanism
-from rbfrag.solver.sliding_search import KY_OVER_PGA, critical_sliding, sliding_displacements
 from tests.synthetic import shaking
 
 TWO = (FAMILY[0], FAMILY[2])

@@ -11,9 +11,9 @@ from rbfrag.campaign.add_motions import add_motions
 from rbfrag.campaign.simulate import simulate
 from rbfrag.campaign.spectra import missing_sizes
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import load_motion
+from rbfrag.db.motions import load_motion
 from rbfrag.db.schema import toppling_spectrum as table
-from rbfrag.db.spectrum_store import spectrum_values
+from rbfrag.db.spectra import spectrum_values
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from tests.synthetic import write_suite
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from rbfrag.motions.recognise import read_motions
-from rbfrag.solver.block import Block
-from rbfrag.solver.scaled_search import critical_scale
-from rbfrag.solver.sliding_search import KY_OVER_PGA, critical_sliding, sliding_displacements
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.search.displacement import KY_OVER_PGA, critical_sliding, sliding_displacements
+from rbfrag.solver.search.scale import critical_scale
 from tests.cli.conftest import Refuses, Shell
 from tests.synthetic import shaking, write_at2
 

@@ -10,7 +10,7 @@ import pytest
 
 import rbfrag
 from rbfrag.db.engine import opened_database
-from rbfrag.db.model_store import save_model
+from rbfrag.db.models import save_model
 from rbfrag.exchange.nrml_read import read_nrml
 from rbfrag.exchange.pelicun_table import read_pelicun
 from tests.cli.conftest import Shell

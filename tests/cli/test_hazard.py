@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rbfrag.db.engine import opened_database
-from rbfrag.db.model_store import save_model
+from rbfrag.db.models import save_model
 from tests.cli.conftest import Shell
 from tests.fragility.conftest import model_row
 

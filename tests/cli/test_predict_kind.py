@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping
-from rbfrag.solver.block import Block
+from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.shaken_mechanism import shaken_mechanism
 from tests.cli.conftest import Refuses, Shell
 from tests.synthetic import write_suite

@@ -10,7 +10,7 @@ import typer
 from rbfrag.cli.main import app
 from rbfrag.cli.quick_predict import NAMES, NUMBERS, plain_options, quick_predict
 from rbfrag.db.engine import opened_database
-from rbfrag.db.model_store import save_model
+from rbfrag.db.models import save_model
 from tests.cli.conftest import Shell
 from tests.fragility.conftest import model_row
 

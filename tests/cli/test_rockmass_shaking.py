@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from rbfrag.exchange.block_columns import read_columns
-from rbfrag.fragility.rockmass_failures import failures
-from rbfrag.fragility.rockmass_file import read_rock_mass
-from rbfrag.fragility.rockmass_shaken import plan_shaking
-from rbfrag.fragility.rockmass_shaking import FailureLimits, run_blocks
 from rbfrag.motions.recognise import read_motion
+from rbfrag.rockmass.failures import failures
+from rbfrag.rockmass.file import read_rock_mass
+from rbfrag.rockmass.response import plan_shaking
+from rbfrag.rockmass.shaking import FailureLimits, run_blocks
 from tests.cli.conftest import Refuses, Shell
 from tests.synthetic import shaking, write_at2
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from rbfrag.cli.main import app
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.respond import respond
+from rbfrag.solver.toppling_run import respond
 from tests.synthetic import shaking, write_at2
 
 DT_S = 0.02

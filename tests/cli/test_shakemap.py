@@ -12,7 +12,7 @@ import pytest
 
 import rbfrag
 from rbfrag.db.engine import opened_database
-from rbfrag.db.model_store import save_model
+from rbfrag.db.models import save_model
 from tests.cli.conftest import Shell
 from tests.exchange.test_shakemap_grid import GRID, UNCERTAINTY
 from tests.fragility.conftest import model_row

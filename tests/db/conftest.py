@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from sqlalchemy import Engine
 
-from rbfrag.db.campaign_store import (
+from rbfrag.db.campaigns import (
     combination_key,
     finish_campaign,
     insert_combination,
     start_campaign,
 )
 from rbfrag.db.engine import open_database
-from rbfrag.db.motion_store import add_motion
+from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo, ModelRow
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, SearchPoints

@@ -10,10 +10,10 @@ import pytest
 from sqlalchemy import Engine, delete, func, insert, select, update
 
 from rbfrag.db import schema
-from rbfrag.db.check import check_database
+from rbfrag.db.check.database import check_database
 from rbfrag.db.engine import opened_database
-from rbfrag.db.natural_key import response_key
-from rbfrag.db.spectrum_store import store_spectrum
+from rbfrag.db.keys import response_key
+from rbfrag.db.spectra import store_spectrum
 from rbfrag.motions.toppling_spectrum import toppling_spectrum as spectrum_of
 
 # The map of the first found combination of `filled`, whose critical kr/PGA is 0.1.
@@ -266,9 +266,9 @@ def test_numerics_of_the_campaign_agree(filled: Engine) -> None:
 
 
 def test_rows_are_looked_at_in_any_number(filled: Engine, monkeypatch: Any) -> None:
-    import rbfrag.db.check_combinations
+    import rbfrag.db.check.combinations
 
-    monkeypatch.setattr(rbfrag.db.check_combinations, "_ROWS_AT_ONCE", 2)
+    monkeypatch.setattr(rbfrag.db.check.combinations, "_ROWS_AT_ONCE", 2)
     with filled.begin() as connection:
         connection.execute(update(schema.combination).values(settings="{"))
         connection.execute(delete(schema.simulation))

@@ -13,15 +13,15 @@ from hypothesis import strategies as st
 from sqlalchemy import Engine, delete, func, insert, select, update
 
 from rbfrag.db import schema
-from rbfrag.db.campaign_store import start_campaign
-from rbfrag.db.check import check_database
-from rbfrag.db.compare_maps import contradictions
+from rbfrag.db.campaigns import start_campaign
+from rbfrag.db.check.compare_maps import contradictions
+from rbfrag.db.check.database import check_database
 from rbfrag.db.content import CONTENT_TABLES, content_digest, table_rows_by_natural_key
 from rbfrag.db.engine import open_database, opened_database
-from rbfrag.db.merge import MergeReport, merge_databases
-from rbfrag.db.model_store import load_model, model_rows, save_model
-from rbfrag.db.motion_store import add_motion
-from rbfrag.db.natural_key import response_key
+from rbfrag.db.keys import response_key
+from rbfrag.db.merge.databases import MergeReport, merge_databases
+from rbfrag.db.models import load_model, model_rows, save_model
+from rbfrag.db.motions import add_motion
 from rbfrag.db.queries import database_info
 from rbfrag.db.rows import EarthquakeInfo, ModelRow
 from rbfrag.errors import (
@@ -165,7 +165,7 @@ class TestTogether:
     def test_rows_in_any_number(
         self, filled: Engine, theirs: Engine, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("rbfrag.db.merge_results._AT_ONCE", 2)
+        monkeypatch.setattr("rbfrag.db.merge.results._AT_ONCE", 2)
         _merge(filled, theirs)
         assert _digest(theirs) == _digest(filled)
 

@@ -19,8 +19,8 @@ import rbfrag.db.upgrade
 import rbfrag.migrations
 from rbfrag.db.content import table_rows_by_natural_key
 from rbfrag.db.engine import open_database, unchecked_engine
-from rbfrag.db.model_store import load_model, save_model
-from rbfrag.db.motion_store import add_motion, load_motion, motion_rows
+from rbfrag.db.models import load_model, save_model
+from rbfrag.db.motions import add_motion, load_motion, motion_rows
 from rbfrag.db.revision import REVISIONS, SCHEMA_REVISION, VERSION_TABLE
 from rbfrag.db.rows import EarthquakeInfo, ModelRow
 from rbfrag.db.schema import metadata

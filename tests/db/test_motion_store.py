@@ -15,7 +15,7 @@ from sqlalchemy import Engine, func, select, update
 
 from rbfrag.db import schema
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import add_motion, load_motion, motion_row, motion_rows, suite_names
+from rbfrag.db.motions import add_motion, load_motion, motion_row, motion_rows, suite_names
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import DatabaseError, InputError
 from rbfrag.motions.ground_motion import GroundMotion

@@ -9,8 +9,8 @@ import pytest
 from sqlalchemy import Engine, func, select
 
 from rbfrag.db import schema
-from rbfrag.db.campaign_store import CombinationRecord, insert_combinations, start_campaign
-from rbfrag.db.motion_store import add_motion
+from rbfrag.db.campaigns import CombinationRecord, insert_combinations, start_campaign
+from rbfrag.db.motions import add_motion
 from rbfrag.db.outcome_maps import OutcomeMaps, outcome_maps
 from rbfrag.db.queries import combination_table
 from rbfrag.db.rows import EarthquakeInfo

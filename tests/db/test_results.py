@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from sqlalchemy import Engine, delete, exc, func, select, update
 
 from rbfrag.db import schema
-from rbfrag.db.campaign_store import (
+from rbfrag.db.campaigns import (
     combination_key,
     finish_campaign,
     known_combinations,
@@ -21,7 +21,7 @@ from rbfrag.db.campaign_store import (
 )
 from rbfrag.db.content import CONTENT_TABLES, content_digest, table_rows_by_natural_key
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motion_store import add_motion
+from rbfrag.db.motions import add_motion
 from rbfrag.db.queries import combination_table, database_info, simulation_points
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError

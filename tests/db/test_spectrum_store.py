@@ -9,9 +9,9 @@ import pytest
 from sqlalchemy import Engine
 
 from rbfrag.db.content import content_digest
-from rbfrag.db.motion_store import add_motion
+from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo
-from rbfrag.db.spectrum_store import spectrum_values, store_spectrum, stored_spectrum
+from rbfrag.db.spectra import spectrum_values, store_spectrum, stored_spectrum
 from rbfrag.motions.ground_motion import GroundMotion
 
 QUAKE = EarthquakeInfo("chi-chi-1999", magnitude=7.62, guessed=False)

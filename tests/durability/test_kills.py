@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.durability import digest, kill_once, make_database, stored
 from rbfrag.campaign.simulate import simulate
-from rbfrag.db.merge import merge_databases
+from rbfrag.db.merge.databases import merge_databases
 from tests.durability.conftest import P2
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="finds the workers under /proc")

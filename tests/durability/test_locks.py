@@ -15,7 +15,7 @@ from benchmarks.durability import campaign, digest, environment, stored
 from rbfrag.campaign.progress import CampaignProgress
 from rbfrag.campaign.simulate import simulate
 from rbfrag.db.engine import opened_database
-from rbfrag.db.merge import merge_databases
+from rbfrag.db.merge.databases import merge_databases
 from rbfrag.errors import DatabaseBusyError, DatabaseFailedError
 from tests.cli.conftest import Refuses, Shell, refuses, shell
 from tests.durability.conftest import P2
@@ -138,7 +138,7 @@ def test_what_another_campaign_stores_meanwhile_stays_its_own(
 
     SQLite lets no other write between the two.
     """
-    import rbfrag.db.campaign_store as store
+    import rbfrag.db.campaigns as store
 
     look = store.known_keys
     met = []

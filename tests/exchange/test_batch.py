@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from rbfrag.db.engine import opened_database
-from rbfrag.db.model_store import save_model
+from rbfrag.db.models import save_model
 from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange import batch_reading, batch_writing
 from rbfrag.exchange.batch import predict_table
 from rbfrag.exchange.block_columns import read_columns, read_texts
 from rbfrag.exchange.block_table import write_block_table
-from rbfrag.fragility.prediction import predict
+from rbfrag.fragility.predict import predict
 from tests.fragility.conftest import model_row
 
 HEAD = "block_id,p2_1_s2,kr,pgv_m_s"

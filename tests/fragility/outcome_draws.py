@@ -7,8 +7,8 @@ import numpy as np
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility import formulas
 from rbfrag.fragility.compiled_formulas import probabilities
-from rbfrag.fragility.scores import GRID_OF_Y0_OVER_PGV
-from rbfrag.fragility.source import FitSource
+from rbfrag.fragility.fit.scores import GRID_OF_Y0_OVER_PGV
+from rbfrag.fragility.fit.source import FitSource
 
 G = 9.80665
 P2 = (30.0, 3.0, 0.3)

@@ -7,9 +7,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from rbfrag.fragility.fitting import fit, fit_source
+from rbfrag.fragility.fit.fitting import fit, fit_source
 from rbfrag.fragility.interval_floor import Sample, interval_floor, of_motions
-from rbfrag.fragility.terms import TERMS
+from rbfrag.fragility.measures import TERMS
 from tests.fragility.outcome_draws import drawn_outcomes
 
 

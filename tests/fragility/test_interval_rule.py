@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbfrag.db.location import REFERENCE
-from rbfrag.fragility.prediction import predict
+from rbfrag.fragility.predict import predict
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 

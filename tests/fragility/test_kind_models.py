@@ -19,8 +19,8 @@ from scipy.special import ndtr
 from rbfrag.db.engine import opened_database
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import FitError, InputError, ModelError, UnknownModelError
-from rbfrag.fragility.kind_data import LEAST_DISPLACEMENT_M, KindData
-from rbfrag.fragility.kind_fitting import (
+from rbfrag.fragility.fit.kind_data import LEAST_DISPLACEMENT_M, KindData
+from rbfrag.fragility.fit.kind_fitting import (
     ARRAYS,
     STARTS,
     fit_kind,

@@ -6,10 +6,10 @@ import pytest
 
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
-from rbfrag.db.model_store import load_model, save_model, set_default
+from rbfrag.db.models import load_model, save_model, set_default
 from rbfrag.errors import DatabaseNotFoundError, InputError, UnknownModelError
-from rbfrag.fragility.model_lookup import FROM_REFERENCE, find_model
-from rbfrag.fragility.prediction import predict
+from rbfrag.fragility.lookup import FROM_REFERENCE, find_model
+from rbfrag.fragility.predict import predict
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def test_the_database_of_the_environment_and_folder_without_heavy_libraries(data
     path = database("pgv")
     program = """
 import sys
-from rbfrag.fragility.prediction import predict
+from rbfrag.fragility.predict import predict
 print(predict(3.0, 0.1, pgv_m_s=0.6).model)
 heavy = {"numpy", "scipy", "pandas", "statsmodels", "numba", "matplotlib", "sqlalchemy"}
 print(sorted(heavy & set(sys.modules)))

@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import FitError, InputError
-from rbfrag.fragility import formulas, outcome_method
-from rbfrag.fragility.binomial import jackknife_covariance
-from rbfrag.fragility.fit_data import fit_data
-from rbfrag.fragility.fitting import fit, fit_source
+from rbfrag.fragility import formulas
+from rbfrag.fragility.fit.binomial import jackknife_covariance
+from rbfrag.fragility.fit.data import fit_data
+from rbfrag.fragility.fit.fitting import fit, fit_source
+from rbfrag.fragility.fit.report import FitReport
+from rbfrag.fragility.fit.source import FitSource
+from rbfrag.fragility.measures import TERMS
+from rbfrag.fragility.methods import outcome as outcome_method
+from rbfrag.fragility.methods.outcome import fit_parameters
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.outcome_method import fit_parameters
-from rbfrag.fragility.report import FitReport
-from rbfrag.fragility.source import FitSource
-from rbfrag.fragility.terms import TERMS
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
 
 

@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError, ModelError
-from rbfrag.fragility import interval_floor, outcome_method, prediction_array
+from rbfrag.fragility import interval_floor, prediction_array
 from rbfrag.fragility.answers import MotionPrediction
-from rbfrag.fragility.fitting import fit
+from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.formulas import FLOOR_FROM, FLOOR_NODES, FLOOR_STEP, PARAMETERS, SHAPES
+from rbfrag.fragility.methods import outcome as outcome_method
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import answer_given, predict
+from rbfrag.fragility.predict import answer_given, predict
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes

@@ -12,7 +12,7 @@ from scipy.stats import norm
 from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility.answers import Prediction, PredictionArray
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import predict
+from rbfrag.fragility.predict import predict
 
 G = 9.80665
 
@@ -299,7 +299,7 @@ def test_single_numbers_load_no_heavy_library():
     program = """
 import sys
 from rbfrag.db.rows import ModelRow
-from rbfrag.fragility.prediction import predict
+from rbfrag.fragility.predict import predict
 row = ModelRow("m", "pgv", "wls", {"c0": 0.0, "c1": 0.7, "v0": 1e-4, "v1": 2e-3},
                ((1e-6, 0, 0, 0), (0, 1e-4, 0, 0), (0, 0, 1e-10, 0), (0, 0, 0, 1e-8)),
                {"p2": (0.1, 30.0)}, "")

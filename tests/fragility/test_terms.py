@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.terms import TERMS, intensity_term, terms_from
+from rbfrag.fragility.measures import TERMS, intensity_term, terms_from
 
 
 def test_terms_of_one_harmonic_motion_agree():

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.motions.clock import first_sample_time
 from rbfrag.motions.companions import companion, upward
 from rbfrag.motions.direction import is_downward_name, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.processing import processed
-from rbfrag.solver.respond import respond
+from rbfrag.motions.text.clock import first_sample_time
+from rbfrag.solver.toppling_run import respond
 from tests.synthetic import shaking
 
 DT_S = 0.02

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbfrag.errors import MotionFileError
-from rbfrag.motions.delimited_text import FORMAT
+from rbfrag.motions.formats.delimited_text import FORMAT
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import read_motion
-from rbfrag.motions.time_column import sampling_interval
+from rbfrag.motions.text.times import sampling_interval
 from tests.motions.written import two_columns
 
 G = 9.80665

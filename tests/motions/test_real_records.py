@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from rbfrag.errors import MotionFileError, UnknownFormatError
-from rbfrag.motions import delimited_text
+from rbfrag.motions.formats import delimited_text
 from rbfrag.motions.metadata import read_metadata
 from rbfrag.motions.recognise import HEAD_CHARACTERS, READERS, read_motion, read_motions
-from rbfrag.motions.text_file import read_text
+from rbfrag.motions.text.file import read_text
 
 COUNTS = {
     "peer_at2_opensees": 52,

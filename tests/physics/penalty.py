@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from rbfrag.solver.block import Block
+from rbfrag.solver.block.geometry import Block
 
 FloatArray = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import read_motions
-from rbfrag.solver.block import Block
-from rbfrag.solver.response import respond
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome, Response
 from tests.physics.penalty import Simulated, simulate
 

@@ -13,9 +13,9 @@ import pytest
 from scipy.optimize import brentq
 
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.critical import critical
-from rbfrag.solver.respond import respond
 from rbfrag.solver.results import CriticalResult, Outcome
+from rbfrag.solver.search.critical import critical
+from rbfrag.solver.toppling_run import respond
 from tests.physics.pulses import rectangle, rectangular_cycle, sine_lobes, triangle
 
 F = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)

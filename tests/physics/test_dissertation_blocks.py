@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.block import Block
-from rbfrag.solver.block_arrays import BlockArray
-from rbfrag.solver.rotated_yield import kct_after_rotation, ks_after_rotation
-from rbfrag.solver.stability import stability
-from rbfrag.solver.stability_arrays import stability_arrays
+from rbfrag.solver.block.arrays import BlockArray
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.stability.arrays import stability_arrays
+from rbfrag.solver.stability.rotated_yield import kct_after_rotation, ks_after_rotation
+from rbfrag.solver.stability.single import stability
 
 REFERENCE = [
     # α1, α3, φ, β, γ, k(0), k(0.1 rad)

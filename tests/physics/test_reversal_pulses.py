@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
-from rbfrag.solver.critical import critical
-from rbfrag.solver.respond import respond
 from rbfrag.solver.results import CriticalResult, Outcome
+from rbfrag.solver.search.critical import critical
+from rbfrag.solver.toppling_run import respond
 from tests.physics.pulses import rectangular_cycle, sine_lobes
 
 SAMPLES = 500

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
-from rbfrag.solver.response import respond
+from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome, Response
 
 

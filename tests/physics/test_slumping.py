@@ -7,11 +7,11 @@ import math
 import pytest
 
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
-from rbfrag.solver.block import Block
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.integrator.one_freedom.equation import Equation
+from rbfrag.solver.kind import BlockOnPlanes
 from rbfrag.solver.models import confined_toppling, slumping
-from rbfrag.solver.one_freedom.equation import Equation
-from rbfrag.solver.response_model import BlockOnPlanes
-from rbfrag.solver.stability import stability
+from rbfrag.solver.stability.single import stability
 
 # r1 = 1 m, g = 9.81 m/s², both friction angles equal: an independent calculation by 3x3 equilibrium
 # (angles, then k, p², q at rest, k in reverse, and k, p², q after a rotation of 0.1 rad)

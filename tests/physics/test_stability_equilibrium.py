@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.solver.block import Block
-from rbfrag.solver.stability import Stability, stability
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.stability.single import Stability, stability
 from tests.physics import equilibrium as statics
 
 BLOCKS = 2400

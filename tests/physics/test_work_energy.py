@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
-from rbfrag.solver.block import Block
+from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.integrator.one_freedom.equation import Mechanism
+from rbfrag.solver.integrator.one_freedom.follow import follow
+from rbfrag.solver.kind import BlockOnPlanes
 from rbfrag.solver.models import confined_toppling, sliding, slumping
-from rbfrag.solver.one_freedom.equation import Mechanism
-from rbfrag.solver.one_freedom.follow import follow
-from rbfrag.solver.response import respond
-from rbfrag.solver.response_model import BlockOnPlanes
+from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome
 
 FloatArray = NDArray[np.float64]

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from rbfrag.plots.block_lines import block_lines
-from rbfrag.solver.block import Block
-from rbfrag.solver.stability import stability
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.stability.single import stability
 
 BETA_DEG = 20.0
 

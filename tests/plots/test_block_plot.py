@@ -11,8 +11,8 @@ from matplotlib.patches import Polygon
 from rbfrag.errors import InputError
 from rbfrag.plots import block as module
 from rbfrag.plots.block import plot_block
-from rbfrag.solver.block import Block
-from rbfrag.solver.stability import stability
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.stability.single import stability
 
 TOPPLE = (Block.from_angles(-20.0, 25.0, 1.0), {"beta_deg": 5.0, "phi_deg": 35.0})
 SLUMP = (Block.from_angles(50.0, 72.0, 1.0), {"beta_deg": 5.0, "phi_deg": 35.0})

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.calibration_bins import CalibrationBins
 from rbfrag.fragility.claims_of_vertical import vertical_pairs
+from rbfrag.fragility.fit.calibration_bins import CalibrationBins
 from rbfrag.plots import calibration as calibration_module
 from rbfrag.plots import vertical as vertical_module
 from rbfrag.plots.calibration import plot_calibration

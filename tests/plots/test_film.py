@@ -14,8 +14,8 @@ from PIL import Image
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.plots.film import FRAMES_PER_S, film
-from rbfrag.solver.block import Block
-from rbfrag.solver.response import respond
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Response
 
 BLOCK = Block.from_angles(45, 65, 1.0)

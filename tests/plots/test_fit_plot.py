@@ -91,7 +91,7 @@ def test_what_the_figure_says(table, model, tmp_path, drawn):
 
 
 def test_the_failure_lines_have_their_probabilities(table, model, tmp_path, drawn):
-    from rbfrag.fragility.prediction import predict
+    from rbfrag.fragility.predict import predict
 
     plot_fit(table, model, tmp_path / "fit.png")
     lines = {line.get_label(): line for line in drawn[0].axes[0].lines}

@@ -10,7 +10,7 @@ import pytest
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import predict
+from rbfrag.fragility.predict import predict
 from rbfrag.plots.chart import plot_chart
 from rbfrag.plots.failure_lines import failure_line
 from rbfrag.plots.held_measures import held_measures

@@ -8,9 +8,9 @@ import pytest
 from rbfrag.errors import InputError
 from rbfrag.plots import modes as module
 from rbfrag.plots.modes import MOST_POINTS, plot_modes
-from rbfrag.solver.block import Block
-from rbfrag.solver.mechanism import MODES
-from rbfrag.solver.stability import stability
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.stability.modes import MODES
+from rbfrag.solver.stability.single import stability
 
 
 def images(figure):

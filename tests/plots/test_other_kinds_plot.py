@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.other_kinds import jibson_2007, saygili_rathje_2008, within_motion
 from rbfrag.errors import InputError
-from rbfrag.fragility.kind_fitting import fit_kind_data
+from rbfrag.fragility.fit.kind_fitting import fit_kind_data
 from rbfrag.plots.other_kinds import plot_other_kinds
 from tests.fragility.test_kind_models import drawn
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rbfrag.fragility.prediction import predict
+from rbfrag.fragility.predict import predict
 from rbfrag.plots.fit import plot_fit
 from rbfrag.plots.predicted_strengths import predicted_strengths, running_medians
 from tests.fragility.outcome_draws import drawn_outcomes

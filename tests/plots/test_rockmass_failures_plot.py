@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.rockmass import RockMass
-from rbfrag.fragility.rockmass_failures import failures
-from rbfrag.fragility.rockmass_shaken import plan_shaking
-from rbfrag.fragility.rockmass_shaking import run_blocks
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.plots import rockmass_failures as module
 from rbfrag.plots.rockmass_failures import plot_failures
+from rbfrag.rockmass.failures import failures
+from rbfrag.rockmass.joint_sets import RockMass
+from rbfrag.rockmass.response import plan_shaking
+from rbfrag.rockmass.shaking import run_blocks
 from tests.synthetic import shaking
 
 UNIFORM = {"distribution": "uniform"}

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.rockmass import RockMass
-from rbfrag.fragility.rockmass_counts import crossings, mode_counts
 from rbfrag.plots import rockmass as module
 from rbfrag.plots.rockmass import plot_rockmass
+from rbfrag.rockmass.counts import crossings, mode_counts
+from rbfrag.rockmass.joint_sets import RockMass
 
 
 def normal(mean, sd):

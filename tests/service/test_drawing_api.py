@@ -3,8 +3,8 @@
 import pytest
 
 from rbfrag.plots.block_lines import block_lines
-from rbfrag.solver.block import Block
-from rbfrag.solver.stability import stability
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.stability.single import stability
 
 SHAPE = {"alpha1": -15, "alpha3": 24, "r3": 2.5, "beta": 18, "phi": 38}
 

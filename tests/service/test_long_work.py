@@ -10,9 +10,9 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.motions.export import export_motions
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.service.app import make_app
-from rbfrag.service.hazard_api import EXAMPLE as CURVE
-from rbfrag.service.rockmass_api import EXAMPLE as TABLES
-from rbfrag.service.rockmass_api import EXAMPLE_TOML
+from rbfrag.service.routes.hazard import EXAMPLE as CURVE
+from rbfrag.service.routes.rockmass import EXAMPLE as TABLES
+from rbfrag.service.routes.rockmass import EXAMPLE_TOML
 from rbfrag.service.settings import Settings
 from rbfrag.service.work import EXAMPLE as RECORD
 from tests.cli.conftest import Shell

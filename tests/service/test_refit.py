@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from rbfrag.db.engine import opened_database
-from rbfrag.db.model_store import load_model, save_model
+from rbfrag.db.models import load_model, save_model
 from rbfrag.errors import DatabaseFailedError
 from rbfrag.service.problem import in_parameters, refused
 from rbfrag.service.settings import Settings

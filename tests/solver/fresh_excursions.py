@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.ground import ground_of
-from rbfrag.solver.renewal import all_known, begin, no_starts
+from rbfrag.solver.integrator.block_excitation import ground_of
+from rbfrag.solver.search.renewal import all_known, begin, no_starts
 
 
 def fails(drive: Excitation, p2: float, linear: bool, kr: float) -> bool:

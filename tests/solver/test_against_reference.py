@@ -10,10 +10,10 @@ import pytest
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import read_motions
-from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome, Polarity
+from rbfrag.solver.search.critical import critical
+from rbfrag.solver.toppling_run import respond
 from tests.solver.reference import integrate
 
 HORIZONTALS = (

@@ -13,10 +13,10 @@ import pytest
 from benchmarks.certify.borders import border
 from benchmarks.extended.toppling import truth
 from rbfrag.motions.recognise import read_motions
-from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.respond import OUTCOMES, simulate
 from rbfrag.solver.results import POLARITIES, Polarity
+from rbfrag.solver.search.critical import critical
+from rbfrag.solver.toppling_run import OUTCOMES, simulate
 
 DISTANCES = tuple(10.0**-n for n in range(3, 11))
 """Relative distances from the critical k_r at which the outcome must be the true one."""

@@ -1,1 +1,1 @@
-"""The response models, one small file each; `rbfrag.solver.response_models` finds them."""
+"""The response models, one small file each; `rbfrag.solver.kinds` finds them."""

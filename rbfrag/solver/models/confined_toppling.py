@@ -1,6 +1,7 @@
 """A block that topples under an overhanging back plane: its toe slides out, its heel up that plane.
 
-The equation of two sliding contacts (`rbfrag.solver.one_freedom.two_contacts`) holds up to the
+The equation of two sliding contacts (`rbfrag.solver.integrator.one_freedom.two_contacts`) holds up
+to the
 first standstill, or until the base edge stands at right angles to the back plane, where the toe
 stops and free toppling follows. At a standstill the back plane holds the block only while
 
@@ -17,12 +18,19 @@ import math
 from collections.abc import Callable
 
 from rbfrag.errors import InputError
-from rbfrag.solver.block import Block
-from rbfrag.solver.one_freedom.equation import Ending, Equation, Exit, Mechanism, Phase, Pose
-from rbfrag.solver.one_freedom.harmonics import Harmonics, Vector, constant, turning
-from rbfrag.solver.one_freedom.rocking import rocking_equation
-from rbfrag.solver.one_freedom.two_contacts import Contact, two_contact_equation
-from rbfrag.solver.response_model import BlockOnPlanes, MechanismModel
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.integrator.one_freedom.equation import (
+    Ending,
+    Equation,
+    Exit,
+    Mechanism,
+    Phase,
+    Pose,
+)
+from rbfrag.solver.integrator.one_freedom.harmonics import Harmonics, Vector, constant, turning
+from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
+from rbfrag.solver.integrator.one_freedom.two_contacts import Contact, two_contact_equation
+from rbfrag.solver.kind import BlockOnPlanes, MechanismModel
 from rbfrag.solver.results import Outcome
 
 

@@ -15,7 +15,7 @@ import math
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.one_freedom.equation import (
+from rbfrag.solver.integrator.one_freedom.equation import (
     Condition,
     Ending,
     Equation,
@@ -24,8 +24,8 @@ from rbfrag.solver.one_freedom.equation import (
     Phase,
     Pose,
 )
-from rbfrag.solver.one_freedom.harmonics import constant
-from rbfrag.solver.response_model import BlockOnPlanes, MechanismModel
+from rbfrag.solver.integrator.one_freedom.harmonics import constant
+from rbfrag.solver.kind import BlockOnPlanes, MechanismModel
 from rbfrag.solver.results import Outcome
 
 

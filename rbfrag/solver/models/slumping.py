@@ -3,7 +3,7 @@ down the back plane.
 
 Friction is fully mobilised at both contacts, against the motion: forward (sense 1) or, when
 the ground drives the block back up, in reverse (sense -1). The equation of two sliding contacts is
-derived in `rbfrag.solver.one_freedom.two_contacts`; it has the form of toppling,
+derived in `rbfrag.solver.integrator.one_freedom.two_contacts`; it has the form of toppling,
 
     θ'' = p_s²(θ) [k_h - (1 + k_v) k_s(θ)] - q(θ) θ'²
 
@@ -17,11 +17,18 @@ from __future__ import annotations
 import math
 
 from rbfrag.errors import InputError
-from rbfrag.solver.block import Block
-from rbfrag.solver.one_freedom.equation import Ending, Equation, Exit, Mechanism, Phase, Pose
-from rbfrag.solver.one_freedom.harmonics import Harmonics, Vector, constant, turning
-from rbfrag.solver.one_freedom.two_contacts import Contact, two_contact_equation
-from rbfrag.solver.response_model import BlockOnPlanes, MechanismModel
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.integrator.one_freedom.equation import (
+    Ending,
+    Equation,
+    Exit,
+    Mechanism,
+    Phase,
+    Pose,
+)
+from rbfrag.solver.integrator.one_freedom.harmonics import Harmonics, Vector, constant, turning
+from rbfrag.solver.integrator.one_freedom.two_contacts import Contact, two_contact_equation
+from rbfrag.solver.kind import BlockOnPlanes, MechanismModel
 from rbfrag.solver.results import Outcome
 
 

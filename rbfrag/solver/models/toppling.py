@@ -2,7 +2,8 @@
 
     θ'' = p² cos(θc - θ) [k_h - (1 + k_v) tan(θc - θ)],    tan θc = k_r
 
-It has a kernel of its own, `rbfrag.solver.toppling`, which campaigns and searches call by the
+It has a kernel of its own, `rbfrag.solver.integrator.single_run`, which campaigns and searches
+call by the
 million, and whose results are stored.
 """
 
@@ -13,13 +14,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from rbfrag.errors import InputError
-from rbfrag.solver.mechanism import ModeName
-from rbfrag.solver.response_model import BlockOnPlanes, Shaking
+from rbfrag.solver.kind import BlockOnPlanes, Shaking
 from rbfrag.solver.results import Response
+from rbfrag.solver.stability.modes import ModeName
 
 if TYPE_CHECKING:
     from rbfrag.solver.excitation import Excitation
-    from rbfrag.solver.fate import Runner
+    from rbfrag.solver.run_end import Runner
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Toppling:
 
     def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
         """Return what the block does."""
-        from rbfrag.solver.respond import respond
+        from rbfrag.solver.toppling_run import respond
 
         assert site.block is not None
         answer = respond(
@@ -48,8 +49,8 @@ class Toppling:
 
     def runner(self, site: BlockOnPlanes) -> Runner:
         """Return a function that says what becomes of the block under an excitation."""
-        from rbfrag.solver.fate import Fate
-        from rbfrag.solver.respond import OUTCOMES, refuse_endless, simulate
+        from rbfrag.solver.run_end import Fate
+        from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless, simulate
 
         assert site.block is not None
         p2, kr = site.block.p2, _strength(site)

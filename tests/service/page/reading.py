@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from playwright.sync_api import Page
 
 from rbfrag.db.location import REFERENCE
-from rbfrag.fragility.prediction import predict
+from rbfrag.fragility.predict import predict
 
 PERCENT = re.compile(r"([<>]?)\s*([\d.]+)\s*%")
 

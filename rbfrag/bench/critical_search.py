@@ -1,0 +1,164 @@
+"""The critical search against the runs of the dissertation's search, paired in one process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rbfrag.bench import cvode_peer
+from rbfrag.bench.cases import Case
+from rbfrag.bench.cvode_peer import cvode_run
+from rbfrag.bench.methods import taylor_run
+from rbfrag.bench.timing import spread, timed
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.excitation import excitation
+from rbfrag.solver.integrator.batch import simulate_many
+from rbfrag.solver.results import SEARCH_LIMIT, Polarity
+from rbfrag.solver.search.critical import critical
+from rbfrag.solver.toppling_run import OUTCOMES
+
+SCAN = 11
+"""Runs of the descending scan, evenly in ln k_r between PGA and the search limit ..."""
+
+BISECTIONS = 12
+"""... and of the bisection below the first that topples: 23 runs in all."""
+
+
+@dataclass(frozen=True)
+class SearchTimes:
+    """One kind of work over all combinations.
+
+    Args:
+        name: what was run.
+        combinations: how many combinations.
+        time_s: median time per combination [s].
+        time_low_s: its 10 % quantile [s].
+        time_high_s: its 90 % quantile [s].
+        over_runs: median of its time over that of the same 23 runs by rbfrag, side by side.
+        over_runs_least: least of these ratios.
+        over_search: median of its time over that of the whole critical search.
+        over_search_least: least of these ratios.
+        wrong: outcomes that differ from those of rbfrag's kernel; None for the search.
+    """
+
+    name: str
+    combinations: int
+    time_s: float
+    time_low_s: float
+    time_high_s: float
+    over_runs: float
+    over_runs_least: float
+    over_search: float
+    over_search_least: float
+    wrong: int | None
+
+
+def compare_searches(
+    combinations: Sequence[tuple[GroundMotion, Polarity, float]],
+    *,
+    tolerances: Sequence[float] = (1e-6, 1e-8),
+    seed: int = 1,
+    on_combination: Callable[[int, int], None] | None = None,
+) -> tuple[SearchTimes, ...]:
+    """Time the critical search, and the same 23 runs by rbfrag's kernel and by CVODE.
+
+    The 23 values of k_r are those of a descending scan and a bisection, made beforehand:
+    every method runs the same values, whatever it would have found itself.
+
+    Args:
+        combinations: motions with polarity and p² [1/s²].
+        tolerances: relative tolerances of CVODE; not run where it is not installed.
+        seed: of the order in which the methods take turns on each combination.
+        on_combination: called after each combination with (done, total).
+    """
+    rng = np.random.default_rng(seed)
+    names = ["critical search", "23 runs, rbfrag, side by side", "23 runs, rbfrag, one by one"]
+    works: list[Callable[[tuple[Case, ...]], object]] = [_search, _runs_in_lanes, _runs_by_kernel]
+    if cvode_peer.is_installed():
+        for rtol in tolerances:
+            names.append(f"23 runs, CVODE in Python, rtol {rtol:.0e}")
+            works.append(_runs_by_cvode(rtol))
+    seconds = np.empty((len(works), len(combinations)))
+    wrong = [0] * len(works)
+    for j, (motion, polarity, p2) in enumerate(combinations):
+        cases = search_runs(motion, polarity, p2)
+        if j == 0:
+            for work in works[:3]:
+                work(cases)  # compiles
+        answers: dict[int, object] = {}
+        for i in rng.permutation(len(works)):
+            answers[int(i)], seconds[i, j] = timed(_bound(works[i], cases))
+        ours = answers[1]
+        assert isinstance(ours, tuple)
+        for i in range(2, len(works)):
+            theirs = answers[i]
+            assert isinstance(theirs, tuple)
+            wrong[i] += sum(a != b for a, b in zip(ours, theirs, strict=True))
+        if on_combination is not None:
+            on_combination(j + 1, len(combinations))
+    rows = []
+    for i, name in enumerate(names):
+        middle, low, high = spread(seconds[i])
+        over_search, over_runs = seconds[i] / seconds[0], seconds[i] / seconds[1]
+        rows.append(
+            SearchTimes(
+                name=name,
+                combinations=len(combinations),
+                time_s=middle,
+                time_low_s=low,
+                time_high_s=high,
+                over_runs=float(np.median(over_runs)),
+                over_runs_least=float(over_runs.min()),
+                over_search=float(np.median(over_search)),
+                over_search_least=float(over_search.min()),
+                wrong=None if i == 0 else wrong[i],
+            )
+        )
+    return tuple(rows)
+
+
+def search_runs(motion: GroundMotion, polarity: Polarity, p2: float) -> tuple[Case, ...]:
+    """Return the 23 runs of one search: a descending scan, then a bisection."""
+    drive = excitation(motion, None, polarity)
+
+    def case(ratio: float) -> Case:
+        return Case(motion, polarity, drive, p2, ratio * drive.pga_g)
+
+    ratios = np.geomspace(1.0, SEARCH_LIMIT, SCAN)
+    runs = [case(float(ratio)) for ratio in ratios]
+    topples = [taylor_run(run).outcome == "toppled" for run in runs]
+    first = topples.index(True) if True in topples else SCAN - 1
+    low, high = float(ratios[first]), float(ratios[max(first - 1, 0)])
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        runs.append(case(middle))
+        if taylor_run(runs[-1]).outcome == "toppled":
+            low = middle
+        else:
+            high = middle
+    return tuple(runs)
+
+
+def _search(cases: tuple[Case, ...]) -> object:
+    return critical(cases[0].motion, p2=cases[0].p2, polarity=cases[0].polarity)
+
+
+def _runs_in_lanes(cases: tuple[Case, ...]) -> tuple[str, ...]:
+    runs = simulate_many(cases[0].drive, p2=cases[0].p2, kr=np.array([case.kr for case in cases]))
+    return tuple(OUTCOMES[code].value for code in runs.outcome.tolist())
+
+
+def _runs_by_kernel(cases: tuple[Case, ...]) -> tuple[str, ...]:
+    return tuple(taylor_run(case).outcome for case in cases)
+
+
+def _runs_by_cvode(rtol: float) -> Callable[[tuple[Case, ...]], object]:
+    return lambda cases: tuple(cvode_run(case, rtol).outcome for case in cases)
+
+
+def _bound(
+    work: Callable[[tuple[Case, ...]], object], cases: tuple[Case, ...]
+) -> Callable[[], object]:
+    return lambda: work(cases)

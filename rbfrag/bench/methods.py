@@ -1,0 +1,94 @@
+"""The methods that are compared, and those that cannot be run here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rbfrag.bench import cvode_peer
+from rbfrag.bench.cases import Case
+from rbfrag.bench.cvode_peer import cvode_run
+from rbfrag.bench.euler import euler
+from rbfrag.bench.free_motion import Answer
+from rbfrag.bench.scipy_peer import Solver, solve_ivp_run
+from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
+from rbfrag.solver.toppling_run import OUTCOMES, simulate
+
+UNSPLIT = math.inf
+
+
+@dataclass(frozen=True)
+class Method:
+    """One method at one setting.
+
+    Args:
+        family: methods of one family are joined by a line in the figure.
+        setting: what distinguishes it within the family.
+        run: how one case is run.
+        of_use: the setting that users of rbfrag get.
+    """
+
+    family: str
+    setting: str
+    run: Callable[[Case], Answer]
+    of_use: bool = False
+
+    @property
+    def name(self) -> str:
+        """Family and setting."""
+        return f"{self.family}, {self.setting}"
+
+
+def taylor_run(case: Case, order: int = ORDER, ph_max: float = PH_MAX) -> Answer:
+    """Run one case with rbfrag's kernel."""
+    run = simulate(case.drive, p2=case.p2, kr=case.kr, order=order, ph_max=ph_max)
+    return Answer(OUTCOMES[run.outcome].value, run.peak_rad)
+
+
+def methods(*, quick: bool = False) -> tuple[Method, ...]:
+    """Return every method that can be run here.
+
+    Args:
+        quick: leave out the slowest settings.
+    """
+    splits = dict.fromkeys((UNSPLIT, PH_MAX, PH_MAX / 3.0))
+    orders = dict.fromkeys((4, 5, 6, ORDER))
+    found = [_taylor(order, ph_max) for ph_max in splits for order in orders]
+    found += [_euler(parts) for parts in ((1, 8) if quick else (1, 8, 64))]
+    solvers: tuple[Solver, ...] = ("RK45", "DOP853", "LSODA")
+    tolerances = (1e-6,) if quick else (1e-4, 1e-6)
+    found += [_scipy(solver, rtol) for solver in solvers for rtol in tolerances]
+    if cvode_peer.is_installed():
+        found += [_cvode(rtol) for rtol in ((1e-6, 1e-8) if quick else (1e-6, 1e-8, 1e-10))]
+    return tuple(found)
+
+
+def missing_peers() -> tuple[str, ...]:
+    """Return the packages of peers that are not installed here."""
+    return () if cvode_peer.is_installed() else (cvode_peer.INSTALL,)
+
+
+def _taylor(order: int, ph_max: float) -> Method:
+    split = "unsplit" if ph_max == UNSPLIT else f"p·h ≤ {ph_max:g}"
+    return Method(
+        f"rbfrag, {split}",
+        f"order {order}",
+        lambda case: taylor_run(case, order, ph_max),
+        of_use=(order, ph_max) == (ORDER, PH_MAX),
+    )
+
+
+def _euler(parts: int) -> Method:
+    setting = "dt" if parts == 1 else f"dt/{parts}"
+    return Method("forward Euler", setting, lambda case: euler(case, parts))
+
+
+def _scipy(solver: Solver, rtol: float) -> Method:
+    return Method(
+        f"scipy {solver}", f"rtol {rtol:.0e}", lambda case: solve_ivp_run(case, solver, rtol)
+    )
+
+
+def _cvode(rtol: float) -> Method:
+    return Method("CVODE in Python", f"rtol {rtol:.0e}", lambda case: cvode_run(case, rtol))

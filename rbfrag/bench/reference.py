@@ -1,0 +1,174 @@
+"""Peak rotations to judge every method by, in extended precision.
+
+A Taylor step of degree 16 in numpy's longdouble (64 bits of mantissa on x86), p·h <= 0.25,
+sines and cosines called at every step, roots isolated by bounds of the polynomial on each
+half of the step. It shares no code with rbfrag.solver, only the arrays of the excitation.
+The truncation of a step is below (p h)^17/17!, some 1e-25; what is left is the rounding of
+longdouble. Where longdouble is no longer than a double (some platforms) some 1e-13 is left.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rbfrag.bench.cases import Case
+from rbfrag.bench.free_motion import STABLE, TOPPLED, Answer, free_motion
+
+Real = np.longdouble
+ORDER = 16
+PH_MAX = 0.25
+
+
+def reference(case: Case) -> Answer:
+    """Return outcome and peak rotation [rad] of one case."""
+    drive = case.drive
+    k = [Real(x) for x in drive.k_h]
+    w = [Real(x) for x in drive.w]
+    kr, p = Real(case.kr), np.sqrt(Real(case.p2))
+    theta_c = np.arctan(kr)
+    rest = Real(0)
+    # tan falls short past 90 degrees: the block is followed by its angle, never by tan
+    border = [
+        np.arctan(min(Real(q), rest)) for q in np.minimum.accumulate(drive.q[::-1])[::-1].tolist()
+    ]
+    g = drive.k_h - drive.w * case.kr
+    lifts = np.flatnonzero(g > 0.0)
+    peak = rest
+    moving = False
+    theta = rate = rest
+    i = 0
+    while i < len(k) - 1:
+        h = Real(drive.interval_s[i])
+        if not moving and (h == 0 or (g[i] <= 0.0 and g[i + 1] <= 0.0)):
+            later = lifts[np.searchsorted(lifts, i + 1) :]
+            if not later.size:
+                break
+            i = max(i + 1, int(later[0]) - 1)
+            continue
+        at, fresh = rest, False
+        da, dw = k[i + 1] - k[i], w[i + 1] - w[i]
+        g0, slope = k[i] - w[i] * kr, da - dw * kr
+        if not moving:
+            fresh = bool(g0 <= 0)
+            at = -g0 / slope if fresh else rest
+            moving, theta, rate = True, rest, rest
+        while moving and at < 1 and h > 0:
+            left = h * (1 - at)
+            pieces = max(1, math.ceil(float(p * left) / PH_MAX))
+            part = (1 - at) / pieces
+            u = _coefficients(
+                theta_c - theta, rate * h * part, (p * h * part) ** 2,
+                k[i] + da * at, da * part, w[i] + dw * at, dw * part, fresh,
+            )  # fmt: skip
+            fresh = False
+            path = [theta, *(u[j] / (j + 1) for j in range(len(u)))]
+            landing = _first_root(path)
+            for turn in _roots(u):
+                if landing is None or turn < landing:
+                    peak = max(peak, _value(path, turn))
+            if landing is None:
+                theta, rate = _value(path, Real(1)), _value(u, Real(1)) / (h * part)
+                at = at + part if pieces > 1 else Real(1)
+                if rate > 0 and theta_c - theta < border[i]:
+                    return Answer(TOPPLED, math.nan)
+                continue
+            at += part * landing
+            now = g0 + slope * at
+            theta = rate = rest
+            if now <= 0:
+                fresh = bool(slope > 0 and g0 + slope > 0)
+                moving = fresh
+                at = max(at, -g0 / slope) if fresh else at
+        i += 1
+        if moving and rate > 0 and theta_c - theta < border[i]:
+            return Answer(TOPPLED, math.nan)
+    if not moving:
+        return Answer(STABLE, float(peak))
+    return free_motion(theta, rate, p, theta_c, peak)
+
+
+def _coefficients(
+    phi: Real, u0: Real, big_p: Real, a: Real, da: Real, w: Real, dw: Real, fresh: bool
+) -> list[Real]:
+    """Taylor coefficients of h theta' over one step."""
+    u, s, c = [u0], [np.sin(phi)], [np.cos(phi)]
+    for n in range(ORDER):
+        drive = a * c[n] - w * s[n]
+        if n:
+            drive += da * c[n - 1] - dw * s[n - 1]
+        elif fresh:
+            drive = Real(0)  # a = w k_r is where the motion starts
+        u.append(big_p * drive / (n + 1))
+        s.append(-sum((u[j] * c[n - j] for j in range(n + 1)), Real(0)) / (n + 1))
+        c.append(sum((u[j] * s[n - j] for j in range(n + 1)), Real(0)) / (n + 1))
+    return u
+
+
+def _value(x: list[Real], t: Real) -> Real:
+    total = Real(0)
+    for coefficient in reversed(x):
+        total = total * t + coefficient
+    return total
+
+
+def _first_root(x: list[Real]) -> Real | None:
+    roots = _roots(x)
+    return roots[0] if roots else None
+
+
+def _roots(x: list[Real]) -> list[Real]:
+    """Sign changes of a polynomial in (0, 1], in order; a root at 0 itself is divided out."""
+    while x and x[0] == 0:
+        x = x[1:]
+    found: list[Real] = []
+    if x:
+        _isolate(x, Real(0), Real(1), found)
+    return found
+
+
+def _isolate(x: list[Real], low: Real, high: Real, found: list[Real]) -> None:
+    middle, half = (low + high) / 2, (high - low) / 2
+    about = x if low == 0 and high == 1 else _shifted(x, middle, half)
+    if about is x:  # expanded at 0: bounds hold on [0, 1]
+        if abs(x[0]) > sum((abs(v) for v in x[1:]), Real(0)):
+            return
+        about = _shifted(x, middle, half)
+    tail = [abs(v) for v in about[1:]]
+    if abs(about[0]) > sum(tail, Real(0)):
+        return
+    slope = sum((n * v for n, v in enumerate(tail[1:], 2)), Real(0))
+    if (tail and tail[0] > slope) or high - low < 1e-9:
+        at_low, at_high = _value(x, low), _value(x, high)
+        if at_low != 0 and (at_high == 0 or (at_low > 0) != (at_high > 0)):
+            found.append(_bisected(x, low, high, at_low))
+        return
+    _isolate(x, low, middle, found)
+    _isolate(x, middle, high, found)
+
+
+def _bisected(x: list[Real], low: Real, high: Real, at_low: Real) -> Real:
+    for _ in range(200):
+        middle = (low + high) / 2
+        f = _value(x, middle)
+        if middle in (low, high) or f == 0:
+            return middle
+        if (f > 0) == (at_low > 0):
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def _shifted(x: list[Real], centre: Real, scale: Real) -> list[Real]:
+    """Coefficients of x(centre + scale t) in t."""
+    y = list(x)
+    for i in range(len(y) - 1):
+        for j in range(len(y) - 2, i - 1, -1):
+            y[j] += centre * y[j + 1]
+    power = Real(1)
+    for i in range(len(y)):
+        y[i] *= power
+        power *= scale
+    return y

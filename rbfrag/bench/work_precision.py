@@ -1,0 +1,120 @@
+"""Time against error: every method on the same cases, in turns, in one process."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rbfrag.bench.cases import Case
+from rbfrag.bench.free_motion import STABLE, Answer
+from rbfrag.bench.methods import Method
+from rbfrag.bench.reference import reference
+from rbfrag.bench.timing import spread, timed
+
+
+@dataclass(frozen=True)
+class WorkPrecision:
+    """What one method did on all cases.
+
+    Args:
+        family: the method.
+        setting: its setting.
+        of_use: the setting that users of rbfrag get.
+        cases: number of cases.
+        wrong: cases whose outcome differs from the reference's.
+        error_median: median relative error of the peak rotation, where the block stays.
+        error_worst: greatest of these errors.
+        time_s: median time of one run [s].
+        time_low_s: its 10 % quantile over the cases [s].
+        time_high_s: its 90 % quantile [s].
+        slower: median over the cases of its time over that of rbfrag as used.
+        slower_least: least of these ratios.
+    """
+
+    family: str
+    setting: str
+    of_use: bool
+    cases: int
+    wrong: int
+    error_median: float | None
+    error_worst: float | None
+    time_s: float
+    time_low_s: float
+    time_high_s: float
+    slower: float
+    slower_least: float
+
+
+def measure(
+    cases: Sequence[Case],
+    methods: Sequence[Method],
+    *,
+    seed: int = 1,
+    on_case: Callable[[int, int], None] | None = None,
+) -> tuple[WorkPrecision, ...]:
+    """Run every method on every case and compare with the extended-precision reference.
+
+    Args:
+        cases: what to run.
+        methods: with what; one of them `of_use`, to which times are compared.
+        seed: of the order in which the methods take turns on each case.
+        on_case: called after each case with (done, total).
+    """
+    rng = np.random.default_rng(seed)
+    for method in methods:
+        method.run(cases[0])  # compiles, imports
+    truth: list[Answer] = []
+    answers: list[list[Answer]] = [[] for _ in methods]
+    seconds = np.empty((len(methods), len(cases)))
+    for j, case in enumerate(cases):
+        truth.append(reference(case))
+        given: dict[int, Answer] = {}
+        for i in rng.permutation(len(methods)):
+            given[int(i)], seconds[i, j] = timed(_bound(methods[i], case))
+        for i in range(len(methods)):
+            answers[i].append(given[i])
+        if on_case is not None:
+            on_case(j + 1, len(cases))
+    base = next(i for i, method in enumerate(methods) if method.of_use)
+    return tuple(
+        _row(method, truth, answers[i], seconds[i], seconds[base])
+        for i, method in enumerate(methods)
+    )
+
+
+def _bound(method: Method, case: Case) -> Callable[[], Answer]:
+    return lambda: method.run(case)
+
+
+def _row(
+    method: Method,
+    truth: Sequence[Answer],
+    answers: Sequence[Answer],
+    seconds: np.ndarray,
+    base: np.ndarray,
+) -> WorkPrecision:
+    wrong = sum(a.outcome != t.outcome for a, t in zip(answers, truth, strict=True))
+    errors = [
+        abs(a.peak_rad - t.peak_rad) / t.peak_rad
+        for a, t in zip(answers, truth, strict=True)
+        if a.outcome == t.outcome == STABLE and t.peak_rad > 0.0 and math.isfinite(a.peak_rad)
+    ]
+    middle, low, high = spread(seconds)
+    ratios = seconds / base
+    return WorkPrecision(
+        family=method.family,
+        setting=method.setting,
+        of_use=method.of_use,
+        cases=len(truth),
+        wrong=wrong,
+        error_median=float(np.median(errors)) if errors else None,
+        error_worst=max(errors, default=None),
+        time_s=middle,
+        time_low_s=low,
+        time_high_s=high,
+        slower=float(np.median(ratios)),
+        slower_least=float(ratios.min()),
+    )

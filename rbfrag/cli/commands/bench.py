@@ -1,0 +1,87 @@
+"""`rbfrag bench`: speed against error, on this machine."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rbfrag.cli.output import print_json, print_pairs, print_table
+from rbfrag.cli.parameters import options
+
+EXAMPLE = "Example:  rbfrag bench --quick"
+
+
+def bench(
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Fewer cases and settings: under a minute.")
+    ] = False,
+    records: Annotated[
+        str | None,
+        typer.Option(
+            "--records",
+            metavar="PATH",
+            help="Accelerogram file or folder to measure on. Default: the folder in "
+            "RBFRAG_TEST_RECORDS, else the sample records of rbfrag[samples], else analytic "
+            "pulses.",
+            show_default=False,
+        ),
+    ] = None,
+    out: Annotated[
+        str | None,
+        typer.Option(
+            "--out",
+            metavar="FOLDER",
+            help="Folder for the tables as CSV and, with matplotlib, work-precision.svg.",
+            show_default=False,
+        ),
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Measure speed against error beside general ODE solvers, on the same runs.
+
+    Every method runs the same blocks under the same records, in turns, and is compared with
+    an extended-precision reference. Then come the critical search and the scaling with the
+    length of the record and the number of workers. Times are processor times of one thread,
+    those of workers wall times. Peers that are not installed are named and left out.
+    """
+    from dataclasses import asdict
+
+    from rbfrag.bench import tables
+    from rbfrag.bench.run import run_bench
+    from rbfrag.errors import InputError, MissingExtraError
+
+    folder = None if out is None else Path(out)
+    if folder is not None and not folder.is_dir():
+        raise InputError(f"--out: there is no folder {folder}; make it first")
+
+    def say(sentence: str) -> None:
+        print(sentence, file=sys.stderr, flush=True)
+
+    result = run_bench(records, quick=quick, say=say)
+    if folder is not None:
+        for name, rows in result.tables().items():
+            tables.write_csv(rows, folder / f"{name}.csv")
+        try:
+            from rbfrag.plots.work_precision import plot_work_precision
+
+            plot_work_precision(result.work_precision, folder / "work-precision.svg")
+        except MissingExtraError as error:
+            say(f"no figure: {error}")
+    if json:
+        print_json(asdict(result))
+        return
+    print_pairs(result.machine)
+    print(f"{result.records}; {result.seconds:.0f} s in all")
+    for heading, table in (
+        ("Time of one run against its error", tables.work_precision_table(result.work_precision)),
+        ("Critical search", tables.critical_table(result.critical_search)),
+        ("Length of the record", tables.length_table(result.record_length)),
+        ("Workers", tables.workers_table(result.workers)),
+    ):
+        print(f"\n{heading}")
+        print_table(*table)
+    for name in result.not_installed:
+        print(f"\nnot compared with, because not installed: {name} (pip install {name})")

@@ -1,0 +1,101 @@
+"""`rbfrag block`: how one block fails, and at which acceleration."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from rbfrag.cli.output import print_json, print_pairs, print_warnings
+from rbfrag.cli.parameters import described_block, options
+
+EXAMPLE = "Example:  rbfrag block --s1 1 --s2 0.6 --gamma 25 --beta 20 --phi 40"
+
+
+def block(
+    alpha1: described_block.Alpha1 = None,
+    alpha3: described_block.Alpha3 = None,
+    r3: described_block.R3 = None,
+    s1: described_block.S1 = None,
+    s2: described_block.S2 = None,
+    gamma: described_block.Gamma = None,
+    polygon: Annotated[
+        str | None,
+        typer.Option(
+            "--polygon",
+            help="Block file (.toml or .csv); what it states may be given anew by options.",
+            show_default=False,
+        ),
+    ] = None,
+    beta: described_block.Beta = None,
+    phi: described_block.Phi = None,
+    phi_back: described_block.PhiBack = None,
+    cohesion: Annotated[
+        float | None,
+        typer.Option(
+            "--cohesion", help="Cohesion of the base [Pa], with --density.", show_default=False
+        ),
+    ] = None,
+    density: Annotated[
+        float | None,
+        typer.Option("--density", help="Density of the rock [kg/m3].", show_default=False),
+    ] = None,
+    kv: Annotated[
+        float | None,
+        typer.Option(
+            "--kv", help="Vertical acceleration of the ground, up positive [g].", show_default=False
+        ),
+    ] = None,
+    no_back: described_block.NoBack = False,
+    plot: Annotated[
+        str | None,
+        typer.Option(
+            "--plot",
+            help="Draw the block on its planes with its contacts and the resultant at yield "
+            "(.png, .pdf, .svg).",
+            show_default=False,
+        ),
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Print a block's failure mode, yield accelerations and size parameter.
+
+    Angles in degrees, lengths in m, accelerations in g, p2 in 1/s2.
+    """
+    from rbfrag.solver.block.described import described
+    from rbfrag.solver.stability.report import as_dict
+    from rbfrag.solver.stability.single import stability
+
+    shape, conditions = described(
+        {"alpha1": alpha1, "alpha3": alpha3, "r3": r3},
+        {"s1": s1, "s2": s2, "gamma": gamma},
+        {
+            "beta_deg": beta,
+            "phi_deg": phi,
+            "phi_back_deg": phi_back,
+            "cohesion_pa": cohesion,
+            "density_kg_m3": density,
+            "kv": kv,
+        },
+        no_back,
+        file_option="--polygon",
+        path=polygon,
+    )
+    found = stability(shape, **conditions)
+    if plot is not None:
+        from rbfrag.plots.block import plot_block
+
+        plot_block(shape, found, plot)
+    answer = as_dict(shape, found)
+    if json:
+        print_json(answer)
+        return
+    answer.pop("warnings")
+    margins = answer.pop("margins")
+    bond = answer.pop("cohesion")
+    print_pairs(answer | {f"cohesion_{name}": value for name, value in (bond or {}).items()})
+    for margin in margins:
+        print(
+            f"{margin['mode']} if {margin['variable']} changes by {margin['change_deg']:+.6g} deg"
+        )
+    print_warnings(found.warnings)

@@ -1,0 +1,183 @@
+"""`rbfrag db`: the database itself."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from rbfrag.cli.output import print_json, print_pairs, print_table
+from rbfrag.cli.parameters import options
+
+app = typer.Typer(
+    help="Upgrade, describe, check, export and merge databases.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    epilog="Example:  rbfrag db info",
+)
+
+
+@app.command("upgrade", epilog="Example:  rbfrag db upgrade --db old.db")
+def upgrade(db: options.Db = None, json: options.Json = False) -> None:
+    """Bring a database to the schema of this rbfrag, in one transaction."""
+    from rbfrag.db.upgrade import upgrade_database
+
+    before, after = upgrade_database(db)
+    if json:
+        print_json({"from": before, "to": after})
+    elif before == after:
+        print(f"schema {after}: nothing to do")
+    else:
+        print(f"schema {before} upgraded to {after}")
+
+
+@app.command("info", epilog="Example:  rbfrag db info --json")
+def info(db: options.Db = None, json: options.Json = False) -> None:
+    """Print the schema, the number of rows and the default model."""
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.queries import database_info
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        found = database_info(connection)
+    if json:
+        print_json(asdict(found))
+        return
+    print_pairs(
+        {
+            "schema": found.revision,
+            "dialect": found.dialect,
+            "numerics": found.numerics_versions,
+            "default model": found.default_model,
+        }
+    )
+    print()
+    print_table(("table", "rows"), found.rows.items())
+    if found.combinations_by_status:
+        print()
+        print_table(("combinations", "number"), found.combinations_by_status.items())
+
+
+@app.command("check", epilog="Example:  rbfrag db check --sample 100 --seed 7")
+def check(
+    db: options.Db = None,
+    sample: Annotated[
+        int,
+        typer.Option(
+            "--sample",
+            min=0,
+            help="Combinations to compute again, chosen at random; 0 leaves this out.",
+        ),
+    ] = 20,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the random choice.")] = 0,
+    json: options.Json = False,
+) -> None:
+    """Look for damage: the file, references, samples, keys, brackets, maps, and a random sample
+    computed again. Exit 1 if any is found."""
+    from rbfrag.db.check.database import check_database
+    from rbfrag.db.engine import opened_database
+
+    again = None
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        findings = check_database(connection)
+        if sample:
+            from rbfrag.campaign.resimulate import resimulate
+
+            again = resimulate(connection, sample=sample, seed=seed)
+            findings += again.findings
+    if json:
+        computed = None if again is None else asdict(again)
+        if computed is not None:
+            del computed["findings"]
+        print_json(
+            {
+                "sound": not findings,
+                "findings": [asdict(found) for found in findings],
+                "resimulated": computed,
+            }
+        )
+    else:
+        if again is not None:
+            print(
+                f"computed again: {again.sampled} of {again.eligible} combinations, "
+                f"{again.exact} exact, {again.within_error} within the solver's error"
+            )
+        if findings:
+            print_table(
+                ("table", "row", "problem"), [(f.table, f.row, f.problem) for f in findings]
+            )
+            for advice in dict.fromkeys(found.advice for found in findings):
+                print(f"to do: {advice}")
+        else:
+            print("sound: nothing is wrong with this database")
+    if findings:
+        raise typer.Exit(1)
+
+
+@app.command("export", epilog="Example:  rbfrag db export --out tables --tables motion,combination")
+def export(
+    out: Annotated[
+        str,
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="Folder to make: a file for each table, and the data dictionary.",
+            show_default=False,
+        ),
+    ],
+    db: options.Db = None,
+    format: Annotated[str, typer.Option("--format", help="parquet or csv.")] = "parquet",
+    tables: Annotated[
+        str | None,
+        typer.Option("--tables", help="Only these, with commas between.", show_default=False),
+    ] = None,
+    arrays: Annotated[
+        bool,
+        typer.Option("--arrays", help="Include samples [g] and histories (Parquet only)."),
+    ] = False,
+    json: options.Json = False,
+) -> None:
+    """Write the tables as Parquet or CSV, with a data dictionary of every column and unit."""
+    from rbfrag.exchange.database_export import export_database
+
+    names = None if tables is None else [name.strip() for name in tables.split(",") if name.strip()]
+    report = export_database(out, db=db, format=format, tables=names, arrays=arrays)
+    if json:
+        print_json(report.as_dict())
+    else:
+        print_table(("table", "rows"), report.rows.items())
+        print(f"written to {report.folder}")
+
+
+@app.command("merge", epilog="Example:  rbfrag db merge theirs.db --db ours.db")
+def merge(
+    other: Annotated[
+        str,
+        typer.Argument(
+            metavar="OTHER",
+            help="Database to read: a path or an SQLAlchemy URL. It is not changed.",
+            show_default=False,
+        ),
+    ],
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Add all that another database holds: motions, suites, results, models.
+
+    Merging twice changes nothing. If the two contradict each other, nothing is written."""
+    from rbfrag.db.merge.databases import merge_databases
+
+    report = merge_databases(other, db=db)
+    if json:
+        print_json(report.as_dict())
+        return
+    for note in report.notes:
+        print(f"note: {note}", file=sys.stderr)
+    tables = sorted(report.added.keys() | report.same.keys())
+    rows = [(name, report.added.get(name, 0), report.same.get(name, 0)) for name in tables]
+    print_table(("table", "added", "already here"), rows)
+    if report.restated:
+        print(f"earthquakes stated instead of guessed: {report.restated} motions")
+    if report.within_error:
+        print(f"equal within the error of the solver, ours kept: {report.within_error}")

@@ -1,0 +1,62 @@
+"""`rbfrag demo`: the whole chain on real recorded motions in one go."""
+
+from __future__ import annotations
+
+import shlex
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+EXAMPLE = "Example:  rbfrag demo"
+
+
+def demo(
+    folder: Annotated[
+        str, typer.Option("--folder", help="Folder that the results are written to.")
+    ] = ".",
+) -> None:
+    """Run the whole chain: records, responses, campaign, fit, prediction, two pictures.
+
+    The records are the 18 samples that come with the extra rbfrag[samples]; without them
+    analytic pulses take their place. Every command is printed before it runs. Leaves
+    rbfrag-demo.db, rbfrag-demo-response.png and rbfrag-demo-fit.png.
+    """
+    from rbfrag.errors import InputError
+    from rbfrag.motions.sample_motions import demo_motions
+
+    home = Path(folder)
+    if not home.is_dir():
+        raise InputError(f"--folder: there is no folder {home}; make it first")
+    database = home / "rbfrag-demo.db"
+    response_png, fit_png = home / "rbfrag-demo-response.png", home / "rbfrag-demo-fit.png"
+    for leftover in ("", "-wal", "-shm"):
+        database.with_name(database.name + leftover).unlink(missing_ok=True)
+    started = time.perf_counter()
+    records, sentence = demo_motions(home)
+    print(sentence)
+    db = ("--db", str(database))
+    for arguments in (
+        ("motions", "add", *map(str, records), "--suite", "demo", *db),
+        ("motions", "list", *db),
+        ("respond", "1", "--p2", "3", "--kr", "0.1", "--plot", str(response_png), *db),
+        ("critical", "1", "--p2", "3", *db),
+        ("simulate", "--suite", "demo", *db),
+        ("fit", "--term", "pgv", "--suite", "demo", *db),
+        ("plot", "fit", "--out", str(fit_png), *db),
+        ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6", *db),
+    ):
+        _run(arguments)
+    print(f"\ndone in {time.perf_counter() - started:.0f} s; written:")
+    for path in (database, response_png, fit_png):
+        print(f"  {path}")
+
+
+def _run(arguments: tuple[str, ...]) -> None:
+    from rbfrag.cli.main import app
+
+    print(f"\n$ rbfrag {shlex.join(arguments)}", flush=True)
+    status = app(arguments, standalone_mode=False)
+    if status:
+        raise typer.Exit(int(status))

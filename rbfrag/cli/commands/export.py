@@ -1,0 +1,190 @@
+"""`rbfrag export`: fragility functions for other tools."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from rbfrag.cli.output import print_json, print_pairs, print_warnings
+from rbfrag.cli.parameters import options
+from rbfrag.cli.parameters.block import toppling_block
+from rbfrag.errors import InputError
+
+app = typer.Typer(
+    help="Write fragility functions for other tools.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    epilog="Example:  rbfrag export nrml --p2 3 --kr 0.1 --out block.xml",
+)
+
+Blocks = Annotated[
+    str | None,
+    typer.Option(
+        "--blocks",
+        metavar="FILE",
+        help="Block table (.csv, .parquet) with block_id, p2_1_s2 [1/s²] and kr; one function a "
+        "block.",
+        show_default=False,
+    ),
+]
+
+RockMass = Annotated[
+    str | None,
+    typer.Option(
+        "--rockmass",
+        metavar="FILE",
+        help="Rock mass file (.toml, .csv): one function, the mean over its toppling blocks.",
+        show_default=False,
+    ),
+]
+
+Imt = Annotated[str, typer.Option("--imt", help="Measure of the function: PGV, or PGA with --tm.")]
+
+Levels = Annotated[
+    int, typer.Option("--levels", help="Number of levels of a function that is not lognormal.")
+]
+
+Name = Annotated[
+    str, typer.Option("--name", help="Identifier of the one block or of the rock mass.")
+]
+
+Out = Annotated[str, typer.Option("--out", help="File to write.", show_default=False)]
+
+
+@app.command("nrml", epilog="Example:  rbfrag export nrml --blocks blocks.csv --out blocks.xml")
+def nrml(
+    out: Out,
+    p2: options.P2OrFile = None,
+    kr: options.KrOrFile = None,
+    block: options.BlockFile = None,
+    blocks: Blocks = None,
+    rockmass: RockMass = None,
+    name: Name = "block",
+    imt: Imt = "PGV",
+    tm: options.Tm = None,
+    levels: Levels = 80,
+    model: options.Model = None,
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Write an OpenQuake fragility model, NRML 0.5 (.xml); PGV is in cm/s there."""
+    from rbfrag.exchange.nrml_write import nrml_text
+    from rbfrag.exchange.text_output import output_path, write_text
+
+    target = output_path(out, (".xml",), "an NRML file")
+    made, about, warnings = _functions(
+        p2, kr, block, blocks, rockmass, name, imt, tm, levels, model, db
+    )
+    write_text(nrml_text(made, description=_sentence(about, tm)), target)
+    _tell(str(target), made, about, warnings, json)
+
+
+@app.command(
+    "pelicun", epilog="Example:  rbfrag export pelicun --p2 3 --kr 0.1 --out fragility.csv"
+)
+def pelicun(
+    out: Out,
+    p2: options.P2OrFile = None,
+    kr: options.KrOrFile = None,
+    block: options.BlockFile = None,
+    blocks: Blocks = None,
+    rockmass: RockMass = None,
+    name: Name = "block",
+    imt: Imt = "PGV",
+    tm: options.Tm = None,
+    levels: Levels = 80,
+    model: options.Model = None,
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Write a fragility table of pelicun and SimCenter (.csv); PGV is in m/s (mps) there."""
+    from rbfrag.exchange.pelicun_table import pelicun_text
+    from rbfrag.exchange.text_output import output_path, write_text
+
+    target = output_path(out, (".csv",), "a fragility table")
+    made, about, warnings = _functions(
+        p2, kr, block, blocks, rockmass, name, imt, tm, levels, model, db
+    )
+    write_text(pelicun_text(made), target)
+    _tell(str(target), made, about, warnings, json)
+
+
+def _functions(
+    p2: float | None,
+    kr: float | None,
+    block: str | None,
+    blocks: str | None,
+    rockmass: str | None,
+    name: str,
+    imt: str,
+    tm: float | None,
+    levels: int,
+    model: str | None,
+    db: str | None,
+) -> tuple[list[Any], tuple[str, ...], list[str]]:
+    import numpy as np
+
+    from rbfrag.exchange.block_fragility import block_functions, class_function
+
+    measures = {"PGV": "pgv_m_s", "PGA": "pga_g"}
+    if imt.upper() not in measures:
+        raise InputError(f"--imt {imt}: use PGV, or PGA with --tm")
+    warnings: list[str] = []
+    alone = p2 is not None or kr is not None or block is not None
+    if (blocks is not None) + (rockmass is not None) + alone > 1:
+        raise InputError(
+            "give one of --p2 with --kr, --block, --blocks and --rockmass, not several of them"
+        )
+    measure = measures[imt.upper()]
+    if rockmass is not None:
+        from rbfrag.rockmass.file import read_rock_mass
+        from rbfrag.rockmass.table import toppling_blocks
+
+        p2s, krs, share = toppling_blocks(read_rock_mass(rockmass).realise(None, None))
+        mean, about = class_function(
+            name, p2s, krs, measure, tm_s=tm, levels=levels, model=model, db=db
+        )
+        warnings.append(
+            f"the function is the mean over {p2s.size} stable toppling blocks, "
+            f"{100.0 * share:.3g} % of the rock mass; the others have no part in it"
+        )
+        return [mean], about, warnings
+    if blocks is not None:
+        from rbfrag.exchange.waiting_blocks import waiting_blocks
+
+        table = waiting_blocks(blocks)
+        names, p2s, krs = table["block_id"].tolist(), table["p2_1_s2"], table["kr"]
+    else:
+        one_p2, one_kr, remarks = toppling_block(p2, kr, block)
+        names, p2s, krs = [name], np.array([one_p2]), np.array([one_kr])
+        warnings += remarks
+    made, about = block_functions(
+        names, p2s, krs, measure, tm_s=tm, levels=levels, model=model, db=db
+    )
+    return made, about, warnings
+
+
+def _sentence(about: tuple[str, ...], tm: float | None) -> str:
+    period = "" if tm is None else f", mean period {tm:g} s"
+    return f"Toppling of rock blocks, model {about[0]} ({about[2]} on {about[1]}){period}"
+
+
+def _tell(
+    path: str, made: list[Any], about: tuple[str, ...], warnings: list[str], json: bool
+) -> None:
+    errors = [function.grid_error for function in made if function.grid_error is not None]
+    document = {
+        "file": path,
+        "functions": len(made),
+        "lognormal": sum(function.is_lognormal for function in made),
+        "largest_grid_error": max(errors, default=0.0),
+        "model": about[0],
+        "term": about[1],
+        "method": about[2],
+    }
+    if json:
+        print_json({**document, "warnings": warnings})
+        return
+    print_pairs(document)
+    print_warnings(warnings)

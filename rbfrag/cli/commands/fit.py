@@ -1,0 +1,192 @@
+"""`rbfrag fit`: a fragility model from the stored critical values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rbfrag.cli.output import cell, print_json, print_pairs, print_table, print_warnings
+from rbfrag.cli.parameters import options
+from rbfrag.errors import InputError
+
+if TYPE_CHECKING:
+    from rbfrag.fragility.fit.report import FitReport
+
+EXAMPLE = "Example:  rbfrag fit --term pgv"
+
+
+def fit(
+    term: Annotated[
+        str,
+        typer.Option(
+            "--term",
+            help="Intensity term [m/s]: pgv; pga_tm = PGA g Tm/(2 pi); pgd_tm = 2 pi PGD/Tm; "
+            "pgv_pga and pgv_pga_tm: PGV with PGA (and Tm); xp: the toppling spectrum X(p).",
+            show_default=False,
+        ),
+    ],
+    kind: Annotated[
+        str,
+        typer.Option(
+            "--kind",
+            help="What the blocks do: toppling; slumping or sliding, on the terms pgv and pgv_pga.",
+        ),
+    ] = "toppling",
+    rotation: Annotated[
+        float | None,
+        typer.Option(
+            "--rotation",
+            help="Slumping: rotation that counts as failure [deg]. Default: failure past recovery.",
+            show_default=False,
+        ),
+    ] = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            "--method",
+            show_default=False,
+            help="Toppling. Of critical values: wls (weighted least squares, the dissertation's), "
+            "lognormal (with censored motions). Of outcomes: logistic, weibull, bounded; of "
+            "outcomes on xp: record, power. Default: wls.",
+        ),
+    ] = None,
+    suite: options.Suite = None,
+    vertical: Annotated[
+        str,
+        typer.Option("--vertical", help="Combinations without vertical motion, with it, or both."),
+    ] = "without",
+    free_m: Annotated[
+        bool,
+        typer.Option(
+            "--free-m",
+            help="Estimate the exponent M of y = k_r g/p^M instead of M = 1 (lognormal, logistic).",
+        ),
+    ] = False,
+    doubtful_pgd: Annotated[
+        bool,
+        typer.Option(
+            "--doubtful-pgd",
+            help="Let pgd_tm read the PGD of records flagged final_velocity or "
+            "final_displacement, which it leaves out otherwise.",
+        ),
+    ] = False,
+    name: Annotated[
+        str | None,
+        typer.Option("--name", help="Name of the model. Default: method-term.", show_default=False),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the bootstrap by earthquake.")] = 0,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Replace a stored model of the same name.")
+    ] = False,
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Fit a fragility model to the stored critical values or outcomes and store it.
+
+    The first model of a kind becomes its default (rbfrag models default NAME changes it).
+    """
+    if kind != "toppling":
+        _refuse_options_of_toppling(
+            kind,
+            {
+                "--method": method is not None,
+                "--free-m": free_m,
+                "--doubtful-pgd": doubtful_pgd,
+                "--seed": seed != 0,
+            },
+        )
+        from rbfrag.cli.commands.fit_kind import fit_kind
+
+        fit_kind(
+            kind, term=term, rotation_deg=rotation, suite=suite, vertical=vertical, name=name,
+            replace=replace, db=db, json=json,
+        )  # fmt: skip
+        return
+    if rotation is not None:
+        raise InputError("--rotation goes with --kind slumping, not with toppling")
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.models import save_model
+    from rbfrag.fragility.fit.fitting import fit as run
+    from rbfrag.fragility.fit.report import FitReport
+    from rbfrag.fragility.model import FragilityModel
+
+    # reading takes no lock, so that a campaign may go on meanwhile
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        report = run(
+            connection,
+            term=term,
+            method=method or "wls",
+            suite=suite,
+            vertical=vertical,  # type: ignore[arg-type]
+            name=name,
+            seed=seed,
+            estimate_m=free_m,
+            doubtful_pgd=doubtful_pgd,
+        )
+    with opened_database(db) as engine, engine.begin() as connection:
+        row = save_model(connection, report.model.row, replace=replace)
+    print_report(FitReport.from_model(FragilityModel.from_row(row)), json=json)
+
+
+def _refuse_options_of_toppling(kind: str, given: dict[str, bool]) -> None:
+    for option, is_given in given.items():
+        if is_given:
+            raise InputError(f"{option} goes with --kind toppling, not with {kind}")
+
+
+def print_report(report: FitReport, *, json: bool) -> None:
+    """Print the report of a fitted model."""
+    if json:
+        print_json(report.as_dict())
+        return
+    details: dict[str, Any] = dict(report.details)
+    default = ", the default" if report.model.row.is_default else ""
+    print(f"model {report.name}: {report.method} on {report.term}{default}")
+    print(f"says: {report.model.meaning}")
+    kinds = details.get("standard_error_kinds") or {}
+    bootstrap = (details.get("bootstrap") or {}).get("standard_errors", {})
+    naive = details.get("naive_standard_errors") or {}
+    print_table(
+        ("parameter", "value", "standard error", "by bootstrap", "taken as independent"),
+        [
+            (name, value, report.standard_errors.get(name), bootstrap.get(name), naive.get(name))
+            for name, value in report.coefficients.items()
+        ],
+    )
+    for kind in dict.fromkeys(kinds.values()):
+        print(f"standard error: {kind}")
+    for name, pair in (details.get("natural") or {}).items():
+        print(f"{name}: {cell(pair[0])} ± {cell(pair[1])}")
+    print()
+    counts: dict[str, object] = {
+        "combinations": details.get("n_total"),
+        "critical value found": report.n,
+        "below the search limit": report.n_censored,
+        "outside the model": details.get("n_outside_model"),
+        "earthquakes": report.events,
+    }
+    if "n_outcomes" in details:
+        counts["outcomes fitted (toppled)"] = f"{details['n_outcomes']} ({details['n_toppled']})"
+        counts["outcomes certain by mechanics"] = details["n_bounded"]
+    print_pairs(counts)
+    law = details.get("power_law")
+    if law:
+        print_pairs({f"power law {name}": value for name, value in law.items()})
+    correlations = details.get("log_correlations") or {}
+    if correlations:
+        ranked = ", ".join(f"{name} {cell(value)}" for name, value in correlations.items())
+        print(f"correlation of ln y with ln x: {ranked}")
+    scatter = details.get("scatter_ln_y")
+    if scatter:
+        parts = ", ".join(
+            f"{name.replace('_', ' ')} {value:.3f}" for name, value in scatter.items()
+        )
+        print(f"scatter of ln y about the median: {parts}")
+    intervals = details.get("score_intervals") or {}
+    print(f"scores, judged on {details.get('judged_on', 'critical values')}:")
+    for name, value in report.scores.items():
+        around = intervals.get(name)
+        ends = f"  ({cell(around[0])} to {cell(around[1])} by earthquakes)" if around else ""
+        print(f"  {name}: {cell(value)}{ends}")
+    print_warnings(report.warnings)

@@ -1,0 +1,89 @@
+"""`rbfrag models`: the fitted fragility models of a database."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from rbfrag.cli.output import print_json, print_table
+from rbfrag.cli.parameters import options
+
+app = typer.Typer(
+    help="List, show and choose fitted fragility models.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    epilog="Example:  rbfrag models show wls-pgv",
+)
+
+Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the model.", show_default=False)]
+
+
+@app.command("list", epilog="Example:  rbfrag models list --json")
+def list_models(db: options.Db = None, json: options.Json = False) -> None:
+    """List the fitted models; the default answers when none is named."""
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.models import model_rows
+    from rbfrag.fragility.model_list import model_list
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        rows = model_rows(connection)
+    listed = model_list(rows)
+    if json:
+        print_json(listed)
+        return
+    print_table(
+        ("name", "kind", "term", "method", "default", "n", "earthquakes", "fitted"),
+        [tuple(value for name, value in each.items() if name != "domain") for each in listed],
+    )
+
+
+@app.command("show", epilog="Example:  rbfrag models show wls-pgv")
+def show_model(name: Name, db: options.Db = None, json: options.Json = False) -> None:
+    """Print the report of a fitted model from its stored row."""
+    from rbfrag.cli.commands.fit import print_report
+    from rbfrag.cli.commands.fit_kind import print_kind_report
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.models import load_model
+    from rbfrag.fragility.fit.report import FitReport
+    from rbfrag.fragility.model import FragilityModel
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        row = load_model(connection, name)
+    if row.kind != "toppling":
+        print_kind_report(row, json=json)
+        return
+    print_report(FitReport.from_model(FragilityModel.from_row(row)), json=json)
+
+
+@app.command("default", epilog="Example:  rbfrag models default wls-pgv")
+def set_default_model(name: Name, db: options.Db = None) -> None:
+    """Make a model the one of its kind that answers when none is named."""
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.models import set_default
+
+    with opened_database(db) as engine, engine.begin() as connection:
+        set_default(connection, name)
+    print(f"{name} is the default model now")
+
+
+@app.command("check", epilog="Example:  rbfrag models check")
+def check(db: options.Db = None, json: options.Json = False) -> None:
+    """Say whether the data of each model have changed since it was fitted.
+
+    The exit status is 1 if any have, or if a model cannot be read.
+    """
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.models import model_rows
+    from rbfrag.fragility.fit.model_check import check_models
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        found = check_models(connection, model_rows(connection))
+    if json:
+        print_json([each.as_dict() for each in found])
+    else:
+        print_table(
+            ("model", "data", "remark"), [(each.name, each.state, each.remark) for each in found]
+        )
+    if any(each.state in ("changed", "unreadable") for each in found):
+        raise typer.Exit(1)

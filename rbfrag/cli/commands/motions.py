@@ -1,0 +1,233 @@
+"""`rbfrag motions`: the accelerograms of a database."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rbfrag.cli.output import print_json, print_pairs, print_table, print_warnings
+from rbfrag.cli.parameters import options
+from rbfrag.cli.parameters.motion import find_motion, stored_row
+
+if TYPE_CHECKING:
+    from rbfrag.db.rows import MotionRow
+
+STORED_LABELS = (
+    "id", "event_id", "event_guessed", "magnitude", "is_vertical", "processing", "flags",
+)  # fmt: skip
+"""What the database knows of a motion better than its samples do."""
+
+app = typer.Typer(
+    help="Add, list, show and export accelerograms.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    epilog="Example:  rbfrag motions add records/ --metadata records/MANIFEST.csv",
+)
+
+
+@app.command("add", epilog="Example:  rbfrag motions add records/ --metadata records/META.csv")
+def add(
+    paths: Annotated[
+        list[str],
+        typer.Argument(metavar="PATHS...", help="Files, or folders to search.", show_default=False),
+    ],
+    suite: Annotated[
+        str | None,
+        typer.Option("--suite", help="Put the motions into this suite.", show_default=False),
+    ] = None,
+    metadata: Annotated[
+        str | None,
+        typer.Option(
+            "--metadata",
+            metavar="CSV",
+            help="Table with the columns file, trace_index, event_id, units, is_vertical, "
+            "companion_group, magnitude, processing (only file must be there). Files are named "
+            "relative to the table's folder.",
+            show_default=False,
+        ),
+    ] = None,
+    raw: Annotated[
+        bool,
+        typer.Option(
+            "--raw", help="Store every record as its file has it; uncorrected ones are flagged."
+        ),
+    ] = False,
+    allow_partial: options.AllowPartial = False,
+    units: options.Units = None,
+    dt: options.Dt = None,
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Read accelerogram files and store them; uncorrected records are processed first.
+
+    Uncorrected, by metadata, header or format: mean removed, 20 s of zeros on each side,
+    Butterworth high-pass of order 2 at 0.1 Hz forward and backward. Corrected records are
+    stored as they are. Vertical components called DOWN are turned upward.
+
+    Formats are recognised by content. In a folder, texts about the records (.md, .pdf, .html,
+    .rst, .doc) are passed over. A file that cannot be read is listed with its reason,
+    the others are added, and the exit status is 1. Without --metadata an earthquake is only a
+    guess from the file's header, flagged, and never merged with one that was stated.
+    """
+    from rbfrag.campaign.add_motions import add_motions
+
+    def show(done: int, total: int) -> None:
+        if sys.stderr.isatty():
+            end = "\n" if done == total else ""
+            print(f"\r\x1b[Kmotions add: {done}/{total} files", end=end, file=sys.stderr)
+
+    report = add_motions(
+        paths,
+        db=db,
+        suite=suite,
+        metadata=metadata,
+        units=units,
+        dt_s=dt,
+        raw=raw,
+        allow_partial=allow_partial,
+        on_file=show,
+    )
+    if json:
+        print_json(report.as_dict())
+    else:
+        print_pairs(
+            {
+                "added": len(report.added),
+                "of these processed": len(report.processed),
+                "stored before": len(report.known),
+                "left out": len(report.failed),
+            }
+        )
+    print_warnings(report.warnings)
+    for bad in report.failed:
+        print(f"left out: {bad.path}: {bad.reason}", file=sys.stderr)
+    if report.failed:
+        raise typer.Exit(1)
+
+
+@app.command("list", epilog="Example:  rbfrag motions list --json")
+def list_motions(
+    suite: options.Suite = None, db: options.Db = None, json: options.Json = False
+) -> None:
+    """List the stored motions with their intensity measures and quality flags."""
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.motions import motion_rows
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        rows = motion_rows(connection, suite=suite)
+    if json:
+        print_json([_as_dict(row) for row in rows])
+        return
+    print_table(
+        ("id", "motion", "event", "vert.", "dt [s]", "npts", "PGA [g]", "PGV [m/s]", "PGD [m]",
+         "Tm [s]", "flags"),
+        [
+            (row.id, row.name, row.event_id, row.is_vertical, row.dt_s, row.npts,
+             round(row.pga_g, 4), round(row.pgv_m_s, 4), round(row.pgd_m, 4),
+             None if row.tm_s is None else round(row.tm_s, 3), row.flags)
+            for row in rows
+        ],
+    )  # fmt: skip
+
+
+@app.command("show", epilog="Example:  rbfrag motions show record.AT2")
+def show(
+    motion: options.Motion,
+    allow_partial: options.AllowPartial = False,
+    units: options.Units = None,
+    dt: options.Dt = None,
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Show one motion: a file as it is, or a stored one by its id."""
+    from rbfrag.motions.quality import quality_flags
+
+    ground = find_motion(motion, db=db, units=units, dt_s=dt, allow_partial=allow_partial)
+    flags = quality_flags(ground)
+    document: dict[str, Any] = {
+        "name": ground.label,
+        "event": ground.event,
+        "station": ground.station,
+        "component": ground.component,
+        "orientation_deg": ground.orientation_deg,
+        "is_vertical": ground.is_vertical,
+        "is_corrected": ground.is_corrected,
+        "recording": ground.recording,
+        "source_file": ground.source_file,
+        "trace_index": ground.trace_index,
+        "format": ground.file_format,
+        "start_time": None if ground.start_time is None else ground.start_time.isoformat(),
+        "dt_s": ground.dt_s,
+        "npts": ground.npts,
+        "duration_s": ground.duration_s,
+        **asdict(ground.measures),
+        "processing_applied": ground.processing_applied,
+        "sha256": ground.sha256,
+        "source_sha256": ground.source_sha256 or ground.sha256,
+        "flags": [flag.code for flag in flags],
+        "remarks": list(ground.remarks),
+    }
+    stored = stored_row(motion, db=db)
+    if stored is not None:
+        row, pair = stored
+        kept = _as_dict(row)
+        document = {**document, **{name: kept[name] for name in STORED_LABELS}}
+        document["vertical_id"] = None if pair is None else pair.vertical_id
+        document["vertical_remark"] = None if pair is None else pair.reason or pair.remark or None
+    if json:
+        print_json(document)
+        return
+    remarks = document.pop("remarks")
+    print_pairs({name: value for name, value in document.items() if value is not None})
+    print_warnings([*remarks, *(flag.sentence for flag in flags)])
+
+
+@app.command("export", epilog="Example:  rbfrag motions export 1 2 --out two.csv")
+def export(
+    motions: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="MOTION...",
+            help="Accelerograms: files, FILE#INDEX for one trace of several, or database ids.",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[
+        str, typer.Option("--out", metavar="FILE", help="File to write.", show_default=False)
+    ],
+    file_format: Annotated[
+        str | None,
+        typer.Option(
+            "--format",
+            help="csv (several motions, every label) or at2 (one motion). Default: what FILE ends "
+            "in.",
+            show_default=False,
+        ),
+    ] = None,
+    allow_partial: options.AllowPartial = False,
+    units: options.Units = None,
+    dt: options.Dt = None,
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Write motions into a file from which they are read back bit for bit."""
+    from rbfrag.motions.export import export_motions
+
+    found = [
+        find_motion(text, db=db, units=units, dt_s=dt, allow_partial=allow_partial)
+        for text in motions
+    ]
+    written = export_motions(found, out, file_format=file_format)
+    if json:
+        print_json({"file": out, "format": written, "sha256": [motion.sha256 for motion in found]})
+        return
+    print(out)
+
+
+def _as_dict(row: MotionRow) -> dict[str, Any]:
+    document = asdict(row)
+    document["flags"] = list(row.flags)
+    return document

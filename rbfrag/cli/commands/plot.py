@@ -1,0 +1,322 @@
+"""`rbfrag plot`: pictures of models, data, responses and failure modes."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from rbfrag.cli.output import print_warnings
+from rbfrag.cli.parameters import options
+from rbfrag.cli.parameters.motion import find_motion, find_vertical
+
+app = typer.Typer(
+    help="Draw models, data, spectra, responses and failure modes (.png, .pdf, .svg).",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    epilog="Example:  rbfrag plot fit --out fit.png",
+)
+
+Out = Annotated[
+    str, typer.Option("--out", help="File to write: .png, .pdf or .svg.", show_default=False)
+]
+
+
+@app.command("fit", epilog="Example:  rbfrag plot fit --model wls-pgv --out fit.png")
+def plot_fit(
+    out: Out,
+    model: Annotated[
+        str | None,
+        typer.Option("--model", help="Name of the model. Default: the database's default."),
+    ] = None,
+    log: Annotated[bool, typer.Option("--log", help="Logarithmic axes.")] = False,
+    db: options.Db = None,
+) -> None:
+    """Draw the data of a fit with its 2.5 %, 50 % and 97.5 % failure lines and histograms."""
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.models import load_model
+    from rbfrag.fragility.fit.data import fit_data
+    from rbfrag.fragility.fit.source import read_source
+    from rbfrag.fragility.model import FragilityModel
+    from rbfrag.plots.fit import plot_fit as draw
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        fitted = FragilityModel.from_row(load_model(connection, model))
+        suite = fitted.row.diagnostics.get("suite")
+        source = read_source(
+            connection,
+            suite=None if suite is None else str(suite),
+            doubtful_pgd=bool(fitted.row.diagnostics.get("doubtful_pgd")),
+        )
+    draw(source.table, fitted, out, log=log, xp_m_s=source.xp_m_s)
+    print(out)
+    if fit_data(source, fitted.term).fingerprint != fitted.row.data_fingerprint:
+        print_warnings(
+            [
+                f"the data have changed since {fitted.name} was fitted: the points are those of "
+                "today; rbfrag fit --replace  fits them anew"
+            ]
+        )
+
+
+@app.command(
+    "chart",
+    epilog="Example:  rbfrag plot chart --model bounded-pgv_pga --p2 3 --pga 0.4 --out chart.pdf",
+)
+def plot_chart(
+    out: Out,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            "--model",
+            help="Model of PGV, PGA*Tm, PGD/Tm, or PGV with PGA (and Tm). Default: the one that "
+            "answers for PGV.",
+        ),
+    ] = None,
+    p2: options.HeldP2 = None,
+    pga: options.HeldPga = None,
+    tm: options.HeldTm = None,
+    db: options.Db = None,
+) -> None:
+    """Draw lines of equal probability of toppling over intensity and block, to read by hand.
+
+    A model of PGV with PGA is drawn over PGV, with --p2, --pga and --tm held.
+    """
+    from rbfrag.fragility.lookup import find_model
+    from rbfrag.plots.chart import plot_chart as draw
+    from rbfrag.plots.held_measures import held_measures
+
+    given = ["pgv_m_s"] if model is None else ["pgv_m_s", "pga_g", "tm_s", "pgd_m"]
+    chosen = find_model(model, given, db)
+    draw(chosen, out, held_measures(chosen, p2=p2, pga_g=pga, tm_s=tm))
+    print(out)
+
+
+@app.command(
+    "curve", epilog="Example:  rbfrag plot curve --p2 3 --kr 0.1 --pga 0.4 --out curve.png"
+)
+def plot_curve(
+    p2: options.P2,
+    kr: options.Kr,
+    out: Out,
+    pga: options.Pga = None,
+    tm: options.Tm = None,
+    model: Annotated[
+        str | None,
+        typer.Option("--model", help="Name of the model. Default: the best for what is given."),
+    ] = None,
+    level: options.Level = 0.95,
+    beside: Annotated[
+        str | None,
+        typer.Option(
+            "--beside",
+            metavar="FILE",
+            help="Fragilities of the same measure to compare with: NRML 0.4 or 0.5 (.xml), or a "
+            "pelicun table (.csv).",
+            show_default=False,
+        ),
+    ] = None,
+    db: options.Db = None,
+) -> None:
+    """Draw the fragility curve of one block over PGV, with its confidence band.
+
+    PGA and Tm are held at the values given. A model of another measure runs over that one.
+    """
+    from rbfrag.fragility.lookup import find_model
+    from rbfrag.plots.curve import plot_curve as draw
+
+    held = {name: value for name, value in (("pga_g", pga), ("tm_s", tm)) if value is not None}
+    varied = ["pgv_m_s"] if model is None else ["pgv_m_s", "pga_g", "pgd_m", "xp_m_s"]
+    chosen = find_model(model, [*varied, *held], db)
+    others = {}
+    if beside is not None:
+        from rbfrag.exchange.other_fragilities import of_measure
+
+        others = of_measure(beside, chosen.term.inputs[0])
+    draw(chosen, p2, kr, out, fixed=held, level=level, beside=others)
+    print(out)
+
+
+@app.command("sensitivity", epilog="Example:  rbfrag plot sensitivity --out sensitivity.png")
+def plot_sensitivity(out: Out, suite: options.Suite = None, db: options.Db = None) -> None:
+    """Draw critical k_r/PGA over the frequency ratio omega_m/p, with the lines of single lobes."""
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.queries import combination_table
+    from rbfrag.plots.sensitivity import plot_sensitivity as draw
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        table = combination_table(connection, suite=suite)
+    draw(table, out, data="without vertical motion" + (f", suite {suite}" if suite else ""))
+    print(out)
+
+
+@app.command("calibration", epilog="Example:  rbfrag plot calibration --out calibration.png")
+def plot_calibration(
+    out: Out,
+    model: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--model", help="Stored model; may be given up to four times. Default: the default."
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the draws of earthquakes.")] = 0,
+    db: options.Db = None,
+) -> None:
+    """Draw predicted probabilities beside the shares that toppled, earthquakes left out in turn.
+
+    Each model is fitted again, once without each earthquake.
+    """
+    from rbfrag.db.engine import opened_database
+    from rbfrag.fragility.fit.held_out import held_out_of
+    from rbfrag.plots.calibration import plot_calibration as draw
+    from rbfrag.plots.canvas import plot_path
+
+    plot_path(out)
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        names: list[str | None] = [*model] if model else [None]
+        answers = [held_out_of(connection, name, seed=seed) for name in names]
+    draw(
+        {each.name: each.bins for each in answers},
+        out,
+        scores={each.name: each.scores for each in answers},
+        data=answers[0].kind,
+    )
+    print(out)
+
+
+@app.command("vertical", epilog="Example:  rbfrag plot vertical --out vertical.png")
+def plot_vertical(out: Out, suite: options.Suite = None, db: options.Db = None) -> None:
+    """Draw critical strengths with vertical motion beside those without it."""
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.queries import combination_table
+    from rbfrag.fragility.claims_of_vertical import vertical_pairs
+    from rbfrag.plots.vertical import plot_vertical as draw
+
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        without = combination_table(connection, suite=suite)
+        with_it = combination_table(connection, suite=suite, vertical="with")
+    draw(vertical_pairs(without, with_it), out)
+    print(out)
+
+
+@app.command("spectrum", epilog="Example:  rbfrag plot spectrum 1 5 --polarity both --out x.png")
+def plot_spectrum(
+    motions: options.Motions,
+    out: Out,
+    p2: Annotated[
+        str, typer.Option("--p2", help="The figure spans at least these p² [1/s²].")
+    ] = "0.1,30",
+    polarity: options.Polarity = "both",
+    units: options.Units = None,
+    dt: options.Dt = None,
+    db: options.Db = None,
+) -> None:
+    """Draw the toppling spectra of motions over the size of the block, with PGV beside them."""
+    from rbfrag.cli.parameters.number_list import number_list
+    from rbfrag.cli.parameters.polarity import polarities
+    from rbfrag.plots.canvas import plot_path
+    from rbfrag.plots.spectrum import plot_spectrum as draw
+
+    sizes, wanted = number_list(p2, "--p2"), polarities(polarity)
+    plot_path(out)
+    found = [find_motion(text, db=db, units=units, dt_s=dt) for text in motions]
+    draw(found, out, polarities=wanted, p2=sizes)
+    print(out)
+
+
+@app.command("response", epilog="Example:  rbfrag plot response 1 --p2 3 --kr 0.1 --out a.png")
+def plot_response(
+    motion: options.Motion,
+    p2: options.P2,
+    kr: options.Kr,
+    out: Out,
+    vertical: options.Vertical = None,
+    reverse: options.Reverse = False,
+    linear: options.Linear = False,
+    units: options.Units = None,
+    dt: options.Dt = None,
+    db: options.Db = None,
+) -> None:
+    """Draw acceleration against k_r(theta), and theta over the critical angle, in time."""
+    from rbfrag.plots.response import plot_response as draw
+    from rbfrag.solver.toppling_run import respond
+
+    ground = find_motion(motion, db=db, units=units, dt_s=dt)
+    upward, remarks = find_vertical(vertical, ground, db=db, units=units, dt_s=dt)
+    response = respond(
+        ground,
+        p2=p2,
+        kr=kr,
+        vertical=upward,
+        polarity="reverse" if reverse else "forward",
+        linear=linear,
+        history=True,
+    )
+    draw(response, out, p2=p2, kr=kr, linear=linear, reverse=reverse, title=ground.label)
+    print_warnings(remarks)
+    print(out)
+
+
+@app.command(
+    "modes",
+    epilog="Example:  rbfrag plot modes --phi 40 --beta 20 --rockmass mass.toml --out a.png",
+)
+def plot_modes(
+    phi: Annotated[
+        float,
+        typer.Option("--phi", help="Friction angle of the base [deg].", show_default=False),
+    ],
+    out: Out,
+    beta: Annotated[
+        float,
+        typer.Option("--beta", help="Dip of the base for the yield accelerations [deg]."),
+    ] = 0.0,
+    phi_back: Annotated[
+        float | None,
+        typer.Option(
+            "--phi-back",
+            help="Friction angle of the back plane [deg]. Default: that of the base.",
+            show_default=False,
+        ),
+    ] = None,
+    no_back: Annotated[
+        bool, typer.Option("--no-back", help="There is no fracture behind the blocks.")
+    ] = False,
+    blocks: Annotated[
+        str | None,
+        typer.Option(
+            "--blocks",
+            metavar="FILE",
+            help="Show the blocks of a table (.csv, .parquet) with alpha1_deg and alpha3_deg, "
+            "as  rbfrag rockmass --out  writes it.",
+            show_default=False,
+        ),
+    ] = None,
+    rockmass: Annotated[
+        str | None,
+        typer.Option(
+            "--rockmass",
+            metavar="FILE",
+            help="Show the blocks of a rock mass file (.toml, .csv).",
+            show_default=False,
+        ),
+    ] = None,
+) -> None:
+    """Draw failure modes and yield accelerations over the block angles alpha1 and alpha3."""
+    from rbfrag.cli.parameters.charted_blocks import charted_blocks
+    from rbfrag.plots.canvas import plot_path
+    from rbfrag.plots.modes import plot_modes as draw
+
+    plot_path(out)
+    shown = charted_blocks(blocks, rockmass, phi=phi, phi_back=phi_back, no_back=no_back)
+    draw(
+        out,
+        phi_deg=phi,
+        beta_deg=beta,
+        phi_back_deg=phi_back,
+        back_fracture=not no_back,
+        alpha1_deg=shown.alpha1_deg,
+        alpha3_deg=shown.alpha3_deg,
+    )
+    print(out)
+    print_warnings(shown.warnings)

@@ -1,0 +1,96 @@
+"""`rbfrag spectrum`: the toppling spectrum X(p) of motions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rbfrag.cli.output import print_json, print_table, print_warnings
+from rbfrag.cli.parameters import options
+from rbfrag.cli.parameters.motion import find_motion
+from rbfrag.cli.parameters.number_list import number_list
+from rbfrag.cli.parameters.polarity import polarities as polarities_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+EXAMPLE = "Example:  rbfrag spectrum record.AT2 --polarity both --plot spectrum.png"
+
+
+def spectrum(
+    motions: options.Motions,
+    p2: Annotated[
+        str, typer.Option("--p2", help="Frequency parameters p² [1/s²], separated by commas.")
+    ] = "30,10,3,1,0.3,0.1",
+    polarity: options.Polarity = "forward",
+    csv: Annotated[
+        str | None,
+        typer.Option("--csv", help="Write the values (.csv or .parquet).", show_default=False),
+    ] = None,
+    plot: Annotated[
+        str | None,
+        typer.Option(
+            "--plot",
+            help="Draw the spectra over p², with PGV beside them (.png, .pdf, .svg).",
+            show_default=False,
+        ),
+    ] = None,
+    units: options.Units = None,
+    dt: options.Dt = None,
+    db: options.Db = None,
+    json: options.Json = False,
+) -> None:
+    """Compute the toppling spectrum X(p) [m/s]: what a motion can topple of any size.
+
+    No block with a toppling velocity k_r g/p more than 2 % above X(p) topples. With --json, one
+    motion in one polarity is an object, several are a list of such objects.
+    """
+    from rbfrag.exchange.block_table import table_path, write_block_table
+    from rbfrag.motions.spectrum_report import as_dict
+
+    sizes, polarities = number_list(p2, "--p2"), polarities_of(polarity)
+    if csv is not None:
+        table_path(csv)
+    if plot is not None:
+        from rbfrag.plots.canvas import plot_path
+
+        plot_path(plot)
+    found = [find_motion(text, db=db, units=units, dt_s=dt) for text in motions]
+    answers = [
+        as_dict(text, ground, sizes, each)
+        for text, ground in zip(motions, found, strict=True)
+        for each in polarities
+    ]
+    if csv is not None:
+        write_block_table(_columns(answers), csv)
+    if plot is not None:
+        from rbfrag.plots.spectrum import plot_spectrum
+
+        plot_spectrum(found, plot, polarities=polarities, p2=sizes)
+    if json:
+        print_json(answers[0] if len(answers) == 1 else answers)
+        return
+    for first in range(0, len(answers), len(polarities)):
+        mine = answers[first : first + len(polarities)]
+        print(f"{mine[0]['name']}: PGV {mine[0]['pgv_m_s']:.6g} m/s, X(p) in m/s")
+        columns = [one["x_m_s"] for one in mine]
+        print_table(("p2", *polarities), zip(sizes, *columns, strict=True))
+    print_warnings(
+        dict.fromkeys(f"{one['motion']}: {word}" for one in answers for word in one["warnings"])
+    )
+
+
+def _columns(answers: Sequence[dict[str, Any]]) -> dict[str, NDArray[Any]]:
+    import numpy as np
+
+    rows = [
+        (one["motion"], one["name"], one["polarity"], *values)
+        for one in answers
+        for values in zip(one["p2"], one["x_m_s"], strict=True)
+    ]
+    names = ("motion", "name", "polarity", "p2_1_s2", "x_m_s")
+    columns = zip(*rows, strict=True)
+    return {name: np.array(column) for name, column in zip(names, columns, strict=True)}

@@ -1,0 +1,167 @@
+"""Stored combinations against their inputs, their brackets and what was simulated."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from sqlalchemy import Connection, Row, RowMapping, Select, select
+
+from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
+from rbfrag.db.check.intervals import interval_problems
+from rbfrag.db.check.kinds import rotation_of, sliding_problems
+from rbfrag.db.keys import combination_key
+from rbfrag.db.schema import campaign, combination, motion, outcome_interval, simulation
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+# What a few roundings of a product and a quotient can do.
+_ROUNDING = 1e-12
+
+_ROWS_AT_ONCE = 500
+
+
+def check_combinations(connection: Connection) -> Iterator[Finding]:
+    """Yield what is wrong with combinations, their intervals and their simulations.
+
+    Args:
+        connection: the database, inside one transaction.
+    """
+    query = _query()
+    last = 0
+    while True:
+        rows = (
+            connection.execute(query.where(combination.c.id > last).limit(_ROWS_AT_ONCE))
+            .mappings()
+            .all()
+        )
+        if not rows:
+            return
+        last = rows[-1]["id"]
+        ids = (rows[0]["id"], last)
+        intervals = _children(connection, outcome_interval, ids)
+        points = _children(connection, simulation, ids)
+        for row in rows:
+            for problem in _problems(row, intervals[row["id"]], points[row["id"]]):
+                yield Finding("combination", str(row["id"]), problem, COMPUTE_AGAIN)
+
+
+def _query() -> Select[Any]:
+    vertical = motion.alias("vertical")
+    return (
+        select(
+            combination,
+            motion.c.pga_g,
+            motion.c.dt_s,
+            motion.c.samples_sha256,
+            vertical.c.samples_sha256.label("vertical_sha256"),
+            campaign.c.numerics_version.label("campaign_numerics"),
+        )
+        .select_from(
+            combination.join(motion, motion.c.id == combination.c.motion_id)
+            .outerjoin(vertical, vertical.c.id == combination.c.vertical_motion_id)
+            .outerjoin(campaign, campaign.c.id == combination.c.campaign_id)
+        )
+        .order_by(combination.c.id)
+    )
+
+
+def _children(
+    connection: Connection, table: Any, ids: tuple[int, int]
+) -> defaultdict[int, list[Row[Any]]]:
+    own = [column for column in table.c if column.name != "combination_id"]
+    query = (
+        select(table.c.combination_id, *own)
+        .where(table.c.combination_id.between(*ids))
+        .order_by(table.c.combination_id, own[0])
+    )
+    by_id: defaultdict[int, list[Row[Any]]] = defaultdict(list)
+    for row in connection.execute(query):
+        by_id[row.combination_id].append(row)
+    return by_id
+
+
+def _problems(
+    row: RowMapping, intervals: Sequence[Row[Any]], points: Sequence[Row[Any]]
+) -> Iterator[str]:
+    yield from _key_problems(row)
+    if row["campaign_numerics"] not in (None, row["numerics_version"]):
+        yield (
+            f"numerics version {row['numerics_version']}, its campaign says "
+            f"{row['campaign_numerics']}"
+        )
+    try:
+        json.loads(row["warnings"])
+    except ValueError as error:
+        yield f"its warnings cannot be read: {error}"
+    yield from _value_problems(row)
+    if row["kind"] == "sliding":
+        yield from sliding_problems(row, points)
+        return
+    toppled = [point.kr_over_pga for point in points if point.outcome == "toppled"]
+    unsure = [point.kr_over_pga for point in points if point.outcome == "undetermined"]
+    if rotation_of(row["settings"]) is None:
+        yield from _point_problems(row, toppled, unsure)
+    stable = [point.kr_over_pga for point in points if point.outcome == "stable"]
+    yield from interval_problems(row, intervals, toppled, stable)
+
+
+def _key_problems(row: RowMapping) -> Iterator[str]:
+    try:
+        block = None if row["block"] is None else json.loads(row["block"])
+    except ValueError as error:
+        yield f"its block cannot be read: {error}"
+        return
+    try:
+        settings = json.loads(row["settings"])
+        expected = combination_key(
+            motion_sha256=row["samples_sha256"],
+            dt_s=row["dt_s"],
+            vertical_sha256=row["vertical_sha256"],
+            polarity=row["polarity"],
+            kind=row["kind"],
+            p2=row["p2"],
+            settings=settings,
+            numerics_version=row["numerics_version"],
+            linear=row["linear"],
+            block=block,
+        )
+    except ValueError as error:
+        yield f"its settings cannot be read: {error}"
+        return
+    if expected != row["natural_key"]:
+        yield "its natural key is not the hash of its inputs"
+
+
+def _value_problems(row: RowMapping) -> Iterator[str]:
+    if row["status"] != "found":
+        return
+    k, lower, upper = row["kr_over_pga"], row["lower"], row["upper"]
+    if lower is not None and lower > k:
+        yield f"kr/PGA {k!r} lies below its bracket, {lower!r} to {upper!r}"
+    if upper is not None and upper < k:
+        yield f"kr/PGA {k!r} lies above its bracket, {lower!r} to {upper!r}"
+    if not math.isclose(row["kr"], k * row["pga_g"], rel_tol=_ROUNDING):
+        yield f"kr {row['kr']!r} is not kr/PGA times the motion's PGA"
+    if row["p2"] is None:
+        return
+    y_m_s = row["kr"] * STANDARD_GRAVITY_M_S2 / math.sqrt(row["p2"])
+    if not math.isclose(row["y_m_s"], y_m_s, rel_tol=_ROUNDING):
+        yield f"y {row['y_m_s']!r} m/s is not kr g/p = {y_m_s!r} m/s"
+
+
+def _point_problems(
+    row: RowMapping, toppled: Sequence[float], unsure: Sequence[float]
+) -> Iterator[str]:
+    if row["status"] == "found":
+        # a run beside a very sensitive border may not tell; the certificate of its interval does
+        if row["kr_over_pga"] not in toppled and row["kr_over_pga"] not in unsure:
+            yield "no simulation topples at its critical kr/PGA"
+        elif max(toppled, default=0.0) > row["kr_over_pga"]:
+            yield f"a simulation topples above its critical kr/PGA, at {max(toppled)!r}"
+    elif row["status"] in ("below_limit", "no_motion") and toppled:
+        above = [k for k in toppled if k >= row["search_limit"]]
+        if above:
+            yield f"status {row['status']}, yet a simulation topples at kr/PGA {max(above)!r}"

@@ -1,0 +1,95 @@
+"""Stored motions against their own samples."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from sqlalchemy import Connection, select
+
+from rbfrag.db.check.finding import Finding
+from rbfrag.db.schema import motion
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+
+# Sums over some 1e5 samples, in another order on another processor.
+_ROUNDING = 1e-9
+
+
+def check_motions(connection: Connection) -> Iterator[Finding]:
+    """Yield what is wrong with motions: bytes, sha256, and intensity measures calculated anew.
+
+    Args:
+        connection: the database, inside one transaction.
+    """
+    query = select(motion).order_by(motion.c.id)
+    ids = list(connection.scalars(select(motion.c.id).order_by(motion.c.id)))
+    for row_id in ids:  # one at a time: the samples of all may not fit into memory
+        row = connection.execute(query.where(motion.c.id == row_id)).mappings().one()
+        for problem in _problems(row):
+            yield Finding("motion", str(row_id), problem, _advice(row["source_file"]))
+
+
+def _advice(source_file: str) -> str:
+    file = source_file or "the file of its record"
+    return f"restore the database from a copy, or add {file} to a new database"
+
+
+def _problems(row: Any) -> Iterator[str]:
+    for column in ("flags", "remarks"):
+        try:
+            if not isinstance(json.loads(row[column]), list):
+                yield f"its {column} are no JSON list"
+        except ValueError as error:
+            yield f"its {column} cannot be read: {error}"
+    try:
+        json.loads(row["processing_applied"] or "{}")
+    except ValueError as error:
+        yield f"its processing_applied cannot be read: {error}"
+    if row["processing_applied"] is None and row["source_sha256"] != row["samples_sha256"]:
+        yield "its samples are not those of the file, yet no processing is said to be applied"
+    samples = row["samples"]
+    if samples is None:
+        return
+    if len(samples) != 8 * row["npts"]:
+        yield f"holds {len(samples)} bytes, not 8 x {row['npts']}"
+    elif hashlib.sha256(samples).hexdigest() != row["samples_sha256"]:
+        yield "the samples do not match their sha256"
+    else:
+        yield from _measure_problems(row, np.frombuffer(samples, dtype="<f8"))
+
+
+def _measure_problems(row: Any, samples: np.ndarray) -> Iterator[str]:
+    try:
+        measures = GroundMotion(samples.astype(np.float64), row["dt_s"]).measures
+    except InputError as error:
+        yield f"the samples are no accelerogram: {error}"
+        return
+    # what cancels is compared with what it is the rest of
+    scale = {
+        "final_velocity_m_s": measures.pgv_m_s,
+        "final_displacement_m": measures.pgd_m,
+    }
+    for name in (
+        "pga_g",
+        "pgv_m_s",
+        "pgd_m",
+        "tm_s",
+        "final_velocity_m_s",
+        "final_displacement_m",
+    ):
+        stored, now = row[name], getattr(measures, name)
+        if stored is None and now is None:
+            continue
+        if (
+            stored is None
+            or now is None
+            or not math.isclose(
+                stored, now, rel_tol=_ROUNDING, abs_tol=_ROUNDING * scale.get(name, 0.0)
+            )
+        ):
+            yield f"{name} is {stored!r}, the samples give {now!r}"

@@ -1,0 +1,39 @@
+"""Numbers that are none: NaN and infinities, which no writer of rbfrag stores."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from sqlalchemy import Connection, Double, or_, select
+from sqlalchemy.sql.elements import ColumnElement
+
+from rbfrag.db.check.finding import Finding
+from rbfrag.db.schema import metadata
+
+_GREATEST = 1.7976931348623157e308
+
+
+def check_numbers(connection: Connection) -> Iterator[Finding]:
+    """Yield every row with a number that is not finite.
+
+    Args:
+        connection: the database, inside one transaction.
+    """
+    for name, table in sorted(metadata.tables.items()):
+        doubles = [column for column in table.c if isinstance(column.type, Double)]
+        if not doubles:
+            continue
+        key = list(table.primary_key.columns)
+        # PostgreSQL sorts NaN above every number; SQLite holds it as NULL.
+        wrong: list[ColumnElement[bool]] = [
+            or_(column > _GREATEST, column < -_GREATEST) for column in doubles
+        ]
+        query = select(*key, *doubles).where(or_(*wrong))
+        for row in connection.execute(query).mappings():
+            bad = [c.name for c in doubles if row[c.name] is not None and not _finite(row[c.name])]
+            at = ", ".join(str(row[column.name]) for column in key)
+            yield Finding(name, at, f"{', '.join(bad)}: not a finite number")
+
+
+def _finite(value: float) -> bool:
+    return abs(value) <= _GREATEST

@@ -1,0 +1,1 @@
+"""Bringing two databases together."""

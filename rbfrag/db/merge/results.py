@@ -1,0 +1,351 @@
+"""Bringing the results of another database in: campaigns, combinations, maps, runs, spectra."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from sqlalchemy import Connection, RowMapping, Table, insert, select, update
+
+from rbfrag.db.campaigns import known_combinations
+from rbfrag.db.check.compare_maps import BORDER_ERROR, contradictions
+from rbfrag.db.insert import insert_if_new, insert_rows
+from rbfrag.db.keys import combination_key
+from rbfrag.db.merge.ledger import Ledger
+from rbfrag.db.merge.motions import MergedMotions
+from rbfrag.db.schema import (
+    campaign,
+    combination,
+    motion,
+    outcome_interval,
+    response,
+    simulation,
+    toppling_spectrum,
+)
+
+_AT_ONCE = 500
+_COLUMNS = tuple(column.name for column in combination.c if column.name != "id")
+_INPUTS = (
+    "natural_key", "polarity", "kind", "linear", "p2", "block", "settings", "numerics_version",
+)  # fmt: skip
+_INCIDENTAL = ("campaign_id", "motion_id", "vertical_motion_id", "warnings")
+_VALUES = tuple(name for name in _COLUMNS if name not in (*_INPUTS, *_INCIDENTAL))
+
+ROTATION_ERROR = 1e-6
+"""Relative error of a rotation that another processor's last bits can make."""
+
+Point = tuple[float, float | None, str, float | None]
+AnyRow = RowMapping | Mapping[str, Any]
+
+
+def merge_campaigns(source: Connection, target: Connection, ledger: Ledger) -> dict[int, int]:
+    """Bring campaigns in; two are one when settings, versions and start are the same.
+
+    Args:
+        source: the other database.
+        target: the database that is merged into, inside the caller's transaction.
+        ledger: what was done.
+
+    Returns:
+        The row id here of each campaign there.
+    """
+    ids: dict[int, int] = {}
+    for theirs in source.execute(select(campaign).order_by(campaign.c.id)).mappings():
+        key = {
+            name: theirs[name]
+            for name in ("settings", "numerics_version", "rbfrag_version", "started")
+        }
+        ours = target.execute(
+            select(campaign.c.id, campaign.c.finished).filter_by(**key).order_by(campaign.c.id)
+        ).first()
+        if ours is not None:
+            ledger.same["campaign"] += 1
+            ids[theirs["id"]] = ours.id
+            if ours.finished is None and theirs["finished"] is not None:
+                values = {"finished": theirs["finished"]}
+                target.execute(update(campaign).where(campaign.c.id == ours.id).values(**values))
+            continue
+        done = target.execute(insert(campaign).values(**key, finished=theirs["finished"]))
+        assert done.inserted_primary_key is not None
+        ids[theirs["id"]] = int(done.inserted_primary_key[0])
+        ledger.added["campaign"] += 1
+    return ids
+
+
+def merge_combinations(
+    source: Connection,
+    target: Connection,
+    motions: MergedMotions,
+    campaigns: Mapping[int, int],
+    ledger: Ledger,
+) -> None:
+    """Bring combinations in, each with its map and its simulations.
+
+    Args:
+        source: the other database.
+        target: the database that is merged into, inside the caller's transaction.
+        motions: where the motions are here.
+        campaigns: the row id here of each campaign there.
+        ledger: what was done, and conflicts.
+    """
+    last = 0
+    while True:
+        query = select(combination).where(combination.c.id > last).order_by(combination.c.id)
+        found = source.execute(query.limit(_AT_ONCE)).mappings().all()
+        if not found:
+            return
+        last = found[-1]["id"]
+        rows = [{**row, "natural_key": _key_here(source, row, motions)} for row in found]
+        known = known_combinations(target, (row["natural_key"] for row in rows))
+        _add(source, target, [row for row in rows if row["natural_key"] not in known],
+             motions, campaigns, ledger)  # fmt: skip
+        shared = [row for row in rows if row["natural_key"] in known]
+        if shared:
+            ids = {key: stored.id for key, stored in known.items()}
+            _compare(source, target, shared, ids, ledger)
+
+
+def _add(
+    source: Connection,
+    target: Connection,
+    rows: Sequence[Mapping[str, Any]],
+    motions: MergedMotions,
+    campaigns: Mapping[int, int],
+    ledger: Ledger,
+) -> None:
+    if not rows:
+        return
+    values = []
+    for row in rows:
+        own = {
+            **row,
+            "campaign_id": campaigns[row["campaign_id"]],
+            "motion_id": motions.ids[row["motion_id"]],
+            "vertical_motion_id": _vertical(motions, row["vertical_motion_id"]),
+        }
+        values.append(tuple(own[name] for name in _COLUMNS))
+    insert_rows(target, combination, _COLUMNS, values)
+    ledger.added["combination"] += len(rows)
+    ids = known_combinations(target, (row["natural_key"] for row in rows))
+    here = {row["id"]: ids[row["natural_key"]].id for row in rows}
+    for table in (outcome_interval, simulation):
+        names = tuple(column.name for column in table.c)
+        children = [
+            (here[their_id], *child)
+            for their_id, of_it in _children(source, table, list(here)).items()
+            for child in of_it
+        ]
+        insert_rows(target, table, names, children)
+        ledger.added[table.name] += len(children)
+
+
+def _vertical(motions: MergedMotions, motion_id: int | None) -> int | None:
+    return None if motion_id is None else motions.ids[motion_id]
+
+
+def _key_here(source: Connection, row: AnyRow, motions: MergedMotions) -> str:
+    """Return the natural key that a combination there has with the samples here."""
+    inputs = (row["motion_id"], row["vertical_motion_id"])
+    if not motions.other_bits.keys() & set(inputs):
+        return str(row["natural_key"])
+    shas = {None: None}
+    query = select(motion.c.id, motion.c.samples_sha256, motion.c.dt_s)
+    rows = source.execute(query.where(motion.c.id.in_([i for i in inputs if i]))).all()
+    shas |= {row.id: motions.other_bits.get(row.id, row.samples_sha256) for row in rows}
+    (dt_s,) = {found.dt_s for found in rows if found.id == row["motion_id"]}
+    return combination_key(
+        motion_sha256=str(shas[row["motion_id"]]),
+        dt_s=dt_s,
+        vertical_sha256=shas[row["vertical_motion_id"]],
+        polarity=row["polarity"],
+        kind=row["kind"],
+        p2=row["p2"],
+        settings=json.loads(row["settings"]),
+        numerics_version=row["numerics_version"],
+        linear=row["linear"],
+        block=None if row["block"] is None else json.loads(row["block"]),
+    )
+
+
+def _children(
+    connection: Connection, table: Table, ids: Sequence[int]
+) -> defaultdict[int, list[tuple[Any, ...]]]:
+    """Return the rows of a table that belong to combinations, in the order of its key."""
+    query = (
+        select(table).where(table.c.combination_id.in_(ids)).order_by(*table.primary_key.columns)
+    )
+    by_id: defaultdict[int, list[tuple[Any, ...]]] = defaultdict(list)
+    for combination_id, *rest in connection.execute(query):
+        by_id[combination_id].append(tuple(rest))
+    return by_id
+
+
+def _compare(
+    source: Connection,
+    target: Connection,
+    rows: Sequence[Mapping[str, Any]],
+    known: Mapping[str, int],
+    ledger: Ledger,
+) -> None:
+    our_ids = [known[row["natural_key"]] for row in rows]
+    query = select(combination).where(combination.c.id.in_(our_ids))
+    ours_by_key = {row["natural_key"]: row for row in target.execute(query).mappings()}
+    their_ids = [row["id"] for row in rows]
+    maps = (_children(target, outcome_interval, our_ids),
+            _children(source, outcome_interval, their_ids))  # fmt: skip
+    runs = (_children(target, simulation, our_ids), _children(source, simulation, their_ids))
+    more: list[tuple[object, ...]] = []
+    for theirs in rows:
+        ours = ours_by_key[theirs["natural_key"]]
+        name = f"{theirs['natural_key'][:12]}…"
+        here_map, there_map = maps[0][ours["id"]], maps[1][theirs["id"]]
+        exact = here_map == there_map and all(ours[c] == theirs[c] for c in _VALUES)
+        if not exact and not _within_error(name, ours, theirs, here_map, there_map, ledger):
+            continue
+        ledger.same["combination"] += 1
+        ledger.within_error += not exact
+        band = None if exact else _band(ours, theirs)
+        points = (runs[0][ours["id"]], runs[1][theirs["id"]])
+        more += ((ours["id"], *point) for point in _more_points(name, *points, band, ledger))
+    insert_rows(target, simulation, tuple(column.name for column in simulation.c), more)
+    ledger.added["simulation"] += len(more)
+
+
+def _within_error(
+    name: str,
+    ours: AnyRow,
+    theirs: AnyRow,
+    here_map: Sequence[Any],
+    there_map: Sequence[Any],
+    ledger: Ledger,
+) -> bool:
+    if ours["status"] != theirs["status"]:
+        ledger.conflict("combination", name, "status", ours["status"], theirs["status"])
+        return False
+    if ours["status"] == "found":
+        low = max(_lower(ours), _lower(theirs))
+        high = min(_upper(ours), _upper(theirs))
+        if low > high * (1.0 + BORDER_ERROR):
+            here, there = ours["kr_over_pga"], theirs["kr_over_pga"]
+            ledger.conflict("combination", name, "kr_over_pga", here, there)
+            return False
+    for bottom, top, here, there in contradictions(here_map, there_map):
+        column = f"the outcome from kr/PGA {bottom!r} to {top!r}"
+        ledger.conflict("combination", name, column, here, there)
+        return False
+    return True
+
+
+def _lower(row: AnyRow) -> float:
+    return float(row["kr_over_pga"] if row["lower"] is None else row["lower"])
+
+
+def _upper(row: AnyRow) -> float:
+    return float(row["kr_over_pga"] if row["upper"] is None else row["upper"])
+
+
+def _band(ours: AnyRow, theirs: AnyRow) -> tuple[float, float] | None:
+    """Return where runs of the other search belong to its bracket, not to ours."""
+    if ours["status"] != "found":
+        return None
+    low = min(_lower(ours), _lower(theirs))
+    high = max(_upper(ours), _upper(theirs))
+    return low * (1.0 - BORDER_ERROR), high * (1.0 + BORDER_ERROR)
+
+
+def _more_points(
+    name: str,
+    here: Sequence[Any],
+    there: Sequence[Any],
+    band: tuple[float, float] | None,
+    ledger: Ledger,
+) -> list[Point]:
+    known = {k: rest for k, *rest in here}
+    more: list[Point] = []
+    for k, theta, outcome, slid in there:
+        if k not in known:
+            if band is None or not band[0] <= k <= band[1]:
+                more.append((k, theta, outcome, slid))
+            continue
+        our_theta, our_outcome, our_slid = known[k]
+        if None not in (slid, our_slid) and not math.isclose(
+            slid, our_slid, rel_tol=ROTATION_ERROR, abs_tol=1e-12
+        ):
+            column = f"displacement_m at ky/PGA {k!r}"
+            ledger.conflict("simulation", name, column, our_slid, slid)
+        if outcome != our_outcome and (band is None or not band[0] <= k <= band[1]):
+            column = f"the outcome at kr/PGA {k!r}"
+            ledger.conflict("simulation", name, column, our_outcome, outcome)
+        elif None not in (theta, our_theta) and not math.isclose(
+            theta, our_theta, rel_tol=ROTATION_ERROR, abs_tol=1e-12
+        ):
+            column = f"theta_n at kr/PGA {k!r}"
+            ledger.conflict("simulation", name, column, our_theta, theta)
+    return more
+
+
+def merge_spectra(
+    source: Connection, target: Connection, motions: MergedMotions, ledger: Ledger
+) -> None:
+    """Bring toppling spectra in.
+
+    Args:
+        source: the other database.
+        target: the database that is merged into, inside the caller's transaction.
+        motions: where the motions are here.
+        ledger: what was done, and conflicts.
+    """
+    for theirs in source.execute(select(toppling_spectrum)).mappings():
+        values = {**theirs, "motion_id": motions.ids[theirs["motion_id"]]}
+        if insert_if_new(target, toppling_spectrum, values):
+            ledger.added["toppling_spectrum"] += 1
+            continue
+        ledger.same["toppling_spectrum"] += 1
+        key = {name: values[name] for name in ("motion_id", "polarity", "p2", "numerics_version")}
+        here = target.execute(select(toppling_spectrum.c.x_m_s).filter_by(**key)).scalar_one()
+        if not math.isclose(here, values["x_m_s"], rel_tol=1e-9, abs_tol=1e-15):
+            row = f"of motion {key['motion_id']} at p2 {key['p2']:g}, {key['polarity']}"
+            ledger.conflict("toppling_spectrum", row, "x_m_s", here, values["x_m_s"])
+
+
+def merge_responses(
+    source: Connection, target: Connection, motions: MergedMotions, ledger: Ledger
+) -> None:
+    """Bring histories in.
+
+    Args:
+        source: the other database.
+        target: the database that is merged into, inside the caller's transaction.
+        motions: where the motions are here.
+        ledger: what was done, and conflicts.
+    """
+    for their_id in list(source.scalars(select(response.c.id).order_by(response.c.id))):
+        theirs = source.execute(select(response).where(response.c.id == their_id)).mappings().one()
+        if motions.other_bits.keys() & {theirs["motion_id"], theirs["vertical_motion_id"]}:
+            ledger.notes.append(
+                f"left out: history {theirs['natural_key'][:12]}… of samples whose last bits "
+                "are other here: rbfrag simulate  makes it again"
+            )
+            continue
+        values = {name: value for name, value in theirs.items() if name != "id"}
+        values["motion_id"] = motions.ids[theirs["motion_id"]]
+        values["vertical_motion_id"] = _vertical(motions, theirs["vertical_motion_id"])
+        if insert_if_new(target, response, values):
+            ledger.added["response"] += 1
+            continue
+        ledger.same["response"] += 1
+        same_key = response.c.natural_key == theirs["natural_key"]
+        ours = target.execute(select(response).where(same_key)).mappings().one()
+        name = f"{theirs['natural_key'][:12]}…"
+        here, there = ours["peak_theta_n"], theirs["peak_theta_n"]
+        if ours["outcome"] != theirs["outcome"]:
+            ledger.conflict("response", name, "outcome", ours["outcome"], theirs["outcome"])
+        elif here != there and (
+            None in (here, there) or not math.isclose(here, there, rel_tol=ROTATION_ERROR)
+        ):
+            ledger.conflict("response", name, "peak_theta_n", here, there)
+        elif any(ours[c] != theirs[c] for c in ("time_s", "theta_rad", "theta_dot_rad_s")):
+            ledger.within_error += 1

@@ -1,0 +1,421 @@
+"""Writing and reading accelerograms."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from sqlalchemy import (
+    Connection,
+    RowMapping,
+    Select,
+    and_,
+    case,
+    delete,
+    exists,
+    or_,
+    select,
+    update,
+)
+
+from rbfrag.db import schema
+from rbfrag.db.clock import utc_now
+from rbfrag.db.earthquakes import earthquake_id_for
+from rbfrag.db.insert import insert_if_new
+from rbfrag.db.keys import canonical_json
+from rbfrag.db.rows import EarthquakeInfo, MotionRow
+from rbfrag.db.stored_text import storable
+from rbfrag.db.suites import add_to_suite, require_suite, suite_names
+from rbfrag.errors import DatabaseError, InputError
+from rbfrag.motions.ground_motion import GroundMotion
+
+__all__ = [
+    "add_motion",
+    "load_motion",
+    "motion_row",
+    "motion_rows",
+    "same_source",
+    "suite_names",
+]
+
+_ID_LIMIT = 2**31  # drivers refuse larger integers in words of their own
+
+
+def add_motion(
+    connection: Connection,
+    motion: GroundMotion,
+    *,
+    earthquake: EarthquakeInfo,
+    is_vertical: bool,
+    recording: str = "",
+    station: str = "",
+    component: str = "",
+    processing: str = "",
+    flags: Sequence[str] = (),
+    suite: str | None = None,
+) -> tuple[int, bool]:
+    """Store a motion, or find it when the same samples are there already.
+
+    A motion is its samples and their interval; labels do not make another one. Nor does a
+    filter that rounds otherwise: the same samples of a file, processed alike, are one motion
+    even where another machine's arithmetic differs in the last bits.
+
+    Where it is there already, a stated earthquake replaces a guessed one together with all
+    labels (recording, station, component, vertical or not, processing, flags); a guess replaces
+    nothing; what was stated before stays, and stating another earthquake or direction is
+    refused.
+
+    Args:
+        connection: inside the caller's transaction.
+        motion: equally spaced samples [g].
+        earthquake: where it belongs; without an event_id it stands for itself alone.
+        is_vertical: True for a vertical component.
+        recording: what all components of one recording share; when empty, the motion's own,
+            or else file and trace, so that strangers never become companions.
+        station: station; when empty, the motion's own.
+        component: component; when empty, the motion's own.
+        processing: what was done to the samples, in words.
+        flags: quality signs, such as ``event_guessed``.
+        suite: suite to put the motion into; made when new.
+
+    Returns:
+        The motion's id, and True when it was not there before.
+
+    Raises:
+        InputError: a motion from nodes; another earthquake or direction was stated before.
+    """
+    if motion.dt_s is None:
+        raise InputError(
+            f"{motion.label}: the database holds equally spaced samples only; "
+            "sample the motion first"
+        )
+    recording = storable(recording or motion.recording or _own_name(motion))
+    labels: dict[str, Any] = {
+        "component": storable(component or motion.component),
+        "orientation_deg": motion.orientation_deg,
+        "is_vertical": is_vertical,
+        "processing": storable(processing),
+        "flags": json.dumps(list(flags)),
+        "remarks": json.dumps(list(motion.remarks)),
+        "source_file": storable(motion.source_file),
+        "trace_index": motion.trace_index,
+        "file_format": motion.file_format,
+    }
+    place = (earthquake, recording, storable(station or motion.station))
+    stored = _find(connection, motion)
+    if stored is None:
+        labels["recording_id"] = _recording_id_for(connection, *place)
+        values = {**_measured(motion), **labels, "added": utc_now()}
+        new = insert_if_new(connection, schema.motion, values)
+        stored = _find(connection, motion)
+        assert stored is not None
+    else:
+        new = False
+        if stored["guessed"] and not earthquake.guessed:
+            labels["recording_id"] = _recording_id_for(connection, *place)
+            connection.execute(
+                update(schema.motion).where(schema.motion.c.id == stored["id"]).values(**labels)
+            )
+            _delete_orphans(connection, stored["recording_id"])
+        elif not earthquake.guessed:
+            _refuse_contradiction(motion, stored, earthquake, is_vertical)
+    if suite is not None:
+        add_to_suite(connection, suite, stored["id"])
+    return stored["id"], new
+
+
+def motion_rows(connection: Connection, *, suite: str | None = None) -> list[MotionRow]:
+    """Return the stored motions without their samples, by id.
+
+    Args:
+        connection: the database.
+        suite: only those of this suite.
+
+    Raises:
+        InputError: there is no such suite.
+    """
+    query = _row_query()
+    if suite is not None:
+        suite_id = require_suite(connection, suite)
+        query = query.join(
+            schema.suite_motion,
+            and_(
+                schema.suite_motion.c.motion_id == schema.motion.c.id,
+                schema.suite_motion.c.suite_id == suite_id,
+            ),
+        )
+    return [
+        _motion_row(row)
+        for row in connection.execute(query.order_by(schema.motion.c.id)).mappings()
+    ]
+
+
+def motion_row(connection: Connection, motion_id: int) -> MotionRow:
+    """Return one stored motion without its samples.
+
+    Raises:
+        InputError: there is no motion of that id.
+    """
+    return _motion_row(_row_of(connection, _row_query(), motion_id))
+
+
+def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
+    """Return a stored motion with its samples, bit for bit as it was stored.
+
+    Raises:
+        InputError: there is no motion of that id, or a reference file left its samples out.
+        DatabaseError: the samples are not those that were stored.
+    """
+    query = _row_query().add_columns(schema.motion.c.samples, schema.motion.c.remarks)
+    row = _row_of(connection, query, motion_id)
+    if row["samples"] is None:
+        raise InputError(
+            f"motion {motion_id}: this database was written without samples; add the record's file"
+        )
+    blob = bytes(row["samples"])
+    if hashlib.sha256(blob).hexdigest() != row["samples_sha256"] or len(blob) != 8 * row["npts"]:
+        raise DatabaseError(
+            f"motion {motion_id}: the stored samples are damaged (their sha256 differs): restore "
+            "the database from a copy; rbfrag db check lists what else is wrong"
+        )
+    return GroundMotion(
+        np.frombuffer(blob, dtype="<f8").astype(np.float64),
+        row["dt_s"],
+        station=row["station"],
+        event=row["event_name"] or row["event_id"],
+        component=row["component"],
+        orientation_deg=row["orientation_deg"],
+        is_vertical=row["is_vertical"],
+        recording=row["recording"],
+        source_file=row["source_file"],
+        trace_index=row["trace_index"],
+        file_format=row["file_format"],
+        remarks=tuple(json.loads(row["remarks"])),
+        is_corrected=_is_corrected(row),
+        is_partial="partial" in json.loads(row["flags"]),
+        start_time=_time(row["start_time"]),
+        processing_applied=_parameters(row["processing_applied"]),
+        source_sha256="" if row["processing_applied"] is None else row["source_sha256"],
+    )
+
+
+def same_source(connection: Connection, motion_id: int) -> list[int]:
+    """Return the other motions that were made from the same samples of a file, by id.
+
+    Args:
+        connection: the database.
+        motion_id: a stored motion.
+    """
+    own = select(schema.motion.c.source_sha256).where(schema.motion.c.id == motion_id)
+    interval = select(schema.motion.c.dt_s).where(schema.motion.c.id == motion_id)
+    query = (
+        select(schema.motion.c.id)
+        .where(
+            schema.motion.c.source_sha256 == own.scalar_subquery(),
+            schema.motion.c.dt_s == interval.scalar_subquery(),
+            schema.motion.c.id != motion_id,
+        )
+        .order_by(schema.motion.c.id)
+    )
+    return list(connection.scalars(query))
+
+
+def _applied(motion: GroundMotion) -> str | None:
+    return None if motion.processing_applied is None else canonical_json(motion.processing_applied)
+
+
+def _find(connection: Connection, motion: GroundMotion) -> RowMapping | None:
+    same_samples = schema.motion.c.samples_sha256 == motion.sha256
+    same_origin = and_(
+        schema.motion.c.source_sha256 == motion.source_sha256,
+        schema.motion.c.processing_applied == _applied(motion),
+    )
+    return (
+        connection.execute(
+            select(
+                schema.motion.c.id,
+                schema.motion.c.recording_id,
+                schema.motion.c.is_vertical,
+                schema.motion.c.source_file,
+                schema.earthquake.c.event_id,
+                schema.earthquake.c.guessed,
+            )
+            .select_from(schema.motion.join(schema.recording).join(schema.earthquake))
+            .where(schema.motion.c.dt_s == motion.dt_s, or_(same_samples, same_origin))
+            .order_by(case((same_samples, 0), else_=1), schema.motion.c.id)
+        )
+        .mappings()
+        .first()
+    )
+
+
+def _measured(motion: GroundMotion) -> dict[str, Any]:
+    measures = motion.measures
+    values = {
+        "dt_s": motion.dt_s,
+        "npts": motion.npts,
+        "pga_g": measures.pga_g,
+        "pgv_m_s": measures.pgv_m_s,
+        "pgd_m": measures.pgd_m,
+        "tm_s": measures.tm_s,
+        "final_velocity_m_s": measures.final_velocity_m_s,
+        "final_displacement_m": measures.final_displacement_m,
+    }
+    for name, value in values.items():
+        if value is not None and not math.isfinite(value):
+            raise InputError(
+                f"{motion.label}: {name} is {value}: samples of up to "
+                f"{np.max(np.abs(motion.acceleration_g)):g} g are no accelerogram; check "
+                "the units"
+            )
+    return {
+        **values,
+        "processing_applied": _applied(motion),
+        "source_sha256": motion.source_sha256 or motion.sha256,
+        "start_time": None if motion.start_time is None else motion.start_time.isoformat(),
+        "samples_sha256": motion.sha256,
+        "samples": motion.acceleration_g.astype("<f8").tobytes(),
+    }
+
+
+def _is_corrected(row: RowMapping) -> bool | None:
+    if "uncorrected" in json.loads(row["flags"]):
+        return False
+    return True if "filter" in (_parameters(row["processing_applied"]) or {}) else None
+
+
+def _time(text: str | None) -> datetime | None:
+    return None if text is None else datetime.fromisoformat(text)
+
+
+def _parameters(text: str | None) -> dict[str, object] | None:
+    return None if text is None else json.loads(text)
+
+
+def _own_name(motion: GroundMotion) -> str:
+    if motion.source_file:
+        return f"{motion.source_file}#{motion.trace_index}"
+    return motion.sha256[:12]
+
+
+def _recording_id_for(
+    connection: Connection, event: EarthquakeInfo, name: str, station: str
+) -> int:
+    earthquake_id = earthquake_id_for(connection, event, recording=name)
+    values = {"earthquake_id": earthquake_id, "name": name, "station": station}
+    insert_if_new(connection, schema.recording, values)
+    found: int = connection.execute(select(schema.recording.c.id).filter_by(**values)).scalar_one()
+    return found
+
+
+def _delete_orphans(connection: Connection, recording_id: int) -> None:
+    # The guess that nothing refers to any more.
+    connection.execute(
+        delete(schema.recording).where(
+            schema.recording.c.id == recording_id,
+            ~exists().where(schema.motion.c.recording_id == schema.recording.c.id),
+        )
+    )
+    connection.execute(
+        delete(schema.earthquake).where(
+            schema.earthquake.c.guessed,
+            ~exists().where(schema.recording.c.earthquake_id == schema.earthquake.c.id),
+        )
+    )
+
+
+def _refuse_contradiction(
+    motion: GroundMotion, stored: RowMapping, stated: EarthquakeInfo, is_vertical: bool
+) -> None:
+    name = motion.source_file or motion.label
+    known = f"the same samples are stored as motion {stored['id']} (from {stored['source_file']})"
+    if stored["event_id"] != stated.event_id:
+        raise InputError(
+            f"{name}: {known} of event {stored['event_id']!r}, not {stated.event_id!r}: "
+            "correct the metadata"
+        )
+    if stored["is_vertical"] != is_vertical:
+        direction = "vertical" if stored["is_vertical"] else "horizontal"
+        raise InputError(f"{name}: {known}, a {direction} component: correct the metadata")
+
+
+def _row_query() -> Select[Any]:
+    return select(
+        schema.motion.c.id,
+        schema.earthquake.c.event_id,
+        schema.earthquake.c.guessed,
+        schema.earthquake.c.name.label("event_name"),
+        schema.earthquake.c.magnitude,
+        schema.recording.c.name.label("recording"),
+        schema.recording.c.station,
+        schema.motion.c.component,
+        schema.motion.c.orientation_deg,
+        schema.motion.c.is_vertical,
+        schema.motion.c.dt_s,
+        schema.motion.c.npts,
+        schema.motion.c.pga_g,
+        schema.motion.c.pgv_m_s,
+        schema.motion.c.pgd_m,
+        schema.motion.c.tm_s,
+        schema.motion.c.final_velocity_m_s,
+        schema.motion.c.final_displacement_m,
+        schema.motion.c.source_file,
+        schema.motion.c.trace_index,
+        schema.motion.c.file_format,
+        schema.motion.c.processing,
+        schema.motion.c.processing_applied,
+        schema.motion.c.source_sha256,
+        schema.motion.c.start_time,
+        schema.motion.c.samples_sha256,
+        schema.motion.c.flags,
+    ).select_from(schema.motion.join(schema.recording).join(schema.earthquake))
+
+
+def _motion_row(row: RowMapping) -> MotionRow:
+    label = " ".join(part for part in (row["station"], row["component"]) if part)
+    return MotionRow(
+        id=row["id"],
+        name=label or f"{row['source_file']}#{row['trace_index']}",
+        event_id=row["event_id"],
+        event_guessed=row["guessed"],
+        magnitude=row["magnitude"],
+        recording=row["recording"],
+        station=row["station"],
+        component=row["component"],
+        orientation_deg=row["orientation_deg"],
+        is_vertical=row["is_vertical"],
+        dt_s=row["dt_s"],
+        npts=row["npts"],
+        pga_g=row["pga_g"],
+        pgv_m_s=row["pgv_m_s"],
+        pgd_m=row["pgd_m"],
+        tm_s=row["tm_s"],
+        final_velocity_m_s=row["final_velocity_m_s"],
+        final_displacement_m=row["final_displacement_m"],
+        source_file=row["source_file"],
+        trace_index=row["trace_index"],
+        file_format=row["file_format"],
+        processing=row["processing"],
+        processing_applied=_parameters(row["processing_applied"]),
+        source_sha256=row["source_sha256"],
+        start_time=row["start_time"],
+        sha256=row["samples_sha256"],
+        flags=tuple(json.loads(row["flags"])),
+    )
+
+
+def _row_of(connection: Connection, query: Select[Any], motion_id: int) -> RowMapping:
+    row = None
+    if 0 < motion_id < _ID_LIMIT:
+        found = connection.execute(query.where(schema.motion.c.id == motion_id))
+        row = found.mappings().one_or_none()
+    if row is None:
+        raise InputError(
+            f"there is no motion {motion_id} in the database: rbfrag motions list  shows the ids"
+        )
+    return row

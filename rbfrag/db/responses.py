@@ -1,0 +1,123 @@
+"""Writing and reading the motion in time of single blocks, kept on request."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Connection, bindparam, select
+
+from rbfrag.db.insert import insert_rows
+from rbfrag.db.schema import response
+from rbfrag.errors import InputError
+from rbfrag.solver.results import Response, ResponseHistory
+
+_COLUMNS = (
+    "natural_key", "motion_id", "vertical_motion_id", "polarity", "kind", "linear", "p2", "kr",
+    "numerics_version", "outcome", "peak_theta_n", "peak_theta_rad", "npts", "time_s",
+    "theta_rad", "theta_dot_rad_s", "k_h", "k_v",
+)  # fmt: skip
+
+_KEYS_AT_ONCE = 500  # below the number of variables that any SQLite build takes
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseRecord:
+    """One response with its history as it is stored.
+
+    Args:
+        natural_key: from :func:`rbfrag.db.keys.response_key`.
+        motion_id: the horizontal motion.
+        vertical_motion_id: the vertical one, or None.
+        polarity: ``forward`` or ``reverse``.
+        p2: frequency parameter p² [1/s²].
+        kr: rocking acceleration coefficient.
+        response: what the solver answered, with its history.
+        numerics_version: the same that went into the key.
+        linear: True for the linear verification model.
+    """
+
+    natural_key: str
+    motion_id: int
+    vertical_motion_id: int | None
+    polarity: str
+    p2: float
+    kr: float
+    response: Response
+    numerics_version: str
+    linear: bool = False
+
+
+def insert_responses(connection: Connection, records: Sequence[ResponseRecord]) -> None:
+    """Store responses with their histories; those whose key is there are left alone.
+
+    Args:
+        connection: inside the caller's transaction.
+        records: the responses.
+
+    Raises:
+        InputError: one has no history.
+    """
+    insert_rows(connection, response, _COLUMNS, [_row(record) for record in records])
+
+
+def known_responses(connection: Connection, keys: Iterable[str]) -> set[str]:
+    """Return those natural keys whose responses are stored already."""
+    wanted = list(dict.fromkeys(keys))
+    query = select(response.c.natural_key).where(
+        response.c.natural_key.in_(bindparam("keys", expanding=True))
+    )
+    found: set[str] = set()
+    for start in range(0, len(wanted), _KEYS_AT_ONCE):
+        found.update(connection.scalars(query, {"keys": wanted[start : start + _KEYS_AT_ONCE]}))
+    return found
+
+
+def stored_history(connection: Connection, natural_key: str) -> ResponseHistory:
+    """Return the history of a stored response.
+
+    Raises:
+        InputError: there is none of that key.
+    """
+    column = response.c
+    row = connection.execute(
+        select(
+            column.time_s, column.theta_rad, column.theta_dot_rad_s, column.k_h, column.k_v
+        ).where(column.natural_key == natural_key)
+    ).one_or_none()
+    if row is None:
+        raise InputError(f"there is no stored response {natural_key!r}")
+    return ResponseHistory(*[np.frombuffer(blob, dtype="<f8").astype(np.float64) for blob in row])
+
+
+def _row(record: ResponseRecord) -> tuple[object, ...]:
+    answer = record.response
+    history = answer.history
+    if history is None:
+        raise InputError("a response without its history is not stored")
+    return (
+        record.natural_key,
+        record.motion_id,
+        record.vertical_motion_id,
+        record.polarity,
+        answer.kind,
+        record.linear,
+        float(record.p2),
+        float(record.kr),
+        record.numerics_version,
+        str(answer.outcome),
+        answer.peak_theta_n,
+        answer.peak_theta_rad,
+        int(history.time_s.size),
+        _blob(history.time_s),
+        _blob(history.theta_rad),
+        _blob(history.theta_dot_rad_s),
+        _blob(history.k_h),
+        _blob(history.k_v),
+    )
+
+
+def _blob(values: NDArray[np.float64]) -> bytes:
+    return values.astype("<f8").tobytes()

@@ -1,0 +1,1 @@
+"""Hazard curves in the files of other tools."""

@@ -1,0 +1,1 @@
+"""Fitting: data, estimators, errors clustered by earthquake, scores."""

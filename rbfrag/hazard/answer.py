@@ -1,0 +1,312 @@
+"""How often per year a block topples, with honest uncertainty: `hazard`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.answers import PredictionArray
+from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.predict import Model, predict
+from rbfrag.hazard.annual_rate import failure_rate, probability_in
+from rbfrag.hazard.component import component as component_named
+from rbfrag.hazard.curve import HazardCurve
+from rbfrag.hazard.normal_steps import normal_steps
+from rbfrag.hazard.velocity_conversion import velocity_conversion
+
+FloatArray = NDArray[np.float64]
+
+_SCATTER_POINTS = 17
+_CHUNK = 512
+_NOTABLE = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class HazardAnswer:
+    """Annual rates of toppling of m blocks at one site.
+
+    Args:
+        annual_rate: mean number of failures a year [1/a], shape (m,); NaN for a block that
+            cannot be used.
+        ci_low: lower end of the interval from the uncertain parameters of the model.
+        ci_high: upper end of it.
+        probability: probability of at least one failure in `years`, shape (m,).
+        years: the period [a].
+        level: confidence level of the interval.
+        model: name of the model that answered.
+        term: its intensity term.
+        method: how it was fitted.
+        edges: levels of the curve's measure between which contributions are told, (k + 1,).
+        contribution: part of each rate from each interval [1/a], shape (m, k).
+        above: part from beyond the last level, at least [1/a], shape (m,).
+        above_at_most: the same at most.
+        measure: measure of `edges`: ``pga_g``, ``pgv_m_s`` or ``sa_g``.
+        warnings: what to know about the answer.
+    """
+
+    annual_rate: FloatArray
+    ci_low: FloatArray
+    ci_high: FloatArray
+    probability: FloatArray
+    years: float
+    level: float
+    model: str
+    term: str
+    method: str
+    edges: FloatArray
+    contribution: FloatArray
+    above: FloatArray
+    above_at_most: FloatArray
+    measure: str
+    warnings: tuple[str, ...]
+
+
+def hazard(
+    curve: HazardCurve,
+    p2: ArrayLike,
+    kr: ArrayLike,
+    *,
+    tm_s: float | None = None,
+    convert: str | None = None,
+    component: str | None = None,
+    years: float = 50.0,
+    model: Model | None = None,
+    level: float = 0.95,
+    db: str | PathLike[str] | None = None,
+    one_class: bool = False,
+) -> HazardAnswer:
+    """Return how often per year blocks topple under a seismic hazard curve.
+
+    λ_f = ∫ P(topples | x) (-dλ), see :func:`rbfrag.hazard.annual_rate.failure_rate`. The
+    ends of the interval are the integrals of the ends of the fragility's own interval; since
+    these are taken at every level at once, the interval is at least as wide as one from the
+    joint distribution of the parameters.
+
+    Args:
+        curve: hazard curve of PGV, of PGA (with `tm_s`), or of a spectral acceleration
+            (with `convert`).
+        p2: frequency parameters p² [1/s²], scalar or shape (m,).
+        kr: toppling yield acceleration coefficients, scalar or shape (m,).
+        tm_s: mean period [s] of the shaking, for a PGA curve.
+        convert: name of a published conversion from spectral acceleration to PGV.
+        component: what the curve's horizontal component means: single, geometric_mean,
+            rotd50 or larger; None for single, with a warning.
+        years: period for the probability [a].
+        model: as in :func:`rbfrag.predict`.
+        level: confidence level of the interval.
+        db: as in :func:`rbfrag.predict`.
+        one_class: the blocks stand for one class, and the answer is the rate of a block drawn
+            from it: one rate, by the mean of their fragilities.
+
+    Raises:
+        InputError: the curve's measure does not suffice, or a value that cannot be used.
+        UnknownModelError: no model of that name.
+        DatabaseError: the database cannot be read.
+    """
+    blocks = np.broadcast_arrays(
+        np.atleast_1d(np.asarray(p2, dtype=np.float64)),
+        np.atleast_1d(np.asarray(kr, dtype=np.float64)),
+    )
+    p2s, krs = (np.ravel(values) for values in blocks)
+    if not np.isfinite(years) or years <= 0.0:
+        raise InputError(f"years = {years:g}: give a period above 0 years")
+    warnings = list(curve.warnings)
+    name, factor, fixed = _measure(curve, tm_s, convert, warnings)
+    meaning = component_named("single" if component is None else component)
+    if component is None:
+        warnings.append(
+            "the curve's horizontal component is taken as a single one, which the models are "
+            "fitted on; hazard products often mean rotd50 or the geometric mean: say which"
+        )
+    else:
+        warnings.append(
+            f"the curve is of {meaning.title}; Beyer and Bommer (2006) relate it to one component"
+            if meaning.name != "single"
+            else "the curve is of a single component, as the models are"
+        )
+    xi, weight = normal_steps(1 if meaning.scatter == 0.0 else _SCATTER_POINTS)
+    shift = factor / meaning.ratio * np.exp(meaning.scatter * xi)
+
+    chosen = find_model(model, ("p2", "kr", name, *fixed), db)
+    parts = []
+    for start in range(0, 0 if one_class else p2s.size, _CHUNK):
+        some = slice(start, start + _CHUNK)
+
+        def bands(levels: FloatArray, some: slice = some) -> FloatArray:
+            """Return P and the two ends of its interval for blocks x levels, stacked."""
+            shaking = {name: (levels[:, None] * shift).reshape(1, -1), **fixed}
+            found = _predicted(p2s[some, None], krs[some, None], shaking, chosen, level)
+            stacked = np.concatenate([found.probability, found.ci_low, found.ci_high])
+            averaged: FloatArray = stacked.reshape(-1, levels.size, shift.size) @ weight
+            return averaged
+
+        parts.append((p2s[some].size, failure_rate(curve, bands)))
+    if one_class:
+        mean = _mean_bands(curve, p2s, krs, name, shift, fixed, chosen, level)
+        parts.append((1, failure_rate(curve, lambda levels: mean(levels) @ weight)))
+    rates = [_split(part.annual_rate, m) for m, part in parts]
+    rate, low, high = (np.concatenate([r[i] for r in rates]) for i in range(3))
+    contribution = np.concatenate([part.contribution[:m] for m, part in parts])
+    above = np.concatenate([part.above[:m] for m, part in parts])
+    above_at_most = np.concatenate([part.above_at_most[:m] for m, part in parts])
+    below = np.concatenate([part.below[:m] for m, part in parts])
+    _tails(curve, rate, above, above_at_most, below, warnings)
+    edges = parts[0][1].edges
+    shaking = {name: factor / meaning.ratio * np.sqrt(edges[None, 1:] * edges[None, :-1]), **fixed}
+    known = _predicted(p2s[:, None], krs[:, None], shaking, chosen, level).in_domain
+    unknown = 1.0 - known
+    if one_class:
+        unknown = unknown.mean(axis=0, keepdims=True)
+    _extrapolated(rate, (unknown * contribution).sum(axis=1), warnings)
+    return HazardAnswer(
+        annual_rate=rate,
+        ci_low=low,
+        ci_high=high,
+        probability=probability_in(years, rate),
+        years=years,
+        level=level,
+        model=chosen.name,
+        term=chosen.term.name,
+        method=chosen.row.method,
+        edges=edges,
+        contribution=contribution,
+        above=above,
+        above_at_most=above_at_most,
+        measure=curve.measure,
+        warnings=tuple(warnings),
+    )
+
+
+def _measure(
+    curve: HazardCurve, tm_s: float | None, convert: str | None, warnings: list[str]
+) -> tuple[str, float, dict[str, float]]:
+    """Return predict's argument, the factor from the curve's unit, and other arguments."""
+    if convert is not None and curve.measure != "sa_g":
+        raise InputError(
+            f"{curve.source}: --convert {convert} is for spectral accelerations; the curve is of "
+            f"{curve.imt}"
+        )
+    if curve.measure == "pgv_m_s":
+        if tm_s is not None:
+            warnings.append("the mean period is not used: a PGV curve answers by itself")
+        return "pgv_m_s", 1.0, {}
+    if curve.measure == "pga_g":
+        if tm_s is None:
+            raise InputError(
+                f"{curve.source}: PGA alone does not say whether a block topples: give the mean "
+                "period with --tm, or a curve of PGV"
+            )
+        warnings.append(f"the mean period {tm_s:g} s is taken to be the same at every PGA")
+        return "pga_g", 1.0, {"tm_s": tm_s}
+    if convert is None:
+        raise InputError(
+            f"{curve.source}: the models know PGV, not {curve.imt}: give a curve of PGV, or ask "
+            "for a published conversion with --convert newmark_hall_1982 (SA(1)) or "
+            "bommer_alarcon_2006 (SA(0.5))"
+        )
+    used = velocity_conversion(convert)
+    if curve.period_s is None or abs(curve.period_s - used.period_s) > 1e-9:
+        raise InputError(
+            f"{curve.source}: {used.name} is for SA({used.period_s:g}), not for {curve.imt}: "
+            f"choose the curve with --imt 'SA({used.period_s:g})'"
+        )
+    warnings.append(
+        f"PGV = {used.factor:.4g} m/s per g times {curve.imt}: {used.source}; the scatter of this "
+        "conversion is not in the answer"
+    )
+    return "pgv_m_s", used.factor, {}
+
+
+def _mean_bands(
+    curve: HazardCurve,
+    p2: FloatArray,
+    kr: FloatArray,
+    name: str,
+    shift: FloatArray,
+    fixed: dict[str, float],
+    model: FragilityModel,
+    level: float,
+) -> Callable[[FloatArray], FloatArray]:
+    """Return a function for P and its two ends, (3, levels, shifts), meaned over the blocks.
+
+    The means are tabled on steps of 1 % and interpolated by monotone cubics: a mean over blocks
+    is smooth, and thousands of blocks at every node of the integral would take minutes.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    end = curve.levels[-1] if curve.end_level is None else curve.end_level
+    low, high = math.log(curve.levels[0] * shift.min()), math.log(end * shift.max())
+    u = np.linspace(low, high, max(64, math.ceil((high - low) / 0.01)))
+    total = np.zeros((3, u.size))
+    for start in range(0, p2.size, _CHUNK):
+        some = slice(start, start + _CHUNK)
+        shaking = {name: np.exp(u)[None, :], **fixed}
+        found = _predicted(p2[some, None], kr[some, None], shaking, model, level)
+        for row, values in zip(
+            total, (found.probability, found.ci_low, found.ci_high), strict=True
+        ):
+            row += values.sum(axis=0)
+    total[total < 1e-100] = 0.0  # the cubics divide by differences
+    smooth = PchipInterpolator(u, total / p2.size, axis=1)
+
+    def bands(levels: FloatArray) -> FloatArray:
+        x = np.clip(np.log(levels[:, None] * shift), low, high)
+        return np.asarray(smooth(x), dtype=np.float64)
+
+    return bands
+
+
+def _predicted(
+    p2: FloatArray,
+    kr: FloatArray,
+    shaking: dict[str, Any],
+    model: FragilityModel,
+    level: float,
+) -> PredictionArray:
+    found = predict(p2, kr, **shaking, model=model, level=level)
+    assert isinstance(found, PredictionArray)
+    return found
+
+
+def _extrapolated(rate: FloatArray, outside: FloatArray, warnings: list[str]) -> None:
+    share = outside / np.maximum(rate, np.finfo(np.float64).tiny)
+    if (share > _NOTABLE).any():
+        warnings.append(
+            f"up to {100.0 * float(share.max()):.3g} % of the rate comes from blocks and shaking "
+            "outside the ranges that the model was fitted on"
+        )
+
+
+def _split(stacked: FloatArray, m: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    return stacked[:m], stacked[m : 2 * m], stacked[2 * m :]
+
+
+def _tails(
+    curve: HazardCurve,
+    rate: FloatArray,
+    above: FloatArray,
+    above_at_most: FloatArray,
+    below: FloatArray,
+    warnings: list[str],
+) -> None:
+    unit = curve.measure.replace("sa_g", curve.imt + " in g")
+    open_above = above_at_most - above > _NOTABLE * rate
+    if open_above.any():
+        worst = float((above_at_most - above)[open_above].max())
+        warnings.append(
+            f"the curve ends at {unit} = {curve.levels[-1]:g}: stronger shaking may add up to "
+            f"{worst:.3g} failures a year to the answer"
+        )
+    if (below > _NOTABLE).any():
+        warnings.append(
+            f"the curve begins at {unit} = {curve.levels[0]:g}, where the probability of failure "
+            f"is already {float(below.max()):.3g}: weaker shaking is not counted"
+        )

@@ -1,0 +1,65 @@
+"""Annual rates as scripts read them: a dictionary of plain values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rbfrag.hazard.answer import HazardAnswer
+from rbfrag.hazard.curve import HazardCurve
+
+
+def as_dict(
+    curves: Sequence[HazardCurve],
+    names: Sequence[str | None],
+    found: Sequence[HazardAnswer],
+    remarks: Sequence[str] = (),
+) -> dict[str, Any]:
+    """Return the answer under the keys of the JSON contract.
+
+    One block at one site is an object with its contributions; several are a list in it.
+
+    Args:
+        curves: hazard curves, one a site.
+        names: the blocks.
+        found: annual rates of all blocks at each site.
+        remarks: warnings about the blocks, which go before those of the answers.
+    """
+    rows = [
+        {
+            "site": curve.place or None,
+            "block_id": name,
+            "annual_rate": float(rates.annual_rate[i]),
+            "ci_low": float(rates.ci_low[i]),
+            "ci_high": float(rates.ci_high[i]),
+            "probability": float(rates.probability[i]),
+        }
+        for curve, rates in zip(curves, found, strict=True)
+        for i, name in enumerate(names)
+    ]
+    shared = {
+        "years": found[0].years,
+        "level": found[0].level,
+        "model": found[0].model,
+        "term": found[0].term,
+        "method": found[0].method,
+        "imt": curves[0].imt,
+    }
+    warnings = [*remarks, *dict.fromkeys(word for each in found for word in each.warnings)]
+    if len(rows) > 1:
+        return {**shared, "answers": rows, "warnings": warnings}
+    del rows[0]["block_id"]
+    return {**rows[0], **shared, "contributions": _parts(found[0]), "warnings": warnings}
+
+
+def _parts(found: HazardAnswer) -> list[dict[str, float]]:
+    """Return the contributions by intensity in the intervals of the table."""
+    return [
+        {"from": low, "to": high, "annual_rate": part}
+        for low, high, part in zip(
+            found.edges[:-1].tolist(),
+            found.edges[1:].tolist(),
+            found.contribution[0].tolist(),
+            strict=True,
+        )
+    ]

@@ -1,0 +1,1 @@
+"""One file a format: the pattern that recognises it, and its parse."""

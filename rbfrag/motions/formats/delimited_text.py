@@ -1,0 +1,236 @@
+"""Delimited text: time and acceleration in two columns, or acceleration alone.
+
+Columns are separated by comma, semicolon, tab or blanks. Above them stand ``#`` lines, or one
+line with the names of the columns. The unit comes from there, or from the caller::
+
+    # Time Series: Chi-Chi, Taiwan 1999 - TCU068-090
+    # Time (s),Acceleration (g's)
+    0.0,-6.67772E-4
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import MotionFileError
+from rbfrag.motions.direction import azimuth_deg, is_vertical_name
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.text.column_header import event_station_component, stated_unit
+from rbfrag.motions.text.dt_index import INDEX, indexed_interval
+from rbfrag.motions.text.file import finite_number
+from rbfrag.motions.text.times import sampling_interval
+from rbfrag.motions.units import unit_in_g
+
+FORMAT = "delimited text"
+
+COMMENT = "#"
+
+LONGEST_HEADER_LINE = 500
+"""Characters of a header line that are looked at."""
+
+_NUMBER_LIKE = re.compile(
+    r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[ed][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE
+)
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*[;\s]\s*[+-]?\d*,\d+\S*\s*")
+
+
+def recognises(head: str) -> bool:
+    """Return whether the first rows are numbers, below comments or one line of names."""
+    rows = [line for line in head.split("\n") if line.strip() and not line.startswith(COMMENT)]
+    if rows and not _is_numeric(rows[0]):
+        del rows[0]
+    if not rows:
+        return False
+    if _has_decimal_commas(rows[0]):
+        return True
+    width = len(_fields(rows[0]))
+    if width > 2 and (len(rows) < 2 or len(_fields(rows[1])) != width):
+        return False
+    return all(map(_is_numeric, rows[: 1 if width <= 2 else 2]))
+
+
+def read(
+    path: Path,
+    text: str,
+    *,
+    units: str | None,
+    dt_s: float | None,
+    allow_partial: bool = False,  # noqa: ARG001
+) -> list[GroundMotion]:
+    """Return the one motion of a delimited text file.
+
+    Args:
+        path: for labels and messages.
+        text: the file's text.
+        units: unit of acceleration that the caller states; refused when the file states another.
+        dt_s: sampling interval that the caller states [s]; needed where there is neither a time
+            column nor an index beside the file, refused where it contradicts one.
+        allow_partial: makes no difference: such files state no number of samples.
+
+    Raises:
+        MotionFileError: a header or value that cannot be used, with its line.
+    """
+    lines = text.split("\n")
+    start = _first_data_line(lines)
+    header = [
+        (number, line[:LONGEST_HEADER_LINE])
+        for number, line in enumerate(lines[:start], 1)
+        if line.strip()
+    ]
+    rows = _rows(path, lines, start)
+    unit = stated_unit(path, header, units)
+    if len(rows[0][1]) == 1:
+        samples = _numbers(path, rows, 0, "acceleration")
+        _refuse_gaps(path, rows)
+        dt, remark = _interval_of_list(path, dt_s)
+    else:
+        times = _numbers(path, rows, 0, "time")
+        samples = _numbers(path, rows, 1, "acceleration")
+        tokens = [fields[0].strip() for _, fields in rows]
+        dt = sampling_interval(path, tokens, times, [number for number, _ in rows], dt_s)
+        first_s = float(times[0])
+        remark = f"times in the file start at {first_s:g} s; here they start at 0"
+        if first_s == 0.0:
+            remark = ""
+    event, station, component = event_station_component(header)
+    factor = unit_in_g(unit)
+    return [
+        GroundMotion(
+            samples * factor if factor != 1.0 else samples,
+            dt,
+            station=station,
+            event=event,
+            component=component,
+            orientation_deg=azimuth_deg(component),
+            is_vertical=is_vertical_name(component),
+            recording=f"{event} {station}" if event and station else "",
+            source_file=path.name,
+            file_format=FORMAT,
+            remarks=(remark,) if remark else (),
+        )
+    ]
+
+
+def _mark(row: str) -> str | None:
+    return next((mark for mark in (";", ",") if mark in row), None)
+
+
+def _fields(row: str) -> list[str]:
+    return row.split(_mark(row))
+
+
+def _numeric(row: str) -> list[bool]:
+    # decimal commas are refused in words of their own, once it is clear that these are numbers
+    decimal = "," if _mark(row) == ";" else "."
+    return [
+        bool(_NUMBER_LIKE.fullmatch(field.strip().replace(decimal, "."))) for field in _fields(row)
+    ]
+
+
+def _has_decimal_commas(row: str) -> bool:
+    return len(row) < LONGEST_HEADER_LINE and bool(_DECIMAL_COMMA.fullmatch(row))
+
+
+def _is_numeric(row: str) -> bool:
+    return all(_numeric(row))
+
+
+def _first_data_line(lines: list[str]) -> int:
+    """Index of the first row; a row with any number in it is data, not names."""
+    named = False
+    for at, line in enumerate(lines):
+        if not line.strip() or line.startswith(COMMENT):
+            continue
+        if named or any(_numeric(line)) or _has_decimal_commas(line):
+            return at
+        named = True
+    return len(lines)
+
+
+def _rows(path: Path, lines: list[str], start: int) -> list[tuple[int, list[str]]]:
+    """Line number and fields of every row, all of one width."""
+    numbered = [(n, line) for n, line in enumerate(lines[start:], start + 1) if line.strip()]
+    if not numbered:
+        raise MotionFileError(path, "no values follow the header: export the record again")
+    first, top = numbered[0]
+    mark = _mark(top)
+    if _has_decimal_commas(top) or (mark == ";" and "," in top):
+        raise MotionFileError(
+            path,
+            f"{top.strip()!r} has decimal commas: write decimal points, as in 0.005",
+            line=first,
+        )
+    rows = [(number, line.split(mark)) for number, line in numbered]
+    fields = rows[0][1]
+    width = len(fields)
+    if width > 2:
+        raise MotionFileError(
+            path,
+            f"{width} columns: keep two, the time and one component's acceleration, or one with "
+            "the acceleration alone",
+            line=first,
+        )
+    for number, fields in rows:
+        if len(fields) != width:
+            raise MotionFileError(
+                path,
+                f"{lines[number - 1].strip()[:60]!r} has not {width} columns as the rows above: "
+                "repair the line or export the record again",
+                line=number,
+            )
+    return rows
+
+
+def _numbers(
+    path: Path, rows: list[tuple[int, list[str]]], column: int, what: str
+) -> NDArray[np.float64]:
+    tokens = [fields[column] for _, fields in rows]
+    try:
+        numbers = np.array(tokens, dtype=np.float64)
+    except ValueError:
+        numbers = np.array([np.nan])
+    # float() also reads 'nan', 'inf', '1_000' and digits of other scripts
+    plain = all(token.isascii() and "_" not in token for token in tokens)
+    if not plain or not np.isfinite(numbers).all():
+        return np.array(
+            [finite_number(path, fields[column].strip(), n, what) for n, fields in rows]
+        )
+    return numbers
+
+
+def _interval_of_list(path: Path, dt_s: float | None) -> tuple[float, str]:
+    """Sampling interval of a list of accelerations, and a sentence on where it comes from."""
+    indexed = indexed_interval(path)
+    if indexed is None and dt_s is None:
+        raise MotionFileError(
+            path,
+            "the file holds one column and states no sampling interval: give it in seconds, "
+            f"as in  --dt 0.005, or in a file {INDEX} beside it, as in  {path.name} 0.005",
+        )
+    if indexed is None:
+        assert dt_s is not None
+        return dt_s, f"the file states no dt; {dt_s:g} s is what was stated when it was read"
+    if dt_s is not None and dt_s != indexed.dt_s:
+        raise MotionFileError(
+            path,
+            f"{indexed.source} beside the file says dt = {indexed.dt_s:g} s, not {dt_s:g}: "
+            "leave --dt out, or correct one of them",
+        )
+    return indexed.dt_s, f"the file states no dt; {indexed.dt_s:g} s is from {indexed.source}"
+
+
+def _refuse_gaps(path: Path, rows: list[tuple[int, list[str]]]) -> None:
+    # without times an empty line may be a missing sample
+    for (above, _), (number, _) in pairwise(rows):
+        if number != above + 1:
+            raise MotionFileError(
+                path,
+                "an empty line among the accelerations may be a missing sample: remove it, or "
+                "add a time column",
+                line=above + 1,
+            )

@@ -1,0 +1,1 @@
+"""Fields, columns and times in text files."""

@@ -1,0 +1,1 @@
+"""Rock masses: joint sets that scatter, their blocks, and how many fail."""

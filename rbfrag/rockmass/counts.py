@@ -1,0 +1,168 @@
+"""How many blocks of a rock mass fail in each mode, and at which acceleration."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.rockmass.joint_sets import Realisations
+from rbfrag.solver.stability.modes import MODES, STATES, ModeName, StateName
+
+FloatArray = NDArray[np.float64]
+
+QUANTILES = (0.05, 0.16, 0.5, 0.84, 0.95)
+"""Quantiles of the yield acceleration that are reported."""
+
+_SIGNIFICANT = 3.0
+"""A mode leads where its count exceeds the other's by so many standard errors."""
+
+_SLOPE_BLOCKS = 400
+
+
+@dataclass(frozen=True)
+class ModeCount:
+    """The blocks of one mode.
+
+    Args:
+        mode: name of the mode.
+        count: number of blocks.
+        share: their share of all blocks.
+        share_error: standard error of the share from the finite number of realisations.
+        states: number of blocks by state.
+        yield_quantiles_g: yield acceleration of the stable ones at :data:`QUANTILES` [g];
+            empty if there are none.
+    """
+
+    mode: ModeName
+    count: int
+    share: float
+    share_error: float
+    states: dict[StateName, int]
+    yield_quantiles_g: dict[float, float]
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """A PGA at which two modes have lost equally many blocks.
+
+    Args:
+        below: the mode with more blocks of lower yield below this PGA.
+        above: the mode with more of them above it.
+        pga_g: peak ground acceleration [g].
+        standard_error_g: its standard error from the finite number of realisations [g].
+        count: number of blocks of either mode with a yield below it.
+    """
+
+    below: ModeName
+    above: ModeName
+    pga_g: float
+    standard_error_g: float
+    count: float
+
+
+def mode_counts(made: Realisations) -> dict[ModeName, ModeCount]:
+    """Return the blocks of all modes, in the order of the mode codes.
+
+    Args:
+        made: the realisations.
+    """
+    found = made.stability
+    counts: dict[ModeName, ModeCount] = {}
+    for code, mode in enumerate(MODES):
+        here = made.is_block & (found.mode_code == code)
+        count = int(np.count_nonzero(here))
+        share = count / made.n_blocks
+        by_state = np.bincount(found.state_code[here], minlength=len(STATES)).tolist()
+        stable = found.yield_acceleration[here & (found.state_code == 0)]
+        values = np.quantile(stable, QUANTILES).tolist() if stable.size else []
+        counts[mode] = ModeCount(
+            mode=mode,
+            count=count,
+            share=share,
+            share_error=math.sqrt(share * (1.0 - share) / made.n_blocks),
+            states=dict(zip(STATES, by_state, strict=True)),
+            yield_quantiles_g=dict(zip(QUANTILES, values, strict=False)),
+        )
+    return counts
+
+
+def sorted_yields(made: Realisations, mode: ModeName) -> FloatArray:
+    """Return the yield accelerations of a mode, rising [g]; those unstable at rest count as 0.
+
+    Locked blocks, which no horizontal acceleration moves, are left out.
+    """
+    here = made.is_block & (made.stability.mode_code == MODES.index(mode))
+    k = made.stability.yield_acceleration[here]
+    return np.sort(np.maximum(k[k < math.inf], 0.0))
+
+
+def cumulative_counts(made: Realisations, mode: ModeName, pga_g: FloatArray) -> NDArray[np.int64]:
+    """Return the number of blocks of a mode whose yield acceleration is not above PGA.
+
+    These are counts of blocks, not shares of their mode: the curves of two modes may be compared.
+
+    Args:
+        made: the realisations.
+        mode: name of the mode.
+        pga_g: accelerations [g], shape (m,).
+    """
+    return np.searchsorted(sorted_yields(made, mode), pga_g, side="right").astype(np.int64)
+
+
+def crossings(made: Realisations) -> list[Crossing]:
+    """Return where the cumulative counts of two modes cross, by rising PGA.
+
+    A crossing lies between two ranges of PGA in which one mode and then the other leads by more
+    than three standard errors of the difference; closer races are chance. Its own standard error
+    is that of the difference of the counts, over the slope of the difference.
+
+    Args:
+        made: the realisations.
+    """
+    yields = {mode: sorted_yields(made, mode) for mode in MODES}
+    found = [
+        crossing
+        for first, second in combinations(MODES, 2)
+        if yields[first].size and yields[second].size
+        for crossing in _between(first, yields[first], second, yields[second])
+    ]
+    return sorted(found, key=lambda crossing: crossing.pga_g)
+
+
+def _between(first: ModeName, a: FloatArray, second: ModeName, b: FloatArray) -> list[Crossing]:
+    k = np.unique(np.concatenate([a, b]))
+    count_a = np.searchsorted(a, k, side="right")
+    count_b = np.searchsorted(b, k, side="right")
+    lead = count_a - count_b
+    clear = np.flatnonzero(np.abs(lead) > _SIGNIFICANT * np.sqrt(count_a + count_b))
+    turns = np.flatnonzero(np.diff(np.sign(lead[clear])))
+    found = []
+    for i in turns:
+        start, end = int(clear[i]), int(clear[i + 1])
+        before = np.sign(lead[start])
+        # Between the two, chance lets the difference change sign more than once.
+        steps = np.arange(start + 1, end + 1)
+        turned = steps[np.sign(lead[steps]) != np.sign(lead[steps - 1])]
+        middle = int(turned[turned.size // 2])
+        found.append(
+            Crossing(
+                below=first if before > 0 else second,
+                above=second if before > 0 else first,
+                pga_g=float(k[middle]),
+                standard_error_g=_error(k, count_a + count_b, lead, middle),
+                count=0.5 * float(count_a[middle] + count_b[middle]),
+            )
+        )
+    return found
+
+
+def _error(k: FloatArray, total: NDArray[np.int64], lead: NDArray[np.int64], at: int) -> float:
+    """Return the standard error of a crossing: that of the difference over its slope."""
+    half = max(1, min(_SLOPE_BLOCKS, k.size // 10))
+    low, high = max(at - half, 0), min(at + half, k.size - 1)
+    slope = abs(float(lead[high] - lead[low])) / float(k[high] - k[low])
+    return math.sqrt(float(total[at])) / slope if slope > 0.0 else math.inf

@@ -1,0 +1,185 @@
+"""A rock mass in a file.
+
+TOML::
+
+    realisations = 20000
+    seed = 1
+
+    [base]
+    dip_deg = { distribution = "normal", mean = 20.0, sd = 5.0 }
+    spacing_m = { distribution = "lognormal", median = 1.0, sd_ln = 0.1, low = 0.5 }
+
+    [back]
+    dip_deg = { distribution = "measured", values = [41.0, 44.5, 47.0] }
+    spacing_m = 0.6
+
+    [friction]
+    phi_deg = 40.0
+
+    [block]
+    size_factor = 1.0
+    back_fracture = true
+
+CSV: the columns ``variable,distribution`` and, as needed, ``value, mean, median, sd, sd_ln, kappa,
+low, high, values``, one variable a row such as ``base.dip_deg,normal``; measurements stand in
+``values`` with blanks between them. ``realisations``, ``seed`` and ``block.back_fracture`` are rows
+with a ``value`` and no distribution.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+
+from rbfrag.errors import InputError
+from rbfrag.rockmass.joint_sets import RockMass
+
+COLUMNS = (
+    "variable", "distribution", "value", "mean", "median", "sd", "sd_ln", "kappa", "low", "high",
+    "values",
+)  # fmt: skip
+"""Columns of the CSV form; only the first is always needed."""
+
+_SECTIONS = ("base", "back", "friction", "block")
+_LARGEST_BYTES = 10_000_000
+
+
+def read_rock_mass(path: str | os.PathLike[str]) -> RockMass:
+    """Return the rock mass that a TOML or CSV file describes.
+
+    Args:
+        path: file ending in ``.toml`` or ``.csv``.
+
+    Raises:
+        InputError: the file cannot be read or describes no rock mass; the message names the
+            file and the key.
+    """
+    source = Path(path)
+    suffix = source.suffix.lower()
+    if suffix not in (".toml", ".csv"):
+        raise InputError(f"{source}: a rock mass file ends in .toml or .csv, not {suffix!r}")
+    text = _text(source)
+    try:
+        return rock_mass_of_toml(text) if suffix == ".toml" else rock_mass_of_csv(text)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
+
+
+def rock_mass_of_toml(text: str) -> RockMass:
+    """Return the rock mass that TOML describes.
+
+    Raises:
+        InputError: it is not TOML, or describes no rock mass; the message names the key.
+    """
+    try:
+        document = tomllib.loads(text)
+    # Beside its own error, the parser passes on those of absurd numbers and nesting.
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"not valid TOML: {error}") from None
+    return rock_mass_of_tables(document)
+
+
+def rock_mass_of_csv(text: str) -> RockMass:
+    """Return the rock mass that CSV describes.
+
+    Raises:
+        InputError: it is not CSV, or describes no rock mass; the message names the line or key.
+    """
+    try:
+        return RockMass.of(_from_csv(text))
+    except csv.Error as error:
+        raise InputError(f"not a CSV file: {error}") from None
+
+
+def rock_mass_of_tables(document: Mapping[str, object]) -> RockMass:
+    """Return the rock mass that the tables of a TOML or JSON document describe.
+
+    Raises:
+        InputError: they describe no rock mass; the message names the key.
+    """
+    stated: dict[str, object] = {}
+    for name, content in document.items():
+        if name not in _SECTIONS:
+            stated[name] = content
+            continue
+        if not isinstance(content, dict):
+            raise InputError(f"{name} = {content!r} is not a table: write [{name}] and its keys")
+        stated |= {f"{name}.{key}": value for key, value in content.items()}
+    return RockMass.of(stated)
+
+
+def _text(source: Path) -> str:
+    try:
+        if source.is_dir():
+            raise InputError(f"{source} is a folder: name a rock mass file in it")
+        if source.stat().st_size > _LARGEST_BYTES:
+            raise InputError(f"{source}: larger than a rock mass file can be (10 MB)")
+        return source.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(f"{source}: no such file; name a .toml or .csv rock mass file") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{source}: not a text file (UTF-8)") from None
+    except OSError as error:
+        raise InputError(f"{source}: cannot be read: {error.strerror}") from None
+
+
+def _from_csv(text: str) -> dict[str, object]:
+    stated: dict[str, object] = {}
+    header: list[str] = []
+    for line, cells in enumerate(csv.reader(text.splitlines()), start=1):
+        row = [cell.strip() for cell in cells]
+        if not any(row) or row[0].startswith("#"):
+            continue
+        if not header:
+            header = _header(row, line)
+            continue
+        if len(row) > len(header):
+            raise InputError(f"line {line}: {len(row)} cells under {len(header)} columns")
+        keys = {name: cell for name, cell in zip(header, row, strict=False) if cell}
+        variable = keys.pop("variable", "")
+        if variable in stated:
+            raise InputError(f"line {line}: {variable} is stated twice")
+        stated[variable] = _row(keys, variable, line)
+    return stated
+
+
+def _header(row: list[str], line: int) -> list[str]:
+    unknown = [name for name in row if name not in COLUMNS]
+    if "variable" not in row or unknown or len(set(row)) < len(row):
+        raise InputError(
+            f"line {line}: the columns are {','.join(row)}, but a rock mass has variable and "
+            f"any of {','.join(COLUMNS[1:])}, each once"
+        )
+    return row
+
+
+def _row(keys: dict[str, str], variable: str, line: int) -> object:
+    law = keys.pop("distribution", None)
+    numbers: dict[str, object] = {}
+    for name, text in keys.items():
+        where = f"line {line}: {variable}: {name}"
+        if name == "values":
+            numbers[name] = [_number(part, where) for part in text.split()]
+        elif text.lower() in ("true", "false"):
+            numbers[name] = text.lower() == "true"
+        else:
+            numbers[name] = _number(text, where)
+    if law is None:
+        if set(numbers) != {"value"}:
+            raise InputError(f"line {line}: {variable}: without a distribution only a value counts")
+        return numbers["value"]
+    return {"distribution": law, **numbers}
+
+
+def _number(text: str, where: str) -> float | int:
+    try:
+        return int(text)
+    except ValueError:
+        pass
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{where} = {text!r} is not a number") from None

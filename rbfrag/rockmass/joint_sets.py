@@ -1,0 +1,313 @@
+"""A rock mass with two fracture sets that scatter, and the blocks that chance makes of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.rockmass.distributions import Distribution
+from rbfrag.solver.block.arrays import BlockArray
+from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
+
+FloatArray = NDArray[np.float64]
+
+REALISATIONS = 20_000
+"""Blocks that are drawn when nothing else is asked for."""
+
+MOST_REALISATIONS = 5_000_000
+SEED = 1
+"""Seed when nothing else is asked for."""
+
+_LARGEST_SEED = 2**63 - 1
+
+
+class Variable(NamedTuple):
+    """A quantity of the rock mass that may scatter.
+
+    Args:
+        stream: number of its own stream of random numbers; never to be given to another.
+        low: lower end of its permitted range.
+        high: upper end of it.
+        from_low: whether the lower end itself is permitted.
+        default: value when the description leaves it out; NaN if it must be there.
+    """
+
+    stream: int
+    low: float
+    high: float
+    from_low: bool = False
+    default: float = math.nan
+
+    def permits(self, value: float) -> bool:
+        """Return whether a value lies in the permitted range."""
+        return self.low < value < self.high or (self.from_low and value == self.low)
+
+    @property
+    def range_text(self) -> str:
+        """The permitted range in words."""
+        if math.isinf(self.high):
+            return f"above {self.low:g}"
+        if self.from_low:
+            return f"from {self.low:g} to below {self.high:g}"
+        return f"between {self.low:g} and {self.high:g}"
+
+
+VARIABLES: dict[str, Variable] = {
+    "base.dip_deg": Variable(0, -90.0, 90.0),
+    "base.spacing_m": Variable(1, 0.0, math.inf),
+    "back.dip_deg": Variable(2, -90.0, 270.0),
+    "back.spacing_m": Variable(3, 0.0, math.inf),
+    "friction.phi_deg": Variable(4, 0.0, 90.0, from_low=True),
+    "friction.phi_back_deg": Variable(5, 0.0, 90.0, from_low=True),
+    "block.size_factor": Variable(6, 0.0, math.inf, default=1.0),
+    "block.kv": Variable(7, -1.0, math.inf, default=0.0),
+}
+"""The variables of a rock mass by their keys."""
+
+_SETTINGS = ("block.back_fracture", "realisations", "seed")
+_BACK_FRICTION = "friction.phi_back_deg"
+
+IMPOSSIBLE = (
+    "",
+    "the spacing of the base fractures is not above zero",
+    "the spacing of the back fractures is not above zero",
+    "the dip of the base is not between -90 and 90 degrees",
+    "gamma = dip of the back - dip of the base is not between 0 and 180 degrees",
+    "a friction angle is not from 0 to below 90 degrees",
+    "the size factor is not above zero",
+    "kv is not above -1 g",
+    "the planes make a sliver without thickness (alpha1 is not below alpha3)",
+)
+"""Why a realisation is no block, by its reason code; 0 for one that is."""
+
+
+@dataclass(frozen=True)
+class RockMass:
+    """Two fracture sets, the friction on them and the size of the blocks between them.
+
+    Make one with :meth:`of`, or read it from a file.
+
+    Args:
+        variables: law of each variable by its key in :data:`VARIABLES`.
+        back_fracture: False for blocks that no plane supports from behind.
+        realisations: number of blocks that the description asks for.
+        seed: seed of the random numbers that the description asks for.
+    """
+
+    variables: Mapping[str, Distribution]
+    back_fracture: bool = True
+    realisations: int = REALISATIONS
+    seed: int = SEED
+
+    @classmethod
+    def of(cls, stated: Mapping[str, object]) -> RockMass:
+        """Return the rock mass that a mapping describes.
+
+        Args:
+            stated: keys such as ``base.dip_deg`` with a number or the keys of a
+                :class:`~rbfrag.rockmass.distributions.Distribution`; ``friction.phi_back_deg``,
+                ``block.size_factor``, ``block.kv``, ``block.back_fracture``, ``realisations``
+                and ``seed`` may be left out.
+
+        Raises:
+            InputError: a key is missing, unknown or has an impossible value; it is named.
+        """
+        for key in stated:
+            if key not in VARIABLES and key not in _SETTINGS:
+                known = ", ".join((*VARIABLES, *_SETTINGS))
+                raise InputError(f"unknown key {key}: a rock mass knows {known}")
+        variables: dict[str, Distribution] = {}
+        for key, variable in VARIABLES.items():
+            if key in stated:
+                variables[key] = _law(key, variable, stated[key])
+            elif not math.isnan(variable.default):
+                variables[key] = Distribution("constant", location=variable.default)
+            elif key != _BACK_FRICTION:
+                raise InputError(
+                    f"{key} is missing: give a number, or a table such as "
+                    "{ distribution = 'normal', mean = …, sd = … }"
+                )
+        back_fracture = stated.get("block.back_fracture", True)
+        if not isinstance(back_fracture, bool):
+            raise InputError(f"block.back_fracture = {back_fracture!r}: use true or false")
+        return cls(
+            variables,
+            back_fracture,
+            checked_count(stated.get("realisations", REALISATIONS), "realisations"),
+            checked_seed(stated.get("seed", SEED), "seed"),
+        )
+
+    def draw(self, n: int, seed: int) -> dict[str, FloatArray]:
+        """Return n values of every variable, each from its own stream of random numbers."""
+        return {
+            key: law.sample(n, _generator(seed, VARIABLES[key].stream))
+            for key, law in self.variables.items()
+        }
+
+    def realise(self, n: int | None = None, seed: int | None = None) -> Realisations:
+        """Return blocks drawn at random, with their modes and yield accelerations.
+
+        Every variable has its own stream of random numbers: changing the law of one of them,
+        or letting one more of them scatter, leaves the values of the others as they were.
+
+        Args:
+            n: how many; None for what the description asks for.
+            seed: seed; None for that of the description.
+
+        Raises:
+            InputError: n or seed is impossible, or none of the realisations is a block.
+        """
+        n = self.realisations if n is None else checked_count(n, "n")
+        seed = self.seed if seed is None else checked_seed(seed, "seed")
+        drawn = self.draw(n, seed)
+        factor, phi = drawn["block.size_factor"], drawn["friction.phi_deg"]
+        beta, back_dip = drawn["base.dip_deg"], drawn["back.dip_deg"]
+        s1, s2 = drawn["base.spacing_m"] * factor, drawn["back.spacing_m"] * factor
+        phi_back = drawn.get(_BACK_FRICTION, phi)
+        gamma = back_dip - beta
+        reason = np.zeros(n, dtype=np.int8)
+        # Slivers come last: where another reason holds there is no block to be one.
+        for code, fine in enumerate(
+            (
+                drawn["base.spacing_m"] > 0.0,
+                drawn["back.spacing_m"] > 0.0,
+                np.abs(beta) < 90.0,
+                (gamma > 0.0) & (gamma < 180.0),
+                (phi >= 0.0) & (phi < 90.0) & (phi_back >= 0.0) & (phi_back < 90.0),
+                factor > 0.0,
+                drawn["block.kv"] > -1.0,
+            ),
+            start=1,
+        ):
+            reason[~fine & (reason == 0)] = code
+        possible = reason == 0
+        blocks = BlockArray.from_fractures(np.where(possible, s1, np.nan), s2, gamma)
+        found = stability_arrays(
+            blocks,
+            beta_deg=beta,
+            phi_deg=phi,
+            phi_back_deg=phi_back,
+            kv=drawn["block.kv"],
+            back_fracture=self.back_fracture,
+        )
+        reason[possible & ((found.reason_code != 0) | ~(found.p2 > 0.0))] = len(IMPOSSIBLE) - 1
+        made = Realisations(
+            rock_mass=self,
+            seed=seed,
+            beta_deg=beta,
+            gamma_deg=gamma,
+            s1_m=s1,
+            s2_m=s2,
+            phi_deg=phi,
+            phi_back_deg=phi_back,
+            kv=drawn["block.kv"],
+            blocks=blocks,
+            stability=found,
+            reason_code=reason,
+        )
+        if made.n_blocks == 0:
+            why = "; ".join(f"{count} times {text}" for text, count in made.impossible.items())
+            raise InputError(f"none of {n} realisations is a block: {why}")
+        return made
+
+
+@dataclass(frozen=True, eq=False)
+class Realisations:
+    """Blocks drawn from a rock mass; all arrays have shape (n,).
+
+    Args:
+        rock_mass: where they come from.
+        seed: seed of the random numbers.
+        beta_deg: dip of the base [deg].
+        gamma_deg: dip of the back less dip of the base [deg].
+        s1_m: thickness normal to the base [m].
+        s2_m: thickness normal to the back [m].
+        phi_deg: friction angle of the base [deg].
+        phi_back_deg: friction angle of the back [deg].
+        kv: vertical acceleration of the ground [g].
+        blocks: the blocks.
+        stability: their modes, states and yield accelerations.
+        reason_code: why a realisation is no block, a place in :data:`IMPOSSIBLE`.
+    """
+
+    rock_mass: RockMass
+    seed: int
+    beta_deg: FloatArray
+    gamma_deg: FloatArray
+    s1_m: FloatArray
+    s2_m: FloatArray
+    phi_deg: FloatArray
+    phi_back_deg: FloatArray
+    kv: FloatArray
+    blocks: BlockArray
+    stability: StabilityArray
+    reason_code: NDArray[np.int8]
+
+    @property
+    def n(self) -> int:
+        """Number of realisations, possible or not."""
+        return int(self.reason_code.size)
+
+    @property
+    def is_block(self) -> NDArray[np.bool_]:
+        """Whether a realisation is a block."""
+        return np.equal(self.reason_code, 0)
+
+    @property
+    def n_blocks(self) -> int:
+        """Number of realisations that are blocks."""
+        return int(np.count_nonzero(self.is_block))
+
+    @property
+    def impossible(self) -> dict[str, int]:
+        """How many realisations are no block, by the reason."""
+        counts = np.bincount(self.reason_code, minlength=len(IMPOSSIBLE)).tolist()
+        return {text: c for text, c in zip(IMPOSSIBLE[1:], counts[1:], strict=True) if c}
+
+    @property
+    def reason(self) -> NDArray[np.object_]:
+        """Why a realisation is no block, as text; empty for one that is."""
+        return np.array(IMPOSSIBLE, dtype=object)[self.reason_code]
+
+    @property
+    def kr_at_rest(self) -> FloatArray:
+        """Toppling yield without vertical acceleration, tan(α3 - β); NaN for other modes."""
+        return self.stability.kr / (1.0 + self.kv)
+
+
+def checked_count(value: object, name: str) -> int:
+    """Return a number of realisations, or refuse it."""
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 < value <= MOST_REALISATIONS:
+        raise InputError(
+            f"{name} = {value!r}: give a whole number of realisations from 1 to "
+            f"{MOST_REALISATIONS}, such as {REALISATIONS}"
+        )
+    return value
+
+
+def checked_seed(value: object, name: str) -> int:
+    """Return a seed, or refuse it."""
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _LARGEST_SEED:
+        raise InputError(f"{name} = {value!r}: give a whole number from 0 to {_LARGEST_SEED}")
+    return value
+
+
+def _generator(seed: int, stream: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream,)))
+
+
+def _law(key: str, variable: Variable, stated: object) -> Distribution:
+    try:
+        law = Distribution.of(stated, angle=key.endswith("_deg"))
+    except InputError as error:
+        raise InputError(f"{key}: {error}") from None
+    for centre in law.centres:
+        if not variable.permits(centre):
+            raise InputError(f"{key}: {centre:.10g} is out of range: give {variable.range_text}")
+    return law

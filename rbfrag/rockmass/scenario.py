@@ -1,0 +1,290 @@
+"""The probability that a motion brings down the blocks of a rock mass."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.answers import PredictionArray
+from rbfrag.fragility.checks import refusals
+from rbfrag.fragility.functions import normal_half_width
+from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.predict import Model, predict
+from rbfrag.rockmass.joint_sets import Realisations
+from rbfrag.rockmass.other_modes import other_modes
+from rbfrag.solver.stability.modes import MODES, STABLE, TOPPLE, UNSTABLE, ModeName
+
+FloatArray = NDArray[np.float64]
+
+MODELLED: tuple[ModeName, ...] = ("topple",)
+"""Modes that a fragility model answers for."""
+
+UNCOVERED = "no fragility model for this mode"
+LOCKED = "locked: no horizontal acceleration moves it in this mode"
+
+
+@dataclass(frozen=True)
+class Average:
+    """A probability of failure averaged over blocks.
+
+    Args:
+        count: number of blocks.
+        probability: mean of their probabilities; None without blocks.
+        standard_error: its standard error from the finite number of realisations; None
+            without at least two blocks.
+        ci_low: mean of the lower ends of their confidence intervals, which express the
+            uncertainty of the model's coefficients alone.
+        ci_high: mean of the upper ends.
+    """
+
+    count: int
+    probability: float | None
+    standard_error: float | None
+    ci_low: float | None
+    ci_high: float | None
+
+
+@dataclass(frozen=True)
+class ScenarioMode:
+    """The answer for the blocks of one mode.
+
+    Args:
+        mode: name of the mode.
+        count: number of blocks.
+        share: their share of all blocks.
+        has_model: whether a fragility model answers for the mode.
+        unstable: number of blocks that fail at rest, P = 1 whatever the mode.
+        covered: average over the blocks for which there is an answer.
+        in_domain: number of blocks with a model's answer in the range that was fitted.
+    """
+
+    mode: ModeName
+    count: int
+    share: float
+    has_model: bool
+    unstable: int
+    covered: Average
+    in_domain: int
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """What one motion does to the blocks of a rock mass.
+
+    Args:
+        measures: the measures of the motion by name.
+        model: name of the model that answered; None if no block needed one.
+        term: its intensity term.
+        method: how it was fitted.
+        level: confidence level of the intervals.
+        modes: answers by mode, for the modes that have blocks.
+        covered: average over all blocks for which there is an answer, and over no others.
+        covered_share: the share of these among all blocks.
+        uncovered_share: share of the blocks without an answer, by mode.
+        probability: by realisation; NaN without an answer; shape (n,).
+        ci_low: lower ends of the confidence intervals, shape (n,).
+        ci_high: upper ends, shape (n,).
+        in_domain: True where a model answered in the range that was fitted, shape (n,).
+        reason: why an answer is missing, ruled or to be doubted, shape (n,).
+        warnings: sentences on the whole answer.
+        other_models: names of the models that answered for other modes than toppling, by mode.
+    """
+
+    measures: Mapping[str, float]
+    model: str | None
+    term: str | None
+    method: str | None
+    level: float
+    modes: tuple[ScenarioMode, ...]
+    covered: Average
+    covered_share: float
+    uncovered_share: Mapping[ModeName, float]
+    probability: FloatArray
+    ci_low: FloatArray
+    ci_high: FloatArray
+    in_domain: NDArray[np.bool_]
+    reason: NDArray[np.object_]
+    warnings: tuple[str, ...]
+    other_models: Mapping[ModeName, str] = field(default_factory=dict)
+
+
+def scenario(
+    made: Realisations,
+    *,
+    pgv_m_s: float | None = None,
+    pga_g: float | None = None,
+    tm_s: float | None = None,
+    pgd_m: float | None = None,
+    model: Model | None = None,
+    level: float = 0.95,
+    db: str | PathLike[str] | None = None,
+    displacement_m: float | None = None,
+    rotation_deg: float | None = None,
+) -> Scenario:
+    """Return the probability of failure of the blocks in one motion, averaged by mode.
+
+    A block that fails at rest has P = 1. A stable toppling block has the probability of the
+    fragility model. With `displacement_m` a stable block that slides has the probability of
+    sliding further than that, and one that slumps that of slumping past recovery. All others have
+    no answer and are left out of every average; the answer says how many they are.
+
+    Args:
+        made: blocks of a rock mass.
+        pgv_m_s: peak ground velocity of the horizontal component [m/s].
+        pga_g: peak ground acceleration [g].
+        tm_s: mean period [s].
+        pgd_m: peak ground displacement [m].
+        model: as in :func:`rbfrag.fragility.predict.predict`.
+        level: confidence level of the intervals.
+        db: database of the models.
+        displacement_m: how far is too far for a block that slides [m]; None for an answer of
+            toppling alone.
+        rotation_deg: with it, the rotation that is failure of a block that slumps [deg]; None
+            for failure past recovery. There must be a model of it.
+
+    Raises:
+        InputError: a measure that cannot be used, measures that do not suffice, or a rock mass
+            that states a vertical acceleration.
+        UnknownModelError: no model of that name.
+        DatabaseError: the database cannot be read.
+    """
+    offered = {"pgv_m_s": pgv_m_s, "pga_g": pga_g, "tm_s": tm_s, "pgd_m": pgd_m}
+    measures = {name: float(value) for name, value in offered.items() if value is not None}
+    for refusal in refusals(measures, measures):
+        if refusal.holds:
+            raise InputError(refusal.about(refusal.value))
+    if not measures:
+        raise InputError("a scenario needs a measure of the motion: give pgv_m_s, or others")
+    normal_half_width(level)
+    if np.any(made.kv != 0.0):
+        raise InputError(
+            "block.kv does not belong in a rock mass that is to be shaken: the vertical "
+            "acceleration comes with the motion; leave the key out"
+        )
+    found = made.stability
+    falls = made.is_block & (found.state_code == UNSTABLE)
+    asked = made.is_block & (found.mode_code == TOPPLE) & (found.state_code == STABLE)
+
+    probability, low, high = (np.full(made.n, np.nan) for _ in range(3))
+    in_domain = np.zeros(made.n, dtype=np.bool_)
+    reason = np.where(made.is_block, UNCOVERED, made.reason)
+    reason[made.is_block & np.isposinf(found.yield_acceleration)] = LOCKED
+    for array in (probability, low, high):
+        array[falls] = 1.0
+    reason[falls] = "unstable"
+    answer: PredictionArray | None = None
+    if asked.any():
+        chosen = find_model(model, measures, db)
+        predicted = predict(
+            found.p2[asked],
+            made.kr_at_rest[asked],
+            pgv_m_s=pgv_m_s,
+            pga_g=pga_g,
+            tm_s=tm_s,
+            pgd_m=pgd_m,
+            model=chosen,
+            level=level,
+        )
+        assert isinstance(predicted, PredictionArray)
+        answer = predicted
+        probability[asked] = answer.probability
+        low[asked], high[asked] = answer.ci_low, answer.ci_high
+        in_domain[asked], reason[asked] = answer.in_domain, answer.reason
+
+    modelled: set[ModeName] = set(MODELLED)
+    others: dict[ModeName, str] = {}
+    if displacement_m is not None:
+        for mode, name, chosen_blocks, answers in other_modes(
+            made,
+            measures,
+            displacement_m=displacement_m,
+            rotation_deg=rotation_deg,
+            level=level,
+            db=db,
+        ):
+            modelled.add(mode)
+            others[mode] = name
+            probability[chosen_blocks] = answers.probability
+            low[chosen_blocks], high[chosen_blocks] = answers.ci_low, answers.ci_high
+            in_domain[chosen_blocks] = answers.in_domain
+            reason[chosen_blocks] = answers.reason
+
+    covered = np.isfinite(probability)
+    modes = []
+    for code, mode in enumerate(MODES):
+        here = made.is_block & (found.mode_code == code)
+        count = int(np.count_nonzero(here))
+        if count:
+            modes.append(
+                ScenarioMode(
+                    mode=mode,
+                    count=count,
+                    share=count / made.n_blocks,
+                    has_model=mode in modelled,
+                    unstable=int(np.count_nonzero(here & falls)),
+                    covered=_average(here & covered, probability, low, high),
+                    in_domain=int(np.count_nonzero(here & in_domain)),
+                )
+            )
+    missing = {m.mode: (m.count - m.covered.count) / made.n_blocks for m in modes}
+    missing = {mode: share for mode, share in missing.items() if share > 0.0}
+    return Scenario(
+        measures=measures,
+        model=None if answer is None else answer.model,
+        term=None if answer is None else answer.term,
+        method=None if answer is None else answer.method,
+        level=level,
+        modes=tuple(modes),
+        covered=_average(covered, probability, low, high),
+        covered_share=int(np.count_nonzero(covered)) / made.n_blocks,
+        uncovered_share=missing,
+        probability=probability,
+        ci_low=low,
+        ci_high=high,
+        in_domain=in_domain,
+        reason=reason,
+        warnings=tuple(_warnings(missing, reason[asked], modelled)),
+        other_models=others,
+    )
+
+
+def _average(
+    chosen: NDArray[np.bool_], probability: FloatArray, low: FloatArray, high: FloatArray
+) -> Average:
+    count = int(np.count_nonzero(chosen))
+    if count == 0:
+        return Average(0, None, None, None, None)
+    values = probability[chosen]
+    error = float(np.std(values, ddof=1)) / math.sqrt(count) if count > 1 else None
+    return Average(
+        count=count,
+        probability=float(np.mean(values)),
+        standard_error=error,
+        ci_low=float(np.mean(low[chosen])),
+        ci_high=float(np.mean(high[chosen])),
+    )
+
+
+def _warnings(
+    missing: Mapping[ModeName, float], reason: NDArray[np.object_], modelled: set[ModeName]
+) -> list[str]:
+    warnings = [
+        f"{mode.replace('_', ' ')}: {100 * share:.3g} % of the blocks have no answer"
+        + ("" if mode in modelled else ", because there is no fragility model for this mode")
+        for mode, share in missing.items()
+    ]
+    texts, counts = np.unique(reason.astype(str), return_counts=True)
+    tally: dict[str, int] = {}
+    for text, count in zip(texts.tolist(), counts.tolist(), strict=True):
+        for sentence in filter(None, text.split("; ")):
+            tally[sentence] = tally.get(sentence, 0) + count
+    total = reason.size
+    return warnings + [
+        f"{count} of {total} toppling blocks: {sentence}" for sentence, count in tally.items()
+    ]

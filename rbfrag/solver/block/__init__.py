@@ -1,0 +1,1 @@
+"""The block: geometry, arrays of blocks, polygons, files."""

@@ -1,0 +1,190 @@
+"""Many parallelogram blocks at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbfrag.solver.block.chunks import FloatArray, common_shape, in_chunks
+from rbfrag.solver.block.elementwise import array_elementwise
+from rbfrag.solver.block.parallelogram import (
+    cot_gamma,
+    frequency_parameter,
+    shape_factor,
+    tangents_from_spacings,
+)
+from rbfrag.solver.block.tangent import tan_deg
+
+CodeArray = NDArray[np.int8]
+
+REASONS = (
+    "",
+    "a value that describes the block is not a finite number",
+    "an angle of the block is out of range: alpha1_deg and alpha3_deg between -90 and 90, "
+    "gamma_deg between 0 and 180",
+    "a length of the block is not above zero",
+    "alpha1_deg is not below alpha3_deg: such angles belong to no block",
+    "beta_deg is not between -90 and 90",
+    "phi_deg or phi_back_deg is not a friction angle from 0 to below 90 degrees",
+    "kv is not above -1: the ground falls away under the block (a jump)",
+)
+"""Why there is no answer for an element, by its reason code; 0 for none."""
+
+_NOT_FINITE, _ANGLE, _LENGTH, _NO_BLOCK = 1, 2, 3, 4
+
+
+@dataclass(frozen=True, eq=False)
+class BlockArray:
+    """Parallelogram blocks of any number; elements that are no block are NaN with a reason.
+
+    Args:
+        tan_alpha1: tan α1, shape (...).
+        tan_alpha3: tan α3, same shape.
+        half_s1_m: half of the thickness normal to the base [m], same shape.
+        reason_code: why an element is no block, a place in :data:`REASONS`; same shape.
+    """
+
+    tan_alpha1: FloatArray
+    tan_alpha3: FloatArray
+    half_s1_m: FloatArray
+    reason_code: CodeArray
+
+    @classmethod
+    def from_angles(
+        cls, alpha1_deg: ArrayLike, alpha3_deg: ArrayLike, r3_m: ArrayLike
+    ) -> BlockArray:
+        """Return the blocks of two block angles and a size; the arguments broadcast.
+
+        Args:
+            alpha1_deg: angles of the heel [deg].
+            alpha3_deg: angles of the toe [deg].
+            r3_m: distances from centroid to toe [m].
+
+        Raises:
+            InputError: an argument holds no numbers, or the shapes do not go together.
+        """
+        functions = array_elementwise()
+
+        def formula(alpha1: FloatArray, alpha3: FloatArray, r3: FloatArray) -> _Columns:
+            reason = _reasons((alpha1, alpha3, r3), (r3,))
+            in_range = (np.abs(alpha1) < 90.0) & (np.abs(alpha3) < 90.0)
+            _because(_ANGLE, ~in_range, reason)
+            _because(_NO_BLOCK, alpha1 >= alpha3, reason)
+            alpha1, alpha3, r3 = _only_usable(reason, alpha1, alpha3, r3)
+            t1, t3 = tan_deg(alpha1, functions), tan_deg(alpha3, functions)
+            _because(_NO_BLOCK, t1 >= t3, reason)
+            return t1, t3, r3 / np.sqrt(t3 * t3 + 1.0), reason
+
+        return _blocks(formula, {"alpha1_deg": alpha1_deg, "alpha3_deg": alpha3_deg, "r3_m": r3_m})
+
+    @classmethod
+    def from_fractures(cls, s1_m: ArrayLike, s2_m: ArrayLike, gamma_deg: ArrayLike) -> BlockArray:
+        """Return the blocks that pairs of fracture sets cut out; the arguments broadcast.
+
+        Args:
+            s1_m: spacings of the base fractures [m].
+            s2_m: spacings of the back fractures [m].
+            gamma_deg: dips of the back planes less dips of the bases [deg].
+
+        Raises:
+            InputError: an argument holds no numbers, or the shapes do not go together.
+        """
+        functions = array_elementwise()
+
+        def formula(s1: FloatArray, s2: FloatArray, gamma: FloatArray) -> _Columns:
+            reason = _reasons((s1, s2, gamma), (s1, s2))
+            _because(_ANGLE, ~((gamma > 0.0) & (gamma < 180.0)), reason)
+            s1, s2, gamma = _only_usable(reason, s1, s2, gamma)
+            t1, t3 = tangents_from_spacings(s1, s2, gamma, functions)
+            _because(_NO_BLOCK, t1 >= t3, reason)
+            return t1, t3, s1 * 0.5, reason
+
+        return _blocks(formula, {"s1_m": s1_m, "s2_m": s2_m, "gamma_deg": gamma_deg})
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the arrays."""
+        return self.tan_alpha1.shape
+
+    @property
+    def size(self) -> int:
+        """Number of elements."""
+        return int(self.tan_alpha1.size)
+
+    @property
+    def reason(self) -> NDArray[np.str_]:
+        """Why an element is no block, as text; empty where it is one."""
+        return np.array(REASONS)[self.reason_code]
+
+    @property
+    def alpha1_deg(self) -> FloatArray:
+        """Angles of the heel [deg]."""
+        return np.degrees(np.arctan(self.tan_alpha1))
+
+    @property
+    def alpha3_deg(self) -> FloatArray:
+        """Angles of the toe [deg]."""
+        return np.degrees(np.arctan(self.tan_alpha3))
+
+    @property
+    def gamma_deg(self) -> FloatArray:
+        """Angles of the back planes [deg]."""
+        return np.degrees(np.arctan2(1.0, cot_gamma(self.tan_alpha1, self.tan_alpha3)))
+
+    @property
+    def r1_m(self) -> FloatArray:
+        """Distances from the centroid to the heel [m]."""
+        return self.half_s1_m * np.sqrt(self.tan_alpha1 * self.tan_alpha1 + 1.0)
+
+    @property
+    def r3_m(self) -> FloatArray:
+        """Distances from the centroid to the toe [m]."""
+        return self.half_s1_m * np.sqrt(self.tan_alpha3 * self.tan_alpha3 + 1.0)
+
+    @property
+    def shape_factor(self) -> FloatArray:
+        """F_s = m r3²/I_toe (eq. 4.27)."""
+        return shape_factor(self.tan_alpha1, self.tan_alpha3)
+
+    @property
+    def p2(self) -> FloatArray:
+        """Frequency parameters p² [1/s²] at standard gravity."""
+        return frequency_parameter(self.shape_factor, self.r3_m)
+
+
+_Columns = tuple[FloatArray, FloatArray, FloatArray, CodeArray]
+
+
+def _blocks(formula: Callable[..., _Columns], given: dict[str, ArrayLike]) -> BlockArray:
+    arrays, shape = common_shape(given)
+    t1, t3, h = (np.empty(shape) for _ in range(3))
+    reason = np.empty(shape, dtype=np.int8)
+    whole = [np.broadcast_to(array, shape) for array in arrays.values()]
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        in_chunks(formula, whole, (t1, t3, h, reason))
+    return BlockArray(t1, t3, h, reason)
+
+
+def _reasons(values: tuple[FloatArray, ...], lengths: tuple[FloatArray, ...]) -> CodeArray:
+    reason = np.zeros(values[0].shape, dtype=np.int8)
+    for value in values:
+        _because(_NOT_FINITE, ~np.isfinite(value), reason)
+    for length in lengths:
+        _because(_LENGTH, length <= 0.0, reason)
+    return reason
+
+
+def _because(code: int, holds: NDArray[np.bool_], reason: CodeArray) -> None:
+    """Enter a reason where it holds and no earlier one does."""
+    if holds.any():
+        reason[holds & (reason == 0)] = code
+
+
+def _only_usable(reason: CodeArray, *values: FloatArray) -> tuple[FloatArray, ...]:
+    """Return the values with NaN where there is no block."""
+    if not reason.any():
+        return values
+    return tuple(np.where(reason == 0, value, np.nan) for value in values)

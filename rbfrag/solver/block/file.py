@@ -1,0 +1,203 @@
+"""A block in a file: outline, angles or spacings, and what it stands on.
+
+TOML holds one of the three descriptions of a block::
+
+    alpha1_deg = -10.0        s1_m = 1.2            vertices_m = [[0, 0], [1, 0], [1, 2], [0, 2]]
+    alpha3_deg = 25.0         s2_m = 0.6            heel = 0
+    r3_m = 1.5                gamma_deg = 70.0      toe = 1
+                                                    back = 3
+                                                    gamma_deg = 90.0
+
+and, where a command needs them, ``beta_deg``, ``phi_deg``, ``phi_back_deg``, ``kv``,
+``cohesion_pa``, ``density_kg_m3`` and ``back_fracture``.
+
+CSV holds an outline: the columns ``x_m,y_m,contact``, one vertex a row in counter-clockwise
+order, ``heel``, ``toe`` and ``back`` in the third column where a vertex is a contact. The other
+values stand in comment lines above it, such as ``# gamma_deg = 90``.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rbfrag.errors import InputError
+from rbfrag.solver.block.geometry import Block
+
+ANGLES = ("alpha1_deg", "alpha3_deg", "r3_m")
+FRACTURES = ("s1_m", "s2_m", "gamma_deg")
+POLYGON = ("vertices_m", "heel", "back", "toe", "gamma_deg")
+CONDITIONS = (
+    "beta_deg", "phi_deg", "phi_back_deg", "kv", "back_fracture", "cohesion_pa", "density_kg_m3",
+)  # fmt: skip
+"""What a file may say about the block's planes; the keywords of `stability`."""
+
+_CONTACTS = ("heel", "back", "toe")
+_LARGEST_BYTES = 1_000_000
+
+
+@dataclass(frozen=True)
+class BlockFile:
+    """A block read from a file.
+
+    Args:
+        path: the file.
+        block: the block.
+        conditions: keywords of :func:`rbfrag.solver.stability.single.stability` that the file
+            states.
+    """
+
+    path: str
+    block: Block
+    conditions: Mapping[str, Any] = field(default_factory=dict)
+
+
+def read_block(path: str | os.PathLike[str], *, gamma_deg: float | None = None) -> BlockFile:
+    """Return the block that a TOML or CSV file describes.
+
+    Args:
+        path: file ending in ``.toml`` or ``.csv``.
+        gamma_deg: angle of the back plane for a file that does not state it [deg].
+
+    Raises:
+        InputError: the file cannot be read, or describes no block; the message names the file
+            and, in a CSV, the line.
+    """
+    source = Path(path)
+    suffix = source.suffix.lower()
+    if suffix not in (".toml", ".csv"):
+        raise InputError(f"{source}: a block file ends in .toml or .csv, not {suffix!r}")
+    text = _text(source)
+    stated = _from_toml(source, text) if suffix == ".toml" else _from_csv(source, text)
+    if gamma_deg is not None:
+        if "gamma_deg" in stated:
+            raise InputError(
+                f"{source}: gamma_deg is stated in the file and given besides: give it once"
+            )
+        stated["gamma_deg"] = gamma_deg
+    conditions = {key: stated.pop(key) for key in CONDITIONS if key in stated}
+    if not isinstance(conditions.get("back_fracture", True), bool):
+        raise InputError(
+            f"{source}: back_fracture = {conditions['back_fracture']!r}: use true or false"
+        )
+    try:
+        block = _block(stated)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
+    return BlockFile(os.fspath(path), block, conditions)
+
+
+def _text(source: Path) -> str:
+    try:
+        if source.is_dir():
+            raise InputError(f"{source} is a folder: name a block file in it")
+        if source.stat().st_size > _LARGEST_BYTES:
+            raise InputError(f"{source}: larger than a block file can be (1 MB)")
+        return source.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(f"{source}: no such file; name a .toml or .csv block file") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{source}: not a text file (UTF-8)") from None
+    except OSError as error:
+        raise InputError(f"{source}: cannot be read: {error.strerror}") from None
+
+
+def _block(stated: dict[str, Any]) -> Block:
+    keys = set(stated)
+    for names, make in (
+        (POLYGON, Block.from_polygon),
+        (ANGLES, Block.from_angles),
+        (FRACTURES, Block.from_fractures),
+    ):
+        if keys == set(names):
+            return make(**stated)
+    known = {*POLYGON, *ANGLES, *FRACTURES}
+    unknown = sorted(keys - known)
+    if unknown:
+        raise InputError(
+            f"unknown key {unknown[0]!r}: a block file knows {', '.join(sorted(known))}, "
+            f"{', '.join(CONDITIONS)}"
+        )
+    forms = " or ".join(", ".join(names) for names in (ANGLES, FRACTURES, POLYGON))
+    given = ", ".join(sorted(keys)) or "none of them"
+    raise InputError(f"a block is given by exactly {forms}; the file states {given}")
+
+
+def _from_toml(source: Path, text: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{source}: not valid TOML: {error}") from None
+
+
+def _from_csv(source: Path, text: str) -> dict[str, Any]:
+    stated: dict[str, Any] = {"vertices_m": []}
+    header: list[str] | None = None
+    for line, cells in enumerate(csv.reader(text.splitlines()), start=1):
+        row = [cell.strip() for cell in cells]
+        where = f"{source}, line {line}"
+        if not any(row):
+            continue
+        if row[0].startswith("#"):
+            _comment(stated, ",".join(cells).strip()[1:], where)
+        elif header is None:
+            header = row
+            if header != ["x_m", "y_m", "contact"]:
+                raise InputError(
+                    f"{where}: the columns are {','.join(row)}, but an outline has "
+                    "x_m,y_m,contact (the third one empty where a vertex is no contact)"
+                )
+        else:
+            _vertex(stated, row, where)
+    if header is None:
+        raise InputError(f"{source}: no outline: the first row names the columns x_m,y_m,contact")
+    missing = [name for name in _CONTACTS if name not in stated]
+    if missing:
+        raise InputError(
+            f"{source}: no vertex is marked as {' or '.join(missing)} in the column contact"
+        )
+    return stated
+
+
+def _comment(stated: dict[str, Any], text: str, where: str) -> None:
+    name, separator, value = text.partition("=")
+    key = name.strip()
+    if not separator or not key.isidentifier():
+        return
+    if key not in ("gamma_deg", *CONDITIONS):
+        raise InputError(
+            f"{where}: unknown name {key!r}: use gamma_deg or one of {', '.join(CONDITIONS)}"
+        )
+    if key in stated:
+        raise InputError(f"{where}: {key} is stated twice")
+    if key == "back_fracture":
+        truth = {"true": True, "false": False}
+        stated[key] = truth.get(value.strip().lower(), value.strip())
+    else:
+        stated[key] = _number(value, key, where)
+
+
+def _vertex(stated: dict[str, Any], row: list[str], where: str) -> None:
+    if len(row) not in (2, 3):
+        raise InputError(f"{where}: {len(row)} cells instead of x_m,y_m,contact")
+    vertices = stated["vertices_m"]
+    if len(row) == 3 and row[2]:
+        contact = row[2].lower()
+        if contact not in _CONTACTS:
+            raise InputError(f"{where}: unknown contact {row[2]!r}: use heel, back, toe or nothing")
+        if contact in stated:
+            raise InputError(f"{where}: a second {contact}: each contact is one vertex")
+        stated[contact] = len(vertices)
+    vertices.append((_number(row[0], "x_m", where), _number(row[1], "y_m", where)))
+
+
+def _number(text: str, name: str, where: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{where}: {name} = {text.strip()!r} is not a number") from None

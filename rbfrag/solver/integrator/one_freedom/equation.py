@@ -1,0 +1,210 @@
+"""What a model tells the engine: an equation of motion, and where it holds.
+
+With x the coordinate (a rotation [rad], or a displacement [m] on which nothing depends):
+
+    inertia(x) x'' = drive(x) k_h - resistance(x) (1 + k_v) - braking(x) x'^2
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from rbfrag.solver.integrator.one_freedom.harmonics import Harmonics, constant
+from rbfrag.solver.results import FloatArray, Outcome
+
+_LOOKS = 256
+"""Points at which the strength of a block is looked at, over the range of its motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """A contact that holds while per_k_h k_h + per_w (1 + k_v) + per_rate2 x'^2 is above zero.
+
+    x'' is eliminated by the equation of motion; a factor that is positive may be left out.
+
+    Args:
+        per_k_h: factor of the driving acceleration.
+        per_w: factor of the effective gravity 1 + k_v.
+        per_rate2: factor of x'^2; it alone may hold a third harmonic.
+        outcome: how the run ends where the condition fails.
+        sentence: what has happened then.
+    """
+
+    per_k_h: Harmonics
+    per_w: Harmonics
+    per_rate2: Harmonics
+    outcome: Outcome
+    sentence: str
+
+
+@dataclass(frozen=True, eq=False)
+class Equation:
+    """An equation of motion in one sense of motion, with the conditions of its validity.
+
+    Where `inertia` is not above zero, rigid bodies with friction have no unique motion
+    (Painlevé): the run ends as indeterminate.
+
+    Args:
+        inertia: factor of x''.
+        drive: factor of k_h, above zero: k_h drives forward.
+        resistance: factor of 1 + k_v, counted against the motion.
+        braking: factor of x'^2, counted against the motion.
+        conditions: what must hold besides.
+    """
+
+    inertia: Harmonics
+    drive: Harmonics
+    resistance: Harmonics
+    braking: Harmonics = field(default_factory=lambda: constant(0.0))
+    conditions: tuple[Condition, ...] = ()
+
+    @cached_property
+    def table(self) -> FloatArray:
+        """The coefficients as the kernel reads them, shape (4 + 3 conditions, 7)."""
+        rows = [self.inertia, self.drive, self.resistance, self.braking]
+        for condition in self.conditions:
+            rows += [condition.per_k_h, condition.per_w, condition.per_rate2]
+        return np.array([row.coefficients for row in rows])
+
+    @cached_property
+    def uniform(self) -> bool:
+        """Whether the equation is the same everywhere: x is then a cubic in each interval."""
+        everywhere = (self.inertia, self.drive, self.resistance, self.braking)
+        return all(row.constant for row in everywhere) and not self.braking.coefficients[0]
+
+    def first_without_strength(self, limit: float) -> float:
+        """Return the least x at which a block at rest moves of itself, or `limit`.
+
+        Args:
+            limit: greatest x.
+        """
+        places = limit * np.arange(_LOOKS + 1) / _LOOKS
+        weak = np.flatnonzero(self.resistance.at(places[1:]) <= 0.0)
+        if not weak.size:
+            return limit
+        before, here = float(places[weak[0]]), float(places[weak[0] + 1])
+        while here - before > 1e-15 * limit:
+            middle = 0.5 * (before + here)
+            if not before < middle < here:
+                break
+            before, here = (before, middle) if self.resistance(middle) <= 0.0 else (middle, here)
+        return here
+
+    def threshold(self, x: float) -> float:
+        """Return the k_h that starts the motion at a position where 1 + k_v = 1."""
+        return self.resistance(x) / self.drive(x)
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the block is, in the base frame with the heel at rest as origin.
+
+    Args:
+        turned_rad: rotation, counter-clockwise [rad].
+        centroid_m: position of the centroid (x, y) [m].
+        displacement_m: how far the contact on the base has slipped along it, down the
+            slope positive [m].
+    """
+
+    turned_rad: float
+    centroid_m: tuple[float, float]
+    displacement_m: float
+
+
+@dataclass(frozen=True)
+class Ending:
+    """The end of a run.
+
+    Args:
+        outcome: how it ended.
+        sentence: what happened and what was not followed; empty where there is nothing to say.
+        in_place: whether it is known where the block is; False where it ends in an impact
+            that the model does not describe.
+    """
+
+    outcome: Outcome
+    sentence: str = ""
+    in_place: bool = True
+
+
+ExitReason = Literal["upper", "lower", "reverse"]
+"""Why a phase was left: its upper or lower limit was met, or motion in reverse sets in."""
+
+
+@dataclass(frozen=True)
+class Exit:
+    """The state in which a phase was left.
+
+    Args:
+        reason: why.
+        time_s: when [s].
+        x: position.
+        rate: its rate.
+        rest_max_q: greatest k_h/(1 + k_v) from here to the end of the record, rest included.
+        rest_min_q: least of it.
+    """
+
+    reason: ExitReason
+    time_s: float
+    x: float
+    rate: float
+    rest_max_q: float
+    rest_min_q: float
+
+
+@dataclass(frozen=True, eq=False)
+class Phase:
+    """A stretch of motion that one equation (for each sense) governs.
+
+    Args:
+        name: what the block does, for people.
+        forward: the equation of growing x; of all motion where friction plays no part.
+        pose: where the block is at a position.
+        after: what follows where the phase is left.
+        reverse: the equation of falling x; None where the block does not move in reverse.
+        sticks: whether friction holds the block at a standstill. Where it does not, x turns
+            freely, and `forward` governs both senses.
+        leaves_in_reverse: whether the onset of motion in reverse ends the phase.
+        lowest: least x; the block is seated there, without rebound, if the phase `seats`.
+        highest: greatest x.
+        seats: whether the block comes to rest at `lowest`, rather than leaving the phase.
+    """
+
+    name: str
+    forward: Equation
+    pose: Callable[[float], Pose]
+    after: Callable[[Exit], Phase | Ending]
+    reverse: Equation | None = None
+    sticks: bool = True
+    leaves_in_reverse: bool = False
+    lowest: float = 0.0
+    highest: float = np.inf
+    seats: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """A block that moves with one degree of freedom.
+
+    Args:
+        first: the phase that starts at rest with x = 0.
+        rotates: whether x is a rotation [rad] rather than a displacement [m].
+        critical: x at which the block stands without any strength; None where there is none.
+        warnings: what the reader of the answer should know.
+        if_seated: the same where the block has come back to its lowest position in motion.
+        least_q: least k_h/(1 + k_v) that the model covers.
+        if_below: what the reader should know where the record goes below it.
+    """
+
+    first: Phase
+    rotates: bool
+    critical: float | None
+    warnings: tuple[str, ...] = ()
+    if_seated: str = ""
+    least_q: float = -np.inf
+    if_below: str = ""

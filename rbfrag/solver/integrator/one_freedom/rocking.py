@@ -1,0 +1,67 @@
+"""The equation of a block that rocks about its toe (4.13), with the forces at the toe."""
+
+from __future__ import annotations
+
+import math
+
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.integrator.one_freedom.equation import Condition, Equation
+from rbfrag.solver.integrator.one_freedom.harmonics import constant, cosine, sine
+from rbfrag.solver.results import Outcome
+
+
+def rocking_equation(block: Block, beta_rad: float, phi_rad: float | None = None) -> Equation:
+    """Return θ'' = p² [k_h cos(θc - θ) - (1 + k_v) sin(θc - θ)], θc = α3 - β, clockwise.
+
+    With `phi_rad` its conditions are that the toe presses on the base and does not slip.
+
+    Args:
+        block: the block.
+        beta_rad: dip of the base [rad].
+        phi_rad: friction angle of the base [rad]; None for a toe that is held fast, as the
+            toppling model takes it to be.
+    """
+    g = STANDARD_GRAVITY_M_S2
+    alpha3 = math.radians(block.alpha3_deg)
+    balance = alpha3 - beta_rad
+    p2, r3 = block.p2, block.r3_m
+    drive = cosine(balance, -1) * p2
+    resistance = sine(balance, -1) * p2
+    # the centroid, as seen from the toe, is at r3 (-sin, cos) of α3 - θ
+    along, across = cosine(alpha3, -1), sine(alpha3, -1)
+    if phi_rad is None:
+        return Equation(inertia=constant(1.0), drive=drive, resistance=resistance)
+    friction = math.tan(phi_rad)
+    # force on the toe per mass along the base and normal to it: its factors of k_h, w and θ'²
+    shear = (
+        drive * along * r3 - g * math.cos(beta_rad),
+        resistance * along * -r3 - g * math.sin(beta_rad),
+        across * r3,
+    )
+    normal = (
+        drive * across * r3 - g * math.sin(beta_rad),
+        resistance * across * -r3 + g * math.cos(beta_rad),
+        along * -r3,
+    )
+
+    def holds(sign: float) -> Condition:
+        per_k_h, per_w, per_rate2 = (
+            across_base * friction - along_base * sign
+            for along_base, across_base in zip(shear, normal, strict=True)
+        )
+        return Condition(
+            per_k_h=per_k_h,
+            per_w=per_w,
+            per_rate2=per_rate2,
+            outcome=Outcome.CONTACT_LOST,
+            sentence="the toe slips or lifts while the block rocks about it, which no model here "
+            "describes",
+        )
+
+    return Equation(
+        inertia=constant(1.0),
+        drive=drive,
+        resistance=resistance,
+        conditions=(holds(1.0), holds(-1.0)),
+    )

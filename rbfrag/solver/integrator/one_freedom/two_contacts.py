@@ -1,0 +1,90 @@
+"""The equation of motion of a block that slides on two planes at once.
+
+The contact forces have fixed directions u_a and u_b, because friction is fully mobilised at both
+contacts. With M_a and M_b their moments about the centroid, C(θ) the path of the centroid (dashes
+are derivatives by θ) and s = 1 for a rotation that is counter-clockwise, -1 for clockwise,
+
+    R_a u_a + R_b u_b = C' θ'' + C'' θ'² - g G,        R_a M_a + R_b M_b = s (I_C/m) θ''
+
+per mass, where G is the resultant of weight and inertia in units of g. With A = -s M_b, B = s M_a
+and F = A u_a + B u_b, the two forces drop out:
+
+    D θ'' = g (F_y G_x - F_x G_y) - (F_y C''_x - F_x C''_y) θ'²
+    D     = F_y C'_x - F_x C'_y - (I_C/m) u_a x u_b
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.integrator.one_freedom.equation import Condition, Equation
+from rbfrag.solver.integrator.one_freedom.harmonics import Vector, constant_vector
+from rbfrag.solver.results import Outcome
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A point of the block that slides on a plane.
+
+    Args:
+        arm: from the centroid to the point [m].
+        direction: unit direction of the contact force on the block.
+        lost: what it means where the force would have to pull.
+    """
+
+    arm: Vector
+    direction: tuple[float, float]
+    lost: str
+
+
+def two_contact_equation(
+    *,
+    base: Contact,
+    back: Contact,
+    path: Vector,
+    clockwise: bool,
+    inertia_m2: float,
+    beta_rad: float,
+) -> Equation:
+    """Return the equation of motion of a block on two contacts, with their conditions.
+
+    Args:
+        base: the contact on the base plane.
+        back: the contact on the back plane.
+        path: position of the centroid in the base frame [m].
+        clockwise: whether the rotation is counted clockwise.
+        inertia_m2: moment of inertia about the centroid per mass [m²].
+        beta_rad: dip of the base [rad].
+    """
+    g = STANDARD_GRAVITY_M_S2
+    sense = -1.0 if clockwise else 1.0
+    u_a, u_b = constant_vector(base.direction), constant_vector(back.direction)
+    a = back.arm.cross(u_b) * -sense
+    b = base.arm.cross(u_a) * sense
+    force = u_a * a + u_b * b
+    velocity = path.derivative()
+    bend = velocity.derivative()
+    # of the resultant G = per_k_h k_h + per_w (1 + k_v)
+    per_k_h = constant_vector((math.cos(beta_rad), math.sin(beta_rad)))
+    per_w = constant_vector((math.sin(beta_rad), -math.cos(beta_rad)))
+    # a contact force times D is one of these across the known part of the acceleration
+    on_base = u_b * inertia_m2 + velocity * a
+    on_back = velocity * b - u_a * inertia_m2
+    return Equation(
+        inertia=velocity.cross(force) - u_a.cross(u_b) * inertia_m2,
+        drive=per_k_h.cross(force) * g,
+        resistance=per_w.cross(force) * -g,
+        braking=bend.cross(force),
+        conditions=tuple(
+            Condition(
+                per_k_h=lever.cross(per_k_h) * -g,
+                per_w=lever.cross(per_w) * -g,
+                per_rate2=lever.cross(bend),
+                outcome=Outcome.CONTACT_LOST,
+                sentence=contact.lost,
+            )
+            for contact, lever in ((base, on_base), (back, on_back))
+        ),
+    )

@@ -1,0 +1,237 @@
+"""Several samples in one step, where a step of one sample would be far more accurate than needed.
+
+Over a span of m intervals of total length T, with tau in [0, 1] and P = (p T)², the drive a(tau)
+and the effective gravity w(tau) are replaced by their projections on cubic polynomials, which keep
+the moments of degree 0 to 3 exactly. What is left out, r = a - cubic, has no effect of first order:
+its double integral vanishes at the end of the span. Its greatest effect, through the rotation that
+it causes inside the span, is the quadratic form ::
+
+    U(1) += P² int d g2 dtau,     theta(1) += P² int (1 - tau) d g2 dtau,
+    d = a sin(phi) + w cos(phi),  g2 = double integral of a cos(phi) - w sin(phi)
+
+of which the part that the cubics miss is a number per span, known beforehand. The next terms are
+smaller by p T theta'/p.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.solver.integrator.compiled import fused_kernel, kernel
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SPAN_PH = 0.01
+"""Greatest p·T of a span: its error is then below that of the margins of the certified search."""
+
+LENGTHS = (64, 32, 16, 8, 4, 2)
+"""Numbers of intervals that a span may have."""
+
+COLUMNS = 18
+"""T; bound of |a| + |w|; a0..a3; w0..w3; what the cubics miss of a·A2, a·W2, w·A2, w·W2 in U and
+in theta."""
+
+_X3 = math.sqrt(0.6)
+_X5A = math.sqrt(5.0 - 2.0 * math.sqrt(10.0 / 7.0)) / 3.0
+_X5B = math.sqrt(5.0 + 2.0 * math.sqrt(10.0 / 7.0)) / 3.0
+_W5A = (322.0 + 13.0 * math.sqrt(70.0)) / 900.0
+_W5B = (322.0 - 13.0 * math.sqrt(70.0)) / 900.0
+_GAUSS3 = ((-_X3, 5.0 / 9.0), (0.0, 8.0 / 9.0), (_X3, 5.0 / 9.0))
+_GAUSS5 = (
+    (-_X5B, _W5B), (-_X5A, _W5A), (0.0, 128.0 / 225.0), (_X5A, _W5A), (_X5B, _W5B),
+)  # fmt: skip
+
+
+@kernel
+def _cubic(m0: float, m1: float, m2: float, m3: float) -> tuple[float, float, float, float]:
+    """Monomial coefficients on [0, 1] of the sum of (2k + 1) m_k P_k(2 tau - 1)."""
+    m1 *= 3.0
+    m2 *= 5.0
+    m3 *= 7.0
+    return (
+        m0 - m1 + m2 - m3,
+        2.0 * m1 - 6.0 * m2 + 12.0 * m3,
+        6.0 * m2 - 30.0 * m3,
+        20.0 * m3,
+    )
+
+
+@kernel
+def fill_spans(
+    interval_s: FloatArray, k_h: FloatArray, w: FloatArray, length: int, rows: FloatArray
+) -> None:
+    """Fill the row of every whole span of `length` intervals.
+
+    Args:
+        interval_s: interval lengths [s], shape (n - 1,).
+        k_h: driving acceleration at the nodes [g], shape (n,).
+        w: 1 + k_v at the nodes, shape (n,).
+        length: intervals of a span.
+        rows: to be filled, shape (number of whole spans, COLUMNS).
+    """
+    for row in range(rows.shape[0]):
+        first = row * length
+        whole = 0.0
+        size = 0.0
+        for i in range(first, first + length):
+            whole += interval_s[i]
+            size = max(size, abs(k_h[i]) + abs(w[i]))
+        size = max(size, abs(k_h[first + length]) + abs(w[first + length]))
+        rows[row, :] = 0.0
+        rows[row, 0] = whole
+        rows[row, 1] = size
+        if whole <= 0.0:
+            continue
+        a_0, a_1, a_2, a_3 = 0.0, 0.0, 0.0, 0.0
+        w_0, w_1, w_2, w_3 = 0.0, 0.0, 0.0, 0.0
+        # integrals of X Y2 and of (1 - tau) X Y2; rate and value of the double integrals
+        aa, aw, wa, ww = 0.0, 0.0, 0.0, 0.0
+        aa1, aw1, wa1, ww1 = 0.0, 0.0, 0.0, 0.0
+        ra, rw, va, vw = 0.0, 0.0, 0.0, 0.0
+        at = 0.0
+        for i in range(first, first + length):
+            part = interval_s[i] / whole
+            if part <= 0.0:
+                continue
+            da = k_h[i + 1] - k_h[i]
+            dw = w[i + 1] - w[i]
+            for x, share in _GAUSS3:
+                y = 0.5 * (1.0 + x)
+                weight = 0.5 * share * part
+                a = k_h[i] + da * y
+                v = w[i] + dw * y
+                z = 2.0 * (at + part * y) - 1.0
+                p2 = 1.5 * z * z - 0.5
+                p3 = (2.5 * z * z - 1.5) * z
+                a_0 += weight * a
+                a_1 += weight * a * z
+                a_2 += weight * a * p2
+                a_3 += weight * a * p3
+                w_0 += weight * v
+                w_1 += weight * v * z
+                w_2 += weight * v * p2
+                w_3 += weight * v * p3
+                h = part * y
+                a2 = va + h * (ra + h * (0.5 * k_h[i] + da * y * (1.0 / 6.0)))
+                w2 = vw + h * (rw + h * (0.5 * w[i] + dw * y * (1.0 / 6.0)))
+                left = weight * 0.5 * (1.0 - z)
+                aa += weight * a * a2
+                aw += weight * a * w2
+                wa += weight * v * a2
+                ww += weight * v * w2
+                aa1 += left * a * a2
+                aw1 += left * a * w2
+                wa1 += left * v * a2
+                ww1 += left * v * w2
+            va += part * (ra + part * (0.5 * k_h[i] + da * (1.0 / 6.0)))
+            vw += part * (rw + part * (0.5 * w[i] + dw * (1.0 / 6.0)))
+            ra += part * (k_h[i] + 0.5 * da)
+            rw += part * (w[i] + 0.5 * dw)
+            at += part
+        a_0, a_1, a_2, a_3 = _cubic(a_0, a_1, a_2, a_3)
+        w_0, w_1, w_2, w_3 = _cubic(w_0, w_1, w_2, w_3)
+        for x, share in _GAUSS5:
+            y = 0.5 * (1.0 + x)
+            weight = 0.5 * share
+            a = a_0 + y * (a_1 + y * (a_2 + y * a_3))
+            v = w_0 + y * (w_1 + y * (w_2 + y * w_3))
+            a2 = y * y * (a_0 / 2.0 + y * (a_1 / 6.0 + y * (a_2 / 12.0 + y * a_3 / 20.0)))
+            w2 = y * y * (w_0 / 2.0 + y * (w_1 / 6.0 + y * (w_2 / 12.0 + y * w_3 / 20.0)))
+            left = weight * (1.0 - y)
+            aa -= weight * a * a2
+            aw -= weight * a * w2
+            wa -= weight * v * a2
+            ww -= weight * v * w2
+            aa1 -= left * a * a2
+            aw1 -= left * a * w2
+            wa1 -= left * v * a2
+            ww1 -= left * v * w2
+        rows[row, 2] = a_0
+        rows[row, 3] = a_1
+        rows[row, 4] = a_2
+        rows[row, 5] = a_3
+        rows[row, 6] = w_0
+        rows[row, 7] = w_1
+        rows[row, 8] = w_2
+        rows[row, 9] = w_3
+        rows[row, 10] = aa
+        rows[row, 11] = aw
+        rows[row, 12] = wa
+        rows[row, 13] = ww
+        rows[row, 14] = aa1
+        rows[row, 15] = aw1
+        rows[row, 16] = wa1
+        rows[row, 17] = ww1
+
+
+@fused_kernel
+def span_step(
+    spans: FloatArray, row: int, u0: float, ph: float, s0: float, c0: float
+) -> tuple[float, float]:
+    """Return theta(1) - theta(0) and U(1) of one span; arguments as of a single step."""
+    big_p = ph * ph
+    a, w = spans[row, 2], spans[row, 6]
+    pa, pd = big_p * (a * c0 - w * s0), big_p * (a * s0 + w * c0)
+    a, w = spans[row, 3], spans[row, 7]
+    pa1, pd1 = big_p * (a * c0 - w * s0), big_p * (a * s0 + w * c0)
+    a, w = spans[row, 4], spans[row, 8]
+    pa2, pd2 = big_p * (a * c0 - w * s0), big_p * (a * s0 + w * c0)
+    a, w = spans[row, 5], spans[row, 9]
+    pa3, pd3 = big_p * (a * c0 - w * s0), big_p * (a * s0 + w * c0)
+    s2 = 0.5 * pa
+    c2 = -0.5 * (u0 * u0)
+    v2 = pa1 + pd * u0
+    s3 = (1.0 / 3.0) * (u0 * c2) + (1.0 / 6.0) * v2
+    u2 = 0.5 * v2
+    c3 = -(1.0 / 3.0) * (u0 * s2 + pa * u0)
+    v3 = pa2 + pd1 * u0 + pa * c2 + pd * s2
+    s4 = 0.25 * (pa * c2 + u0 * c3) + (1.0 / 12.0) * v3
+    u3 = (1.0 / 3.0) * v3
+    c4 = -0.25 * (u0 * s3 + pa * s2 + u2 * u0)
+    v4 = pa3 + pd2 * u0 + pa1 * c2 + pd1 * s2 + pa * c3 + pd * s3
+    s5 = 0.2 * (u2 * c2 + pa * c3 + u0 * c4) + 0.05 * v4
+    u4 = 0.25 * v4
+    c5 = -0.2 * (u0 * s4 + pa * s3 + u2 * s2 + u3 * u0)
+    v5 = pd3 * u0 + pa2 * c2 + pd2 * s2 + pa1 * c3 + pd1 * s3 + pa * c4 + pd * s4
+    s6 = (1.0 / 6.0) * (u2 * c3 + u3 * c2 + pa * c4 + u0 * c5) + (1.0 / 30.0) * v5
+    u5 = 0.2 * v5
+    c6 = -(1.0 / 6.0) * (u0 * s5 + pa * s4 + u2 * s3 + u3 * s2 + u4 * u0)
+    v6 = pa3 * c2 + pd3 * s2 + pa2 * c3 + pd2 * s3 + pa1 * c4 + pd1 * s4 + pa * c5 + pd * s5
+    s7 = (1.0 / 7.0) * (u3 * c3 + u2 * c4 + u4 * c2 + pa * c5 + u0 * c6) + (1.0 / 42.0) * v6
+    u6 = (1.0 / 6.0) * v6
+    c7 = -(1.0 / 7.0) * (u0 * s6 + pa * s5 + u2 * s4 + u3 * s3 + u4 * s2 + u5 * u0)
+    v7 = pa3 * c3 + pd3 * s3 + pa2 * c4 + pd2 * s4 + pa1 * c5 + pd1 * s5 + pa * c6 + pd * s6
+    s8 = 0.125 * (u3 * c4 + u4 * c3 + u2 * c5 + u5 * c2 + pa * c6 + u0 * c7) + (1.0 / 56.0) * v7
+    u7 = (1.0 / 7.0) * v7
+    c8 = -0.125 * (u0 * s7 + pa * s6 + u2 * s5 + u3 * s4 + u4 * s3 + u5 * s2 + u6 * u0)
+    v8 = pa3 * c4 + pd3 * s4 + pa2 * c5 + pd2 * s5 + pa1 * c6 + pd1 * s6 + pa * c7 + pd * s7
+    s9 = (1.0 / 9.0) * (u4 * c4 + u3 * c5 + u5 * c3 + u2 * c6 + u6 * c2 + pa * c7 + u0 * c8)
+    s9 += (1.0 / 72.0) * v8
+    c9 = -(1.0 / 9.0) * (
+        u0 * s8 + pa * s7 + u2 * s6 + u3 * s5 + u4 * s4 + u5 * s3 + u6 * s2 + u7 * u0
+    )
+    v9 = pa3 * c5 + pd3 * s5 + pa2 * c6 + pd2 * s6 + pa1 * c7 + pd1 * s7 + pa * c8 + pd * s8
+    v10 = pa3 * c6 + pd3 * s6 + pa2 * c7 + pd2 * s7 + pa1 * c8 + pd1 * s8 + pa * c9 + pd * s9
+    # what the cubics miss, with the angle at the middle of the span
+    s = s0 - 0.5 * u0 * c0
+    c = c0 + 0.5 * u0 * s0
+    ss, sc, cc = s * s, s * c, c * c
+    missed = big_p * big_p
+    u_missed = missed * (
+        sc * (spans[row, 10] - spans[row, 13]) - ss * spans[row, 11] + cc * spans[row, 12]
+    )
+    missed *= sc * (spans[row, 14] - spans[row, 17]) - ss * spans[row, 15] + cc * spans[row, 16]
+    turned = (
+        (1.0 / 12.0) * v3 + 0.05 * v4 + (1.0 / 30.0) * v5 + (1.0 / 42.0) * v6
+        + (1.0 / 56.0) * v7 + (1.0 / 72.0) * v8 + (1.0 / 90.0) * v9 + (1.0 / 110.0) * v10
+    )  # fmt: skip
+    u_end = (
+        (1.0 / 3.0) * v3 + 0.25 * v4 + 0.2 * v5 + (1.0 / 6.0) * v6
+        + (1.0 / 7.0) * v7 + 0.125 * v8 + (1.0 / 9.0) * v9 + 0.1 * v10
+    )  # fmt: skip
+    turned = (u0 + (0.5 * pa + (1.0 / 6.0) * v2)) + (turned + missed)
+    return turned, (u0 + (pa + 0.5 * v2)) + (u_end + u_missed)

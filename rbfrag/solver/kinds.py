@@ -1,0 +1,40 @@
+"""The response models that there are: every file of `rbfrag/solver/models` with a ``MODEL``."""
+
+from __future__ import annotations
+
+import pkgutil
+from functools import cache
+from importlib import import_module
+
+import rbfrag.solver.models
+from rbfrag.errors import InputError
+from rbfrag.solver.kind import ResponseModel
+from rbfrag.solver.stability.modes import ModeName
+
+
+@cache
+def models() -> dict[str, ResponseModel]:
+    """Return all models by kind."""
+    found: dict[str, ResponseModel] = {}
+    for module in pkgutil.iter_modules(rbfrag.solver.models.__path__):
+        model = getattr(import_module(f"rbfrag.solver.models.{module.name}"), "MODEL", None)
+        if model is not None:
+            found[model.kind] = model
+    return found
+
+
+def model_of_kind(kind: str) -> ResponseModel:
+    """Return the model of that name.
+
+    Raises:
+        InputError: there is none; the message lists what there is.
+    """
+    known = models()
+    if kind not in known:
+        raise InputError(f"unknown kind {kind!r}: use one of {', '.join(sorted(known))}")
+    return known[kind]
+
+
+def model_of_mode(mode: ModeName) -> ResponseModel:
+    """Return the model of blocks that fail in this mode."""
+    return next(model for model in models().values() if model.mode == mode)

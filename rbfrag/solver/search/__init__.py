@@ -1,0 +1,1 @@
+"""Critical strength with its certificate; critical scale; critical displacement."""

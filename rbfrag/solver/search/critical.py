@@ -1,0 +1,246 @@
+"""The critical block: the strongest one that a ground motion topples, with a proof.
+
+The set of k_r that topple is often not one interval: an earlier pulse may leave the block
+rocking so that the decisive one misses. No search by single blocks can promise that it has
+stepped over none. The search here decides whole intervals of k_r at a time, by two motions
+that enclose those of every block between (`rbfrag.solver.search.envelopes`), from an upper bound
+K_up downwards. Where the argument does not hold, the answer is that of a scan, and says so.
+"""
+
+from __future__ import annotations
+
+import math
+
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.quality import quality_flags
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.excitation import Excitation, kept_excitation
+from rbfrag.solver.integrator.block_excitation import ground_of
+from rbfrag.solver.integrator.single_run import TOPPLED
+from rbfrag.solver.results import (
+    RESOLUTION,
+    SEARCH_LIMIT,
+    CriticalResult,
+    OutcomeIntervals,
+    Polarity,
+    SearchPoints,
+    Status,
+    no_intervals,
+)
+from rbfrag.solver.search.certified import (
+    MAP_DEPTH,
+    MAP_SPAN_PH,
+    CertifiedMap,
+    bracket_of,
+    certified_map,
+    surely_topples_below,
+)
+from rbfrag.solver.search.islands import islands_by_blocks, islands_of_map, outcome_intervals
+from rbfrag.solver.search.scan import BlockScan, scan_down
+from rbfrag.solver.toppling_run import positive, refuse_endless
+
+SLIVERS = 1e-9
+"""Undecided length of k_r/PGA up to which an answer still counts as certified."""
+
+
+def critical(
+    motion: GroundMotion,
+    *,
+    p2: float,
+    vertical: GroundMotion | None = None,
+    polarity: Polarity = "forward",
+    linear: bool = False,
+    search_limit: float = SEARCH_LIMIT,
+    full_map: bool = False,
+    map_depth: float = MAP_DEPTH,
+) -> CriticalResult:
+    """Return the largest k_r/PGA that a ground motion topples, with its bracket.
+
+    Args:
+        motion: horizontal ground motion.
+        p2: frequency parameter p² of the block [1/s²], > 0.
+        vertical: vertical motion of the same recording, upward positive.
+        polarity: ``forward`` or ``reverse``.
+        linear: the linear model, for verification only.
+        search_limit: smallest k_r/PGA looked at.
+        full_map: go on below the critical value and map every toppling and safe interval down
+            to the limit.
+        map_depth: width of k_r/PGA at which the map leaves an interval undecided. The bracket
+            does not depend on it; a finer map costs more.
+
+    Raises:
+        InputError: a value that is not a positive finite number, an unknown polarity,
+            components that cannot be brought together.
+
+    Definition of section 4.3.4 of Gibson's dissertation: the largest k_r/PGA that topples.
+    """
+    p2 = positive(p2, "p2", "1/s²")
+    search_limit = positive(search_limit, "search_limit", "the smallest k_r/PGA looked at")
+    map_depth = positive(map_depth, "map_depth", "a width of k_r/PGA")
+    drive = kept_excitation(motion, vertical, polarity)
+    refuse_endless(drive, p2)
+    said = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion)), *drive.warnings]
+    if vertical is not None:
+        said += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
+    search = _Search(drive, p2, linear, search_limit)
+    search.run(full_map, map_depth)
+    points = search.points()
+    found = search.status == "found"
+    kr = search.lower * drive.pga_g if found else None
+    return CriticalResult(
+        p2=p2,
+        polarity=polarity,
+        linear=linear,
+        pga_g=drive.pga_g,
+        status=search.status,
+        search_limit=search_limit,
+        kr_over_pga=search.lower if found else None,
+        lower=search.lower if found else None,
+        upper=search.upper if found else None,
+        kr=kr,
+        y_m_s=None if kr is None else kr * STANDARD_GRAVITY_M_S2 / math.sqrt(p2),
+        certified=search.certified,
+        k_up_over_pga=search.k_up,
+        undecided=search.undecided,
+        island_width=search.island_width,
+        kr_over_pga_resolved=search.resolved,
+        reentrant=search.reentrant,
+        n_runs=search.n_runs + len(points.outcome),
+        warnings=(*said, *search.warnings),
+        points=points,
+        intervals=search.intervals,
+    )
+
+
+class _Search:
+    """The steps of one critical search; attributes are in k_r/PGA."""
+
+    def __init__(self, drive: Excitation, p2: float, linear: bool, limit: float) -> None:
+        self.drive = drive
+        self.p2 = p2
+        self.linear = linear
+        self.limit = limit
+        self.status: Status = "below_limit"
+        self.lower = math.nan
+        self.upper = math.nan
+        self.k_up: float | None = None
+        self.certified = False
+        self.undecided: float | None = None
+        self.island_width: float | None = None
+        self.resolved: float | None = None
+        self.reentrant = False
+        self.intervals: OutcomeIntervals = no_intervals()
+        self.warnings: list[str] = []
+        self.n_runs = 0
+        self._scan = BlockScan(drive, p2=p2, linear=linear)
+
+    def run(self, full_map: bool, map_depth: float) -> None:
+        """Make the search; the answer is left in the attributes."""
+        drive = self.drive
+        if drive.jump_node < drive.w.size:
+            self.status = "outside_model"
+            self.warnings.append(
+                f"1 + k_v <= 0 at {drive.time_s[drive.jump_node]:.3f} s: the vertical motion "
+                "throws every block; search with the horizontal motion alone"
+            )
+            return
+        pga = drive.pga_g
+        if pga == 0.0 or drive.max_q <= self.limit * pga:
+            self.status = "no_motion"
+            self.certified = True
+            return
+        bottom = self.limit * pga
+        found = certified_map(
+            drive,
+            p2=self.p2,
+            linear=self.linear,
+            bottom=bottom,
+            full=full_map,
+            map_depth=map_depth,
+        )
+        self.n_runs += found.runs
+        self.intervals = outcome_intervals(found, pga, drive.max_q, bottom if full_map else None)
+        bracket = bracket_of(found)
+        scan = self._scan
+        if found.k_up > bottom:
+            self.k_up = found.k_up / pga
+        if bracket is None:
+            undecided = float((found.high - found.low)[found.undecided].sum())
+            undecided += max(found.reached - bottom, 0.0)
+        else:
+            undecided = bracket[2]
+        self.undecided = undecided / pga
+        self.certified = bool(self.undecided <= SLIVERS)
+        if not self.certified:
+            self._say_why(found)
+            bracket = self._by_scan(scan, found, bottom, bracket)
+        elif full_map and not found.complete:
+            self.warnings.append(
+                f"the map was given up at {found.reached / pga:.6g} PGA, after its budget: what "
+                "lies below is undecided; the critical value is not touched by this"
+            )
+        if bracket is None:
+            return
+        self.status = "found"
+        self._take_bracket(bracket)
+        resolution = RESOLUTION * pga
+        lower = self.lower * pga
+        if full_map and found.complete:
+            ground = ground_of(drive, p2=self.p2, linear=self.linear)
+            islands, made = islands_of_map(found, ground, lower, resolution)
+        else:
+            ground = ground_of(drive, p2=self.p2, linear=self.linear, span_ph=MAP_SPAN_PH)
+            floor = surely_topples_below(ground, drive, bottom, lower)
+            islands, made = islands_by_blocks(ground, lower, floor, bottom, resolution)
+        self.n_runs += made
+        self.island_width = islands.width / pga
+        self.resolved = None if islands.resolved is None else islands.resolved / pga
+        self.reentrant = islands.reentrant
+
+    def points(self) -> SearchPoints:
+        """Return every block that was run itself, by falling k_r/PGA."""
+        return self._scan.points()
+
+    def _take_bracket(self, bracket: tuple[float, float, float]) -> None:
+        """Run the critical block itself, clear of the error of its run where need be.
+
+        A step of 1e-8 further from the border costs nothing that means anything, and spares
+        an answer that is proven from being reported as undetermined.
+        """
+        pga = self.drive.pga_g
+        self.lower, self.upper = bracket[0] / pga, bracket[1] / pga
+        for step in (0.0, 1e-10, 1e-9, 5e-9):
+            ratio = max(self.lower - step * self.upper, self.limit)
+            if self._scan.outcome_at(ratio) == TOPPLED:
+                self.lower = ratio
+                break
+        self._scan.outcome_at(self.upper)
+
+    def _by_scan(
+        self,
+        scan: BlockScan,
+        found: CertifiedMap,
+        bottom: float,
+        bracket: tuple[float, float, float] | None,
+    ) -> tuple[float, float, float] | None:
+        """Take the higher of the answers of the search and of a scan."""
+        scanned = scan_down(scan, found.k_up, bottom)
+        if scanned is None or (bracket is not None and bracket[0] >= scanned[0]):
+            return bracket
+        return (*scanned, 0.0)
+
+    def _say_why(self, found: CertifiedMap) -> None:
+        pga = self.drive.pga_g
+        if found.order_lost:
+            reason = (
+                "k_h/(1 + k_v) exceeds 1 both ways so far that blocks may overtake one another, "
+                "and the proof does not hold"
+            )
+        elif not found.complete:
+            reason = f"the search was given up at {found.reached / pga:.6g} PGA, after its budget"
+        else:
+            reason = "grazing contacts left intervals that no refinement decided"
+        self.warnings.append(
+            f"not certified: {reason}; {self.undecided:.3g} of k_r/PGA above the answer is not "
+            "proven safe"
+        )

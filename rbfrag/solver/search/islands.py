@@ -1,0 +1,186 @@
+"""Toppling and safe islands below the critical value."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.solver.integrator.block_excitation import Ground
+from rbfrag.solver.results import OutcomeIntervals
+from rbfrag.solver.search.certified import CertifiedMap
+from rbfrag.solver.search.from_rest import first_turn
+from rbfrag.solver.search.march import SAFE, TOPPLES, border
+from rbfrag.solver.search.renewal import no_starts
+
+FloatArray = NDArray[np.float64]
+
+PROBES = 12
+"""Single blocks looked at below the critical one, equally spaced in ln k_r."""
+
+BORDER = 1e-9
+"""Relative width to which the floor of an island is closed in on."""
+
+WORDS = {SAFE: "safe", TOPPLES: "topples"}
+
+
+class Islands(NamedTuple):
+    """What lies below the critical value; lengths and values in k_r.
+
+    `resolved` is None where no toppling interval is as wide as the resolution.
+    """
+
+    width: float
+    resolved: float | None
+    reentrant: bool
+
+
+def outcome_intervals(
+    found: CertifiedMap, pga_g: float, max_q: float, bottom: float | None = None
+) -> OutcomeIntervals:
+    """Return the map over k_r/PGA, rising, up to the k_r that no drive exceeds.
+
+    Args:
+        found: verdicts in k_r, falling.
+        pga_g: PGA [g].
+        max_q: greatest k_h/(1 + k_v).
+        bottom: k_r down to which the map reaches, undecided where the search was given up
+            above it; None for where the search ended.
+    """
+    low = found.low[::-1]
+    high = found.high[::-1]
+    words = [WORDS.get(int(v), "undecided") for v in found.verdict[::-1]]
+    edges = [*low.tolist(), *high.tolist()[-1:]] or [found.k_up]
+    if bottom is not None and edges[0] > bottom:
+        edges.insert(0, bottom)
+        words.insert(0, "undecided")
+    top = max(max_q, found.k_up)
+    if top > found.k_up:
+        edges.append(top)
+        words.append("safe")
+    kept_edges = edges[:1]
+    kept_words: list[str] = []
+    for word, edge in zip(words, edges[1:], strict=True):
+        if kept_words and kept_words[-1] == word:
+            kept_edges[-1] = edge
+        else:
+            kept_words.append(word)
+            kept_edges.append(edge)
+    ratio = np.array(kept_edges) / pga_g
+    # ends one rounding apart may fall together in the quotient, and such an interval is none
+    wide = ratio[1:] > ratio[:-1]
+    return OutcomeIntervals(
+        k_lo=ratio[:-1][wide],
+        k_hi=ratio[1:][wide],
+        outcome=tuple(word for word, kept in zip(kept_words, wide, strict=True) if kept),  # type: ignore[misc]
+    )
+
+
+def islands_of_map(
+    found: CertifiedMap, ground: Ground, lower: float, resolution: float
+) -> tuple[Islands, int]:
+    """Read the islands off a full map.
+
+    Undecided slivers count to the interval above them; the lower end of the deciding island,
+    which lies in one, is closed in on by single blocks. A safe gap narrower than the resolution
+    does not end a toppling island for `resolved`, nor make the set reentrant.
+
+    Args:
+        found: the map, in k_r.
+        ground: the ground under the blocks.
+        lower: greatest k_r that topples.
+        resolution: width of k_r below which islands are ignored.
+
+    Returns:
+        What was read, and the number of blocks.
+    """
+    unknown = no_starts(0)
+    runs = 0
+    width: float | None = None
+    resolved: float | None = None
+    reentrant = False
+    island_top = lower
+    gap_top: float | None = None
+    bottom = lower
+    for low, high, verdict in zip(
+        found.low.tolist(), found.high.tolist(), found.verdict.tolist(), strict=True
+    ):
+        if high > lower and low >= lower:
+            continue
+        if verdict == SAFE:
+            if gap_top is None:
+                gap_top = high
+            if width is None:
+                _, floor, runs, _ = border(ground, high, -1.0, bottom, BORDER, 0, unknown, False)
+                width = lower - floor
+            if gap_top - low > resolution:
+                reentrant = True
+        elif verdict == TOPPLES:
+            if gap_top is not None and gap_top - high > resolution:
+                island_top = high
+            gap_top = None
+            bottom = low
+            if resolved is None and island_top - bottom >= resolution:
+                resolved = island_top
+    if width is None:
+        width = lower - found.reached
+        if resolved is None and width >= resolution:
+            resolved = lower
+    return Islands(width, resolved, reentrant), runs
+
+
+def islands_by_blocks(
+    ground: Ground, lower: float, floor: float, bottom: float, resolution: float
+) -> tuple[Islands, int]:
+    """Look for islands below the critical value by single blocks: a finding, not a proof.
+
+    Args:
+        ground: the ground under the blocks.
+        lower: greatest k_r that topples.
+        floor: least k_r to look at; every one below it topples, or is below `bottom`.
+        bottom: least k_r of interest.
+        resolution: width of k_r below which islands are ignored.
+
+    Returns:
+        What was found, and the number of blocks.
+    """
+    if lower <= floor:
+        return Islands(lower - bottom, lower, False), 0
+    kr = np.geomspace(lower, floor, PROBES)
+    # the island of the critical value itself may be narrower than the spacing
+    near = lower - resolution * np.array([0.25, 1.0])
+    kr = np.concatenate([[lower], near[near > kr[1]], kr[1:]])
+    unknown = no_starts(0)
+    runs = 0
+    at = 1
+    inside = True  # of an island
+    edges = [lower]  # tops and floors of islands in turn
+    resolved: float | None = None
+    reentrant = False
+    while resolved is None or not reentrant:
+        turn = int(first_turn(ground, kr, at, inside))
+        runs += min(turn, kr.size - 1) - at + 1
+        if turn == kr.size:
+            edge = bottom
+            if not inside:
+                break
+        else:
+            low_side, high_side, made, _ = border(
+                ground, float(kr[turn]), -1.0 if inside else 1.0, float(kr[turn - 1]), BORDER,
+                0, unknown, False,
+            )  # fmt: skip
+            runs += made
+            edge = high_side if inside else low_side
+        if inside and resolved is None and edges[-1] - edge >= resolution:
+            resolved = edges[-1]
+        if not inside:
+            reentrant = reentrant or edges[-1] - edge > resolution
+        edges.append(edge)
+        if turn == kr.size:
+            break
+        if inside and resolved is not None and floor > bottom and edge - kr[turn] > resolution:
+            reentrant = True  # the lowest block is known to topple
+        inside = not inside
+        at = turn + 1
+    return Islands(lower - edges[1], resolved, reentrant), runs

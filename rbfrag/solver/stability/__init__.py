@@ -1,0 +1,1 @@
+"""Failure modes and yield accelerations, for single blocks and arrays."""

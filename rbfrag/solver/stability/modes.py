@@ -1,0 +1,201 @@
+"""Failure modes and yield accelerations of a block, for single numbers and arrays.
+
+At the yield of a mechanism friction is mobilised at both of its contacts. Their reactions then
+have directions u_a and u_b, and because they hold the block in moment equilibrium their ratio
+follows from their moments about the centroid, R_a : R_b = M_b : -M_a. The resultant of weight
+and inertia must oppose F = R_a u_a + R_b u_b, which makes the angle δ* with the normal of
+the base, tan δ* = -F_x/F_y, so that (eqs. 3.16-3.29)
+
+    k = (1 + k_v) tan(δ* - β).
+
+The functions here return (-F_x, F_y), the sine and cosine of δ* up to a positive factor, and do
+without any angle: u_a and u_b are scaled by 1/cos φ1 and 1/(sin γ cos φ2), so that tangents and
+cot γ are enough.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal
+
+from rbfrag.solver.block.elementwise import Elementwise, N
+
+ModeName = Literal["slide", "topple", "slump", "confined_topple"]
+StateName = Literal["stable", "unstable", "locked"]
+
+MODES: tuple[ModeName, ...] = ("slide", "topple", "slump", "confined_topple")
+"""Names of the mode codes 0 to 3."""
+
+STATES: tuple[StateName, ...] = ("stable", "unstable", "locked")
+"""Names of the state codes 0 to 2."""
+
+SLIDE, TOPPLE, SLUMP, CONFINED_TOPPLE = range(4)
+STABLE, UNSTABLE, LOCKED = range(3)
+
+AT_LIMIT = 1e-12
+"""A yield acceleration coefficient nearer to zero than this is zero: stable, at its limit."""
+
+_SQUARE = 1e-12
+"""Cosine of δ* - β below which the reaction is taken to be level: no k can be told from ∞."""
+
+
+def slump(heel_x: N, heel_y: N, back_x: N, back_y: N, cot: N, mu1: N, mu2: N) -> tuple[N, N, N, N]:
+    """Return (-F_x, F_y, R_base, R_back) of slumping, up to a factor (eqs. 3.24, 3.25).
+
+    Args:
+        heel_x: from the centroid to the heel, along the base.
+        heel_y: the same, normal to the base.
+        back_x: from the centroid to the back contact, along the base.
+        back_y: the same, normal to the base.
+        cot: cot γ.
+        mu1: tangent of the friction angle of the base.
+        mu2: tangent of the friction angle of the back plane.
+    """
+    u_x, u_y = 1.0 - cot * mu2, cot + mu2
+    r_base = back_y * u_x - back_x * u_y
+    r_back = heel_x + heel_y * mu1
+    return r_base * mu1 - r_back * u_x, r_base + r_back * u_y, r_base, r_back
+
+
+def confined_topple(
+    toe_x: N, toe_y: N, low_x: N, low_y: N, cot: N, mu1: N, mu2: N
+) -> tuple[N, N, N, N]:
+    """Return (-F_x, F_y, R_base, R_back) of confined toppling, up to a factor (eqs. 3.28, 3.29).
+
+    The moments are paired as equilibrium demands; the printed equations pair them the other way
+    round.
+
+    Args:
+        toe_x: from the centroid to the toe, along the base.
+        toe_y: the same, normal to the base.
+        low_x: from the centroid to the lowest point on the back plane, along the base.
+        low_y: the same, normal to the base.
+        cot: cot γ.
+        mu1: tangent of the friction angle of the base.
+        mu2: tangent of the friction angle of the back plane.
+    """
+    u_x, u_y = 1.0 + cot * mu2, cot - mu2
+    r_base = low_x * u_y - low_y * u_x
+    r_back = -(toe_x + toe_y * mu1)
+    return r_base * mu1 - r_back * u_x, r_base + r_back * u_y, r_base, r_back
+
+
+def yield_coefficient(
+    sine: N,
+    cosine: N,
+    tan_beta: N,
+    weight: N | float,
+    functions: Elementwise[N],
+    bond: N | float = 0.0,
+) -> N:
+    """Return k = (1 + k_v) tan(δ* - β), with a cohesive bond's share if there is one.
+
+    Args:
+        sine: sin δ* up to a positive factor.
+        cosine: cos δ* up to the same factor.
+        tan_beta: tangent of the dip of the base.
+        weight: 1 + k_v.
+        functions: the functions for this kind of number.
+        bond: what the bond adds to the numerator, in the same scale.
+
+    Returns:
+        The yield acceleration coefficient; +inf where δ* - β >= 90° (locked) and -inf
+        where δ* - β <= -90° (unstable without any finite k).
+    """
+    where = functions.where
+    numerator = (sine - cosine * tan_beta) * weight + bond
+    denominator = cosine + sine * tan_beta
+    level = denominator <= _SQUARE * abs(numerator)
+    k = numerator / where(level, 1.0, denominator)
+    result: N = where(level, where(numerator > 0.0, math.inf, -math.inf), k)
+    return result
+
+
+def wedges(cot: N, mu1: N, mu2: N) -> Any:
+    """Return whether both planes hold a confined topple between them: γ + φ1 + φ2 > 180°."""
+    return (cot - mu2) * mu1 + cot * mu2 + 1.0 < 0.0
+
+
+def on_its_branch(k: N, ky: N, rises: object, functions: Elementwise[N]) -> N:
+    """Return k with the sign of infinity that continuity gives it.
+
+    As the back plane takes load, δ* leaves φ1 in one sense and turns by less than 180°. A δ*
+    that rises can lock the block but not free it, and one that falls the reverse, although
+    beyond ±180° sine and cosine say otherwise.
+
+    Args:
+        k: yield acceleration coefficient of a mechanism with two contacts.
+        ky: that of sliding, at which δ* = φ1.
+        rises: whether δ* rises from φ1.
+        functions: the functions for this kind of number.
+    """
+    where = functions.where
+    risen = where((k == -math.inf) | (ky == math.inf), math.inf, k)
+    fallen = where((k == math.inf) & (ky < math.inf), -math.inf, k)
+    result: N = where(rises, risen, fallen)
+    return result
+
+
+def mode_code(
+    tan_alpha1: N, tan_alpha3: N, limit: N, confined: object, functions: Elementwise[N]
+) -> N:
+    """Return the code of the mode of a block with a back plane.
+
+    Boundaries belong to sliding; a back plane normal to the base does not confine.
+
+    Args:
+        tan_alpha1: tan α1.
+        tan_alpha3: tan α3.
+        limit: tan φ of the base, or with a cohesive bond the tangent of the angle of the
+            resultant at which the base slides.
+        confined: whether the back plane hinders a rotation about the toe (γ > 90°).
+        functions: the functions for this kind of number.
+    """
+    where = functions.where
+    rotates = where(confined, CONFINED_TOPPLE, TOPPLE)
+    forward = where(tan_alpha3 >= limit, SLIDE, rotates)
+    result: N = where(tan_alpha1 > limit, SLUMP, forward)
+    return result
+
+
+def mode_code_without_back(
+    tan_alpha1: N, tan_alpha3: N, limit: N, tan_beta: N, functions: Elementwise[N]
+) -> N:
+    """Return the code of the mode of a block that nothing supports from behind.
+
+    Beyond the friction angle (α1 > φ1) such a block does not stand: it turns back about its
+    heel (coded as a slump) if β < α1, and slides otherwise.
+
+    Args:
+        tan_alpha1: tan α1.
+        tan_alpha3: tan α3.
+        limit: as in :func:`mode_code`.
+        tan_beta: tangent of the dip of the base.
+        functions: the functions for this kind of number.
+    """
+    where = functions.where
+    backward = where(tan_beta < tan_alpha1, SLUMP, SLIDE)
+    forward = where(tan_alpha3 >= limit, SLIDE, TOPPLE)
+    result: N = where(tan_alpha1 > limit, backward, forward)
+    return result
+
+
+def state_code(k: N, functions: Elementwise[N]) -> N:
+    """Return the code of the state that a yield acceleration coefficient means."""
+    where = functions.where
+    result: N = where(k < -AT_LIMIT, UNSTABLE, where(k == math.inf, LOCKED, STABLE))
+    return result
+
+
+def slump_bond(heel_x: N, heel_y: N, back_x: N, back_y: N, cot: N, mu2: N) -> N:
+    """Return what a bond of the base, 1 m g strong, adds to the numerator of a slump's yield.
+
+    The bond pulls the base up the slope along its plane; moments about the centroid leave
+    -(r2 - r1) x u2 of it. The arguments are those of :func:`slump`.
+    """
+    return (back_y - heel_y) * (1.0 - cot * mu2) - (back_x - heel_x) * (cot + mu2)
+
+
+def confined_bond(toe_x: N, toe_y: N, low_x: N, low_y: N, cot: N, mu2: N) -> N:
+    """Return the same of confined toppling; the arguments are those of that function."""
+    return (low_x - toe_x) * (cot - mu2) - (low_y - toe_y) * (1.0 + cot * mu2)

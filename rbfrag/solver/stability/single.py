@@ -1,0 +1,279 @@
+"""The failure mode and yield acceleration of a block: `stability`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from rbfrag.errors import InputError
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.block.elementwise import SCALAR
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.block.tangent import tan_deg
+from rbfrag.solver.quantity import angle, friction_angle, not_negative, positive, vertical_g
+from rbfrag.solver.stability.margins import Margin, Surroundings, degrees_of, margins
+from rbfrag.solver.stability.modes import (
+    CONFINED_TOPPLE,
+    MODES,
+    SLUMP,
+    STATES,
+    TOPPLE,
+    ModeName,
+    StateName,
+    confined_bond,
+    confined_topple,
+    mode_code,
+    mode_code_without_back,
+    on_its_branch,
+    slump,
+    slump_bond,
+    state_code,
+    wedges,
+    yield_coefficient,
+)
+from rbfrag.solver.stability.remarks import Finding, warnings_about
+
+
+@dataclass(frozen=True)
+class Cohesion:
+    """What a cohesive base adds to the sliding yield, exactly and by an equivalent friction.
+
+    Args:
+        ratio: strength of the bond over the weight, c/(ρ g S1).
+        ky: k_y = (1 + k_v) tan(φ - β) + c/(ρ g S1) cos φ/cos(φ - β), exact.
+        phi_equivalent_deg: the dissertation's atan(tan φ + c/(ρ g S1)), which takes the whole
+            weight as normal force (eqs. 3.30-3.34) [deg].
+        ky_equivalent: (1 + k_v) tan(phi_equivalent - β).
+    """
+
+    ratio: float
+    ky: float
+    phi_equivalent_deg: float
+    ky_equivalent: float
+
+
+@dataclass(frozen=True)
+class Stability:
+    """How a block fails and at which horizontal acceleration.
+
+    Yield acceleration coefficients are in g. The yield of the governing mode and that of sliding
+    are given; the others are None.
+
+    Args:
+        mode: ``slide``, ``topple``, ``slump`` or ``confined_topple``.
+        state: ``stable``, ``unstable`` (fails at rest) or ``locked`` (no horizontal
+            acceleration moves it in this mode).
+        yield_acceleration: of the governing mode; +inf if locked, -inf if nothing holds it.
+        ky: of sliding on the base.
+        kr: of toppling about the toe.
+        ks: of slumping.
+        kct: of confined toppling.
+        delta_deg: angle of the resultant at yield, from the inward normal of the base,
+            positive downslope [deg]; None where no finite k is the yield.
+        beta_deg: dip of the base [deg].
+        phi_deg: friction angle of the base [deg].
+        phi_back_deg: friction angle of the back plane [deg].
+        kv: vertical acceleration of the ground, up positive [g].
+        back_fracture: whether there is a back plane.
+        margins: nearest boundaries to other modes.
+        cohesion: the effect of cohesion, or None if there is none.
+        warnings: sentences on what the answer takes for granted.
+    """
+
+    mode: ModeName
+    state: StateName
+    yield_acceleration: float
+    ky: float
+    kr: float | None
+    ks: float | None
+    kct: float | None
+    delta_deg: float | None
+    beta_deg: float
+    phi_deg: float
+    phi_back_deg: float
+    kv: float
+    back_fracture: bool
+    margins: tuple[Margin, ...]
+    cohesion: Cohesion | None
+    warnings: tuple[str, ...]
+
+
+def stability(
+    block: Block,
+    *,
+    beta_deg: float,
+    phi_deg: float,
+    phi_back_deg: float | None = None,
+    kv: float = 0.0,
+    back_fracture: bool = True,
+    cohesion_pa: float = 0.0,
+    density_kg_m3: float | None = None,
+) -> Stability:
+    """Return the failure mode of a block, its state and its yield acceleration.
+
+    Gibson's dissertation, eqs. 3.16-3.34, with (3.28) and (3.29) corrected and the vertical
+    acceleration included.
+
+    Args:
+        block: the block.
+        beta_deg: dip of the base plane, out of the slope positive, between -90 and 90 [deg].
+        phi_deg: friction angle of the base, from 0 and below 90 [deg].
+        phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
+        kv: vertical acceleration of the ground, up positive, above -1 [g].
+        back_fracture: False for a block that no plane supports or hinders from behind.
+        cohesion_pa: cohesion of the base [Pa]; the back plane has none.
+        density_kg_m3: density of the rock [kg/m³], needed with a cohesion.
+
+    Raises:
+        InputError: a value outside its range; the message names the range.
+    """
+    if not isinstance(block, Block):
+        raise InputError(f"block = {block!r}: make one with Block.from_angles or its siblings")
+    beta_deg = angle(beta_deg, "beta_deg", -90.0, 90.0)
+    phi_deg = friction_angle(phi_deg, "phi_deg")
+    phi_back_deg = phi_deg if phi_back_deg is None else friction_angle(phi_back_deg, "phi_back_deg")
+    kv = vertical_g(kv)
+    bond = _bond(block, cohesion_pa, density_kg_m3)
+
+    tb, mu1, mu2 = (tan_deg(value, SCALAR) for value in (beta_deg, phi_deg, phi_back_deg))
+    weight = 1.0 + kv
+    bond_term = bond * math.sqrt(1.0 + tb * tb)
+    t1, t3, cot = block.tan_alpha1, block.tan_alpha3, block.cot_gamma
+
+    ky = yield_coefficient(mu1, 1.0, tb, weight, SCALAR, bond_term)
+    limit = _sliding_limit(mu1, tb, weight, ky, bond)
+    if back_fracture:
+        code = int(mode_code(t1, t3, limit, block.confines, SCALAR))
+    else:
+        code = int(mode_code_without_back(t1, t3, limit, tb, SCALAR))
+    backward = not back_fracture and tb < t1
+    untenable = lifts = False
+    if code == SLUMP and back_fracture:
+        contacts = (*block.arms.heel, *block.arms.back, cot)
+        sine, cosine, r_base, _ = slump(*contacts, mu1, mu2)
+        share = bond_term * slump_bond(*contacts, mu2) if bond else 0.0
+        k = yield_coefficient(sine, cosine, tb, weight, SCALAR, share)
+        k = on_its_branch(k, ky, phi_back_deg > phi_deg + block.gamma_deg, SCALAR)
+        if r_base <= 0.0:
+            untenable, k = True, -math.inf
+    elif code == CONFINED_TOPPLE:
+        contacts = (*block.arms.toe, *block.arms.lowest_on_back, cot)
+        sine, cosine, r_base, _ = confined_topple(*contacts, mu1, mu2)
+        share = bond_term * confined_bond(*contacts, mu2) if bond else 0.0
+        k = yield_coefficient(sine, cosine, tb, weight, SCALAR, share)
+        k = on_its_branch(k, ky, wedges(cot, mu1, mu2), SCALAR)
+        if r_base <= 0.0:
+            k = math.inf
+        if bond and math.isfinite(k):
+            lifts = _base_lifts(block, r_base, cosine, mu2, tb, weight, bond, k)
+    elif code == TOPPLE:
+        k = yield_coefficient(t3, 1.0, tb, weight, SCALAR)
+    else:
+        k = ky
+    if backward:
+        k = -math.inf
+    state = STATES[int(state_code(k, SCALAR))]
+
+    def phi_for(alpha_deg: float) -> float:
+        return _friction_that_slides_at(alpha_deg, beta_deg, weight, bond)
+
+    finding = Finding(
+        mode=MODES[code],
+        state=state,
+        k=k,
+        ky=ky,
+        beta_deg=beta_deg,
+        phi_deg=phi_deg,
+        phi_back_deg=phi_back_deg,
+        back_fracture=back_fracture,
+        backward=backward,
+        untenable=untenable,
+        lifts=lifts,
+    )
+    around = Surroundings(
+        beta_deg=beta_deg,
+        phi_deg=phi_deg,
+        limit_deg=degrees_of(limit) if bond else phi_deg,
+        back_fracture=back_fracture,
+        phi_for=phi_for,
+    )
+    return Stability(
+        mode=MODES[code],
+        state=state,
+        yield_acceleration=k,
+        ky=ky,
+        kr=k if code == TOPPLE else None,
+        ks=k if code == SLUMP else None,
+        kct=k if code == CONFINED_TOPPLE else None,
+        delta_deg=beta_deg + degrees_of(k / weight) if math.isfinite(k) else None,
+        beta_deg=beta_deg,
+        phi_deg=phi_deg,
+        phi_back_deg=phi_back_deg,
+        kv=kv,
+        back_fracture=back_fracture,
+        margins=margins(block, around),
+        cohesion=_cohesion(mu1, tb, weight, bond, ky) if bond else None,
+        warnings=warnings_about(block, finding),
+    )
+
+
+def _bond(block: Block, cohesion_pa: object, density_kg_m3: object) -> float:
+    """Return the strength of the base's bond over the weight, c L/(ρ g A)."""
+    cohesion = not_negative(cohesion_pa, "cohesion_pa", "Pa")
+    if density_kg_m3 is None:
+        if cohesion > 0.0:
+            raise InputError(
+                f"cohesion_pa = {cohesion:g} needs density_kg_m3, the density of the rock "
+                "(about 2700 kg/m³): its effect is that of a stress over the weight"
+            )
+        return 0.0
+    density = positive(density_kg_m3, "density_kg_m3", "kg/m³")
+    return cohesion * block.base_m / (density * STANDARD_GRAVITY_M_S2 * block.area_m2)
+
+
+def _sliding_limit(mu1: float, tb: float, weight: float, ky: float, bond: float) -> float:
+    """Return the tangent of the resultant's angle at which the base slides."""
+    if bond == 0.0 or not math.isfinite(ky):
+        return mu1
+    normal = weight - ky * tb
+    return (weight * tb + ky) / normal if normal > 0.0 else math.inf
+
+
+def _friction_that_slides_at(
+    alpha_deg: float, beta_deg: float, weight: float, bond: float
+) -> float:
+    """Return the friction angle with which the base slides when the resultant is at alpha_deg."""
+    if bond == 0.0:
+        return alpha_deg
+    tilt = math.radians(alpha_deg - beta_deg)
+    if math.cos(tilt) <= 0.0:
+        return math.copysign(90.0, tilt)
+    # of (1 + k_v) (T cos β - sin β) + C = k (cos β + T sin β) with k = (1 + k_v) tan(α - β)
+    alpha = math.radians(alpha_deg)
+    return degrees_of(math.tan(alpha) - bond * math.cos(tilt) / (weight * math.cos(alpha)))
+
+
+def _base_lifts(
+    block: Block,
+    r_base: float,
+    cosine: float,
+    mu2: float,
+    tb: float,
+    weight: float,
+    bond: float,
+    k: float,
+) -> bool:
+    """Whether the toe would have to pull at the yield of a confined topple with a bond."""
+    normal = (weight - k * tb) / math.sqrt(1.0 + tb * tb)
+    pressed = normal * r_base + bond * block.arms.toe[1] * (block.cot_gamma - mu2)
+    return pressed <= 0.0 < cosine or pressed >= 0.0 > cosine
+
+
+def _cohesion(mu1: float, tb: float, weight: float, bond: float, ky: float) -> Cohesion:
+    equivalent = mu1 + bond
+    return Cohesion(
+        ratio=bond,
+        ky=ky,
+        phi_equivalent_deg=degrees_of(equivalent),
+        ky_equivalent=yield_coefficient(equivalent, 1.0, tb, weight, SCALAR),
+    )

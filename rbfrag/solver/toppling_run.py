@@ -1,0 +1,229 @@
+"""One block under one motion: the public form of the toppling kernel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.quality import quality_flags
+from rbfrag.solver.excitation import Excitation, excitation
+from rbfrag.solver.integrator.single_run import TOPPLED, Run, run_toppling
+from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
+from rbfrag.solver.results import FloatArray, Outcome, Polarity, Response, ResponseHistory
+
+Kind = Literal["toppling"]
+
+OUTCOMES = (Outcome.STABLE, Outcome.TOPPLED, Outcome.UNDETERMINED, Outcome.JUMP)
+"""Outcome of each kernel code."""
+
+_TO_THE_END = np.empty(0)
+_NO_HISTORY = np.empty((4, 0))
+
+MOST_STEPS = 1e8
+"""Steps of one run beyond which p² cannot be meant: a real record takes some thousands."""
+
+TAIL_PERIODS = 12.0
+"""Length of the free motion shown after the record, in units of 1/p."""
+
+
+def respond(
+    motion: GroundMotion,
+    *,
+    p2: float,
+    kr: float,
+    vertical: GroundMotion | None = None,
+    polarity: Polarity = "forward",
+    kind: Kind = "toppling",
+    linear: bool = False,
+    history: bool = False,
+) -> Response:
+    """Return what a toppling block does under a ground motion.
+
+    Args:
+        motion: horizontal ground motion.
+        p2: frequency parameter p² of the block [1/s²], > 0.
+        kr: rocking acceleration coefficient k_r = tan(critical angle), > 0; with
+            `linear` the critical angle itself [rad].
+        vertical: vertical motion of the same recording, upward positive.
+        polarity: ``forward`` (positive samples drive forward rotation) or ``reverse``.
+        kind: the response model; ``toppling``.
+        linear: the linear model, for verification against closed forms only.
+        history: keep the motion in time.
+
+    Raises:
+        InputError: a value that is not a positive finite number, an unknown kind or
+            polarity, components that cannot be brought together.
+
+    The model is eq. (4.2) of Gibson's dissertation with the vertical motion of (4.13).
+    """
+    if kind != "toppling":
+        raise InputError(f"unknown kind {kind!r}: use 'toppling'")
+    p2 = positive(p2, "p2", "1/s²")
+    kr = positive(kr, "kr", "the rocking acceleration coefficient")
+    drive = excitation(motion, vertical, polarity)
+    refuse_endless(drive, p2)
+    run = simulate(drive, p2=p2, kr=kr, linear=linear)
+    outcome = OUTCOMES[run.outcome]
+    theta_c = kr if linear else math.atan(kr)
+    known = math.isfinite(run.peak_rad)
+    return Response(
+        kind=kind,
+        outcome=outcome,
+        peak_theta_n=run.peak_rad / theta_c if known else None,
+        peak_theta_rad=run.peak_rad if known else None,
+        critical_angle_deg=math.degrees(theta_c),
+        started_s=_time_or_none(run.started_s),
+        toppled_s=_time_or_none(run.verdict_s) if outcome is Outcome.TOPPLED else None,
+        error_estimate=run.error_rad,
+        steps=run.steps,
+        samples_moved=run.samples_moved,
+        samples_total=int(np.count_nonzero(drive.interval_s)),
+        warnings=_warnings(motion, vertical, drive, outcome, run),
+        history=_history(drive, p2=p2, kr=kr, linear=linear) if history else None,
+    )
+
+
+def simulate(
+    drive: Excitation,
+    *,
+    p2: float,
+    kr: float,
+    linear: bool = False,
+    order: int = ORDER,
+    ph_max: float = PH_MAX,
+) -> Run:
+    """Run the kernel once; `order` and `ph_max` are there for convergence studies."""
+    return Run(*_kernel_call(drive, kr, math.sqrt(p2), linear, order, ph_max, _NO_HISTORY))
+
+
+def runner(drive: Excitation, *, p2: float, linear: bool) -> Callable[[float], Run]:
+    """Return a function of k_r that runs the block of size p2 [1/s²] under one excitation."""
+    p = math.sqrt(p2)
+
+    def run(kr: float) -> Run:
+        return Run(*_kernel_call(drive, kr, p, linear, ORDER, PH_MAX, _NO_HISTORY))
+
+    return run
+
+
+def refuse_endless(drive: Excitation, p2: float) -> None:
+    """Refuse a block so small that one run would not end in reasonable time."""
+    steps = math.sqrt(p2) * float(drive.time_s[-1] - drive.time_s[0]) / PH_MAX
+    if steps > MOST_STEPS:
+        raise InputError(
+            f"p2 = {p2:g} 1/s² would take {steps:.1g} steps over this record: a block of 1 mm "
+            "has p2 = 7000 1/s²; check its unit"
+        )
+
+
+def positive(number: float, name: str, what: str) -> float:
+    """Return `number` as a float, refusing anything that is not positive and finite."""
+    try:
+        result = float(number)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be a number ({what}), not {number!r}") from None
+    if not math.isfinite(result) or result <= 0.0:
+        raise InputError(f"{name} must be a positive finite number ({what}), not {result:g}")
+    return result
+
+
+def _kernel_call(
+    drive: Excitation,
+    kr: float,
+    p: float,
+    linear: bool,
+    order: int,
+    ph_max: float,
+    history: np.ndarray,
+) -> tuple[int, float, float, float, float, int, int, int]:
+    return run_toppling(
+        drive.time_s,
+        drive.interval_s,
+        drive.k_h,
+        drive.w,
+        drive.q,
+        drive.tail_min_q,
+        drive.block_max_q,
+        drive.jump_node,
+        kr,
+        p,
+        linear,
+        order,
+        ph_max,
+        history,
+        _TO_THE_END,
+        np.empty((3, order + 1)),
+    )
+
+
+def _history(drive: Excitation, *, p2: float, kr: float, linear: bool) -> ResponseHistory:
+    """Run again over the record and a stretch of rest after it, keeping every node."""
+    p = math.sqrt(p2)
+    end = drive.time_s[-1]
+    n_tail = 400
+    tail_s = end + TAIL_PERIODS / p * np.arange(1, n_tail + 1) / n_tail
+    longer = Excitation(
+        time_s=np.concatenate([drive.time_s, [end], tail_s]),
+        interval_s=np.concatenate([drive.interval_s, [0.0], np.diff(tail_s, prepend=end)]),
+        k_h=np.concatenate([drive.k_h, np.zeros(n_tail + 1)]),
+        w=np.concatenate([drive.w, np.ones(n_tail + 1)]),
+        pga_g=drive.pga_g,
+    )
+    # nodes, and at most a start, a peak and a re-seat twice in an interval
+    store = np.empty((4, 7 * longer.time_s.size + 8))
+    run = Run(*_kernel_call(longer, kr, p, linear, ORDER, PH_MAX, store))
+    store = store[:, : run.history_length]
+    # The kernel skips rest. Its nodes are put back, as far as the record goes.
+    at_node = store[3] >= 0.0
+    theta = np.zeros(longer.time_s.size)
+    rate = np.zeros(longer.time_s.size)
+    moved = store[3, at_node].astype(np.int64)
+    theta[moved] = store[1, at_node]
+    rate[moved] = store[2, at_node]
+    shown = max(drive.time_s.size, int(moved[-1]) + 1) if moved.size else drive.time_s.size
+    if run.outcome == TOPPLED and moved.size:
+        shown = int(moved[-1]) + 1
+    event = store[:3, ~at_node]
+    time_s = np.concatenate([longer.time_s[:shown], event[0]])
+    order = np.argsort(time_s, kind="stable")
+
+    def merged(at_nodes: FloatArray, at_events: FloatArray) -> FloatArray:
+        return np.concatenate([at_nodes[:shown], at_events])[order]
+
+    def between(values: FloatArray) -> FloatArray:
+        there: FloatArray = np.interp(event[0], longer.time_s, values)
+        return there
+
+    return ResponseHistory(
+        time_s=time_s[order],
+        theta_rad=merged(theta, event[1]),
+        theta_dot_rad_s=merged(rate, event[2]),
+        k_h=merged(longer.k_h, between(longer.k_h)),
+        k_v=merged(longer.w - 1.0, between(longer.w - 1.0)),
+    )
+
+
+def _time_or_none(time_s: float) -> float | None:
+    return time_s if math.isfinite(time_s) else None
+
+
+def _warnings(
+    motion: GroundMotion,
+    vertical: GroundMotion | None,
+    drive: Excitation,
+    outcome: Outcome,
+    run: Run,
+) -> tuple[str, ...]:
+    said = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion)), *drive.warnings]
+    if vertical is not None:
+        said += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
+    if outcome is Outcome.UNDETERMINED:
+        said.append(outcome.advice)
+    if outcome is Outcome.JUMP:
+        said.append(f"at {run.verdict_s:.3f} s: {outcome.advice}")
+    return tuple(said)

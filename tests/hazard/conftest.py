@@ -1,0 +1,3 @@
+"""Fixtures shared with the tests of models."""
+
+from tests.fragility.conftest import model as model

@@ -1,0 +1,134 @@
+"""Failure rates against closed forms and an independent quadrature."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import quad
+from scipy.special import ndtr
+
+from rbfrag.errors import InputError
+from rbfrag.hazard.annual_rate import failure_rate, probability_in
+from rbfrag.hazard.curve import HazardCurve, hazard_curve
+
+FloatArray = NDArray[np.float64]
+
+
+def power_law(k: float = 1e-4, b: float = 2.5, n: int = 30) -> HazardCurve:
+    x = np.geomspace(1e-4, 1e4, n)
+    return hazard_curve("pgv_m_s", x, k * x**-b)
+
+
+@pytest.mark.parametrize("beta", [0.05, 0.4, 0.9])
+@pytest.mark.parametrize("b", [1.2, 2.5, 3.5])
+def test_lognormal_fragility_on_a_power_law(b: float, beta: float) -> None:
+    # λ = k x^-b and P = Φ(ln(x/m)/β):  λ_f = k m^-b exp(b²β²/2)  (Cornell 1996)
+    found = failure_rate(power_law(1e-4, b), lambda x: ndtr(np.log(x / 0.5) / beta))
+    expected = 1e-4 * 0.5**-b * np.exp(0.5 * (b * beta) ** 2)
+    assert found.annual_rate[0] == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_step_fragility_gives_the_rate_of_its_level() -> None:
+    found = failure_rate(power_law(), lambda x: (x >= 0.37).astype(float))
+    assert found.annual_rate[0] == pytest.approx(1e-4 * 0.37**-2.5, rel=1e-9)
+
+
+def by_quadrature(curve: HazardCurve, p: object, kinks: list[float]) -> float:
+    """The integral piece by piece with QUADPACK, told where the kinks are."""
+    u, rate = np.log(curve.levels), curve.annual_rate
+    total = float(rate[-1] * p(curve.levels[-1]))  # type: ignore[operator]
+    for i in range(u.size - 1):
+        b = -np.log(rate[i + 1] / rate[i]) / (u[i + 1] - u[i])
+        inside = [np.log(x) for x in kinks if u[i] < np.log(x) < u[i + 1]]
+
+        def density(w: float, i: int = i, b: float = b) -> float:
+            share = p(np.exp(w))  # type: ignore[operator]
+            return float(share * b * rate[i] * np.exp(-b * (w - u[i])))
+
+        total += quad(density, u[i], u[i + 1], points=inside or None, epsabs=0, epsrel=1e-12,
+                      limit=400)[0]  # fmt: skip
+    return total
+
+
+def test_any_fragility_against_adaptive_quadrature() -> None:
+    random = np.random.default_rng(4)
+    for _ in range(1000):
+        n = int(random.integers(3, 20))
+        x = np.sort(10.0 ** random.uniform(-3, 1, n))
+        rate = np.sort(10.0 ** random.uniform(-7, 0, n))[::-1]
+        curve = hazard_curve("pgv_m_s", x, rate)
+        start, scale = 10.0 ** random.uniform(-2, 0, 2)
+        power = random.uniform(0.3, 8.0)
+
+        def p(v: FloatArray, g: float = start, m: float = scale, e: float = power) -> FloatArray:
+            shifted = np.maximum(np.asarray(v) - g, 0.0) / m
+            return np.where(shifted > 0.0, -np.expm1(-(shifted**e)), 0.0)
+
+        expected = by_quadrature(curve, p, [start, start + scale])
+        found = failure_rate(curve, p)
+        assert found.annual_rate[0] == pytest.approx(expected, rel=1e-8, abs=1e-300)
+        parts = found.contribution[0].sum() + found.above[0]
+        assert parts == pytest.approx(found.annual_rate[0], rel=1e-12)
+
+
+def test_rows_are_answered_as_if_alone() -> None:
+    curve = power_law(n=12)
+    medians = np.array([0.1, 0.5, 2.0])
+    together = failure_rate(curve, lambda x: ndtr(np.log(x / medians[:, None]) / 0.3))
+    for m, rate in zip(medians, together.annual_rate, strict=True):
+        alone = failure_rate(curve, lambda x, m=m: ndtr(np.log(x / m) / 0.3)).annual_rate[0]
+        assert rate == pytest.approx(alone, rel=1e-9)
+
+
+def test_what_lies_beyond_the_curve_is_bounded() -> None:
+    x = np.array([0.1, 0.2, 0.4])
+    curve = hazard_curve("pgv_m_s", [*x, 0.8], [1e-2, 3e-3, 1e-3, 0.0])
+    assert curve.end_level == 0.8
+    found = failure_rate(curve, lambda v: np.clip(v, 0.0, 1.0))
+    assert found.above[0] == pytest.approx(1e-3 * 0.4)
+    assert found.above_at_most[0] == pytest.approx(1e-3 * 0.8)  # nothing is beyond 0.8
+    endless = failure_rate(
+        hazard_curve("pgv_m_s", x, [1e-2, 3e-3, 1e-3]), lambda v: np.clip(v, 0, 1)
+    )
+    assert endless.above_at_most[0] == pytest.approx(1e-3)
+    assert endless.below[0] == pytest.approx(0.1)
+
+
+def test_probability_in_a_period() -> None:
+    assert probability_in(50.0, np.array([0.01]))[0] == pytest.approx(1 - np.exp(-0.5))
+    with pytest.raises(InputError, match="years = 0"):
+        probability_in(0.0, np.array([0.01]))
+
+
+def test_a_fragility_that_is_no_number_is_refused() -> None:
+    with pytest.raises(InputError, match="not a number"):
+        failure_rate(power_law(), lambda x: np.where(x > 1.0, np.nan, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("levels", "rates", "words"),
+    [
+        ([0.1, 0.2, 0.2], [3e-3, 2e-3, 1e-3], "level 3.*repeats"),
+        ([0.1, 0.3, 0.2], [3e-3, 2e-3, 1e-3], "level 3.*falls"),
+        ([0.1, 0.2, 0.3], [3e-3, 4e-3, 1e-3], "rate rises from 0.003 to 0.004"),
+        ([0.1, 0.2, 0.3], [3e-3, np.nan, 1e-3], "the rate at level 2 .* is nan"),
+        ([0.1, 0.2, 0.3], [3e-3, -1e-3, -2e-3], "the rate at level 2 .* is -0.001"),
+        ([0.0, 0.2, 0.3], [3e-3, 2e-3, 1e-3], "level 1 is 0"),
+        ([0.1, 0.2], [3e-3, 0.0], "at least two"),
+        ([0.1, 0.2], [3e-3], "2 levels and 1 rates"),
+    ],
+)
+def test_disorder_is_refused(levels: list[float], rates: list[float], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        hazard_curve("pgv_m_s", levels, rates, source="a.csv")
+
+
+def test_a_certain_exceedance_is_left_out_with_a_warning() -> None:
+    curve = hazard_curve("pga_g", [0.1, 0.2, 0.3], [np.inf, 2e-3, 1e-3])
+    assert curve.levels.tolist() == [0.2, 0.3]
+    assert "probability 1" in curve.warnings[0]
+    # straight in log-log, and nothing outside
+    middle = curve.rate_at(np.sqrt(0.2 * 0.3))
+    assert float(middle) == pytest.approx(np.sqrt(2e-3 * 1e-3), rel=1e-12)
+    assert np.isnan(curve.rate_at(0.5))

@@ -1,0 +1,95 @@
+"""Rock masses in which blocks that slide or slump are answered for too."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping
+from rbfrag.rockmass.joint_sets import RockMass
+from rbfrag.rockmass.scenario import Scenario, scenario
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.shaken_mechanism import shaken_mechanism
+from rbfrag.solver.stability.modes import SLIDE, SLUMP, STABLE
+
+TABLE_3_4 = {
+    "base.dip_deg": {"distribution": "normal", "mean": 20.0, "sd": 5.0},
+    "base.spacing_m": {"distribution": "normal", "mean": 1.0, "sd": 0.1},
+    "back.dip_deg": {"distribution": "normal", "mean": 45.0, "sd": 5.0},
+    "back.spacing_m": {"distribution": "normal", "mean": 0.6, "sd": 0.1},
+    "friction.phi_deg": 40.0,
+}
+MADE = RockMass.of(TABLE_3_4).realise(400, 3)
+
+
+@pytest.fixture
+def answer(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Scenario:
+    monkeypatch.chdir(tmp_path_factory.mktemp("empty"))
+    monkeypatch.delenv("RBFRAG_DB", raising=False)
+    return scenario(MADE, pgv_m_s=0.6, pga_g=0.7, displacement_m=0.05)
+
+
+def test_every_stable_block_of_this_rock_mass_has_an_answer(answer: Scenario) -> None:
+    assert answer.covered_share == 1.0
+    assert answer.uncovered_share == {}
+    by_mode = {mode.mode: mode for mode in answer.modes}
+    assert set(by_mode) == {"slide", "slump"}
+    assert all(mode.has_model for mode in answer.modes)
+    assert np.all((answer.ci_low <= answer.probability) & (answer.probability <= answer.ci_high))
+
+
+def test_blocks_are_answered_as_one_by_one(answer: Scenario) -> None:
+    found = MADE.stability
+    slides = np.flatnonzero((found.mode_code == SLIDE) & (found.state_code == STABLE))[:6]
+    for i in slides.tolist():
+        one = predict_sliding(
+            float(found.yield_acceleration[i]),
+            0.05,
+            pgv_m_s=0.6,
+            pga_g=0.7,
+            beta_deg=float(MADE.beta_deg[i]),
+        )
+        assert answer.probability[i] == pytest.approx(one.probability, rel=1e-9, abs=1e-12)
+        assert answer.ci_high[i] == pytest.approx(one.ci_high, rel=1e-9, abs=1e-12)
+        assert answer.in_domain[i] == one.in_domain
+    slumps = np.flatnonzero((found.mode_code == SLUMP) & (found.state_code == STABLE))[:6]
+    assert slumps.size == 6
+    for i in slumps.tolist():
+        shaken = shaken_mechanism(
+            Block.from_fractures(
+                float(MADE.s1_m[i]), float(MADE.s2_m[i]), float(MADE.gamma_deg[i])
+            ),
+            kind="slumping",
+            beta_deg=float(MADE.beta_deg[i]),
+            phi_deg=float(MADE.phi_deg[i]),
+        )
+        slump = predict_slumping(shaken.yield_g, shaken.p2, pgv_m_s=0.6, pga_g=0.7)
+        assert answer.probability[i] == pytest.approx(slump.probability, rel=1e-9, abs=1e-12)
+        assert answer.in_domain[i] == slump.in_domain
+
+
+def test_a_longer_distance_is_reached_by_fewer(answer: Scenario) -> None:
+    far = scenario(MADE, pgv_m_s=0.6, pga_g=0.7, displacement_m=0.5)
+    mean = {mode.mode: mode.covered.probability for mode in answer.modes}
+    less = {mode.mode: mode.covered.probability for mode in far.modes}
+    assert less["slide"] < mean["slide"]  # type: ignore[operator]
+    assert less["slump"] == mean["slump"]
+
+
+def test_no_shaking_moves_nothing_that_stands() -> None:
+    still = scenario(MADE, pgv_m_s=0.0, pga_g=0.0, displacement_m=0.05)
+    stands = MADE.stability.state_code == STABLE
+    assert np.all(still.probability[stands] == 0.0)
+
+
+def test_what_the_models_lack_is_refused() -> None:
+    with pytest.raises(InputError, match="displacement_m"):
+        scenario(MADE, pgv_m_s=0.6, displacement_m=0.0)
+    with pytest.raises(InputError, match="read PGV"):
+        scenario(MADE, pga_g=0.6, tm_s=0.5, displacement_m=0.1)
+    without = scenario(MADE, pgv_m_s=0.6)
+    assert without.covered_share < 1.0
+    assert math.isclose(sum(without.uncovered_share.values()), 1.0 - without.covered_share)

@@ -1,0 +1,249 @@
+"""Rock masses under a motion: each block as if it were alone, and the counts of all."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
+from rbfrag.rockmass import response as rockmass_shaken
+from rbfrag.rockmass.failures import failures
+from rbfrag.rockmass.failures_table import fate_columns
+from rbfrag.rockmass.joint_sets import Realisations, RockMass
+from rbfrag.rockmass.response import ShakenMass, plan_shaking
+from rbfrag.rockmass.shaking import (
+    FATES,
+    OPEN,
+    FailureLimits,
+    run_blocks,
+)
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.respond import respond
+from rbfrag.solver.results import Outcome
+from tests.synthetic import shaking
+
+UNIFORM = {"distribution": "uniform"}
+
+FOUR_MODES = RockMass.of(
+    {
+        "base.dip_deg": {**UNIFORM, "low": -20.0, "high": 35.0},
+        "base.spacing_m": {"distribution": "lognormal", "median": 1.0, "sd_ln": 0.7},
+        "back.dip_deg": {**UNIFORM, "low": 25.0, "high": 175.0},
+        "back.spacing_m": {"distribution": "lognormal", "median": 1.0, "sd_ln": 0.7},
+        "friction.phi_deg": {**UNIFORM, "low": 15.0, "high": 50.0},
+    }
+)
+
+
+def one_block(**stated: object) -> Realisations:
+    """A rock mass of three blocks that are all alike."""
+    return RockMass.of(
+        {
+            "base.dip_deg": 20.0,
+            "base.spacing_m": 1.0,
+            "back.dip_deg": 80.0,
+            "back.spacing_m": 2.0,
+            "friction.phi_deg": 30.0,
+            **stated,
+        }
+    ).realise(3, 1)
+
+
+def pulse(amplitude_g: float, duration_s: float) -> GroundMotion:
+    return GroundMotion.from_nodes(
+        [0.0, 0.0, duration_s, duration_s, 30.0], [0.0, amplitude_g, amplitude_g, 0.0, 0.0]
+    )
+
+
+def record(seed: int = 3, pga_g: float = 0.6) -> GroundMotion:
+    a = shaking(seed)
+    return GroundMotion(pga_g * a / np.abs(a).max(), 0.01)
+
+
+def shake(made: Realisations, motion: GroundMotion, chunk: int = 50, **asked: object) -> ShakenMass:
+    plan = plan_shaking(made, motion, **asked)  # type: ignore[arg-type]
+    return plan.gathered(run_blocks(work) for work in plan.work(chunk))
+
+
+def test_sliding_blocks_by_hand() -> None:
+    # D = factor (A g T²/2) (A/k_y - 1) on a base of 20 degrees with 30 degrees of friction
+    made = one_block()
+    ky = math.tan(math.radians(10.0))
+    factor = math.cos(math.radians(10.0)) / math.cos(math.radians(30.0))
+    slid = factor * 0.5 * 0.4 * G * 0.2**2 * (0.4 / ky - 1.0)
+    for limit, fate in ((slid * 1.001, "stays"), (slid * 0.999, "fails")):
+        found = shake(made, pulse(0.4, 0.2), limits=FailureLimits(limit))
+        assert [FATES[code] for code in found.code[0]] == [fate] * 3
+        assert found.displacement_m[0] == pytest.approx([slid] * 3, rel=1e-10)
+        assert np.isnan(found.rotation_rad).all()
+        (each,) = failures(found)
+        assert each.total.fails == (3 if fate == "fails" else 0)
+        assert each.total.of_all.value == (1.0 if fate == "fails" else 0.0)
+        assert each.modes["slide"].displacement_m is not None
+        assert each.modes["slide"].displacement_m["max"] == pytest.approx(slid, rel=1e-10)
+    # on the limit itself rounding decides, and that is said
+    at_limit = shake(made, pulse(0.4, 0.2), limits=FailureLimits(float(found.displacement_m[0, 0])))
+    assert at_limit.code[0].tolist() == [FATES.index("undetermined")] * 3
+    assert failures(at_limit)[0].total.open == 3
+
+
+def test_scales_are_factors_on_the_motion() -> None:
+    made = one_block()
+    found = shake(made, pulse(0.4, 0.2), scales=[2.0, 0.4, 1.0, 0.4])
+    assert found.shaking.scales == (0.4, 1.0, 2.0)
+    assert found.pga_g.tolist() == pytest.approx([0.16, 0.4, 0.8])
+    # k_y = 0.176 g is not passed at 0.16 g
+    assert found.code[0].tolist() == [FATES.index("at_rest")] * 3
+    assert found.displacement_m[0].tolist() == [0.0] * 3
+    assert found.runs == 6
+    for i, scale in enumerate(found.shaking.scales):
+        alone = shake(made, pulse(0.4 * scale, 0.2))
+        assert alone.displacement_m[0] == pytest.approx(found.displacement_m[i], rel=1e-12)
+
+
+def test_a_motion_below_every_threshold_needs_no_run() -> None:
+    made = FOUR_MODES.realise(200, 4)
+    k = made.stability.yield_acceleration
+    positive = k[made.is_block & (k > 0.0)]
+    plan = plan_shaking(made, pulse(0.999 * float(positive.min()), 5.0))
+    assert not plan.moves.any()
+    assert list(plan.work()) == []
+    found = plan.gathered([])
+    assert found.runs == 0
+    assert failures(found)[0].total.fails == 0
+
+
+@pytest.fixture(scope="module")
+def four() -> ShakenMass:
+    return shake(FOUR_MODES.realise(400, 2), record(), scales=[0.5, 1.5])
+
+
+def test_every_block_is_what_it_would_be_alone(four: ShakenMass) -> None:
+    made, motion = four.made, record()
+    outcomes: set[tuple[str, str]] = set()
+    for j in np.flatnonzero(four.moves[1])[:150]:
+        alone = respond(
+            motion.scaled(1.5),
+            block=Block.from_fractures(made.s1_m[j], made.s2_m[j], made.gamma_deg[j]),
+            beta_deg=float(made.beta_deg[j]),
+            phi_deg=float(made.phi_deg[j]),
+        )
+        fate = FATES[four.code[1, j]]
+        outcomes.add((alone.kind, fate))
+        if alone.kind == "sliding":
+            assert alone.peak_displacement_m == pytest.approx(four.displacement_m[1, j], rel=1e-9)
+            if alone.outcome is Outcome.STABLE:
+                assert (fate == "fails") == (alone.peak_displacement_m > 0.05)
+        else:
+            told = {"stable": "stays", "toppled": "fails"}.get(alone.outcome, alone.outcome.value)
+            assert fate == told
+            if alone.peak_theta_rad is not None:
+                assert alone.peak_theta_rad == pytest.approx(
+                    four.rotation_rad[1, j], rel=1e-6, abs=1e-9
+                )
+    assert {kind for kind, _ in outcomes} == {
+        "sliding", "toppling", "slumping", "confined_toppling",
+    }  # fmt: skip
+    assert {"stays", "fails"} <= {fate for _, fate in outcomes}
+
+
+def test_the_fates_are_a_partition(four: ShakenMass) -> None:
+    made = four.made
+    for i, each in enumerate(failures(four)):
+        assert each.total.count == made.n_blocks < made.n
+        assert sum(found.count for found in each.modes.values()) == made.n_blocks
+        for found in (*each.modes.values(), each.total):
+            assert sum(found.fates.values()) == found.count
+            assert found.open == sum(found.fates[name] for name in OPEN)
+            assert found.of_all.low <= found.of_all.value <= found.of_all.high
+            assert found.of_all.value == found.fails / made.n_blocks
+        unstable = made.is_block & (made.stability.state == "unstable")
+        assert each.total.fates["unstable"] == int(unstable.sum()) > 0
+        assert each.total.fates["locked"] == int((made.stability.state == "locked").sum()) > 0
+        assert each.total.moved == int(four.moves[i].sum())
+        assert set(four.code[i, ~made.is_block].tolist()) == {-1}
+    assert four.runs == int(four.moves.sum())
+
+
+def test_neither_seed_nor_pieces_leave_chance(four: ShakenMass) -> None:
+    again = shake(FOUR_MODES.realise(400, 2), record(), scales=[0.5, 1.5], chunk=7)
+    assert np.array_equal(again.code, four.code)
+    assert np.array_equal(again.displacement_m, four.displacement_m, equal_nan=True)
+    assert np.array_equal(again.rotation_rad, four.rotation_rad, equal_nan=True)
+    assert again.about == four.about
+    other = shake(FOUR_MODES.realise(400, 3), record(), scales=[0.5, 1.5])
+    assert not np.array_equal(other.code, four.code)
+
+
+def test_a_stated_rotation_is_failure_before_recovery_is_lost(four: ShakenMass) -> None:
+    strict = shake(four.made, record(), scales=[1.5], limits=FailureLimits(rotation_deg=0.05))
+    slumps = four.made.is_block & (four.made.stability.mode == "slump")
+    turned = four.rotation_rad[1] > math.radians(0.05)
+    lax, now = four.code[1], strict.code[0]
+    fails = FATES.index("fails")
+    assert (now[slumps & turned] == fails).all()
+    assert (lax[slumps & turned] != fails).any()
+    # what a free topple or a slide does is judged as before
+    others = ~slumps & (four.made.stability.mode != "confined_topple")
+    assert np.array_equal(now[others], lax[others])
+
+
+def test_thrown_off_by_the_vertical_motion() -> None:
+    up = GroundMotion(np.array([0.0, 0.0, -2.0, 0.0]), 0.1)
+    motion = GroundMotion(np.array([0.0, 0.9, 0.9, 0.0]), 0.1)
+    thrown = shake(one_block(), motion, vertical=up)
+    assert thrown.code[0].tolist() == [FATES.index("jump")] * 3
+    # the strength is not passed, and yet the block does not stay
+    weak = shake(
+        one_block(), replace(motion, acceleration_g=0.1 * motion.acceleration_g), vertical=up
+    )
+    assert weak.code[0].tolist() == [FATES.index("jump")] * 3
+    assert weak.runs == 0
+    assert failures(weak)[0].total.moved == 0
+
+
+def test_the_table_has_a_row_for_each_block_and_scale(four: ShakenMass) -> None:
+    columns = fate_columns(four)
+    n = four.made.n
+    assert {values.shape for values in columns.values()} == {(2 * n,)}
+    assert columns["block_id"].tolist() == [*range(1, n + 1)] * 2
+    assert set(columns["scale"][:n]) == {0.5}
+    named = columns["fate"].reshape(2, n)
+    assert all(named[1, j] == FATES[four.code[1, j]] for j in np.flatnonzero(four.made.is_block))
+    assert set(named[:, ~four.made.is_block].ravel()) == {""}
+
+
+@pytest.mark.parametrize(
+    ("asked", "word"),
+    [
+        ({"scales": [1.0, 0.0]}, "scale 0"),
+        ({"scales": [math.nan]}, "scale nan"),
+        ({"scales": []}, "no scale"),
+    ],
+)
+def test_refused(asked: dict[str, object], word: str) -> None:
+    with pytest.raises(InputError, match=word):
+        plan_shaking(one_block(), pulse(0.4, 0.2), **asked)  # type: ignore[arg-type]
+
+
+def test_more_than_the_memory_holds_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rockmass_shaken, "MOST_FATES", 5)
+    with pytest.raises(InputError, match="3 realisations at 2 scales are more than 5"):
+        plan_shaking(one_block(), pulse(0.4, 0.2), scales=[1.0, 2.0])
+
+
+def test_impossible_limits_are_refused() -> None:
+    with pytest.raises(InputError, match="displacement"):
+        FailureLimits(0.0)
+    with pytest.raises(InputError, match="rotation"):
+        FailureLimits(0.05, -1.0)
+
+
+def test_a_vertical_acceleration_of_the_mass_is_refused() -> None:
+    with pytest.raises(InputError, match=r"block\.kv"):
+        plan_shaking(one_block(**{"block.kv": 0.1}), pulse(0.4, 0.2))

@@ -1,0 +1,50 @@
+"""The frequency parameter of many slumps at once, against the mechanism of each."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from rbfrag.campaign.slumping_family import FAMILY
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.shaken_mechanism import shaken_mechanism
+from rbfrag.solver.stability.slumping_frequency import slumping_p2
+
+
+def test_it_is_that_of_the_mechanism() -> None:
+    blocks = [each.block for each in FAMILY]
+    found = slumping_p2(
+        alpha1_deg=np.array([b.alpha1_deg for b in blocks]),
+        alpha3_deg=np.array([b.alpha3_deg for b in blocks]),
+        gamma_deg=np.array([b.gamma_deg for b in blocks]),
+        r1_m=np.array([b.r1_m for b in blocks]),
+        r3_m=np.array([b.r3_m for b in blocks]),
+        beta_deg=np.array([each.beta_deg for each in FAMILY]),
+        phi_deg=np.array([each.phi_deg for each in FAMILY]),
+        phi_back_deg=np.array([each.phi_deg - 4.0 for each in FAMILY]),
+    )
+    for value, each in zip(found, FAMILY, strict=True):
+        one = shaken_mechanism(
+            each.block,
+            kind="slumping",
+            beta_deg=each.beta_deg,
+            phi_deg=each.phi_deg,
+            phi_back_deg=each.phi_deg - 4.0,
+        )
+        assert value == pytest.approx(one.p2, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("angles", "p2"), [((45, 65, 35, 0), 2.446054), ((50, 72, 35, 5), 1.652443)]
+)
+def test_printed_values(angles: tuple[float, float, float, float], p2: float) -> None:
+    # r1 = 1 m; the table was computed with 9.81 m/s²
+    alpha1, alpha3, phi, beta = angles
+    r3 = np.cos(np.radians(alpha1)) / np.cos(np.radians(alpha3))
+    block = Block.from_angles(alpha1, alpha3, float(r3))
+    one = {name: np.array([value]) for name, value in (
+        ("alpha1_deg", alpha1), ("alpha3_deg", alpha3), ("gamma_deg", block.gamma_deg),
+        ("r1_m", block.r1_m), ("r3_m", block.r3_m), ("beta_deg", beta), ("phi_deg", phi),
+        ("phi_back_deg", phi),
+    )}  # fmt: skip
+    assert slumping_p2(**one)[0] * 9.81 / 9.80665 == pytest.approx(p2, abs=1e-6)
