@@ -14,8 +14,8 @@ import time
 import numpy as np
 
 from rbfrag.exchange.shakemap_grid import read_shakemap
-from rbfrag.hazard.component import component
-from rbfrag.hazard.site_probability import site_probability
+from rbfrag.hazards.component import component
+from rbfrag.hazards.site_probability import site_probability
 
 
 def main() -> None:

@@ -17,8 +17,8 @@ import numpy as np
 import pandas as pd
 
 import rbfrag
-from rbfrag.rockmass.file import read_rock_mass
-from rbfrag.rockmass.table import toppling_blocks
+from rbfrag.rockmasses.file import read_rock_mass
+from rbfrag.rockmasses.table import toppling_blocks
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.batch import simulate_many
 from rbfrag.solver.integrator.single_run import TOPPLED

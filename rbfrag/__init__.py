@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from rbfrag.fragility.kind_prediction import predict_sliding as predict_sliding
     from rbfrag.fragility.kind_prediction import predict_slumping as predict_slumping
     from rbfrag.fragility.predict import predict as predict
-    from rbfrag.hazard.answer import HazardAnswer as HazardAnswer
-    from rbfrag.hazard.answer import hazard as hazard
-    from rbfrag.hazard.curve import HazardCurve as HazardCurve
+    from rbfrag.hazards.answer import HazardAnswer as HazardAnswer
+    from rbfrag.hazards.answer import hazard as hazard
+    from rbfrag.hazards.curve import HazardCurve as HazardCurve
     from rbfrag.motions.ground_motion import GroundMotion as GroundMotion
     from rbfrag.motions.recognise import read_motions as read_motions
     from rbfrag.motions.toppling_spectrum import toppling_spectrum as toppling_spectrum
@@ -58,8 +58,8 @@ _HOME = {
     "DatabaseError": "rbfrag.errors",
     "FitError": "rbfrag.errors",
     "GroundMotion": "rbfrag.motions.ground_motion",
-    "HazardAnswer": "rbfrag.hazard.answer",
-    "HazardCurve": "rbfrag.hazard.curve",
+    "HazardAnswer": "rbfrag.hazards.answer",
+    "HazardCurve": "rbfrag.hazards.curve",
     "InputError": "rbfrag.errors",
     "MotionFileError": "rbfrag.errors",
     "Outcome": "rbfrag.solver.results",
@@ -75,7 +75,7 @@ _HOME = {
     "critical_sliding": "rbfrag.solver.search.displacement",
     "fit": "rbfrag.fragility.fit.fitting",
     "fit_kind": "rbfrag.fragility.fit.kind_fitting",
-    "hazard": "rbfrag.hazard.answer",
+    "hazard": "rbfrag.hazards.answer",
     "predict": "rbfrag.fragility.predict",
     "predict_sliding": "rbfrag.fragility.kind_prediction",
     "predict_slumping": "rbfrag.fragility.kind_prediction",

@@ -17,7 +17,7 @@ LEVELS = (
     {"solver"},
     {"db"},
     {"fragility"},
-    {"hazard", "rockmass"},
+    {"hazards", "rockmasses"},
     {"plots", "exchange", "campaign"},
     {"bench"},
     {"cli", "service"},

@@ -12,9 +12,9 @@ from rbfrag.campaign.executors.local import run_locally
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
-from rbfrag.rockmass.joint_sets import Realisations
-from rbfrag.rockmass.response import CHUNK, ShakenMass, plan_shaking
-from rbfrag.rockmass.shaking import BlockFates, FailureLimits, run_blocks
+from rbfrag.rockmasses.joint_sets import Realisations
+from rbfrag.rockmasses.response import CHUNK, ShakenMass, plan_shaking
+from rbfrag.rockmasses.shaking import BlockFates, FailureLimits, run_blocks
 
 WORTH_A_PROCESS = 500
 """Blocks below which a worker process takes longer to start than to work."""
@@ -65,7 +65,7 @@ def shake(
         on_progress: called at the beginning and after each piece of work.
 
     Raises:
-        InputError: as for :func:`rbfrag.rockmass.response.plan_shaking`; `jobs` below 1;
+        InputError: as for :func:`rbfrag.rockmasses.response.plan_shaking`; `jobs` below 1;
             a block that cannot be run.
         WorkFailedError: a worker died.
     """

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.hazard.answer import HazardAnswer
-from rbfrag.hazard.curve import HazardCurve
+from rbfrag.hazards.answer import HazardAnswer
+from rbfrag.hazards.curve import HazardCurve
 
 
 def rate_columns(

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rbfrag.hazard.answer import HazardAnswer
-from rbfrag.hazard.curve import HazardCurve
+from rbfrag.hazards.answer import HazardAnswer
+from rbfrag.hazards.curve import HazardCurve
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
 
 _SHOWN = 1e-4

@@ -10,14 +10,14 @@ import numpy as np
 
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
 from rbfrag.plots.mode_style import COLOURS, LINES, words
-from rbfrag.rockmass.counts import (
+from rbfrag.rockmasses.counts import (
     Crossing,
     crossings,
     cumulative_counts,
     mode_counts,
     sorted_yields,
 )
-from rbfrag.rockmass.joint_sets import Realisations
+from rbfrag.rockmasses.joint_sets import Realisations
 
 _POINTS = 600
 _SHOWN = 0.997

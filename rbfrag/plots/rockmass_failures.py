@@ -11,8 +11,8 @@ import numpy as np
 
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
 from rbfrag.plots.mode_style import COLOURS, LINES, words
-from rbfrag.rockmass.failures import ModeFailures, ScaleFailures, failures
-from rbfrag.rockmass.response import ShakenMass
+from rbfrag.rockmasses.failures import ModeFailures, ScaleFailures, failures
+from rbfrag.rockmasses.response import ShakenMass
 from rbfrag.solver.stability.modes import ModeName
 
 if TYPE_CHECKING:

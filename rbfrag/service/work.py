@@ -55,14 +55,14 @@ def rock_mass(
         row_limit: most realisations.
         db: database of the models.
     """
-    from rbfrag.rockmass.counts import crossings, mode_counts
-    from rbfrag.rockmass.file import (
+    from rbfrag.rockmasses.counts import crossings, mode_counts
+    from rbfrag.rockmasses.file import (
         rock_mass_of_csv,
         rock_mass_of_tables,
         rock_mass_of_toml,
     )
-    from rbfrag.rockmass.report import as_dict
-    from rbfrag.rockmass.scenario import scenario
+    from rbfrag.rockmasses.report import as_dict
+    from rbfrag.rockmasses.scenario import scenario
 
     if form == "json":
         document = read_json(body)
@@ -173,9 +173,9 @@ def hazard(
         db: database of the models.
     """
     from rbfrag.exchange.curves.file import hazard_curves_in, suited_curves
-    from rbfrag.hazard.answer import hazard as answer
-    from rbfrag.hazard.report import as_dict
-    from rbfrag.hazard.velocity_conversion import velocity_conversion
+    from rbfrag.hazards.answer import hazard as answer
+    from rbfrag.hazards.report import as_dict
+    from rbfrag.hazards.velocity_conversion import velocity_conversion
     from rbfrag.solver.quantity import positive
 
     p2, kr = positive(p2, "p2", "1/s²"), positive(kr, "kr", "g")

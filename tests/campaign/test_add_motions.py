@@ -330,7 +330,7 @@ def test_the_real_set(everything: tuple[Path, AddReport]) -> None:
     stored = rows(db)
     horizontals = [row for row in stored if not row.is_vertical]
     assert len(horizontals) == 265
-    assert len({row.event_id for row in horizontals}) == 47
+    assert len({row.event_id for row in horizontals}) == 48
     # the near-fault set keeps its permanent displacement, and six of it a velocity as well
     flags = Counter((row.file_format, flag) for row in horizontals for flag in row.flags)
     assert flags == {

@@ -13,9 +13,9 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.db.rows import ModelRow
 from rbfrag.exchange.block_columns import read_columns
-from rbfrag.rockmass.counts import crossings, mode_counts
-from rbfrag.rockmass.file import read_rock_mass
-from rbfrag.rockmass.scenario import scenario
+from rbfrag.rockmasses.counts import crossings, mode_counts
+from rbfrag.rockmasses.file import read_rock_mass
+from rbfrag.rockmasses.scenario import scenario
 from tests.cli.conftest import Refuses, Shell
 
 EXAMPLE = Path(__file__).resolve().parent.parent.parent / "docs" / "examples" / "rockmass.toml"

@@ -9,10 +9,10 @@ import pytest
 
 from rbfrag.exchange.block_columns import read_columns
 from rbfrag.motions.recognise import read_motion
-from rbfrag.rockmass.failures import failures
-from rbfrag.rockmass.file import read_rock_mass
-from rbfrag.rockmass.response import plan_shaking
-from rbfrag.rockmass.shaking import FailureLimits, run_blocks
+from rbfrag.rockmasses.failures import failures
+from rbfrag.rockmasses.file import read_rock_mass
+from rbfrag.rockmasses.response import plan_shaking
+from rbfrag.rockmasses.shaking import FailureLimits, run_blocks
 from tests.cli.conftest import Refuses, Shell
 from tests.synthetic import shaking, write_at2
 

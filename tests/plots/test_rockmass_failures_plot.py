@@ -9,10 +9,10 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.plots import rockmass_failures as module
 from rbfrag.plots.rockmass_failures import plot_failures
-from rbfrag.rockmass.failures import failures
-from rbfrag.rockmass.joint_sets import RockMass
-from rbfrag.rockmass.response import plan_shaking
-from rbfrag.rockmass.shaking import run_blocks
+from rbfrag.rockmasses.failures import failures
+from rbfrag.rockmasses.joint_sets import RockMass
+from rbfrag.rockmasses.response import plan_shaking
+from rbfrag.rockmasses.shaking import run_blocks
 from tests.synthetic import shaking
 
 UNIFORM = {"distribution": "uniform"}

@@ -8,8 +8,8 @@ import pytest
 from rbfrag.errors import InputError
 from rbfrag.plots import rockmass as module
 from rbfrag.plots.rockmass import plot_rockmass
-from rbfrag.rockmass.counts import crossings, mode_counts
-from rbfrag.rockmass.joint_sets import RockMass
+from rbfrag.rockmasses.counts import crossings, mode_counts
+from rbfrag.rockmasses.joint_sets import RockMass
 
 
 def normal(mean, sd):

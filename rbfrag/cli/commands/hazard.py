@@ -96,9 +96,9 @@ def hazard(
     """
     from rbfrag.exchange.block_table import table_path, write_block_table
     from rbfrag.exchange.curves.file import read_hazard_curves, suited_curves
-    from rbfrag.hazard.answer import hazard as answer
-    from rbfrag.hazard.report import as_dict
-    from rbfrag.hazard.velocity_conversion import velocity_conversion
+    from rbfrag.hazards.answer import hazard as answer
+    from rbfrag.hazards.report import as_dict
+    from rbfrag.hazards.velocity_conversion import velocity_conversion
 
     if out is not None:
         table_path(out)
@@ -161,8 +161,8 @@ def _blocks(
     if rockmass is not None:
         if blocks is not None or p2 is not None or kr is not None or block is not None:
             raise InputError("--rockmass goes without --p2, --kr, --block and --blocks")
-        from rbfrag.rockmass.file import read_rock_mass
-        from rbfrag.rockmass.table import toppling_blocks
+        from rbfrag.rockmasses.file import read_rock_mass
+        from rbfrag.rockmasses.table import toppling_blocks
 
         p2s, krs, share = toppling_blocks(read_rock_mass(rockmass).realise(None, None))
         if krs.size == 0:

@@ -111,15 +111,15 @@ def rockmass(
     the blocks of each mode for which there is a fragility model.
     """
     from rbfrag.exchange.block_table import table_path, write_block_table
-    from rbfrag.rockmass.counts import crossings, mode_counts
-    from rbfrag.rockmass.exact_interval import checked_level
-    from rbfrag.rockmass.failures import failures
-    from rbfrag.rockmass.failures_report import failures_as_dict
-    from rbfrag.rockmass.failures_table import fate_columns
-    from rbfrag.rockmass.file import read_rock_mass
-    from rbfrag.rockmass.report import as_dict
-    from rbfrag.rockmass.scenario import scenario
-    from rbfrag.rockmass.table import block_columns
+    from rbfrag.rockmasses.counts import crossings, mode_counts
+    from rbfrag.rockmasses.exact_interval import checked_level
+    from rbfrag.rockmasses.failures import failures
+    from rbfrag.rockmasses.failures_report import failures_as_dict
+    from rbfrag.rockmasses.failures_table import fate_columns
+    from rbfrag.rockmasses.file import read_rock_mass
+    from rbfrag.rockmasses.report import as_dict
+    from rbfrag.rockmasses.scenario import scenario
+    from rbfrag.rockmasses.table import block_columns
 
     if out is not None:
         table_path(out)

@@ -92,8 +92,8 @@ def shakemap(
     from rbfrag.exchange.grid_interpolation import at_places
     from rbfrag.exchange.shakemap_grid import read_shakemap
     from rbfrag.exchange.text_output import output_path
-    from rbfrag.hazard.component import component as component_named
-    from rbfrag.hazard.site_probability import site_probability
+    from rbfrag.hazards.component import component as component_named
+    from rbfrag.hazards.site_probability import site_probability
 
     target = output_path(out, SUFFIXES, "a map")
     if plot is not None:
@@ -230,8 +230,8 @@ def _blocks(
             "give one of --p2 with --kr, --block, --blocks and --rockmass, not several of them"
         )
     if rockmass is not None:
-        from rbfrag.rockmass.file import read_rock_mass
-        from rbfrag.rockmass.table import toppling_blocks
+        from rbfrag.rockmasses.file import read_rock_mass
+        from rbfrag.rockmasses.table import toppling_blocks
 
         p2s, krs, share = toppling_blocks(read_rock_mass(rockmass).realise(n, None))
         if p2s.size == 0:

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from rbfrag.rockmass.joint_sets import RockMass
+    from rbfrag.rockmasses.joint_sets import RockMass
 
 
 class ChartedBlocks(NamedTuple):
@@ -51,8 +51,8 @@ def charted_blocks(
 
         columns = read_columns(blocks, names)
     elif rockmass is not None:
-        from rbfrag.rockmass.file import read_rock_mass
-        from rbfrag.rockmass.table import block_columns
+        from rbfrag.rockmasses.file import read_rock_mass
+        from rbfrag.rockmasses.table import block_columns
 
         mass = read_rock_mass(rockmass)
         columns = block_columns(mass.realise())

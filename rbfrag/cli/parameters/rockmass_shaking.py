@@ -10,8 +10,8 @@ from rbfrag.cli.parameters.number_list import number_list
 from rbfrag.cli.progress_line import ProgressLine
 
 if TYPE_CHECKING:
-    from rbfrag.rockmass.joint_sets import Realisations
-    from rbfrag.rockmass.response import ShakenMass
+    from rbfrag.rockmasses.joint_sets import Realisations
+    from rbfrag.rockmasses.response import ShakenMass
 
 ALWAYS = ("at_rest", "stays", "unstable")
 """Fates that have a column of their own even if there are none."""
@@ -37,8 +37,8 @@ def run_shaken(
         Their fates, and sentences about the motion and about blocks.
     """
     from rbfrag.campaign.shake_rockmass import shake
-    from rbfrag.rockmass.failures_report import failure_warnings
-    from rbfrag.rockmass.shaking import DISPLACEMENT_M, FailureLimits
+    from rbfrag.rockmasses.failures_report import failure_warnings
+    from rbfrag.rockmasses.shaking import DISPLACEMENT_M, FailureLimits
 
     limits = FailureLimits(DISPLACEMENT_M if displacement is None else displacement, rotation)
     factors = [1.0] if scales is None else number_list(scales, "--scales")
@@ -60,7 +60,7 @@ def run_shaken(
 
 def print_failures(document: dict[str, Any]) -> None:
     """Print the failures that a motion causes, mode by mode and scale by scale."""
-    from rbfrag.rockmass.shaking import FATES
+    from rbfrag.rockmasses.shaking import FATES
 
     print()
     turned = document["rotation_limit_deg"]

@@ -9,7 +9,7 @@ from rbfrag.exchange.curves.nshm import is_nshm_curve, nshm_curves
 from rbfrag.exchange.curves.openquake import is_openquake_curve, openquake_curves
 from rbfrag.exchange.curves.table import table_curves
 from rbfrag.exchange.source_text import source_text
-from rbfrag.hazard.curve import HazardCurve
+from rbfrag.hazards.curve import HazardCurve
 
 
 def read_hazard_curves(

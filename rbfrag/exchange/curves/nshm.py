@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.hazard.curve import HazardCurve, hazard_curve
+from rbfrag.hazards.curve import HazardCurve, hazard_curve
 
 _SPECTRAL = re.compile(r"([0-9.]+) Second Spectral Acceleration", re.IGNORECASE)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.intensity_type import openquake_type
-from rbfrag.hazard.curve import HazardCurve, hazard_curve, rates_from_probabilities
+from rbfrag.hazards.curve import HazardCurve, hazard_curve, rates_from_probabilities
 
 _LEVEL = re.compile(r"poe-(.+)")
 _SITE_COLUMNS = ("lon", "lat", "depth", "custom_site_id", "site_id")

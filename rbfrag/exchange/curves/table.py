@@ -8,7 +8,7 @@ import re
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.hazard.curve import HazardCurve, hazard_curve, rates_from_probabilities
+from rbfrag.hazards.curve import HazardCurve, hazard_curve, rates_from_probabilities
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 _LEVELS = {

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import predict
-from rbfrag.hazard import site_probability as site_module
-from rbfrag.hazard.component import component
-from rbfrag.hazard.site_probability import site_probability
+from rbfrag.hazards import site_probability as site_module
+from rbfrag.hazards.component import component
+from rbfrag.hazards.site_probability import site_probability
 
 FloatArray = NDArray[np.float64]
 

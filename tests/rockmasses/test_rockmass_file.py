@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.rockmass.file import read_rock_mass
+from rbfrag.rockmasses.file import read_rock_mass
 
 EXAMPLES = Path(__file__).resolve().parent.parent.parent / "docs" / "examples"
 

@@ -35,7 +35,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from rbfrag.errors import InputError
-from rbfrag.rockmass.joint_sets import RockMass
+from rbfrag.rockmasses.joint_sets import RockMass
 
 COLUMNS = (
     "variable", "distribution", "value", "mean", "median", "sd", "sd_ln", "kappa", "low", "high",

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from rbfrag.errors import InputError
-from rbfrag.rockmass.distributions import LAWS, Distribution
+from rbfrag.rockmasses.distributions import LAWS, Distribution
 
 N = 20_000
 

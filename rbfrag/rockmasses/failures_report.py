@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from rbfrag.rockmass.failures import ModeFailures, ScaleFailures, Share
-from rbfrag.rockmass.response import ShakenMass
+from rbfrag.rockmasses.failures import ModeFailures, ScaleFailures, Share
+from rbfrag.rockmasses.response import ShakenMass
 from rbfrag.solver.stability.modes import MODES
 
 

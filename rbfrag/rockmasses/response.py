@@ -13,8 +13,8 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.quality import quality_flags
-from rbfrag.rockmass.joint_sets import Realisations
-from rbfrag.rockmass.shaking import (
+from rbfrag.rockmasses.joint_sets import Realisations
+from rbfrag.rockmasses.shaking import (
     AT_REST,
     FATES,
     LOCKED,
@@ -46,7 +46,7 @@ class ShakenMass:
         shaking: the motion and its scales.
         limits: what counts as failure.
         pga_g: PGA of the motion at each scale [g], shape (scales,).
-        code: places in :data:`~rbfrag.rockmass.shaking.FATES`, -1 for no block.
+        code: places in :data:`~rbfrag.rockmasses.shaking.FATES`, -1 for no block.
         moves: which block was set in motion at which scale.
         displacement_m: greatest displacement along the base, of the block or, where it turns, of
             its contact on the base; NaN where there is none to tell.

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.rockmass.joint_sets import Realisations
+from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.stability.modes import MODES, STATES, ModeName, StateName
 
 FloatArray = NDArray[np.float64]

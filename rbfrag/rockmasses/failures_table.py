@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.rockmass.response import ShakenMass
-from rbfrag.rockmass.shaking import FATES
-from rbfrag.rockmass.table import block_columns
+from rbfrag.rockmasses.response import ShakenMass
+from rbfrag.rockmasses.shaking import FATES
+from rbfrag.rockmasses.table import block_columns
 
 
 def fate_columns(shaken: ShakenMass) -> dict[str, NDArray[Any]]:

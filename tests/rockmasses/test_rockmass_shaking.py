@@ -11,12 +11,12 @@ import pytest
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
-from rbfrag.rockmass import response as rockmass_shaken
-from rbfrag.rockmass.failures import failures
-from rbfrag.rockmass.failures_table import fate_columns
-from rbfrag.rockmass.joint_sets import Realisations, RockMass
-from rbfrag.rockmass.response import ShakenMass, plan_shaking
-from rbfrag.rockmass.shaking import (
+from rbfrag.rockmasses import response as rockmass_shaken
+from rbfrag.rockmasses.failures import failures
+from rbfrag.rockmasses.failures_table import fate_columns
+from rbfrag.rockmasses.joint_sets import Realisations, RockMass
+from rbfrag.rockmasses.response import ShakenMass, plan_shaking
+from rbfrag.rockmasses.shaking import (
     FATES,
     OPEN,
     FailureLimits,

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from rbfrag.rockmass.counts import Crossing, ModeCount
-from rbfrag.rockmass.joint_sets import Realisations
-from rbfrag.rockmass.scenario import Average, Scenario
+from rbfrag.rockmasses.counts import Crossing, ModeCount
+from rbfrag.rockmasses.joint_sets import Realisations
+from rbfrag.rockmasses.scenario import Average, Scenario
 from rbfrag.solver.stability.modes import ModeName
 
 NEAR_LIMIT = 0.01

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.rockmass.distributions import Distribution
+from rbfrag.rockmasses.distributions import Distribution
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
 
@@ -111,7 +111,7 @@ class RockMass:
 
         Args:
             stated: keys such as ``base.dip_deg`` with a number or the keys of a
-                :class:`~rbfrag.rockmass.distributions.Distribution`; ``friction.phi_back_deg``,
+                :class:`~rbfrag.rockmasses.distributions.Distribution`; ``friction.phi_back_deg``,
                 ``block.size_factor``, ``block.kv``, ``block.back_fracture``, ``realisations``
                 and ``seed`` may be left out.
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.hazard.curve import HazardCurve
+from rbfrag.hazards.curve import HazardCurve
 
 FloatArray = NDArray[np.float64]
 

@@ -12,14 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
-from rbfrag.rockmass.counts import (
+from rbfrag.rockmasses.counts import (
     crossings,
     cumulative_counts,
     mode_counts,
     sorted_yields,
 )
-from rbfrag.rockmass.distributions import LAWS
-from rbfrag.rockmass.joint_sets import IMPOSSIBLE, VARIABLES, RockMass
+from rbfrag.rockmasses.distributions import LAWS
+from rbfrag.rockmasses.joint_sets import IMPOSSIBLE, VARIABLES, RockMass
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.modes import MODES
 from rbfrag.solver.stability.single import stability

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from rbfrag.hazard.answer import HazardAnswer
-from rbfrag.hazard.curve import HazardCurve
+from rbfrag.hazards.answer import HazardAnswer
+from rbfrag.hazards.curve import HazardCurve
 
 
 def as_dict(

@@ -16,11 +16,11 @@ from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Model, predict
-from rbfrag.hazard.annual_rate import failure_rate, probability_in
-from rbfrag.hazard.component import component as component_named
-from rbfrag.hazard.curve import HazardCurve
-from rbfrag.hazard.normal_steps import normal_steps
-from rbfrag.hazard.velocity_conversion import velocity_conversion
+from rbfrag.hazards.annual_rate import failure_rate, probability_in
+from rbfrag.hazards.component import component as component_named
+from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.normal_steps import normal_steps
+from rbfrag.hazards.velocity_conversion import velocity_conversion
 
 FloatArray = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def hazard(
 ) -> HazardAnswer:
     """Return how often per year blocks topple under a seismic hazard curve.
 
-    λ_f = ∫ P(topples | x) (-dλ), see :func:`rbfrag.hazard.annual_rate.failure_rate`. The
+    λ_f = ∫ P(topples | x) (-dλ), see :func:`rbfrag.hazards.annual_rate.failure_rate`. The
     ends of the interval are the integrals of the ends of the fragility's own interval; since
     these are taken at every level at once, the interval is at least as wide as one from the
     joint distribution of the parameters.

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.rockmass.joint_sets import Realisations
-from rbfrag.rockmass.scenario import Scenario
+from rbfrag.rockmasses.joint_sets import Realisations
+from rbfrag.rockmasses.scenario import Scenario
 from rbfrag.solver.stability.modes import MODES, STABLE, STATES, TOPPLE
 
 

@@ -9,8 +9,8 @@ from scipy.integrate import quad
 from scipy.special import ndtr
 
 from rbfrag.errors import InputError
-from rbfrag.hazard.annual_rate import failure_rate, probability_in
-from rbfrag.hazard.curve import HazardCurve, hazard_curve
+from rbfrag.hazards.annual_rate import failure_rate, probability_in
+from rbfrag.hazards.curve import HazardCurve, hazard_curve
 
 FloatArray = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.predict import Model, predict
-from rbfrag.hazard.component import Component
-from rbfrag.hazard.normal_steps import normal_steps
+from rbfrag.hazards.component import Component
+from rbfrag.hazards.normal_steps import normal_steps
 
 FloatArray = NDArray[np.float64]
 

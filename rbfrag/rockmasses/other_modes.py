@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.kind_arrays import KindAnswers, kind_answers
 from rbfrag.fragility.kind_model import find_kind_model
-from rbfrag.rockmass.joint_sets import Realisations
+from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.stability.modes import SLIDE, SLUMP, STABLE, ModeName
 from rbfrag.solver.stability.slumping_frequency import slumping_p2

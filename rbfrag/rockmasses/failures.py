@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.rockmass.exact_interval import exact_interval
-from rbfrag.rockmass.response import ShakenMass
-from rbfrag.rockmass.shaking import FATES, OPEN
+from rbfrag.rockmasses.exact_interval import exact_interval
+from rbfrag.rockmasses.response import ShakenMass
+from rbfrag.rockmasses.shaking import FATES, OPEN
 from rbfrag.solver.stability.modes import MODES, ModeName
 
 QUANTILES = (0.5, 0.95)
@@ -40,7 +40,7 @@ class ModeFailures:
         mode: the mode; None for all.
         count: number of blocks.
         fates: number of blocks by fate, in the order of
-            :data:`~rbfrag.rockmass.shaking.FATES`; they add up to `count`.
+            :data:`~rbfrag.rockmasses.shaking.FATES`; they add up to `count`.
         moved: number of blocks that were set in motion.
         of_all: those that fail, as a share of the blocks of all modes.
         of_mode: the same as a share of the blocks of the mode; None without blocks.

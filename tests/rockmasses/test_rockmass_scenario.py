@@ -12,11 +12,11 @@ import pytest
 from rbfrag.errors import DatabaseNotFoundError, InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import predict
-from rbfrag.rockmass.counts import Crossing, crossings, mode_counts
-from rbfrag.rockmass.joint_sets import Realisations, RockMass
-from rbfrag.rockmass.report import as_dict
-from rbfrag.rockmass.scenario import LOCKED, UNCOVERED, scenario
-from rbfrag.rockmass.table import block_columns
+from rbfrag.rockmasses.counts import Crossing, crossings, mode_counts
+from rbfrag.rockmasses.joint_sets import Realisations, RockMass
+from rbfrag.rockmasses.report import as_dict
+from rbfrag.rockmasses.scenario import LOCKED, UNCOVERED, scenario
+from rbfrag.rockmasses.table import block_columns
 
 UNIFORM = {"distribution": "uniform"}
 WILD: dict[str, object] = {

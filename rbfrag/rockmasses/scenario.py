@@ -16,8 +16,8 @@ from rbfrag.fragility.checks import refusals
 from rbfrag.fragility.functions import normal_half_width
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.predict import Model, predict
-from rbfrag.rockmass.joint_sets import Realisations
-from rbfrag.rockmass.other_modes import other_modes
+from rbfrag.rockmasses.joint_sets import Realisations
+from rbfrag.rockmasses.other_modes import other_modes
 from rbfrag.solver.stability.modes import MODES, STABLE, TOPPLE, UNSTABLE, ModeName
 
 FloatArray = NDArray[np.float64]
