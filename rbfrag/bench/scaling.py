@@ -14,10 +14,10 @@ from rbfrag.bench.cases import Case
 from rbfrag.bench.methods import taylor_run
 from rbfrag.bench.timing import timed
 from rbfrag.campaign.executors.local import prepare
-from rbfrag.campaign.plan import Case as PlannedCase
-from rbfrag.campaign.worker import MotionWork, Task, run_work
+from rbfrag.campaign.worker import MotionWork, PlannedCase, Task, run_work
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
+from rbfrag.solver.kinds import model_of_kind
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES
 from rbfrag.solver.toppling_run import simulate
 
@@ -114,8 +114,10 @@ def workers(
 
 def _work(motion: GroundMotion, number: int, cases: int) -> MotionWork:
     planned = [
-        PlannedCase(natural_key="", polarity=polarity, p2=p2)
-        for p2 in DEFAULT_P2
+        PlannedCase(
+            natural_key=f"{polarity} {case.p2}", polarity=polarity, vertical_id=None, case=case
+        )
+        for case in model_of_kind("toppling").cases()
         for polarity in POLARITIES
     ]
     tasks = tuple(Task(case) for case in planned[:cases])

@@ -205,7 +205,9 @@ def still_to_do(connection: Connection, plan: CampaignPlan, wanted: Wanted) -> T
     spectra = spectrum_values(connection, p2=sizes) if sizes else {}
     motions = []
     for motion in plan.motions:
-        tasks = [_task(motion, case, known, with_blocks, histories, wanted) for case in motion.cases]
+        tasks = [
+            _task(motion, case, known, with_blocks, histories, wanted) for case in motion.cases
+        ]
         left = tuple(task for task in tasks if task is not None)
         spectrum = missing_sizes(spectra, motion.motion.id, sizes)
         if left or spectrum:
@@ -300,10 +302,13 @@ def _task(
     there = known.get(planned.natural_key)
     moves = motion.motion.pga_g > 0.0  # without motion k/PGA says nothing
     critical = None if there is None else there.kr_over_pga
+    lacks_grid = there is None or (
+        not there.gridded and there.status != "outside_model" and _has_grid(motion, planned)
+    )
     task = Task(
         planned=planned,
         search=there is None,
-        grid=moves and (there is None or (not there.gridded and _has_grid(motion, planned))),
+        grid=moves and lacks_grid,
         full_map=wanted.full_map
         and (there is None or (not there.mapped and there.status in ("found", "below_limit"))),
         blocks=wanted.blocks if moves and planned.natural_key not in with_blocks else (),
@@ -315,9 +320,7 @@ def _task(
         critical_history=wanted.critical_history
         and (
             there is None
-            or (
-                critical is not None and _history_key(motion, planned, critical) not in histories
-            )
+            or (critical is not None and _history_key(motion, planned, critical) not in histories)
         ),
         critical_k_over_pga=critical,
     )

@@ -106,7 +106,7 @@ def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain
         [case],
         search=values["status"] != "not_searched",
         grid=stored.gridded,
-        full_map=stored.mapped,
+        full_map=stored.intervals.k_lo.size > 0,
         map_depth=stored.campaign_settings.get("map_depth") or MAP_DEPTH,
     )
     ends = ends_of(found.grid)

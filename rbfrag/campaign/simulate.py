@@ -27,10 +27,10 @@ from rbfrag.campaign.worker import MotionResults, MotionWork, TaskResult, run_wo
 from rbfrag.db.campaigns import (
     CombinationRecord,
     KnownCombination,
+    add_grids,
+    add_maps,
     finish_campaign,
     insert_combinations,
-    insert_grids,
-    insert_maps,
     insert_points,
     start_campaign,
 )
@@ -250,7 +250,6 @@ class _Run:
         self._total = len(plan.cases)
         self._resumed = self._done = self._total - todo.tasks
         self._runs = self._grid_runs = self._responses = 0
-        self._pga_g = {each.motion.id: each.motion.pga_g for each in plan.motions}
 
     def take(self, done: MotionResults) -> None:
         """Store the answers of one motion and count them."""
@@ -261,7 +260,7 @@ class _Run:
             )
         for result in done.results:
             self._compare(result)
-        _store(self._engine, self._campaign_id, done, self._pga_g[done.motion_id])
+        _store(self._engine, self._campaign_id, done)
         for result in done.results:
             self._done += 1
             self._runs += result.runs
@@ -322,10 +321,8 @@ class _Run:
 
 def _as_known(found: CriticalResult | None) -> KnownCombination:
     if found is None:
-        return KnownCombination(0, "not_searched", None, False, None, True, False)
-    return KnownCombination(
-        0, found.status, found.kr_over_pga, found.certified, found.reentrant, True, False
-    )
+        return KnownCombination(0, "not_searched", None, False, None)
+    return KnownCombination(0, found.status, found.kr_over_pga, found.certified, found.reentrant)
 
 
 def _wanted(
@@ -364,7 +361,7 @@ def _with_samples(engine: Engine, each: MotionTasks, map_depth: float) -> Motion
         )
 
 
-def _store(engine: Engine, campaign_id: int, done: MotionResults, pga_g: float) -> None:
+def _store(engine: Engine, campaign_id: int, done: MotionResults) -> None:
     new, stored = [], []
     for each in done.results:
         (new if each.task.search else stored).append(each)
@@ -377,7 +374,6 @@ def _store(engine: Engine, campaign_id: int, done: MotionResults, pga_g: float) 
             grid=each.grid,
             polarity=each.task.planned.polarity,
             p2=each.task.planned.case.p2,
-            pga_g=pga_g,
             settings=each.task.planned.case.settings,
             kind=each.task.planned.case.kind,
             numerics_version=done.numerics_version,
@@ -391,8 +387,8 @@ def _store(engine: Engine, campaign_id: int, done: MotionResults, pga_g: float) 
     responses = [record for each in done.results for record in each.responses]
     with engine.begin() as connection:
         insert_combinations(connection, campaign_id, records)
-        insert_grids(connection, grids)
-        insert_maps(connection, maps)
+        add_grids(connection, grids)
+        add_maps(connection, maps)
         insert_points(connection, blocks)
         insert_responses(connection, responses)
         for part in done.spectrum:

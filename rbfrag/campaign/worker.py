@@ -210,7 +210,9 @@ def _history(
     assert motion.dt_s is not None  # the database holds no other motions
     assert case.p2 is not None
     kr = k_over_pga * motion.pga_g
-    response = model_of_kind(case.kind).history(motion, vertical, planned.polarity, case, k_over_pga)
+    response = model_of_kind(case.kind).history(
+        motion, vertical, planned.polarity, case, k_over_pga
+    )
     key = response_key(
         motion_sha256=motion.sha256,
         dt_s=motion.dt_s,

@@ -97,9 +97,7 @@ def test_every_block_of_the_grid_is_simulated(database: Path) -> None:
         motion = motions[int(table.motion_id[i])]
         strengths = model.grid(Case("toppling", table.p2[i]), motion)
         np.testing.assert_array_equal(stored.k_over_pga[i], strengths)
-        for k, failed, theta_n in zip(
-            strengths, stored.outcome[i], stored.theta_n[i], strict=True
-        ):
+        for k, failed, theta_n in zip(strengths, stored.outcome[i], stored.theta_n[i], strict=True):
             run = respond(motion, p2=table.p2[i], kr=k * motion.pga_g, polarity=table.polarity[i])
             assert (run.outcome == "toppled") == bool(failed)
             np.testing.assert_equal(theta_n, np.nan if failed else run.peak_theta_n)
