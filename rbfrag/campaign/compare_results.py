@@ -45,7 +45,7 @@ class ComputedAgain:
 
     critical: CriticalResult | None
     ends: Mapping[float, End]
-    error: Callable[[float], float] = field(default=lambda k: 0.0)
+    error: Callable[[float], float] = field(default=lambda _: 0.0)
 
 
 def ends_of(points: SearchPoints | None) -> dict[float, End]:

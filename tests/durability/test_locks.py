@@ -12,8 +12,7 @@ from sqlalchemy import text
 
 import rbfrag.db.engine
 from benchmarks.durability import campaign, digest, environment, stored
-from rbfrag.campaign.simulate import CampaignProgress
-from rbfrag.campaign.simulate import simulate
+from rbfrag.campaign.simulate import CampaignProgress, simulate
 from rbfrag.db.engine import opened_database
 from rbfrag.db.merge.databases import merge_databases
 from rbfrag.errors import DatabaseBusyError, DatabaseFailedError
