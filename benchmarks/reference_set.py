@@ -239,8 +239,8 @@ builds the file and this page from the records.
   measures, the hash of their samples, their earthquake, and what was done to them: uncorrected
   records were filtered as `rbfrag motions add` does it.
 
-Maps of intervals, and the grids of combinations with vertical motion, are not in it: `rbfrag simulate`
-makes them where the records are.
+Maps of intervals, and the grids of combinations with vertical motion, are not in it: `rbfrag
+simulate` makes them where the records are.
 
 {model_section(models)}## Where the records come from
 
@@ -293,9 +293,9 @@ def model_section(models: Sequence[FitReport]) -> str:
     return f"""## Models
 
 Fitted without vertical motion ([how](../theory/fragility.md), [how
-well](../theory/model-choice.md), [blocks that slide or slump](../theory/other-kinds.md)) to what is
-shipped; those of slumping to the critical values of their family of blocks, which are too many to be
-shipped. The first of each kind is its default.
+well](../theory/model-choice.md), [blocks that slide or slump](../theory/other-kinds.md)) to what
+is shipped; those of slumping to a family of blocks whose results are too many to be shipped. The
+first of each kind is its default.
 
 {markdown((columns, rows))}
 

@@ -105,7 +105,7 @@ def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain
         polarity,
         [case],
         search=values["status"] != "not_searched",
-        grid=stored.gridded,
+        grid=bool((stored.grid >= 0).any()),
         full_map=stored.intervals.k_lo.size > 0,
         map_depth=stored.campaign_settings.get("map_depth") or MAP_DEPTH,
     )

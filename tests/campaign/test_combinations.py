@@ -121,7 +121,7 @@ class TestGrid:
 
     @pytest.mark.parametrize(
         ("grid", "message"),
-        [(1, "2 to"), ([0.5, 0.5], "twice"), ([-1.0], "positive"), ([float("nan")], "positive")],
+        [(1, "2 to"), ([0.5, 0.5], "twice"), ([-1.0], "above zero"), ([float("nan")], "finite")],
     )
     def test_what_is_refused(self, three_component_database: Path, grid: Any, message: str) -> None:
         with pytest.raises(InputError, match=message):
