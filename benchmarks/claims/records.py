@@ -21,7 +21,7 @@ from rbfrag.errors import FitError
 from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.quantiles import student_half_width
-from rbfrag.plots.sensitivity import lobe_line
+from rbfrag.plots.critical_strength import lobe_line
 
 FEWEST_EVENTS = 5
 

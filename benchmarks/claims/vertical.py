@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.claims.claim import Claim, IntArray, cluster_interval, verdict_of
 from benchmarks.claims.records import Points, residual_sd
 from rbfrag.db.rows import CombinationTable
-from rbfrag.plots.vertical import vertical_pairs
+from rbfrag.plots.critical_strength import vertical_pairs
 
 NEGLIGIBLE = 0.02
 """Mean change of y, relative, that counts as none."""

@@ -22,8 +22,7 @@ from benchmarks.claims.records import (
 from benchmarks.claims.vertical import vertical_is_irrelevant
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError
-from rbfrag.plots.sensitivity import lobe_line
-from rbfrag.plots.vertical import vertical_pairs
+from rbfrag.plots.critical_strength import lobe_line, vertical_pairs
 
 G = 9.80665
 P2 = np.array([30.0, 3.0, 1.0, 0.1])

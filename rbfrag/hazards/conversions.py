@@ -1,10 +1,4 @@
-"""What a horizontal intensity measure means: one component, or two made into one.
-
-The models are fitted on single components. Ratios are medians of Beyer, K. & Bommer, J. J.
-(2006): Relationships between median values and between aleatory variabilities for different
-definitions of the horizontal component of motion. Bulletin of the Seismological Society of
-America 96(4A), 1512-1522, table 2 (PGA and PGV).
-"""
+"""Published ratios: what a horizontal component means, and PGV out of a spectral acceleration."""
 
 from __future__ import annotations
 
@@ -13,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rbfrag.errors import InputError
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
 @dataclass(frozen=True)
@@ -57,4 +52,55 @@ def component(name: str) -> Component:
     except KeyError:
         raise InputError(
             f"component {name!r} is not known: use one of {', '.join(COMPONENTS)}"
+        ) from None
+
+
+@dataclass(frozen=True)
+class VelocityConversion:
+    """PGV [m/s] = `factor` · SA(`period_s`) [g].
+
+    Args:
+        name: name in options.
+        period_s: oscillator period [s].
+        factor: PGV over spectral acceleration [m/s per g].
+        source: where it is published.
+    """
+
+    name: str
+    period_s: float
+    factor: float
+    source: str
+
+
+CONVERSIONS: Mapping[str, VelocityConversion] = {
+    item.name: item
+    for item in (
+        VelocityConversion(
+            "newmark_hall_1982",
+            1.0,
+            STANDARD_GRAVITY_M_S2 / (2.0 * math.pi * 1.65),
+            "Newmark and Hall (1982), SA(1 s)/PGV = 2π·1.65/g at 5 % damping",
+        ),
+        VelocityConversion(
+            "bommer_alarcon_2006",
+            0.5,
+            STANDARD_GRAVITY_M_S2 / 20.0,
+            "Bommer and Alarcón (2006), PGV [cm/s] = SA(0.5 s) [cm/s²]/20",
+        ),
+    )
+}
+"""The conversions by name."""
+
+
+def velocity_conversion(name: str) -> VelocityConversion:
+    """Return the conversion of that name.
+
+    Raises:
+        InputError: there is none.
+    """
+    try:
+        return CONVERSIONS[name]
+    except KeyError:
+        raise InputError(
+            f"conversion {name!r} is not known: use one of {', '.join(CONVERSIONS)}"
         ) from None

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from benchmarks.other_kinds import jibson_2007, saygili_rathje_2008, within_motion
+from benchmarks.other_kinds_figure import plot_other_kinds
 from rbfrag.errors import InputError
 from rbfrag.fragility.fit.kind_fitting import fit_kind_data
-from rbfrag.plots.other_kinds import plot_other_kinds
 from tests.fragility.test_kind_models import drawn
 
 

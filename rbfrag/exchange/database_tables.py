@@ -1,4 +1,4 @@
-"""The tables of a database as files that other programs read: `rbfrag db export`."""
+"""The tables of a database as files that other programs read, and as pandas frames."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from sqlalchemy import Connection
@@ -22,9 +22,12 @@ from rbfrag.db.data_dictionary import (
     dictionary_as_markdown,
 )
 from rbfrag.db.engine import opened_database
-from rbfrag.db.table_columns import TABLES, Batch, chosen_columns, column_batches
+from rbfrag.db.table_columns import TABLES, Batch, chosen_columns, column_batches, read_columns
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.exchange.block_table import pyarrow
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FORMATS = ("parquet", "csv")
 """What the tables can be written as."""
@@ -198,3 +201,39 @@ def _arrow_table(arrow: Any, schema: Any, batch: Batch) -> Any:
 
 def _arrays(blobs: Sequence[bytes | None]) -> list[Any]:
     return [None if blob is None else np.frombuffer(blob, dtype="<f8") for blob in blobs]
+
+
+def read_table(
+    table: str,
+    *,
+    db: str | os.PathLike[str] | None = None,
+    columns: Sequence[str] | None = None,
+    arrays: bool = False,
+) -> pd.DataFrame:
+    """Return a table of a database as a pandas DataFrame, in the order of its key.
+
+    Units are in the column names; :doc:`the data dictionary </reference/data-dictionary>` says
+    what each column means. Numbers are float64 with NaN where missing, true/false is bool,
+    integers are int64 (``Int64`` where one may be missing).
+
+    Args:
+        table: ``earthquake``, ``recording``, ``motion``, ``suite``, ``suite_motion``,
+            ``toppling_spectrum``, ``campaign``, ``combination``, ``outcome_interval``,
+            ``simulation``, ``response`` or ``fragility_model``.
+        db: the database (path, URL, or None for the default).
+        columns: only these columns.
+        arrays: include samples [g] and histories, as one float64 array a row.
+
+    Raises:
+        InputError: there is no such table or column.
+        DatabaseError: the database cannot be used.
+    """
+    # Imported here: no other answer of rbfrag needs pandas.
+    import pandas as pd
+
+    chosen = chosen_columns(table, columns, arrays=arrays)
+    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
+        values = read_columns(connection, table, columns, arrays=arrays)
+    frame = pd.DataFrame(values)
+    whole = [c.name for c in chosen if c.type == "integer" and c.may_be_missing]
+    return frame.astype(dict.fromkeys(whole, "Int64"))

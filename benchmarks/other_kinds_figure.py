@@ -12,8 +12,7 @@ from rbfrag.fragility.fit.kind_data import KindData
 from rbfrag.fragility.fit.kind_fitting import ARRAYS
 from rbfrag.fragility.kind_model import KindModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure
-from rbfrag.plots.numbers import plain_numbers
+from rbfrag.plots.canvas import new_figure, plain_numbers, plot_path, save_figure
 
 
 def plot_other_kinds(

@@ -1,19 +1,51 @@
-"""What a figure of one intensity holds fixed, for models that read more than that one."""
+"""What a model says of many blocks, and the lines where it gives one probability."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
+from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.formulas import EXPONENTS
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.predict import answer_given, predict
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]
+
+
+def model_answers(
+    model: FragilityModel,
+    p2: float,
+    kr: FloatArray | float,
+    measures: Mapping[str, FloatArray | float],
+    *,
+    level: float = 0.95,
+) -> PredictionArray:
+    """Return the answers of one model for blocks of one size.
+
+    Args:
+        model: the model.
+        p2: frequency parameter [1/s²].
+        kr: rocking acceleration coefficients, a number or an array.
+        measures: measures of the motion by name; at least one of them, or kr, an array.
+        level: confidence level.
+    """
+    given: dict[str, Any] = dict(measures)
+    shape = np.broadcast_shapes(np.shape(kr), *(np.shape(value) for value in given.values()))
+    answer = predict(
+        np.full(shape, p2), np.broadcast_to(kr, shape), model=model, level=level, **given
+    )
+    assert isinstance(answer, PredictionArray)
+    return answer
+
 
 ONE_NUMBER_TERMS = ("pgv", "pga_tm", "pgd_tm")
 """Terms for which a probability depends on y and the term alone."""
@@ -146,3 +178,105 @@ def _middle(model: FragilityModel, name: str) -> float:
             f"model {model.name!r} does not say what range of {name} it was fitted to: fit it again"
         ) from None
     return math.sqrt(float(low) * float(high))
+
+
+_LOWEST, _HIGHEST = 1e-4, 50.0
+"""Range of y/x in which a block of given probability is looked for."""
+
+_HALVINGS = 50
+
+
+def failure_line(
+    model: FragilityModel, x_m_s: FloatArray, probability: float, held: HeldMeasures | None = None
+) -> FloatArray:
+    """Return the toppling velocity y [m/s] that fails with a given probability.
+
+    Args:
+        model: a model of a term that is one number, or of PGV with PGA.
+        x_m_s: intensities [m/s], shape (n,), > 0.
+        probability: between 0 and 1.
+        held: what does not change along the line; None for the middle of the fitted ranges.
+
+    Returns:
+        y, shape (n,); NaN where even the weakest block is less likely to fail, which is where
+        a model of no bound runs below zero.
+
+    Raises:
+        InputError: a model of another term.
+    """
+    held = held_measures(model) if held is None else held
+
+    def toppling(y_m_s: FloatArray) -> FloatArray:
+        return toppling_probability(model, x_m_s, y_m_s, held)
+
+    none = toppling(_LOWEST * x_m_s) < probability
+    line: FloatArray = np.where(none, np.nan, _of_probability(toppling, x_m_s, probability))
+    return line
+
+
+def _of_probability(
+    toppling: Callable[[FloatArray], FloatArray], x_m_s: FloatArray, probability: float
+) -> FloatArray:
+    """Return y [m/s] of a given probability, which falls with y, by bisection of its logarithm."""
+    low, high = np.log(_LOWEST * x_m_s), np.log(_HIGHEST * x_m_s)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        likely = toppling(np.exp(middle)) >= probability
+        low, high = np.where(likely, middle, low), np.where(likely, high, middle)
+    y: FloatArray = np.exp(0.5 * (low + high))
+    return y
+
+
+def toppling_probability(
+    model: FragilityModel, x_m_s: FloatArray, y_m_s: FloatArray, held: HeldMeasures
+) -> FloatArray:
+    """Return the probability of blocks y [m/s] at intensities x [m/s], arrays of one shape."""
+    kr = y_m_s * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
+    return model_answers(model, held.p2, kr, held.measures(model, x_m_s)).probability
+
+
+def predicted_strengths(
+    model: FragilityModel, table: CombinationTable, xp_m_s: FloatArray, probability: float
+) -> FloatArray:
+    """Return the toppling velocity y [m/s] at which each motion topples a block so likely.
+
+    Args:
+        model: the model.
+        table: motions and block sizes, n rows.
+        xp_m_s: toppling spectrum of each row [m/s], shape (n,).
+        probability: between 0 and 1.
+
+    Returns:
+        Shape (n,); NaN where what the model reads is not known.
+    """
+    columns = {name: getattr(table, name) for name in ("p2", "pgv_m_s", "pga_g", "tm_s", "pgd_m")}
+    columns["xp_m_s"] = xp_m_s
+    given = {name: columns[name] for name in ("p2", *model.term.inputs)}
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = np.asarray(model.term.intensity_m_s(given), dtype=np.float64)
+    known = np.isfinite(x) & (x > 0.0)
+    for name in model.term.inputs:
+        known &= np.isfinite(given[name])
+    given = {name: column[known] for name, column in given.items()}
+
+    def toppling(y_m_s: FloatArray) -> FloatArray:
+        kr = y_m_s * np.sqrt(given["p2"]) / STANDARD_GRAVITY_M_S2
+        answer = answer_given(model, {**given, "kr": kr}, 0.95)
+        assert isinstance(answer, PredictionArray)
+        return answer.probability
+
+    result = np.full(x.shape, np.nan)
+    result[known] = _of_probability(toppling, x[known], probability)
+    return result
+
+
+def running_medians(
+    x: FloatArray, y: FloatArray, *, bins: int = 24
+) -> tuple[FloatArray, FloatArray]:
+    """Return medians of x and of y in bins of equal count along x, for a line."""
+    order = np.argsort(x, kind="stable")
+    parts = [part for part in np.array_split(order, bins) if part.size]
+    return (
+        np.array([np.median(x[part]) for part in parts]),
+        np.array([np.median(y[part]) for part in parts]),
+    )

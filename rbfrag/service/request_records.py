@@ -1,10 +1,16 @@
-"""Counts of requests for Prometheus, from one process or several."""
+"""What is recorded of requests: counts for Prometheus, and lines of JSON."""
 
 from __future__ import annotations
 
+import json
+import logging
 import os
+import sys
 from collections.abc import Iterable, Mapping
-from typing import Any
+from datetime import UTC, datetime
+from json.encoder import encode_basestring_ascii as _quoted
+from time import gmtime, strftime, time
+from typing import Any, TextIO
 
 from prometheus_client import (
     CONTENT_TYPE_LATEST,
@@ -79,3 +85,63 @@ class Metrics:
             registry = CollectorRegistry()
             MultiProcessCollector(registry)  # type: ignore[no-untyped-call]
         return generate_latest(registry)
+
+
+class RequestLog:
+    """Writes down what was asked and how it ended; not the query, which is the asker's.
+
+    Args:
+        stream: where to; None for standard error.
+    """
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream = stream
+        self._second, self._clock = 0, ""
+
+    def write(self, scope: Mapping[str, Any], status: int, size: int, elapsed_s: float) -> None:
+        """Write one line.
+
+        Args:
+            scope: the request.
+            status: HTTP status of the answer.
+            size: length of the answer [bytes].
+            elapsed_s: how long it took [s].
+        """
+        now = time()
+        second = int(now)
+        if second != self._second:
+            self._second = second
+            self._clock = strftime("%Y-%m-%dT%H:%M:%S", gmtime(second))
+        client = scope.get("client")
+        (self._stream or sys.stderr).write(
+            f'{{"time": "{self._clock}.{int(1e3 * (now - second)):03d}+00:00", "level": "info", '
+            f'"event": "request", "method": {_quoted(scope["method"])}, '
+            f'"path": {_quoted(scope["path"])}, "status": {status}, "bytes": {size}, '
+            f'"ms": {1e3 * elapsed_s:.3f}, "client": {_quoted(client[0] if client else "")}}}\n'
+        )
+
+
+class JsonFormatter(logging.Formatter):
+    """Writes a message of the logging library as one line of JSON."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line."""
+        line = {
+            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "level": record.levelname.lower(),
+            "event": "message",
+            "message": record.getMessage(),
+        }
+        if record.exc_info:
+            line["exception"] = self.formatException(record.exc_info)
+        return json.dumps(line)
+
+
+CONFIGURATION: dict[str, Any] = {
+    "version": 1,
+    "disable_existing_loggers": False,
+    "formatters": {"json": {"()": f"{__name__}.{JsonFormatter.__name__}"}},
+    "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "json"}},
+    "root": {"handlers": ["stderr"], "level": "INFO"},
+}
+"""What the logging library is told."""
