@@ -145,8 +145,8 @@ def _by_mode(
     if model.mode != found.mode:
         remarks = (
             *remarks,
-            f"the mode of the block is {words_of_mode(found.mode)}: by it, {model.kind} is not what "
-            "it would do",
+            f"the mode of the block is {words_of_mode(found.mode)}: by it, {model.kind} is not "
+            "what it would do",
         )
     site = BlockOnPlanes(
         block=block,

@@ -104,9 +104,8 @@ def test_a_small_slump_turns_as_far_as_a_level_slide_says() -> None:
 
 def test_rotations_are_reached_one_after_the_other_and_failure_last() -> None:
     motion, block = shaking(), slump()
-    scales = [
-        search(motion, block, rotation_deg=d).of_kind["scale"] for d in (0.5, 1.0, 2.0, 5.0, None)
-    ]
+    answers = [search(motion, block, rotation_deg=d) for d in (0.5, 1.0, 2.0, 5.0, None)]
+    scales = [found.of_kind["scale"] for found in answers]
     known = [scale for scale in scales if scale is not None]
     assert len(known) == 5
     assert known == sorted(known)
