@@ -19,8 +19,7 @@ from rbfrag.db.stored_combination import (
 from rbfrag.errors import RbfragError
 from rbfrag.solver.kind import Case
 from rbfrag.solver.kinds import model_of_kind
-from rbfrag.solver.results import NUMERICS_VERSION
-from rbfrag.solver.search.certified import MAP_DEPTH
+from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION
 
 
 @dataclass(frozen=True)

@@ -43,8 +43,7 @@ from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.solver.kind import Case
 from rbfrag.solver.kinds import models
 from rbfrag.solver.quantity import positive
-from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult
-from rbfrag.solver.search.certified import MAP_DEPTH
+from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION, CriticalResult
 
 SAME_VALUE = 1e-9
 """Relative difference up to which a search that is repeated on another processor is the same."""
@@ -362,7 +361,8 @@ def _with_samples(engine: Engine, each: MotionTasks, map_depth: float) -> Motion
 
 
 def _store(engine: Engine, campaign_id: int, done: MotionResults) -> None:
-    new, stored = [], []
+    new: list[TaskResult] = []
+    stored: list[TaskResult] = []
     for each in done.results:
         (new if each.task.search else stored).append(each)
     records = [

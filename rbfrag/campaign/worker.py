@@ -13,13 +13,13 @@ from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.solver.kind import Case
 from rbfrag.solver.kinds import model_of_kind
 from rbfrag.solver.results import (
+    MAP_DEPTH,
     NUMERICS_VERSION,
     CriticalResult,
     FloatArray,
     Polarity,
     SearchPoints,
 )
-from rbfrag.solver.search.certified import MAP_DEPTH
 
 
 @dataclass(frozen=True)
