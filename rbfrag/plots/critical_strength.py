@@ -1,17 +1,79 @@
-"""Figures of critical strengths: over frequency, and with vertical motion over that without."""
+"""Figures of critical strengths: over frequency, and with vertical motion over that without.
+
+In the linear model a lobe of amplitude A and duration t_p topples blocks of critical angle up
+to c·A, c a function of f = p t_p alone (docs/theory/toppling-spectrum.md, properties). Against
+the records a lobe stands for half a mean period, t_p = T_m/2, so that f = π/(ω_m/p): the lines of
+figure 4.20 of Gibson's dissertation.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
-from rbfrag.fragility.claims_of_vertical import VerticalPairs
-from rbfrag.fragility.lobes import LOBES, lobe_line
 from rbfrag.plots.canvas import density, new_figure, plain_numbers, plot_path, save_figure
+
+FloatArray = NDArray[np.float64]
+
+_HALVINGS = 60
+
+
+def rectangular_lobe(f: ArrayLike) -> FloatArray:
+    """Return the critical angle over the amplitude of a rectangular lobe, f = p t_p > 0."""
+    line: FloatArray = -np.expm1(-np.asarray(f, dtype=np.float64))
+    return line
+
+
+def triangular_lobe(f: ArrayLike) -> FloatArray:
+    """Return the critical angle over the amplitude of a symmetric triangle, f = p t_p > 0."""
+    of = np.asarray(f, dtype=np.float64)
+    # ln(2 - e) as ln(1 + (1 - e)): no cancellation for short lobes; the rest of it by series
+    half = 0.5 * of
+    exact = 1.0 - np.log1p(-np.expm1(-half)) / half
+    series = half * (1.0 - half + 13.0 / 12.0 * half * half)
+    line: FloatArray = np.where(half < 1e-5, series, exact)
+    return line
+
+
+def half_sine_lobe(f: ArrayLike) -> FloatArray:
+    """Return the critical angle over the amplitude of a half-sine, f = p t_p > 0.
+
+    sin s with x sin s − cos s = exp(−(π − s)/x), x = π/f, by bisection in s.
+    """
+    x = np.pi / np.asarray(f, dtype=np.float64)
+    low, high = np.zeros_like(x), np.full_like(x, 0.5 * np.pi)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        below = x * np.sin(middle) - np.cos(middle) < np.exp(-(np.pi - middle) / x)
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    line: FloatArray = np.sin(0.5 * (low + high))
+    return line
+
+
+LOBES: Mapping[str, Callable[[ArrayLike], FloatArray]] = {
+    "rectangular": rectangular_lobe,
+    "half-sine": half_sine_lobe,
+    "triangular": triangular_lobe,
+}
+"""The lobes by name, the one that topples most first."""
+
+
+def lobe_line(name: str, frequency_ratio: ArrayLike) -> FloatArray:
+    """Return the k_r/PGA of a lobe of half a mean period over ω_m/p, > 0.
+
+    Args:
+        name: one of :data:`LOBES`.
+        frequency_ratio: ω_m/p = 2π/(T_m p).
+    """
+    return LOBES[name](np.pi / np.asarray(frequency_ratio, dtype=np.float64))
+
 
 STYLES = {
     "rectangular": ("-", "#b2182b"),
@@ -96,6 +158,64 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
 
 _NARROWEST, _WIDEST = 0.05, 0.5
 """Least and greatest change of strength, in ln, that the histogram reaches to."""
+
+
+@dataclass(frozen=True, eq=False)
+class VerticalPairs:
+    """Critical values of the same motion, polarity and p², found with and without vertical motion.
+
+    Args:
+        ln_ratio: ln of the critical value with over that without, shape (n,).
+        without: k_r/PGA without vertical motion, shape (n,).
+        with_vertical: k_r/PGA with it, shape (n,).
+        p2: frequency parameters [1/s²], shape (n,).
+        event_id: earthquakes, shape (n,).
+        one_sided: pairs of which only one was found, and that are left out.
+    """
+
+    ln_ratio: FloatArray
+    without: FloatArray
+    with_vertical: FloatArray
+    p2: FloatArray
+    event_id: NDArray[np.object_]
+    one_sided: int
+
+
+def vertical_pairs(without: CombinationTable, with_vertical: CombinationTable) -> VerticalPairs:
+    """Return the pairs of two tables; what is in one of them alone has no pair."""
+    place = {
+        key: i
+        for i, key in enumerate(
+            zip(
+                without.motion_id.tolist(),
+                without.polarity.tolist(),
+                without.p2.tolist(),
+                strict=True,
+            )
+        )
+    }
+    keys = zip(
+        with_vertical.motion_id.tolist(),
+        with_vertical.polarity.tolist(),
+        with_vertical.p2.tolist(),
+        strict=True,
+    )
+    pairs = np.array(
+        [(place[key], j) for j, key in enumerate(keys) if key in place], dtype=np.intp
+    ).reshape(-1, 2)
+    first, second = pairs[:, 0], pairs[:, 1]
+    one, other = without.status[first] == "found", with_vertical.status[second] == "found"
+    both = one & other
+    a = without.kr_over_pga[first[both]]
+    b = with_vertical.kr_over_pga[second[both]]
+    return VerticalPairs(
+        ln_ratio=np.log(b / a),
+        without=a,
+        with_vertical=b,
+        p2=without.p2[first[both]],
+        event_id=without.event_id[first[both]],
+        one_sided=int(np.sum(one != other)),
+    )
 
 
 def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:

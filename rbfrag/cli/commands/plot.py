@@ -189,8 +189,8 @@ def plot_vertical(out: Out, suite: options.Suite = None, db: options.Db = None) 
     """Draw critical strengths with vertical motion beside those without it."""
     from rbfrag.db.engine import opened_database
     from rbfrag.db.queries import combination_table
-    from rbfrag.fragility.claims_of_vertical import vertical_pairs
     from rbfrag.plots.critical_strength import plot_vertical as draw
+    from rbfrag.plots.critical_strength import vertical_pairs
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         without = combination_table(connection, suite=suite)

@@ -5,15 +5,9 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
-from benchmarks.page import ROOT, parser, report
-from benchmarks.reference_agreement import agreement_with_reference
-from rbfrag.bench.tables import markdown
-from rbfrag.db.engine import opened_database
-from rbfrag.db.motions import motion_rows, suite_names
-from rbfrag.db.queries import combination_table
-from rbfrag.fragility.claims import Claim
-from rbfrag.fragility.claims_of_pulses import pulses_scatter_like_records
-from rbfrag.fragility.claims_of_records import (
+from benchmarks.claims.claim import Claim
+from benchmarks.claims.pulses import pulses_scatter_like_records
+from benchmarks.claims.records import (
     exponent_one,
     lobes_as_bounds,
     motion_set,
@@ -21,7 +15,13 @@ from rbfrag.fragility.claims_of_records import (
     rank_of_terms,
     variance_linear,
 )
-from rbfrag.fragility.claims_of_vertical import vertical_is_irrelevant
+from benchmarks.claims.vertical import vertical_is_irrelevant
+from benchmarks.page import ROOT, parser, report
+from benchmarks.reference_agreement import agreement_with_reference
+from rbfrag.bench.tables import markdown
+from rbfrag.db.engine import opened_database
+from rbfrag.db.motions import motion_rows, suite_names
+from rbfrag.db.queries import combination_table
 
 PAGE = ROOT / "docs" / "theory" / "claims.md"
 

@@ -2,75 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
+from benchmarks.claims.claim import Claim, IntArray, cluster_interval, verdict_of
+from benchmarks.claims.records import Points, residual_sd
 from rbfrag.db.rows import CombinationTable
-from rbfrag.fragility.claims import Claim, FloatArray, IntArray, cluster_interval, verdict_of
-from rbfrag.fragility.claims_of_records import Points, residual_sd
+from rbfrag.plots.critical_strength import vertical_pairs
 
 NEGLIGIBLE = 0.02
 """Mean change of y, relative, that counts as none."""
-
-
-@dataclass(frozen=True, eq=False)
-class VerticalPairs:
-    """Critical values of the same motion, polarity and p², found with and without vertical motion.
-
-    Args:
-        ln_ratio: ln of the critical value with over that without, shape (n,).
-        without: k_r/PGA without vertical motion, shape (n,).
-        with_vertical: k_r/PGA with it, shape (n,).
-        p2: frequency parameters [1/s²], shape (n,).
-        event_id: earthquakes, shape (n,).
-        one_sided: pairs of which only one was found, and that are left out.
-    """
-
-    ln_ratio: FloatArray
-    without: FloatArray
-    with_vertical: FloatArray
-    p2: FloatArray
-    event_id: NDArray[np.object_]
-    one_sided: int
-
-
-def vertical_pairs(without: CombinationTable, with_vertical: CombinationTable) -> VerticalPairs:
-    """Return the pairs of two tables; what is in one of them alone has no pair."""
-    place = {
-        key: i
-        for i, key in enumerate(
-            zip(
-                without.motion_id.tolist(),
-                without.polarity.tolist(),
-                without.p2.tolist(),
-                strict=True,
-            )
-        )
-    }
-    keys = zip(
-        with_vertical.motion_id.tolist(),
-        with_vertical.polarity.tolist(),
-        with_vertical.p2.tolist(),
-        strict=True,
-    )
-    pairs = np.array(
-        [(place[key], j) for j, key in enumerate(keys) if key in place], dtype=np.intp
-    ).reshape(-1, 2)
-    first, second = pairs[:, 0], pairs[:, 1]
-    one, other = without.status[first] == "found", with_vertical.status[second] == "found"
-    both = one & other
-    a = without.kr_over_pga[first[both]]
-    b = with_vertical.kr_over_pga[second[both]]
-    return VerticalPairs(
-        ln_ratio=np.log(b / a),
-        without=a,
-        with_vertical=b,
-        p2=without.p2[first[both]],
-        event_id=without.event_id[first[both]],
-        one_sided=int(np.sum(one != other)),
-    )
 
 
 def vertical_is_irrelevant(

@@ -8,9 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.db.rows import CombinationTable
-from rbfrag.errors import FitError
-from rbfrag.fragility.claims import (
+from benchmarks.claims.claim import (
     LEVEL,
     Claim,
     FloatArray,
@@ -18,10 +16,12 @@ from rbfrag.fragility.claims import (
     cluster_interval,
     verdict_of,
 )
+from rbfrag.db.rows import CombinationTable
+from rbfrag.errors import FitError
 from rbfrag.fragility.fit.fitting import fit
-from rbfrag.fragility.lobes import lobe_line
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.quantiles import student_half_width
+from rbfrag.plots.critical_strength import lobe_line
 
 FEWEST_EVENTS = 5
 

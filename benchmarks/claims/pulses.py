@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from benchmarks.claims.claim import Claim, FloatArray, cluster_interval, verdict_of
+from benchmarks.claims.records import Points, line
 from rbfrag.db.rows import CombinationTable
-from rbfrag.fragility.claims import Claim, FloatArray, cluster_interval, verdict_of
-from rbfrag.fragility.claims_of_records import Points, line
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES
 from rbfrag.motions.pulses import (

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from rbfrag.fragility.lobes import LOBES, half_sine_lobe, lobe_line, triangular_lobe
 from rbfrag.motions.pulses import half_sine, rectangular, triangle
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.plots.critical_strength import LOBES, half_sine_lobe, lobe_line, triangular_lobe
 
 F = (0.1, 0.5, 1.0, 2.0, 5.0)
 

@@ -9,11 +9,9 @@ from itertools import count
 import numpy as np
 import pytest
 
-from rbfrag.db.rows import CombinationTable
-from rbfrag.errors import FitError
-from rbfrag.fragility.claims import cluster_interval
-from rbfrag.fragility.claims_of_pulses import PULSES, pulses_scatter_like_records
-from rbfrag.fragility.claims_of_records import (
+from benchmarks.claims.claim import cluster_interval
+from benchmarks.claims.pulses import PULSES, pulses_scatter_like_records
+from benchmarks.claims.records import (
     exponent_one,
     lobes_as_bounds,
     motion_set,
@@ -21,8 +19,10 @@ from rbfrag.fragility.claims_of_records import (
     rank_of_terms,
     variance_linear,
 )
-from rbfrag.fragility.claims_of_vertical import vertical_is_irrelevant, vertical_pairs
-from rbfrag.fragility.lobes import lobe_line
+from benchmarks.claims.vertical import vertical_is_irrelevant
+from rbfrag.db.rows import CombinationTable
+from rbfrag.errors import FitError
+from rbfrag.plots.critical_strength import lobe_line, vertical_pairs
 
 G = 9.80665
 P2 = np.array([30.0, 3.0, 1.0, 0.1])
