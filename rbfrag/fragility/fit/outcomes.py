@@ -26,10 +26,10 @@ from rbfrag.fragility.fit.binomial import (
 )
 from rbfrag.fragility.fit.data import FEW_EVENTS, FitData
 from rbfrag.fragility.fit.judgement import outcomes_of, score_intervals, scores_of
+from rbfrag.fragility.fit.links import COMPLEMENT, LOGIT, LOGLOG, Link
 from rbfrag.fragility.fit.method_result import MethodResult
 from rbfrag.fragility.fit.scatter import nested_scatter
 from rbfrag.fragility.measures import Term
-from rbfrag.fragility.methods.links import COMPLEMENT, LOGIT, LOGLOG, Link
 
 FloatArray = NDArray[np.float64]
 
