@@ -217,8 +217,7 @@ def test_damage_is_found(database: Path) -> None:
             connection.execute(
                 update(table).where(table.c.kr_over_pga == 0.2).values(displacement_m=99.0)
             )
-        (first, *_) = findings(engine)
-        assert "further than" in first.problem
+        assert any("further than" in each.problem for each in findings(engine))
         with engine.connect() as connection:
             again = resimulate(connection, sample=100)
         assert any("computed again" in each.problem for each in again.findings)
@@ -250,7 +249,7 @@ def test_what_two_databases_found_is_merged_and_exported(
         ({"kind": "slumping", "rotations_deg": (2.0, 2.0)}, "2 is in the list twice"),
         ({"kind": "slumping", "rotations_deg": (25.0,)}, "lies on its back edge"),
         ({"kind": "sliding", "displacements_m": (0.0,)}, "above zero"),
-        ({"kind": "confined_toppling"}, "toppling, slumping or sliding"),
+        ({"kind": "confined_toppling"}, "campaigns are of sliding, slumping, toppling"),
         ({"kind": "sliding", "jobs": 0}, "at least 1"),
     ],
 )
