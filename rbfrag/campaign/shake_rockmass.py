@@ -14,7 +14,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.rockmasses.response import CHUNK, ShakenMass, plan_shaking
-from rbfrag.rockmasses.shaking import BlockFates, FailureLimits, run_blocks
+from rbfrag.rockmasses.shaking import BlockOutcomes, FailureLimits, run_blocks
 
 WORTH_A_PROCESS = 500
 """Blocks below which a worker process takes longer to start than to work."""
@@ -80,7 +80,7 @@ def shake(
         workers = 1
     started = time.perf_counter()
 
-    def told(answers: Iterator[BlockFates]) -> Iterator[BlockFates]:
+    def told(answers: Iterator[BlockOutcomes]) -> Iterator[BlockOutcomes]:
         done = 0
         if on_progress is not None and total:
             on_progress(ShakingProgress(0, total, 0.0))

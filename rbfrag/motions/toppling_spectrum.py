@@ -54,7 +54,7 @@ def toppling_spectrum(
 ) -> FloatArray | float:
     """Return the toppling spectrum X(p) of a motion [m/s], for blocks of any size.
 
-    The largest toppling velocity k_r g/p that any fresh excursion topples, in the linear
+    The largest toppling velocity k_r g/p that any excursion from rest topples, in the linear
     model without vertical motion; within 1 % that of the non-linear model. Towards p² = 0 it
     is the largest difference between the ground's final velocity and an earlier one, for
     small blocks g·max(a)/p; it is never above 2 PGV.

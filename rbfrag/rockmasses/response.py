@@ -20,7 +20,7 @@ from rbfrag.rockmasses.shaking import (
     LOCKED,
     NO_BLOCK,
     UNSTABLE,
-    BlockFates,
+    BlockOutcomes,
     BlocksToRun,
     FailureLimits,
     Shaking,
@@ -122,7 +122,7 @@ class ShakingPlan:
                 limits=self.limits,
             )
 
-    def gathered(self, answers: Iterable[BlockFates]) -> ShakenMass:
+    def gathered(self, answers: Iterable[BlockOutcomes]) -> ShakenMass:
         """Return the fates of all blocks; the order of the answers does not matter.
 
         Args:

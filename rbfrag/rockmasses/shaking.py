@@ -69,29 +69,29 @@ class FailureLimits:
         if self.rotation_deg is not None:
             positive(self.rotation_deg, "rotation", "degrees")
 
-    def code(self, mode_code: int, fate: RunEnd) -> int:
+    def code(self, mode_code: int, end: RunEnd) -> int:
         """Return the code in :data:`FATES` of a block that was run.
 
         Args:
             mode_code: its mode.
-            fate: the end of its run.
+            end: the end of its run.
         """
-        if fate.outcome is Outcome.TOPPLED:
+        if end.outcome is Outcome.TOPPLED:
             return FAILS
         peak = limit = None
         if mode_code == SLIDE:
-            peak, limit = fate.peak_displacement_m, self.displacement_m
+            peak, limit = end.peak_displacement_m, self.displacement_m
         elif mode_code in (SLUMP, CONFINED_TOPPLE) and self.rotation_deg is not None:
-            peak, limit = fate.peak_rad, math.radians(self.rotation_deg)
+            peak, limit = end.peak_rad, math.radians(self.rotation_deg)
         if peak is not None and limit is not None:
             # What has happened before a model ends has happened.
-            if peak - fate.error > limit:
+            if peak - end.error > limit:
                 return FAILS
-            if peak + fate.error > limit:
+            if peak + end.error > limit:
                 return UNDETERMINED
-        if fate.outcome is Outcome.STABLE:
-            return STAYS if fate.moved else AT_REST
-        return FATES.index(fate.outcome.value)
+        if end.outcome is Outcome.STABLE:
+            return STAYS if end.moved else AT_REST
+        return FATES.index(end.outcome.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +152,7 @@ class BlocksToRun:
 
 
 @dataclass(frozen=True, eq=False)
-class BlockFates:
+class BlockOutcomes:
     """What became of them, shapes (m, k).
 
     Args:
@@ -173,7 +173,7 @@ class BlockFates:
     runs: int
 
 
-def run_blocks(work: BlocksToRun) -> BlockFates:
+def run_blocks(work: BlocksToRun) -> BlockOutcomes:
     """Run blocks, one after another, each at the scales at which it moves.
 
     Args:
@@ -193,16 +193,16 @@ def run_blocks(work: BlocksToRun) -> BlockFates:
         mode_code = int(work.mode_code[j])
         try:
             run = _runner(work, j)
-            fates = [(i, run(drive)) for i, drive in enumerate(drives) if work.moves[i, j]]
+            ends = [(i, run(drive)) for i, drive in enumerate(drives) if work.moves[i, j]]
         except InputError as error:
             raise InputError(f"block {int(work.place[j]) + 1}: {error}") from None
-        for i, fate in fates:
-            code[i, j] = work.limits.code(mode_code, fate)
-            displacement_m[i, j] = _or_nan(fate.peak_displacement_m)
-            rotation_rad[i, j] = _or_nan(fate.peak_rad)
-        for sentence in fates[0][1].about_block if fates else ():
+        for i, end in ends:
+            code[i, j] = work.limits.code(mode_code, end)
+            displacement_m[i, j] = _or_nan(end.peak_displacement_m)
+            rotation_rad[i, j] = _or_nan(end.peak_rad)
+        for sentence in ends[0][1].about_block if ends else ():
             about[mode_code, sentence] = about.get((mode_code, sentence), 0) + 1
-    return BlockFates(
+    return BlockOutcomes(
         place=work.place,
         code=code,
         displacement_m=displacement_m,
