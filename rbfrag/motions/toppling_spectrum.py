@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity, driving_acceleration_g
+from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]
@@ -215,3 +216,31 @@ def _weights(h: FloatArray, p: FloatArray | float) -> tuple[FloatArray, FloatArr
         near = np.where(z > SERIES_BELOW, (1.0 - mean) / large, near)
         far = np.where(z > SERIES_BELOW, (mean - np.exp(-large)) / large, far)
     return decay, h * near, h * far
+
+
+def spectrum_as_dict(
+    motion: str, ground: GroundMotion, p2: Sequence[float], polarity: Polarity
+) -> dict[str, Any]:
+    """Return the answer under the keys of the JSON contract.
+
+    Args:
+        motion: the motion as it was asked for.
+        ground: the motion itself.
+        p2: frequency parameters [1/s²].
+        polarity: forward or reverse.
+
+    Raises:
+        InputError: a p² that cannot be used.
+    """
+    return {
+        "motion": motion,
+        "name": ground.label,
+        "polarity": polarity,
+        "pgv_m_s": ground.pgv_m_s,
+        "p2": list(p2),
+        "x_m_s": toppling_spectrum(ground, p2, polarity).tolist(),
+        "warnings": [
+            *ground.remarks,
+            *(flag.sentence for flag in quality_flags(ground)),
+        ],
+    }
