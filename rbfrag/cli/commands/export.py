@@ -139,7 +139,7 @@ def _functions(
     measure = measures[imt.upper()]
     if rockmass is not None:
         from rbfrag.rockmasses.file import read_rock_mass
-        from rbfrag.rockmasses.table import toppling_blocks
+        from rbfrag.rockmasses.report import toppling_blocks
 
         p2s, krs, share = toppling_blocks(read_rock_mass(rockmass).realise(None, None))
         mean, about = class_function(

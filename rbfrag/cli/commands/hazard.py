@@ -162,7 +162,7 @@ def _blocks(
         if blocks is not None or p2 is not None or kr is not None or block is not None:
             raise InputError("--rockmass goes without --p2, --kr, --block and --blocks")
         from rbfrag.rockmasses.file import read_rock_mass
-        from rbfrag.rockmasses.table import toppling_blocks
+        from rbfrag.rockmasses.report import toppling_blocks
 
         p2s, krs, share = toppling_blocks(read_rock_mass(rockmass).realise(None, None))
         if krs.size == 0:

@@ -112,14 +112,15 @@ def rockmass(
     """
     from rbfrag.exchange.block_table import table_path, write_block_table
     from rbfrag.rockmasses.counts import crossings, mode_counts
-    from rbfrag.rockmasses.exact_interval import checked_level
-    from rbfrag.rockmasses.failures import failures
-    from rbfrag.rockmasses.failures_report import failures_as_dict
-    from rbfrag.rockmasses.failures_table import fate_columns
+    from rbfrag.rockmasses.failures import (
+        checked_level,
+        failures,
+        failures_as_dict,
+        outcome_columns,
+    )
     from rbfrag.rockmasses.file import read_rock_mass
-    from rbfrag.rockmasses.report import as_dict
+    from rbfrag.rockmasses.report import as_dict, block_columns
     from rbfrag.rockmasses.scenario import scenario
-    from rbfrag.rockmasses.table import block_columns
 
     if out is not None:
         table_path(out)
@@ -146,7 +147,7 @@ def rockmass(
         db=db,
     )
     made = read_rock_mass(file).realise(n, seed)
-    answer = fates = found = None
+    answer = outcomes = found = None
     about: list[str] = []
     if shaken:
         answer = scenario(
@@ -155,25 +156,25 @@ def rockmass(
         )  # fmt: skip
     if motion is not None:
         checked_level(level)
-        fates, about = run_shaken(
+        outcomes, about = run_shaken(
             made, motion, vertical=vertical, reverse=reverse, scales=scales,
             displacement=displacement, rotation=rotation, jobs=jobs, db=db, units=units, dt=dt,
         )  # fmt: skip
-        found = failures_as_dict(fates, failures(fates, level), level)
+        found = failures_as_dict(outcomes, failures(outcomes, level), level)
     document = as_dict(made, mode_counts(made), crossings(made), answer, found)
     document["warnings"] += about
     if out is not None:
-        columns = block_columns(made, answer) if fates is None else fate_columns(fates)
+        columns = block_columns(made, answer) if outcomes is None else outcome_columns(outcomes)
         write_block_table(columns, out)
     if plot is not None:
-        if fates is None:
+        if outcomes is None:
             from rbfrag.plots.rockmass import plot_rockmass
 
             plot_rockmass(made, plot)
         else:
             from rbfrag.plots.rockmass import plot_failures
 
-            plot_failures(fates, plot, level=level)
+            plot_failures(outcomes, plot, level=level)
     if json:
         print_json(document)
         return

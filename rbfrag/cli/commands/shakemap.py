@@ -230,7 +230,7 @@ def _blocks(
         )
     if rockmass is not None:
         from rbfrag.rockmasses.file import read_rock_mass
-        from rbfrag.rockmasses.table import toppling_blocks
+        from rbfrag.rockmasses.report import toppling_blocks
 
         p2s, krs, share = toppling_blocks(read_rock_mass(rockmass).realise(n, None))
         if p2s.size == 0:

@@ -52,7 +52,7 @@ def charted_blocks(
         columns = read_columns(blocks, names)
     elif rockmass is not None:
         from rbfrag.rockmasses.file import read_rock_mass
-        from rbfrag.rockmasses.table import block_columns
+        from rbfrag.rockmasses.report import block_columns
 
         mass = read_rock_mass(rockmass)
         columns = block_columns(mass.realise())

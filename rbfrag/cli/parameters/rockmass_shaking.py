@@ -11,10 +11,10 @@ from rbfrag.cli.progress_line import ProgressLine
 
 if TYPE_CHECKING:
     from rbfrag.rockmasses.joint_sets import Realisations
-    from rbfrag.rockmasses.response import ShakenMass
+    from rbfrag.rockmasses.shaking import ShakenMass
 
 ALWAYS = ("at_rest", "stays", "unstable")
-"""Fates that have a column of their own even if there are none."""
+"""Outcomes that have a column of their own even if there are none."""
 
 
 def run_shaken(
@@ -34,10 +34,10 @@ def run_shaken(
     """Run the blocks under the motion that the options name.
 
     Returns:
-        Their fates, and sentences about the motion and about blocks.
+        Their outcomes, and sentences about the motion and about blocks.
     """
     from rbfrag.campaign.shake_rockmass import shake
-    from rbfrag.rockmasses.failures_report import failure_warnings
+    from rbfrag.rockmasses.failures import failure_warnings
     from rbfrag.rockmasses.shaking import DISPLACEMENT_M, FailureLimits
 
     limits = FailureLimits(DISPLACEMENT_M if displacement is None else displacement, rotation)
@@ -60,7 +60,7 @@ def run_shaken(
 
 def print_failures(document: dict[str, Any]) -> None:
     """Print the failures that a motion causes, mode by mode and scale by scale."""
-    from rbfrag.rockmasses.shaking import FATES
+    from rbfrag.rockmasses.shaking import OUTCOMES
 
     print()
     turned = document["rotation_limit_deg"]
@@ -70,9 +70,9 @@ def print_failures(document: dict[str, Any]) -> None:
         + ("past recovery" if turned is None else f"beyond {turned:g} degrees or past recovery")
     )
     counts = [found for each in document["scales"] for found in each["modes"].values()]
-    fates = [
+    outcomes = [
         name
-        for name in FATES
+        for name in OUTCOMES
         if name != "fails" and (name in ALWAYS or any(found[name] for found in counts))
     ]
     rows = []
@@ -90,11 +90,11 @@ def print_failures(document: dict[str, Any]) -> None:
                     _percent(of_all["share"]),
                     _percent(of_all["ci_low"]),
                     _percent(of_all["ci_high"]),
-                    *(found[name] for name in fates),
+                    *(found[name] for name in outcomes),
                 ]
             )
     headers = ["scale", "pga_g", "mode", "count", "fails", "%_of_mode", "%_of_all"]
-    print_table([*headers, "ci_low_%", "ci_high_%", *fates], rows)
+    print_table([*headers, "ci_low_%", "ci_high_%", *outcomes], rows)
 
 
 def _percent(share: float) -> float:
