@@ -24,27 +24,20 @@ def block(
         typer.Option(
             "--polygon",
             help="Block file (.toml or .csv); what it states may be given anew by options.",
-            show_default=False,
         ),
     ] = None,
     beta: described_block.Beta = None,
     phi: described_block.Phi = None,
     phi_back: described_block.PhiBack = None,
     cohesion: Annotated[
-        float | None,
-        typer.Option(
-            "--cohesion", help="Cohesion of the base [Pa], with --density.", show_default=False
-        ),
+        float | None, typer.Option("--cohesion", help="Cohesion of the base [Pa], with --density.")
     ] = None,
     density: Annotated[
-        float | None,
-        typer.Option("--density", help="Density of the rock [kg/m3].", show_default=False),
+        float | None, typer.Option("--density", help="Density of the rock [kg/m3].")
     ] = None,
     kv: Annotated[
         float | None,
-        typer.Option(
-            "--kv", help="Vertical acceleration of the ground, up positive [g].", show_default=False
-        ),
+        typer.Option("--kv", help="Vertical acceleration of the ground, up positive [g]."),
     ] = None,
     no_back: described_block.NoBack = False,
     plot: Annotated[
@@ -53,7 +46,6 @@ def block(
             "--plot",
             help="Draw the block on its planes with its contacts and the resultant at yield "
             "(.png, .pdf, .svg).",
-            show_default=False,
         ),
     ] = None,
     json: options.Json = False,

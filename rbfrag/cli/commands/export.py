@@ -25,7 +25,6 @@ Blocks = Annotated[
         metavar="FILE",
         help="Block table (.csv, .parquet) with block_id, p2_1_s2 [1/s²] and kr; one function a "
         "block.",
-        show_default=False,
     ),
 ]
 
@@ -35,7 +34,6 @@ RockMass = Annotated[
         "--rockmass",
         metavar="FILE",
         help="Rock mass file (.toml, .csv): one function, the mean over its toppling blocks.",
-        show_default=False,
     ),
 ]
 
@@ -49,7 +47,7 @@ Name = Annotated[
     str, typer.Option("--name", help="Identifier of the one block or of the rock mass.")
 ]
 
-Out = Annotated[str, typer.Option("--out", help="File to write.", show_default=False)]
+Out = Annotated[str, typer.Option("--out", help="File to write.")]
 
 
 @app.command("nrml", epilog="Example:  rbfrag export nrml --blocks blocks.csv --out blocks.xml")

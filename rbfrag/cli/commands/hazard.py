@@ -21,7 +21,6 @@ def hazard(
             metavar="CURVE",
             help="Hazard curve: OpenQuake CSV, USGS NSHM JSON, or CSV of two columns whose header "
             "names their units (pgv_m_s,annual_rate).",
-            show_default=False,
         ),
     ],
     p2: options.P2OrFile = None,
@@ -33,7 +32,6 @@ def hazard(
             "--blocks",
             metavar="FILE",
             help="Block table (.csv, .parquet) with p2_1_s2 [1/s²] and kr, one answer a row.",
-            show_default=False,
         ),
     ] = None,
     rockmass: Annotated[
@@ -43,7 +41,6 @@ def hazard(
             metavar="FILE",
             help="Rock mass file (.toml, .csv): the rate of a block drawn from its stable toppling "
             "blocks.",
-            show_default=False,
         ),
     ] = None,
     imt: Annotated[
@@ -77,8 +74,7 @@ def hazard(
     model: options.Model = None,
     level: options.Level = 0.95,
     out: Annotated[
-        str | None,
-        typer.Option("--out", help="Write one row a block and site (.csv, .parquet)."),
+        str | None, typer.Option("--out", help="Write one row a block and site (.csv, .parquet).")
     ] = None,
     plot: Annotated[
         str | None,
@@ -152,11 +148,7 @@ def hazard(
 
 
 def _blocks(
-    p2: float | None,
-    kr: float | None,
-    block: str | None,
-    blocks: str | None,
-    rockmass: str | None,
+    p2: float | None, kr: float | None, block: str | None, blocks: str | None, rockmass: str | None
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     if rockmass is not None:
         if blocks is not None or p2 is not None or kr is not None or block is not None:

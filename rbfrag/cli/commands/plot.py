@@ -17,9 +17,7 @@ app = typer.Typer(
     epilog="Example:  rbfrag plot fit --out fit.png",
 )
 
-Out = Annotated[
-    str, typer.Option("--out", help="File to write: .png, .pdf or .svg.", show_default=False)
-]
+Out = Annotated[str, typer.Option("--out", help="File to write: .png, .pdf or .svg.")]
 
 
 @app.command("fit", epilog="Example:  rbfrag plot fit --model wls-pgv --out fit.png")
@@ -113,7 +111,6 @@ def plot_curve(
             metavar="FILE",
             help="Fragilities of the same measure to compare with: NRML 0.4 or 0.5 (.xml), or a "
             "pelicun table (.csv).",
-            show_default=False,
         ),
     ] = None,
     db: options.Db = None,
@@ -262,21 +259,15 @@ def plot_response(
     epilog="Example:  rbfrag plot modes --phi 40 --beta 20 --rockmass mass.toml --out a.png",
 )
 def plot_modes(
-    phi: Annotated[
-        float,
-        typer.Option("--phi", help="Friction angle of the base [deg].", show_default=False),
-    ],
+    phi: Annotated[float, typer.Option("--phi", help="Friction angle of the base [deg].")],
     out: Out,
     beta: Annotated[
-        float,
-        typer.Option("--beta", help="Dip of the base for the yield accelerations [deg]."),
+        float, typer.Option("--beta", help="Dip of the base for the yield accelerations [deg].")
     ] = 0.0,
     phi_back: Annotated[
         float | None,
         typer.Option(
-            "--phi-back",
-            help="Friction angle of the back plane [deg]. Default: that of the base.",
-            show_default=False,
+            "--phi-back", help="Friction angle of the back plane [deg]. Default: that of the base."
         ),
     ] = None,
     no_back: Annotated[
@@ -289,16 +280,12 @@ def plot_modes(
             metavar="FILE",
             help="Show the blocks of a table (.csv, .parquet) with alpha1_deg and alpha3_deg, "
             "as  rbfrag rockmass --out  writes it.",
-            show_default=False,
         ),
     ] = None,
     rockmass: Annotated[
         str | None,
         typer.Option(
-            "--rockmass",
-            metavar="FILE",
-            help="Show the blocks of a rock mass file (.toml, .csv).",
-            show_default=False,
+            "--rockmass", metavar="FILE", help="Show the blocks of a rock mass file (.toml, .csv)."
         ),
     ] = None,
 ) -> None:

@@ -30,7 +30,6 @@ def respond(
             "--ky",
             help="Yield acceleration coefficient tan(phi - beta) [g] of a block that slides on a "
             "plane of dip --beta (default 0), whatever its shape.",
-            show_default=False,
         ),
     ] = None,
     block: Annotated[
@@ -40,7 +39,6 @@ def respond(
             metavar="FILE",
             help="Block file (.toml or .csv); its mode chooses the model. What it states about "
             "the planes may be given anew by options.",
-            show_default=False,
         ),
     ] = None,
     alpha1: described_block.Alpha1 = None,
@@ -59,7 +57,6 @@ def respond(
             "--kind",
             help="Response model: toppling, sliding, slumping or confined_toppling. Default: that "
             "of the block's failure mode.",
-            show_default=False,
         ),
     ] = None,
     vertical: options.Vertical = None,
@@ -77,8 +74,7 @@ def respond(
         ),
     ] = False,
     csv: Annotated[
-        str | None,
-        typer.Option("--csv", help="Write the motion of the block in time.", show_default=False),
+        str | None, typer.Option("--csv", help="Write the motion of the block in time.")
     ] = None,
     plot: Annotated[
         str | None,
@@ -86,7 +82,6 @@ def respond(
             "--plot",
             help="Draw the acceleration against the strength that is left, and the motion of the "
             "block (.png, .pdf, .svg).",
-            show_default=False,
         ),
     ] = None,
     animate: Annotated[
@@ -95,7 +90,6 @@ def respond(
             "--animate",
             help="Film the block on its planes (.gif, .mp4 where ffmpeg is installed, .html); it "
             "must be given by its geometry.",
-            show_default=False,
         ),
     ] = None,
     exaggerate: Annotated[

@@ -20,7 +20,6 @@ def rockmass(
         typer.Argument(
             metavar="FILE",
             help="Rock mass file (.toml or .csv): dips [deg], spacings [m], friction [deg].",
-            show_default=False,
         ),
     ],
     n: Annotated[
@@ -38,7 +37,6 @@ def rockmass(
             metavar="MOTION",
             help="Run every block under this accelerogram, each in its own mode: a file, "
             "FILE#INDEX for one trace of several, or a database id.",
-            show_default=False,
         ),
     ] = None,
     vertical: options.Vertical = None,
@@ -49,7 +47,6 @@ def rockmass(
             "--scales",
             metavar="LIST",
             help="Factors on the motion, such as 0.5,1,1.5,2. Default: 1.",
-            show_default=False,
         ),
     ] = None,
     displacement: Annotated[
@@ -58,7 +55,6 @@ def rockmass(
             "--displacement",
             help="A slide fails beyond this displacement [m]. Default with --motion: 0.05. With "
             "--pgv, blocks that slide or slump are answered for where it is given.",
-            show_default=False,
         ),
     ] = None,
     rotation: Annotated[
@@ -67,7 +63,6 @@ def rockmass(
             "--rotation",
             help="A slump, or a topple against the back plane, fails beyond this rotation [deg]. "
             "Default: failure past recovery only.",
-            show_default=False,
         ),
     ] = None,
     jobs: Annotated[
@@ -75,7 +70,6 @@ def rockmass(
         typer.Option(
             "--jobs",
             help="Worker processes. Default: one per processor, where there is work for them.",
-            show_default=False,
         ),
     ] = None,
     pgv: options.Pgv = None,

@@ -17,19 +17,10 @@ SUFFIXES = (".geojson", ".json", ".csv", ".parquet", ".gpkg")
 
 
 def shakemap(
-    grid: Annotated[
-        str,
-        typer.Argument(
-            metavar="GRID.xml", help="ShakeMap grid, version 3 or 4.", show_default=False
-        ),
-    ],
+    grid: Annotated[str, typer.Argument(metavar="GRID.xml", help="ShakeMap grid, version 3 or 4.")],
     out: Annotated[
         str,
-        typer.Option(
-            "--out",
-            help="File to write: .geojson, .csv, .parquet or .gpkg (extra gis).",
-            show_default=False,
-        ),
+        typer.Option("--out", help="File to write: .geojson, .csv, .parquet or .gpkg (extra gis)."),
     ],
     p2: options.P2OrFile = None,
     kr: options.KrOrFile = None,
@@ -41,7 +32,6 @@ def shakemap(
             metavar="FILE",
             help="Blocks (.csv, .parquet, .geojson) with p2_1_s2 [1/s²] and kr: with lon and lat "
             "[deg] one answer a block, without them a class that stands at every node.",
-            show_default=False,
         ),
     ] = None,
     rockmass: Annotated[
@@ -50,7 +40,6 @@ def shakemap(
             "--rockmass",
             metavar="FILE",
             help="Rock mass file (.toml, .csv): its stable toppling blocks stand at every node.",
-            show_default=False,
         ),
     ] = None,
     n: Annotated[int, typer.Option("--n", help="Number of realisations of the rock mass.")] = 200,
@@ -60,7 +49,6 @@ def shakemap(
             "--uncertainty",
             metavar="FILE",
             help="uncertainty.xml of the same map: the answer is integrated over it.",
-            show_default=False,
         ),
     ] = None,
     component: Annotated[
@@ -72,8 +60,7 @@ def shakemap(
         ),
     ] = "larger",
     allow_partial: Annotated[
-        bool,
-        typer.Option("--allow-partial", help="Read a grid that has not its declared size."),
+        bool, typer.Option("--allow-partial", help="Read a grid that has not its declared size.")
     ] = False,
     plot: Annotated[
         str | None, typer.Option("--plot", help="Draw the map (.png, .pdf, .svg).")

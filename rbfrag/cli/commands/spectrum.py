@@ -27,15 +27,12 @@ def spectrum(
     ] = "30,10,3,1,0.3,0.1",
     polarity: options.Polarity = "forward",
     csv: Annotated[
-        str | None,
-        typer.Option("--csv", help="Write the values (.csv or .parquet).", show_default=False),
+        str | None, typer.Option("--csv", help="Write the values (.csv or .parquet).")
     ] = None,
     plot: Annotated[
         str | None,
         typer.Option(
-            "--plot",
-            help="Draw the spectra over p², with PGV beside them (.png, .pdf, .svg).",
-            show_default=False,
+            "--plot", help="Draw the spectra over p², with PGV beside them (.png, .pdf, .svg)."
         ),
     ] = None,
     units: options.Units = None,

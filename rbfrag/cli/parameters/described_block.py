@@ -8,7 +8,7 @@ import typer
 
 
 def _number(name: str, text: str) -> Any:
-    return typer.Option(name, help=text, show_default=False)
+    return typer.Option(name, help=text)
 
 
 Alpha1 = Annotated[
