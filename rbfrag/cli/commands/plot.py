@@ -209,8 +209,7 @@ def plot_spectrum(
     db: options.Db = None,
 ) -> None:
     """Draw the toppling spectra of motions over the size of the block, with PGV beside them."""
-    from rbfrag.cli.parameters.number_list import number_list
-    from rbfrag.cli.parameters.polarity import polarities
+    from rbfrag.cli.parameters.values import number_list, polarities
     from rbfrag.plots.canvas import plot_path
     from rbfrag.plots.spectrum import plot_spectrum as draw
 
@@ -290,7 +289,7 @@ def plot_modes(
     ] = None,
 ) -> None:
     """Draw failure modes and yield accelerations over the block angles alpha1 and alpha3."""
-    from rbfrag.cli.parameters.charted_blocks import charted_blocks
+    from rbfrag.cli.parameters.block import charted_blocks
     from rbfrag.plots.canvas import plot_path
     from rbfrag.plots.modes import plot_modes as draw
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
-from rbfrag.cli.parameters import described_block, options
+from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion, find_vertical
 from rbfrag.errors import InputError
 
@@ -41,16 +41,16 @@ def respond(
             "the planes may be given anew by options.",
         ),
     ] = None,
-    alpha1: described_block.Alpha1 = None,
-    alpha3: described_block.Alpha3 = None,
-    r3: described_block.R3 = None,
-    s1: described_block.S1 = None,
-    s2: described_block.S2 = None,
-    gamma: described_block.Gamma = None,
-    beta: described_block.Beta = None,
-    phi: described_block.Phi = None,
-    phi_back: described_block.PhiBack = None,
-    no_back: described_block.NoBack = False,
+    alpha1: options.Alpha1 = None,
+    alpha3: options.Alpha3 = None,
+    r3: options.R3 = None,
+    s1: options.S1 = None,
+    s2: options.S2 = None,
+    gamma: options.Gamma = None,
+    beta: options.Beta = None,
+    phi: options.Phi = None,
+    phi_back: options.PhiBack = None,
+    no_back: options.NoBack = False,
     kind: Annotated[
         str | None,
         typer.Option(
@@ -223,7 +223,7 @@ def _draw(
     title: str,
     reverse: bool,
 ) -> None:
-    if response.kind != "toppling":
+    if response.history is not None and response.history.displacement_m is not None:
         from rbfrag.plots.response import plot_motion
 
         plot_motion(response, path, title=title, reverse=reverse)

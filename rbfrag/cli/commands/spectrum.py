@@ -9,8 +9,8 @@ import typer
 from rbfrag.cli.output import print_json, print_table, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion
-from rbfrag.cli.parameters.number_list import number_list
-from rbfrag.cli.parameters.polarity import polarities as polarities_of
+from rbfrag.cli.parameters.values import number_list
+from rbfrag.cli.parameters.values import polarities as polarities_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -163,3 +163,29 @@ Model = Annotated[
 ]
 
 Level = Annotated[float, typer.Option("--level", help="Confidence level of the interval.")]
+
+
+Alpha1 = Annotated[
+    float | None, typer.Option("--alpha1", help="Angle of the heel [deg], with --alpha3 and --r3.")
+]
+Alpha3 = Annotated[float | None, typer.Option("--alpha3", help="Angle of the toe [deg].")]
+R3 = Annotated[float | None, typer.Option("--r3", help="Distance from centroid to toe [m].")]
+S1 = Annotated[
+    float | None,
+    typer.Option("--s1", help="Spacing of the base fractures [m], with --s2 and --gamma."),
+]
+S2 = Annotated[float | None, typer.Option("--s2", help="Spacing of the back fractures [m].")]
+Gamma = Annotated[
+    float | None, typer.Option("--gamma", help="Dip of the back plane less dip of the base [deg].")
+]
+Beta = Annotated[
+    float | None, typer.Option("--beta", help="Dip of the base, out of the slope positive [deg].")
+]
+Phi = Annotated[float | None, typer.Option("--phi", help="Friction angle of the base [deg].")]
+PhiBack = Annotated[
+    float | None,
+    typer.Option(
+        "--phi-back", help="Friction angle of the back plane [deg]. Default: that of the base."
+    ),
+]
+NoBack = Annotated[bool, typer.Option("--no-back", help="There is no fracture behind the block.")]
