@@ -20,8 +20,8 @@ from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.predict import Model, predict
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.quantity import positive
+from rbfrag.solver.stability.arrays import slumping_p2
 from rbfrag.solver.stability.modes import MODES, SLIDE, SLUMP, STABLE, TOPPLE, UNSTABLE, ModeName
-from rbfrag.solver.stability.slumping_frequency import slumping_p2
 
 
 def other_modes(
