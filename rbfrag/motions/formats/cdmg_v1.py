@@ -42,12 +42,12 @@ def read(file: RecordFile) -> list[GroundMotion]:
     spans = file.blocks(_BLOCK)
     channels = [_channel(file, span) for span in spans]
     moving = [channel for channel in channels if channel.acceleration_g.any()]
-    still = [channel.component for channel in channels if not channel.acceleration_g.any()]
+    silent = [channel.component for channel in channels if not channel.acceleration_g.any()]
     if not moving:
         raise file.error("every sample of every channel is zero: this is no record")
     remarks = file.missing_channels(spans[0], len(spans))
-    if still:
-        remarks += (f"the channel {', '.join(still)} holds zeros only and is left out",)
+    if silent:
+        remarks += (f"the channel {', '.join(silent)} holds zeros only and is left out",)
     return [
         replace(channel, trace_index=index, remarks=(*remarks, *channel.remarks))
         for index, channel in enumerate(moving)
