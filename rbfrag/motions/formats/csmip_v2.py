@@ -6,8 +6,8 @@ Each block: 25 text lines, numeric headers, then a line such as ::
     3251 POINTS OF ACCEL DATA EQUALLY SPACED AT  .020 SEC.  (UNITS: CM/SEC/SEC)
 
 and the accelerations, 8 of width 10 a line, which may touch; then velocity and displacement in the
-same way. Older files are upper case and may wrap a header line, so that lines are found by what they
-say. Channels of one file may differ in length. A block ends with ``/&``.
+same way. Older files are upper case and may wrap a header line, so that lines are found by what
+they say. Channels of one file may differ in length. A block ends with ``/&``.
 """
 
 from __future__ import annotations
