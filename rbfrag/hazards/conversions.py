@@ -42,11 +42,7 @@ COMPONENTS: Mapping[str, Component] = {
 
 
 def component(name: str) -> Component:
-    """Return the definition of that name.
-
-    Raises:
-        InputError: there is none.
-    """
+    """Return the definition of that name."""
     try:
         return COMPONENTS[name]
     except KeyError:
@@ -93,11 +89,7 @@ CONVERSIONS: Mapping[str, VelocityConversion] = {
 
 
 def velocity_conversion(name: str) -> VelocityConversion:
-    """Return the conversion of that name.
-
-    Raises:
-        InputError: there is none.
-    """
+    """Return the conversion of that name."""
     try:
         return CONVERSIONS[name]
     except KeyError:

@@ -59,13 +59,7 @@ EXAMPLE = "pgv_m_s,annual_rate\n0.05,0.05\n0.1,0.02\n0.2,0.006\n0.5,0.0008\n1.0,
 
 
 def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
-    """Return the operation on `/v1/hazard`.
-
-    Args:
-        settings: the database.
-        bodies: reads what is sent.
-        pool: where the work is done.
-    """
+    """Return the operation on `/v1/hazard`."""
     routes = plain_router()
 
     @routes.post(

@@ -90,12 +90,7 @@ ACCELEROGRAM = {
 
 
 def router(bodies: Bodies, pool: WorkerPool) -> APIRouter:
-    """Return the operations on accelerograms.
-
-    Args:
-        bodies: reads what is sent.
-        pool: where the work is done.
-    """
+    """Return the operations on accelerograms."""
     routes = plain_router()
 
     @routes.post(
