@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 
 from rbfrag.service import work
-from rbfrag.service.body import MULTIPART, Bodies
+from rbfrag.service.body import FILE_FORM, MULTIPART, Bodies
 from rbfrag.service.documents import HazardAnswer
 from rbfrag.service.json_body import answer
 from rbfrag.service.operation import (
@@ -71,14 +71,7 @@ def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
             body={
                 "text/csv": {"schema": {"type": "string"}, "example": EXAMPLE},
                 "application/json": {"schema": {"type": "object"}},
-                MULTIPART: {
-                    "schema": {
-                        "type": "object",
-                        "properties": {"file": {"type": "string", "format": "binary"}},
-                        "required": ["file"],
-                        "additionalProperties": False,
-                    }
-                },
+                MULTIPART: FILE_FORM,
             },
             description="What `rbfrag hazard --json` prints for the curve that is sent: OpenQuake "
             "CSV, USGS NSHM JSON, or CSV of two columns whose header names their units.",
