@@ -46,7 +46,7 @@ def spectrum(
     motion in one polarity is an object, several are a list of such objects.
     """
     from rbfrag.exchange.block_table import write_block_table
-    from rbfrag.motions.spectrum_report import as_dict
+    from rbfrag.motions.toppling_spectrum import spectrum_as_dict as as_dict
 
     sizes, polarities = number_list(p2, "--p2"), polarities_of(polarity)
     check_files(table=csv, plot=plot)
