@@ -19,11 +19,12 @@ import rbfrag.db.upgrade
 import rbfrag.migrations
 from rbfrag.db.campaigns import start_campaign
 from rbfrag.db.check.database import check_database
+from rbfrag.db.connect import unchecked_engine
 from rbfrag.db.content import table_rows_by_natural_key
-from rbfrag.db.engine import open_database, unchecked_engine
+from rbfrag.db.engine import open_database
+from rbfrag.db.location import REVISIONS, SCHEMA_REVISION, VERSION_TABLE
 from rbfrag.db.models import load_model, save_model
 from rbfrag.db.motions import add_motion, load_motion, motion_rows
-from rbfrag.db.revision import REVISIONS, SCHEMA_REVISION, VERSION_TABLE
 from rbfrag.db.rows import EarthquakeInfo, ModelRow
 from rbfrag.db.schema import combination, metadata, simulation
 from rbfrag.db.upgrade import migrate, upgrade_database
