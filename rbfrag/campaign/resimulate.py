@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from sqlalchemy import Connection
 
 from rbfrag.campaign.machine import made_on
-from rbfrag.db.check.compare_maps import BORDER_ERROR, Interval, contradictions
 from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
+from rbfrag.db.check.maps import BORDER_ERROR, Interval, contradictions
 from rbfrag.db.motions import load_motion
 from rbfrag.db.stored_combination import (
     StoredCombination,
