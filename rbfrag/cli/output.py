@@ -44,6 +44,18 @@ def print_warnings(warnings: Iterable[str]) -> None:
         print(f"warning: {warning}", file=sys.stderr)
 
 
+def check_files(*, table: str | None = None, plot: str | None = None) -> None:
+    """Refuse a table or a figure that cannot be written, before long work."""
+    if table is not None:
+        from rbfrag.exchange.block_table import table_path
+
+        table_path(table)
+    if plot is not None:
+        from rbfrag.plots.canvas import plot_path
+
+        plot_path(plot)
+
+
 def cell(value: object) -> str:
     """Return a value as people read it: six digits, a dash for nothing."""
     if value is None:

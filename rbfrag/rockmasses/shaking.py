@@ -60,9 +60,6 @@ class FailureLimits:
         displacement_m: a sliding block fails where it slides further than this [m].
         rotation_deg: a block that slumps, or topples against its back plane, fails where it turns
             by more than this [deg]; None where only one past recovery has failed.
-
-    Raises:
-        InputError: a limit that is not above zero.
     """
 
     displacement_m: float = DISPLACEMENT_M
@@ -74,12 +71,7 @@ class FailureLimits:
             positive(self.rotation_deg, "rotation", "degrees")
 
     def code(self, mode_code: int, end: RunEnd) -> int:
-        """Return the code in :data:`OUTCOMES` of a block that was run.
-
-        Args:
-            mode_code: its mode.
-            end: the end of its run.
-        """
+        """Return the code in :data:`OUTCOMES` of a block that was run."""
         if end.outcome is Outcome.TOPPLED:
             return FAILS
         peak = limit = None
@@ -167,14 +159,7 @@ class BlockOutcomes:
 
 
 def run_blocks(work: BlocksToRun) -> BlockOutcomes:
-    """Run blocks, one after another, each at the scales at which it moves.
-
-    Args:
-        work: the blocks.
-
-    Raises:
-        InputError: a block that cannot be run; it is numbered.
-    """
+    """Run blocks, one after another, each at the scales at which it moves."""
     drives = work.shaking.drives()
     code = np.full(work.moves.shape, AT_REST, dtype=np.int8)
     displacement_m = np.where(work.mode_code == MODES.index("topple"), np.nan, 0.0)
@@ -263,11 +248,7 @@ class ShakingPlan:
         return np.flatnonzero(self.moves.any(axis=0))
 
     def work(self, chunk: int = CHUNK) -> Iterator[BlocksToRun]:
-        """Yield the blocks that are to be run, some at a time.
-
-        Args:
-            chunk: how many at a time.
-        """
+        """Yield the blocks that are to be run, some at a time."""
         made, places = self.made, self.places
         for start in range(0, places.size, chunk):
             at = places[start : start + chunk]
