@@ -225,10 +225,6 @@ class WorkerPool:
             request: who wants to know, its body read; the work ends when the client goes.
             function: a function of a module.
             given: its arguments.
-
-        Raises:
-            RequestRefusedError: it took too long, or waited too long, or the client has gone.
-            RbfragError: as the function raises.
         """
         future = self.open().schedule(function, args=given)
         answer = asyncio.wrap_future(future)
