@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.exchange.batch_table import csv_parts, csv_writer, parquet_parts, parquet_writer
 from rbfrag.exchange.block_table import table_path
-from rbfrag.fragility.answers import PredictionArray
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import answer_given

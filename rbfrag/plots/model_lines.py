@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
-from rbfrag.fragility.answers import PredictionArray
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.formulas import EXPONENTS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import answer_given, predict

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.answers import PredictionArray
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.checks import refusals
-from rbfrag.fragility.functions import normal_half_width
+from rbfrag.fragility.model import normal_half_width
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.predict import Model, predict
 from rbfrag.rockmasses.joint_sets import Realisations

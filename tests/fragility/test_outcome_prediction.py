@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility import interval_floor, prediction_array
-from rbfrag.fragility.answers import MotionPrediction
+from rbfrag.fragility.prediction_motion import MotionPrediction
 from rbfrag.fragility.fit import outcomes as outcome_method
 from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.formulas import FLOOR_FROM, FLOOR_NODES, FLOOR_STEP, PARAMETERS, SHAPES

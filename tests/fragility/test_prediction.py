@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 from rbfrag.errors import InputError, ModelError
-from rbfrag.fragility.answers import Prediction, PredictionArray
+from rbfrag.fragility.predict import Prediction
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import predict
 
