@@ -244,7 +244,7 @@ def judged(
     values = block.completed(floored, term, ns)
     for bound in block.refuses:
         holds = bound.holds(values) & _not(missing) & _not(at_rest)
-        refuse(holds, Finding(holds, bound.about, values[bound.about], bound.text))
+        refuse(holds, Finding(holds, bound.about, values.get(bound.about), bound.text))
         missing = missing | holds
     intensity = values["intensity_m_s"]
     for name in ("y_m_s", "intensity_m_s", "displacement_m", "pgv_m_s"):
@@ -260,7 +260,7 @@ def judged(
         bounds = (block.at_rest, *bounds)
     for bound in bounds:
         holds = bound.holds(values) & _not(ruled)
-        say(holds, Finding(holds, bound.about, values[bound.about], bound.text))
+        say(holds, Finding(holds, bound.about, values.get(bound.about), bound.text))
         ruled = ruled | holds
     p, low, high, eta = _answer(model, values, half_width, ns, ruled)
     in_domain = _not(missing)

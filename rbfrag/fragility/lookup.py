@@ -105,11 +105,9 @@ def find_model(
     if kind is not None and chosen.row.kind != kind:
         raise InputError(f"model {chosen.name!r} is of kind {chosen.kind}, not {kind}")
     block = chosen.method.block
-    for name in block.names:
-        if name not in given:
-            _refuse_block(chosen.kind, block, given, chosen)
+    _check_block(chosen.kind, block, given, chosen)
     if block.criterion is not None or rotation_deg is not None:
-        _refuse_other_block(chosen.kind, block, given, rotation_deg)
+        _check_criterion(chosen.kind, block, rotation_deg)
         if chosen.criterion != rotation_deg:
             raise InputError(
                 f"model {chosen.name!r} tells of {_failure(chosen.criterion)}, asked is "
@@ -174,10 +172,8 @@ def _suited_in(
             f"and  rbfrag fit --kind {kind}"
         )
     block = of_kind[0].method.block
-    for name in block.names:
-        if name not in given:
-            _refuse_block(kind, block, given, None)
-    _refuse_other_block(kind, block, given, rotation_deg)
+    _check_block(kind, block, given, None)
+    _check_criterion(kind, block, rotation_deg)
     best: dict[str, FragilityModel] = {}
     for model in of_kind:
         name = model.term.name
@@ -205,35 +201,39 @@ def _merit(model: FragilityModel) -> tuple[bool, int]:
     return model.row.is_default, -model.form.rank
 
 
-def _refuse_block(
+def _check_block(
     kind: str, block: BlockParameters, given: Collection[str], model: FragilityModel | None
 ) -> None:
-    """Refuse a question that does not describe its block as a kind needs it."""
+    """Refuse a question that describes its block in another way than a kind needs it.
+
+    Measures of the motion alone are no description: the caller has the block.
+    """
+    described = [name for name in given if name not in MEASURES]
     missing = [name for name in block.names if name not in given]
-    others = [name for name in given if name not in MEASURES and name not in block.names]
+    others = [name for name in described if name not in block.names and name not in block.options]
+    if not described or not (missing or others):
+        return
     if others and len(missing) == len(block.names):
         who = f"kind {kind}" if model is None else f"model {model.name!r} is of kind {kind}: it"
         raise InputError(
             f"{who} reads {' and '.join(block.names)}, given is {' and '.join(others)}"
         )
-    raise InputError(
-        f"{missing[0]} is missing: a block of kind {kind} is given by {' and '.join(block.names)}"
-    )
+    if missing:
+        raise InputError(
+            f"{missing[0]} is missing: a block of kind {kind} is given by "
+            f"{' and '.join(block.names)}"
+        )
+    raise InputError(f"{others[0]} does not go with kind {kind}: leave it out")
 
 
-def _refuse_other_block(
-    kind: str, block: BlockParameters, given: Collection[str], rotation_deg: float | None
-) -> None:
-    """Refuse what describes blocks of other kinds only."""
-    known = {*block.names, *block.options}
-    for name in given:
-        if name not in MEASURES and name not in known:
-            raise InputError(f"{name} does not go with kind {kind}: leave it out")
-    if rotation_deg is not None:
-        if block.criterion is None:
-            raise InputError(f"a rotation is no failure of a block of kind {kind}: leave it out")
-        if isinstance(rotation_deg, bool) or not isinstance(rotation_deg, int | float):
-            raise InputError(f"rotation_deg = {rotation_deg!r} is not a number")
+def _check_criterion(kind: str, block: BlockParameters, rotation_deg: float | None) -> None:
+    """Refuse a criterion of failure that blocks of a kind do not have."""
+    if rotation_deg is None:
+        return
+    if block.criterion is None:
+        raise InputError(f"a rotation is no failure of a block of kind {kind}: leave it out")
+    if isinstance(rotation_deg, bool) or not isinstance(rotation_deg, int | float):
+        raise InputError(f"rotation_deg = {rotation_deg!r} is not a number")
 
 
 def _failure(rotation_deg: float | None) -> str:

@@ -128,6 +128,11 @@ class FragilityModel:
         value = self.row.diagnostics.get(name) if name is not None else None
         return float(value) if isinstance(value, int | float) else None
 
+    @property
+    def has_exponent(self) -> bool:
+        """Whether the exponent M was estimated: P then depends on p beside y."""
+        return self.method.exponent in self.row.coefficients
+
     def half_width(self, level: float) -> float:
         """Return the quantile that the interval reaches to.
 

@@ -256,6 +256,12 @@ def answer_given(
     interval: bool = True,
 ) -> Prediction | PredictionArray:
     """Return the answer of one model for values by name; see :func:`predict`."""
+    for name in model.method.block.names:
+        if name not in given:
+            raise InputError(
+                f"{name} is missing: a block of kind {model.kind} is given by "
+                f"{' and '.join(model.method.block.names)}"
+            )
     half_width = model.half_width(level)
     singles: dict[str, float] = {}
     for name, value in given.items():

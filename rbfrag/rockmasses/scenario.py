@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.checks import refusals
-from rbfrag.fragility.model import normal_half_width
 from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.model import normal_half_width
 from rbfrag.fragility.predict import Model, predict
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.rockmasses.other_modes import other_modes
 from rbfrag.solver.stability.modes import MODES, STABLE, TOPPLE, UNSTABLE, ModeName

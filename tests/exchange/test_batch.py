@@ -14,7 +14,7 @@ from rbfrag.db.models import save_model
 from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange import batch_table
 from rbfrag.exchange.batch import predict_table
-from rbfrag.exchange.block_table import read_columns, read_texts, write_block_table
+from rbfrag.exchange.block_table import read_columns, write_block_table
 from rbfrag.fragility.predict import predict
 from tests.fragility.conftest import model_row
 
@@ -39,10 +39,8 @@ def answer(
     with opened_database(str(database), create=True) as engine, engine.begin() as connection:
         save_model(connection, model_row())
 
-    def run(source: Path, target: Path, **measures: float) -> dict[str, object]:
-        return predict_table(
-            source, target, measures=measures, model=None, level=0.95, db=str(database)
-        )
+    def run(source: Path, target: Path, **given: float) -> dict[str, object]:
+        return predict_table(source, target, given=given, model=None, level=0.95, db=str(database))
 
     return run
 
@@ -166,6 +164,9 @@ def test_parquet(answer: Answer, tmp_path: Path) -> None:
     ).probability  # fmt: skip
     assert np.array_equal(found["probability"], expected, equal_nan=True)
     assert np.array_equal(found["kr"], columns["kr"])
-    assert read_texts(target, "block_id").tolist() == columns["block_id"].tolist()
+    assert (
+        read_columns(target, (), texts=["block_id"])["block_id"].tolist()
+        == columns["block_id"].tolist()
+    )
     answer(source, tmp_path / "c.csv")
     assert len(rows_of(tmp_path / "c.csv")) == 50

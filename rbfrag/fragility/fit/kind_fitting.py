@@ -17,9 +17,10 @@ from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.kind_data import KindData, sliding_data, slumping_data
 from rbfrag.fragility.fit.scores import brier, calibration, log_loss
 from rbfrag.fragility.kind_formulas import FORMULAS, METHODS, Formula, Numbers
-from rbfrag.fragility.kind_model import KindModel
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.search.displacement import KY_OVER_PGA, THRESHOLDS_M
+from rbfrag.solver.models.sliding import KY_OVER_PGA, THRESHOLDS_M
+from rbfrag.solver.models.slumping import RATIOS
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
@@ -37,9 +38,6 @@ STARTS: Mapping[tuple[str, str], tuple[float, ...]] = {
     ("slumping", "pgv"): (0.0, 1.0, -1.0),
 }
 """Where the search for the maximum begins; it is the same maximum from anywhere near."""
-
-RATIOS = np.geomspace(0.02, 0.95, 25)
-"""k_s/PGA of the blocks that slumping models are judged by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +57,9 @@ class KindFit:
     held_out: FloatArray
 
     @property
-    def model(self) -> KindModel:
+    def model(self) -> FragilityModel:
         """The model, ready to answer."""
-        return KindModel.from_row(self.row)
+        return FragilityModel.from_row(self.row)
 
 
 @dataclass(frozen=True, eq=False)

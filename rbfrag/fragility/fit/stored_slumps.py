@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import FitError, InputError
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.shaken_mechanism import shaken_mechanism
+from rbfrag.solver.mechanism import shaken_mechanism
 
 
 def slump_yields(blocks: Sequence[str]) -> NDArray[np.float64]:
