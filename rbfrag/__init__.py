@@ -10,12 +10,9 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from rbfrag.version import __version__
-
 if TYPE_CHECKING:
     from rbfrag.campaign.add_motions import add_motions as add_motions
     from rbfrag.campaign.simulate import simulate as simulate
-    from rbfrag.campaign.simulate_kind import simulate_kind as simulate_kind
     from rbfrag.errors import DatabaseError as DatabaseError
     from rbfrag.errors import FitError as FitError
     from rbfrag.errors import InputError as InputError
@@ -46,8 +43,10 @@ if TYPE_CHECKING:
     from rbfrag.solver.stability.arrays import stability_arrays as stability_arrays
     from rbfrag.solver.stability.single import Stability as Stability
     from rbfrag.solver.stability.single import stability as stability
+    from rbfrag.version import __version__ as __version__
 
 _HOME = {
+    "__version__": "rbfrag.version",
     "Block": "rbfrag.solver.block.geometry",
     "BlockArray": "rbfrag.solver.block.arrays",
     "CriticalResult": "rbfrag.solver.results",
@@ -76,14 +75,13 @@ _HOME = {
     "read_table": "rbfrag.exchange.database_tables",
     "respond": "rbfrag.solver.respond",
     "simulate": "rbfrag.campaign.simulate",
-    "simulate_kind": "rbfrag.campaign.simulate_kind",
     "sliding_displacements": "rbfrag.solver.models.sliding",
     "stability": "rbfrag.solver.stability.single",
     "stability_arrays": "rbfrag.solver.stability.arrays",
     "toppling_spectrum": "rbfrag.motions.toppling_spectrum",
 }
 
-__all__ = [*sorted(_HOME), "__version__"]
+__all__ = [*sorted(_HOME)]
 
 
 def __getattr__(name: str) -> object:

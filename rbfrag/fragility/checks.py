@@ -11,9 +11,9 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST
 from rbfrag.fragility.methods import Eta, Numbers
 from rbfrag.fragility.model import LEAST, FragilityModel
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 _SIZE = "p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m"
 _STRENGTH = (
@@ -49,80 +49,7 @@ _WORDS = {
 }
 """Unit of each value, and what is to be given."""
 
-# Beyond these no rock block and no earthquake exists, and arithmetic might overflow.
-_LOWEST, _HIGHEST = 1e-9, 1e9
 _ABOVE_ZERO = {"p2": "block", "ps2": "block", "displacement_m": "block", "tm_s": "earthquake"}
-
-_STEEP = "steeper than 78°: it is the tangent of an angle, not degrees"
-_SUSPECTS = {
-    "pgv_m_s": (0.0, 5.0, "larger than ever recorded (it is in m/s): did you mean cm/s?"),
-    "pga_g": (0.0, 5.0, "larger than ever recorded (it is in g): did you mean cm/s² or m/s²?"),
-    "pgd_m": (0.0, 20.0, "larger than ever recorded (it is in m): did you mean cm?"),
-    "pgv_over_pga_s": (
-        0.005,
-        2.0,
-        "not that of an earthquake (PGV in m/s over 9.81 times PGA in g lies between 0.005 and 2 "
-        "s): is PGV in m/s and PGA in g?",
-    ),
-    "tm_s": (0.02, 10.0, "not the mean period of an earthquake (it is in s): is it a frequency?"),
-    "kr": (
-        0.0,
-        5.0,
-        "steeper than 78°: it is the tangent of the critical angle, not degrees",
-    ),
-    "ky": (0.0, 5.0, _STEEP),
-    "ks": (0.0, 5.0, _STEEP),
-}
-"""Least and greatest credible value, and what is said of others."""
-
-
-class Range(NamedTuple):
-    """Where a value needs no words."""
-
-    name: str
-    low: float
-    high: float
-
-
-def clear_ranges(model: FragilityModel, values: Collection[str]) -> tuple[Range, ...]:
-    """Return the ranges within which nothing is to be said of a question.
-
-    Args:
-        model: the model that answers.
-        values: names of the completed values.
-    """
-    key = tuple(values)
-    found: tuple[Range, ...] | None = model.ranges.get(key)
-    if found is None:
-        found = model.ranges[key] = tuple(_clear_ranges(model, key))
-    return found
-
-
-def _clear_ranges(model: FragilityModel, given: tuple[str, ...]) -> Iterator[Range]:
-    block = model.method.block
-    for name in given:
-        if name not in _WORDS or name in block.options:
-            continue
-        low, high = LEAST, _HIGHEST
-        if name in _ABOVE_ZERO:
-            low = _LOWEST
-        for least, most, *_ in (
-            model.row.domain.get(name, (low, high)),
-            _SUSPECTS.get(name, (low, high)),
-        ):
-            low, high = max(low, least), min(high, most)
-        yield Range(name, low, high)
-
-
-def with_ratios(model: FragilityModel, values: dict[str, Any]) -> dict[str, Any]:
-    """Add PGV/(PGA g) [s] and k/PGA where they are judged by; return the values."""
-    if "pga_g" in values:
-        pga = values["pga_g"]
-        if "pgv_m_s" in values:
-            values["pgv_over_pga_s"] = values["pgv_m_s"] / (pga * STANDARD_GRAVITY_M_S2)
-        if "k_over_pga" in model.row.domain:
-            values["k_over_pga"] = values[model.method.block.strength] / pga
-    return values
 
 
 @dataclass(frozen=True)
@@ -166,12 +93,12 @@ def refusals(
         yield Finding(value != value, name, value, f"is not a number: give {wanted}")
         if name in _ABOVE_ZERO:
             yield Finding(value <= 0.0, name, value, f"is not above zero: give {wanted}")
-            low = (value > 0.0) & (value < _LOWEST)
+            low = (value > 0.0) & (value < LOWEST)
             of = _ABOVE_ZERO[name]
             yield Finding(low, name, value, f"is too small for any {of}: give {wanted}")
         elif name not in signed:
             yield Finding(value < 0.0, name, value, f"is negative: give {wanted}")
-        large = (value > _HIGHEST) | (value == -math.inf)
+        large = (value > HIGHEST) | (value == -math.inf)
         yield Finding(large, name, value, f"is beyond any block or earthquake: give {wanted}")
 
 
@@ -250,7 +177,7 @@ def judged(
     for name in ("y_m_s", "intensity_m_s", "displacement_m", "pgv_m_s"):
         if name in values:
             values[name] = ns.maximum(values[name], LEAST)
-    with_ratios(model, values)
+    model.with_ratios(values)
     no_shaking = (given[term.inputs[0]] == 0.0) & _not(missing) & _not(at_rest)
     say(no_shaking, Finding(no_shaking, "", 0.0, NO_SHAKING))
     unanswered = missing | at_rest | no_shaking
@@ -315,7 +242,7 @@ def doubts(model: FragilityModel, values: Mapping[str, Any], ns: Numbers) -> Ite
             yield Finding(holds, name, values[name], text)
     for bound in model.method.block.doubts:
         yield Finding(bound.holds(values), bound.about, values.get(bound.about), bound.text)
-    for name, (low, high, text) in _SUSPECTS.items():
+    for name, (low, high, text) in CREDIBLE.items():
         if name in values:
             value = values[name]
             yield Finding((value < low) | (value > high), name, value, f"is {text}")

@@ -155,3 +155,29 @@ def intensity_term(name: str) -> Term:
 def terms_from(given: Collection[str]) -> tuple[str, ...]:
     """Return the names of the terms that the given measures suffice for, best first."""
     return tuple(name for name in BEST_FIRST if set(TERMS[name].inputs) <= set(given))
+
+
+LOWEST, HIGHEST = 1e-9, 1e9
+"""Beyond these no rock block and no earthquake exists, and arithmetic might overflow."""
+
+_STEEP = "steeper than 78°: it is the tangent of an angle, not degrees"
+CREDIBLE = {
+    "pgv_m_s": (0.0, 5.0, "larger than ever recorded (it is in m/s): did you mean cm/s?"),
+    "pga_g": (0.0, 5.0, "larger than ever recorded (it is in g): did you mean cm/s² or m/s²?"),
+    "pgd_m": (0.0, 20.0, "larger than ever recorded (it is in m): did you mean cm?"),
+    "pgv_over_pga_s": (
+        0.005,
+        2.0,
+        "not that of an earthquake (PGV in m/s over 9.81 times PGA in g lies between 0.005 and 2 "
+        "s): is PGV in m/s and PGA in g?",
+    ),
+    "tm_s": (0.02, 10.0, "not the mean period of an earthquake (it is in s): is it a frequency?"),
+    "kr": (
+        0.0,
+        5.0,
+        "steeper than 78°: it is the tangent of the critical angle, not degrees",
+    ),
+    "ky": (0.0, 5.0, _STEEP),
+    "ks": (0.0, 5.0, _STEEP),
+}
+"""Least and greatest credible value of a question, and what is said of others."""

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError, ModelError
-from rbfrag.fragility.measures import TERMS, Term
+from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, TERMS, Term
 from rbfrag.fragility.methods import Eta, Form, Method, Numbers, method_named, method_names
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 LEAST = 1e-290
 """Velocities, accelerations and strengths are taken for at least this, for logarithms."""
@@ -22,6 +23,14 @@ y/2x, the share of twice the velocity."""
 FLOOR_FROM, FLOOR_STEP = -10.0, 0.5
 """The first node of eta, and from one to the next."""
 FLOOR_SHARE_STEP = 0.025
+
+
+class Range(NamedTuple):
+    """Where a value needs no words."""
+
+    name: str
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -54,8 +63,10 @@ class FragilityModel:
     vertical: bool
     degrees_of_freedom: int
     notes: tuple[str, ...] = ()
-    ranges: dict[tuple[str, ...], Any] = field(default_factory=dict, compare=False, repr=False)
-    """What :mod:`rbfrag.fragility.checks` has found out about questions of some names."""
+    ranges: dict[tuple[str, ...], tuple[Range, ...]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
+    """What :meth:`clear_ranges` has found for some names."""
 
     @classmethod
     def from_row(cls, row: ModelRow, notes: tuple[str, ...] = ()) -> FragilityModel:
@@ -132,6 +143,35 @@ class FragilityModel:
     def has_exponent(self) -> bool:
         """Whether the exponent M was estimated: P then depends on p beside y."""
         return self.method.exponent in self.row.coefficients
+
+    def with_ratios(self, values: dict[str, Any]) -> dict[str, Any]:
+        """Add PGV/(PGA g) [s] and k/PGA where they are judged by; return the values."""
+        if "pga_g" in values:
+            pga = values["pga_g"]
+            if "pgv_m_s" in values:
+                values["pgv_over_pga_s"] = values["pgv_m_s"] / (pga * STANDARD_GRAVITY_M_S2)
+            if "k_over_pga" in self.row.domain:
+                values["k_over_pga"] = values[self.method.block.strength] / pga
+        return values
+
+    def clear_ranges(self, values: Collection[str]) -> tuple[Range, ...]:
+        """Return the ranges within which nothing is to be said of the values of some names."""
+        key = tuple(values)
+        found = self.ranges.get(key)
+        if found is None:
+            found = self.ranges[key] = tuple(
+                self._clear_range(name) for name in key if name not in self.method.block.options
+            )
+        return found
+
+    def _clear_range(self, name: str) -> Range:
+        low, high = LOWEST, HIGHEST
+        for least, most, *_ in (
+            self.row.domain.get(name, (low, high)),
+            CREDIBLE.get(name, (low, high)),
+        ):
+            low, high = max(low, least), min(high, most)
+        return Range(name, low, high)
 
     def half_width(self, level: float) -> float:
         """Return the quantile that the interval reaches to.

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError
-from rbfrag.fragility.checks import Finding, clear_ranges, judged, with_ratios
 from rbfrag.fragility.lookup import find_model, suited_models
 from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel
@@ -21,6 +20,7 @@ from rbfrag.fragility.model import FragilityModel
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from rbfrag.fragility.checks import Finding
     from rbfrag.fragility.prediction_array import PredictionArray
     from rbfrag.motions.ground_motion import GroundMotion
 
@@ -76,6 +76,30 @@ class Prediction:
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
         return {**vars(self), "warnings": list(self.warnings)}
+
+
+@dataclass(frozen=True)
+class MotionPrediction(Prediction):
+    """Probability that one block fails in a recorded motion of unknown direction.
+
+    Every number of :class:`Prediction` is the mean of the two polarities.
+
+    Args:
+        forward: the answer where positive samples drive forward rotation.
+        reverse: the answer where they drive backward.
+    """
+
+    forward: Prediction | None = None
+    reverse: Prediction | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract, and both polarities."""
+        result = super().as_dict()
+        both = {name: result.pop(name) for name in ("forward", "reverse")}
+        result["polarities"] = {
+            name: None if answer is None else answer.as_dict() for name, answer in both.items()
+        }
+        return result
 
 
 @overload
@@ -199,7 +223,7 @@ def predict(
 
     Returns:
         :class:`Prediction` when every argument is a single number (with `motion` and both
-        polarities :class:`~rbfrag.fragility.prediction_motion.MotionPrediction`), otherwise
+        polarities :class:`MotionPrediction`), otherwise
         :class:`~rbfrag.fragility.prediction_array.PredictionArray` of the broadcast shape. In
         arrays a block with a strength <= 0 fails at rest: P = 1 with the reason ``unstable``.
 
@@ -236,12 +260,9 @@ def predict(
     if pgd_m is not None:
         given["pgd_m"] = pgd_m
     if motion is not None:
-        # Kept apart: a motion needs numpy.
-        from rbfrag.fragility.prediction_motion import predict_motion
-
-        return predict_motion(
+        return _predict_motion(
             given, motion, kind=kind, rotation_deg=rotation_deg, polarity=polarity, model=model,
-            level=level, db=db, nan=nan,
+            level=level, db=db,
         )  # fmt: skip
     chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
     return answer_given(chosen, given, level, nan=nan, interval=interval)
@@ -312,7 +333,7 @@ def _predict_one(
     block = method.block
     warnings: tuple[str, ...] = model.notes
     try:
-        values = with_ratios(model, block.completed(given, model.term, SINGLE))
+        values = model.with_ratios(block.completed(given, model.term, SINGLE))
         clear = _is_clear(model, values)
     except (ArithmeticError, ValueError):  # the checks find the words
         clear = False
@@ -349,7 +370,7 @@ def _predict_one(
 
 def _is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
     """Return whether there is nothing to say about a question but its probability."""
-    for name, low, high in clear_ranges(model, values):
+    for name, low, high in model.clear_ranges(values):
         if not low <= values[name] <= high:
             return False
     block, method = model.method.block, model.method
@@ -369,6 +390,9 @@ def _is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
 def _with_words(
     model: FragilityModel, given: dict[str, float], half_width: float
 ) -> tuple[float, float, float, Any, dict[str, Any], float, bool, list[str]]:
+    # Kept apart: most questions need no words.
+    from rbfrag.fragility.checks import judged
+
     said: list[str] = []
 
     def say(holds: bool, finding: Finding) -> None:
@@ -392,6 +416,78 @@ def _with_words(
         found.intensity_m_s,
         found.in_domain,
         said,
+    )
+
+
+def _predict_motion(
+    given: Mapping[str, ArrayLike],
+    motion: GroundMotion,
+    *,
+    kind: str | None,
+    rotation_deg: float | None,
+    polarity: Polarity,
+    model: Model | None,
+    level: float,
+    db: str | PathLike[str] | None,
+) -> Prediction:
+    """Return the probability for one block; arguments as for :func:`predict`.
+
+    Raises:
+        InputError: measures beside the motion, several blocks, an unknown polarity.
+    """
+    # Kept apart: a motion needs numpy.
+    from rbfrag.fragility.prediction_motion import measures_of
+
+    extra = [name for name in given if name in MEASURES]
+    if extra:
+        raise InputError(
+            f"{' and '.join(extra)} given beside a motion: the motion has them; leave them out"
+        )
+    if polarity not in ("forward", "reverse", "both"):
+        raise InputError(f"polarity = {polarity!r}: use 'forward', 'reverse' or 'both'")
+    several = [name for name, value in given.items() if not is_single(value)]
+    if several:
+        raise InputError(
+            f"{' and '.join(several)} must be single numbers with a motion: call it once for each "
+            "block, or use rbfrag.toppling_spectrum and a model of the term xp"
+        )
+    block = {name: single(name, value) for name, value in given.items()}
+    answers: dict[str, Prediction] = {}
+    for direction in ("forward", "reverse") if polarity == "both" else (polarity,):
+        own = {**block, **measures_of(motion, block.get("p2"), direction)}
+        chosen = find_model(model, own, db, kind=kind, rotation_deg=rotation_deg)
+        answer = answer_given(chosen, own, level)
+        assert isinstance(answer, Prediction)
+        answers[direction] = answer
+    if polarity != "both":
+        return answers[polarity]
+    return _mean(answers["forward"], answers["reverse"])
+
+
+def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
+    def half(name: str) -> float:
+        return 0.5 * (float(getattr(forward, name)) + float(getattr(reverse, name)))
+
+    said = [f"forward: {text}" for text in forward.warnings]
+    said += [f"reverse: {text}" for text in reverse.warnings]
+    return MotionPrediction(
+        kind=forward.kind,
+        failure=forward.failure,
+        median_displacement_m=forward.median_displacement_m,
+        probability=half("probability"),
+        ci_low=half("ci_low"),
+        ci_high=half("ci_high"),
+        level=forward.level,
+        model=forward.model,
+        term=forward.term,
+        method=forward.method,
+        y_m_s=forward.y_m_s,
+        intensity_m_s=half("intensity_m_s"),
+        in_domain=forward.in_domain and reverse.in_domain,
+        warnings=tuple(said),
+        pgv_over_pga_s=forward.pgv_over_pga_s,
+        forward=forward,
+        reverse=reverse,
     )
 
 

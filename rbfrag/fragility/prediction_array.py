@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.checks import Finding, clear_ranges, judged, with_ratios
+from rbfrag.fragility.checks import Finding, judged
 from rbfrag.fragility.methods import Numbers, arrays
 from rbfrag.fragility.model import FragilityModel
 
@@ -178,9 +178,9 @@ def _answer_part(
 ) -> NDArray[np.intp]:
     """Fill the answers of a part; return where there is something to say, which is not answered."""
     method, block = model.method, model.method.block
-    values = with_ratios(model, block.completed(given, model.term, ns))
+    values = model.with_ratios(block.completed(given, model.term, ns))
     clear = np.ones(part.stop - part.start, dtype=np.bool_)
-    for name, least, most in clear_ranges(model, values):
+    for name, least, most in model.clear_ranges(values):
         clear &= values[name] >= least
         clear &= values[name] <= most
     bounds = [*model.form.bounds, *block.refuses, *block.doubts]

@@ -28,6 +28,7 @@ from rbfrag.motions.formats import (
 )
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.file import cut_number, decoded, read_text
+from rbfrag.motions.text.record_file import RecordFile
 from rbfrag.motions.units import acceleration_unit
 
 READERS: tuple[ModuleType, ...] = (
@@ -48,7 +49,7 @@ READERS: tuple[ModuleType, ...] = (
     ucgmsim_text,
     delimited_text,
 )
-"""One module a format, asked in this order; plain text, which has no mark of its own, last."""
+"""One module a format, asked in this order; text without a mark of its own last."""
 
 HEAD_CHARACTERS = 4096
 
@@ -94,7 +95,7 @@ def motions_in(
 
     Raises:
         MotionFileError: as for :func:`read_motions`.
-        InputError: likewise.
+        InputError: an unknown unit, or a dt that is not positive.
     """
     _check_stated(units, dt_s)
     # readers look for an index beside a file, and beside this one there is nothing
@@ -147,7 +148,7 @@ def _read(
     reader = _reader(file, text)
     try:
         motions: list[GroundMotion] = reader.read(
-            file, text, units=units, dt_s=dt_s, allow_partial=allow_partial
+            RecordFile(file, text, reader.FORMAT, units, dt_s, allow_partial)
         )
     except MotionFileError:
         raise

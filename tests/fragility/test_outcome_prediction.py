@@ -16,8 +16,7 @@ from rbfrag.fragility.fit import outcomes as outcome_method
 from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FLOOR_FROM, FLOOR_NODES, FLOOR_STEP, FragilityModel
-from rbfrag.fragility.predict import answer_given, predict
-from rbfrag.fragility.prediction_motion import MotionPrediction
+from rbfrag.fragility.predict import MotionPrediction, answer_given, predict
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes

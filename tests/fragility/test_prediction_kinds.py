@@ -16,9 +16,8 @@ from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError, ModelError, UnknownModelError
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import Prediction, predict
+from rbfrag.fragility.predict import MotionPrediction, Prediction, predict
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.fragility.prediction_motion import MotionPrediction
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from tests.fragility.test_outcome_prediction import shaking
 

@@ -9,8 +9,8 @@ import typer
 from rbfrag.cli.output import print_json, print_table, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion
-from rbfrag.cli.parameters.number_list import number_list
-from rbfrag.cli.parameters.polarity import polarities as polarities_of
+from rbfrag.cli.parameters.values import number_list
+from rbfrag.cli.parameters.values import polarities as polarities_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,15 +27,12 @@ def spectrum(
     ] = "30,10,3,1,0.3,0.1",
     polarity: options.Polarity = "forward",
     csv: Annotated[
-        str | None,
-        typer.Option("--csv", help="Write the values (.csv or .parquet).", show_default=False),
+        str | None, typer.Option("--csv", help="Write the values (.csv or .parquet).")
     ] = None,
     plot: Annotated[
         str | None,
         typer.Option(
-            "--plot",
-            help="Draw the spectra over p², with PGV beside them (.png, .pdf, .svg).",
-            show_default=False,
+            "--plot", help="Draw the spectra over p², with PGV beside them (.png, .pdf, .svg)."
         ),
     ] = None,
     units: options.Units = None,
@@ -49,7 +46,7 @@ def spectrum(
     motion in one polarity is an object, several are a list of such objects.
     """
     from rbfrag.exchange.block_table import table_path, write_block_table
-    from rbfrag.motions.spectrum_report import as_dict
+    from rbfrag.motions.toppling_spectrum import spectrum_as_dict as as_dict
 
     sizes, polarities = number_list(p2, "--p2"), polarities_of(polarity)
     if csv is not None:

@@ -91,7 +91,7 @@ def find_vertical(
     """
     if text is None:
         return None, []
-    from rbfrag.motions.companions import companion
+    from rbfrag.motions.direction import companion
 
     found = find_motion(text, db=db, units=units, dt_s=dt_s)
     warnings = []

@@ -118,8 +118,7 @@ def slumping_data(
     Raises:
         FitError: the data cannot carry a fit.
     """
-    from rbfrag.db.queries import combination_table
-    from rbfrag.db.stored_blocks import stored_blocks
+    from rbfrag.db.queries import combination_table, stored_blocks
     from rbfrag.fragility.fit.stored_slumps import slump_yields
 
     table = combination_table(

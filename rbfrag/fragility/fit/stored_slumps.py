@@ -18,7 +18,7 @@ def slump_yields(blocks: Sequence[str]) -> NDArray[np.float64]:
     """Return k_s of blocks as they are stored, shape (n,).
 
     Args:
-        blocks: JSON text of each, from :func:`rbfrag.db.stored_blocks.stored_blocks`.
+        blocks: JSON text of each, from :func:`rbfrag.db.queries.stored_blocks`.
 
     Raises:
         FitError: a text that describes no block that slumps.

@@ -1,4 +1,4 @@
-"""The --polarity option of commands that answer for one polarity or for both."""
+"""Values of options that several commands read: lists of numbers, polarities."""
 
 from __future__ import annotations
 
@@ -10,6 +10,27 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rbfrag.motions.polarity import Polarity
+
+
+def number_list(text: str, option: str) -> list[float]:
+    """Return the numbers of a list separated by commas.
+
+    Args:
+        text: what was given.
+        option: the option it was given to, for the message.
+
+    Raises:
+        InputError: a part is no number.
+    """
+    values = []
+    for part in text.split(","):
+        try:
+            values.append(float(part))
+        except ValueError:
+            raise InputError(
+                f"{option}: {part.strip()!r} is no number: write a list such as 30,10,3,1"
+            ) from None
+    return values
 
 
 def polarities(text: str) -> Sequence[Polarity]:
