@@ -48,10 +48,6 @@ def plot_rockmass(made: Realisations, path: str | PathLike[str], *, title: str =
         made: the realisations.
         path: file to write: .png, .pdf or .svg.
         title: title of the figure; a count of the blocks if empty.
-
-    Raises:
-        InputError: a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     counts = mode_counts(made)

@@ -21,14 +21,6 @@ def exact_interval(count: int, of: int, level: float) -> tuple[float, float]:
     It covers the true share with at least the stated probability, whatever the share is, because
     it is made of the tails of the binomial distribution itself.
 
-    Args:
-        count: how many of the sample.
-        of: size of the sample, above 0.
-        level: confidence level, between 0 and 1.
-
-    Raises:
-        InputError: the level is not between 0 and 1.
-
     References:
         Clopper and Pearson (1934), Biometrika 26(4), 404-413.
     """
@@ -129,9 +121,6 @@ def failures(shaken: ShakenMass, level: float = 0.95) -> tuple[ScaleFailures, ..
     Args:
         shaken: the outcomes of the blocks.
         level: confidence level of the intervals of the shares.
-
-    Raises:
-        InputError: the level is not between 0 and 1.
     """
     made = shaken.made
     found = []
@@ -189,13 +178,7 @@ def _quantiles(values: NDArray[np.float64]) -> dict[str, float]:
 def failures_as_dict(
     shaken: ShakenMass, found: Sequence[ScaleFailures], level: float
 ) -> dict[str, Any]:
-    """Return the answer under the keys of the JSON contract.
-
-    Args:
-        shaken: the outcomes of the blocks.
-        found: their counts.
-        level: confidence level of the intervals.
-    """
+    """Return the answer under the keys of the JSON contract."""
     shaking = shaken.shaking
     return {
         "motion": shaking.motion.label,
@@ -219,11 +202,7 @@ def failures_as_dict(
 
 
 def failure_warnings(shaken: ShakenMass) -> list[str]:
-    """Return sentences about the motion, and about blocks with how many they are about.
-
-    Args:
-        shaken: the outcomes of the blocks.
-    """
+    """Return sentences about the motion, and about blocks with how many they are about."""
     made = shaken.made
     by_mode = {
         mode: int((made.is_block & (made.stability.mode_code == code)).sum())
@@ -256,11 +235,7 @@ def _as_dict(share: Share) -> dict[str, float]:
 
 
 def outcome_columns(shaken: ShakenMass) -> dict[str, NDArray[Any]]:
-    """Return the columns of the block table, one row a realisation and scale.
-
-    Args:
-        shaken: the outcomes of the blocks.
-    """
+    """Return the columns of the block table, one row a realisation and scale."""
     columns = block_columns(shaken.made)
     reason = columns.pop("reason")
     scales = np.array(shaken.shaking.scales)

@@ -101,11 +101,7 @@ def read_query(query: bytes, known: Mapping[str, Parameter]) -> dict[str, Any]:
 
 
 def _pairs(query: str) -> list[tuple[str, str]]:
-    """Return names and values.
-
-    Raises:
-        ValueError: not UTF-8, or too many.
-    """
+    """Return names and values."""
     if query.count("&") >= MOST_PARAMETERS:
         raise ValueError
     if "%" in query or "+" in query:
@@ -236,15 +232,15 @@ def measures_in(values: Mapping[str, Any]) -> dict[str, Any]:
     return {keyword: values[name] for name, keyword in KEYWORD.items() if name in values}
 
 
-class _PlainRoute(APIRoute):
+class _OwnRoute(APIRoute):
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """Return the endpoint itself: there are no dependencies that would have to be solved."""
         return self.endpoint
 
 
-def plain_router() -> APIRouter:
+def own_router() -> APIRouter:
     """Return a router for functions from a request to a response."""
-    return APIRouter(route_class=_PlainRoute)
+    return APIRouter(route_class=_OwnRoute)
 
 
 PROBLEMS = {

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rbfrag.db.rows import CombinationTable, ModelRow
+from rbfrag.db.model_file import ModelRow
+from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.model import FragilityModel
 
 N = 400
@@ -37,6 +38,7 @@ def critical_values(n: int = N) -> CombinationTable:
         pgd_m=0.1 * pgv,
         tm_s=tm,
         natural_key=np.arange(n).astype(str).astype(object),
+        block=np.full(n, None, dtype=object),
     )
 
 

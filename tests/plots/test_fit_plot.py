@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from rbfrag.db.rows import CombinationTable, ModelRow
+from rbfrag.db.model_file import ModelRow
+from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.plots import fit as fit_module
@@ -37,6 +38,7 @@ def table():
         pgd_m=0.1 * pgv,
         tm_s=np.full(N, 0.5),
         natural_key=np.arange(N).astype(str).astype(object),
+        block=np.full(N, None, dtype=object),
     )
 
 

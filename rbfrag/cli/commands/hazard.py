@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rbfrag.cli.output import print_json, print_pairs, print_table, print_warnings
+from rbfrag.cli.output import check_files, print_json, print_pairs, print_table, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import toppling_blocks
 from rbfrag.errors import InputError
@@ -90,18 +90,13 @@ def hazard(
     The fragility is integrated over the hazard curve. A PGA curve needs --tm, a spectral
     acceleration --convert.
     """
-    from rbfrag.exchange.block_table import table_path, write_block_table
+    from rbfrag.exchange.block_table import write_block_table
     from rbfrag.exchange.hazard_curves import read_hazard_curves, suited_curves
     from rbfrag.hazards.answer import hazard as answer
     from rbfrag.hazards.conversions import velocity_conversion
     from rbfrag.hazards.report import as_dict
 
-    if out is not None:
-        table_path(out)
-    if plot is not None:
-        from rbfrag.plots.canvas import plot_path
-
-        plot_path(plot)
+    check_files(table=out, plot=plot)
     table, is_class, remarks = toppling_blocks(p2, kr, block, blocks, rockmass)
     names = list(table["block_id"])
     curves = suited_curves(

@@ -9,6 +9,7 @@ import typer
 from rbfrag.cli.output import (
     ProgressLine,
     cell,
+    check_files,
     print_json,
     print_pairs,
     print_table,
@@ -204,7 +205,7 @@ def rockmass(
     mode. With a measure of the motion (--pgv ...), the probability of failure is averaged over
     the blocks of each mode for which there is a fragility model.
     """
-    from rbfrag.exchange.block_table import table_path, write_block_table
+    from rbfrag.exchange.block_table import write_block_table
     from rbfrag.rockmasses.counts import crossings, mode_counts
     from rbfrag.rockmasses.failures import (
         checked_level,
@@ -216,12 +217,7 @@ def rockmass(
     from rbfrag.rockmasses.report import as_dict, block_columns
     from rbfrag.rockmasses.scenario import scenario
 
-    if out is not None:
-        table_path(out)
-    if plot is not None:
-        from rbfrag.plots.canvas import plot_path
-
-        plot_path(plot)
+    check_files(table=out, plot=plot)
     measures = {"pgv_m_s": pgv, "pga_g": pga, "tm_s": tm, "pgd_m": pgd}
     shaken = any(value is not None for value in measures.values())
     _refuse_options_without_their_cause(

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rbfrag.cli.output import print_json, print_pairs, print_warnings
+from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import toppling_blocks
 from rbfrag.errors import InputError
@@ -82,10 +82,7 @@ def shakemap(
     from rbfrag.hazards.site_probability import site_probability
 
     target = output_path(out, SUFFIXES, "map")
-    if plot is not None:
-        from rbfrag.plots.canvas import plot_path
-
-        plot_path(plot)
+    check_files(plot=plot)
     meaning = component_named(component)
     found_blocks, _, remarks = toppling_blocks(p2, kr, block, blocks, rockmass, n=n)
     shaken = read_shakemap(grid, uncertainty=uncertainty, allow_partial=allow_partial)

@@ -18,9 +18,6 @@ def number_list(text: str, option: str) -> list[float]:
     Args:
         text: what was given.
         option: the option it was given to, for the message.
-
-    Raises:
-        InputError: a part is no number.
     """
     values = []
     for part in text.split(","):
@@ -34,11 +31,7 @@ def number_list(text: str, option: str) -> list[float]:
 
 
 def polarities(text: str) -> Sequence[Polarity]:
-    """Return the polarities that forward, reverse or both means.
-
-    Raises:
-        InputError: it is none of the three.
-    """
+    """Return the polarities that forward, reverse or both means."""
     from rbfrag.motions.polarity import POLARITIES
 
     if text == "both":

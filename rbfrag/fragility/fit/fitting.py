@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rbfrag.db.rows import CombinationTable, ModelRow
+from rbfrag.db.model_file import ModelRow
+from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility import formulas
 from rbfrag.fragility.fit.data import FitData, fit_data

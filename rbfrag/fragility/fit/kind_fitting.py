@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr
 
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.kind_data import KindData, sliding_data, slumping_data
 from rbfrag.fragility.fit.scores import brier, calibration, log_loss

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import FitError, InputError, ModelError
 from rbfrag.fragility.fit.data import fit_data
 from rbfrag.fragility.fit.kind_data import sliding_data, slumping_data

@@ -18,7 +18,7 @@ from rbfrag.service.operation import (
     by_name,
     measures_in,
     operation,
-    plain_router,
+    own_router,
     read_query,
 )
 from rbfrag.service.problem import RequestRefusedError
@@ -83,14 +83,8 @@ _FORMS: dict[str, Literal["toml", "json", "csv"]] = {
 
 
 def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
-    """Return the operation on `/v1/rockmass`.
-
-    Args:
-        settings: database and limits.
-        bodies: reads what is sent.
-        pool: where the work is done.
-    """
-    routes = plain_router()
+    """Return the operation on `/v1/rockmass`."""
+    routes = own_router()
 
     @routes.post(
         "/v1/rockmass",
