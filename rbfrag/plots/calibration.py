@@ -37,7 +37,6 @@ def plot_calibration(
 
     Raises:
         InputError: no model or too many, or a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     if not 1 <= len(models) <= MOST_MODELS:

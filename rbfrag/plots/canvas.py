@@ -1,4 +1,8 @@
-"""The sheet of a figure and its file, numbers beside axes, labels, shaded clouds, modes."""
+"""The sheet of a figure and its file, numbers beside axes, labels, shaded clouds, modes.
+
+Every figure refuses a path that cannot be written before it draws (InputError), and says which
+extra brings matplotlib where it is missing (MissingExtraError).
+"""
 
 from __future__ import annotations
 

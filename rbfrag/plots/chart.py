@@ -50,7 +50,6 @@ def plot_chart(
 
     Raises:
         InputError: a model of another term, or a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     held = held_measures(model) if held is None else held

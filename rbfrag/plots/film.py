@@ -62,7 +62,6 @@ def film(
     Raises:
         InputError: no history, a factor that is not positive, an unknown suffix, a folder that
             cannot be written, an .mp4 without ffmpeg.
-        MissingExtraError: matplotlib is not installed.
     """
     target = film_path(path)
     if not (math.isfinite(exaggerate) and exaggerate > 0.0):

@@ -59,7 +59,6 @@ def plot_islands(
 
     Raises:
         InputError: a search without a map, an unknown suffix, a folder that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     if not result.intervals.outcome:
         why = f"no map of outcomes (status {result.status})"

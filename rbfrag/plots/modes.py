@@ -72,7 +72,6 @@ def plot_modes(
 
     Raises:
         InputError: an angle outside its range, or a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     nodes = np.arange(-90.0 + 0.5 * _STEP_DEG, 90.0, _STEP_DEG)

@@ -55,7 +55,6 @@ def plot_response(
 
     Raises:
         InputError: no history, an unknown suffix, a folder that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     history = response.history
     if history is None:
@@ -163,7 +162,6 @@ def plot_motion(
 
     Raises:
         InputError: no history, an unknown suffix, a folder that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     history = response.history
     if history is None or history.displacement_m is None or history.strength_g is None:

@@ -155,7 +155,6 @@ def plot_failures(
 
     Raises:
         InputError: a path that cannot be written, a level not between 0 and 1.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     found = failures(shaken, level)

@@ -48,7 +48,6 @@ def plot_shakemap(
 
     Raises:
         InputError: nothing to draw, or a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     if not np.isfinite(probability).any():

@@ -57,7 +57,6 @@ def plot_spectrum(
 
     Raises:
         InputError: no motion or too many, nothing to draw, a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     if not 1 <= len(motions) <= MOST_MOTIONS:
