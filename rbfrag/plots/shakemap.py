@@ -45,9 +45,6 @@ def plot_shakemap(
         title: what is drawn.
         epicentre: longitude and latitude of the epicentre [deg].
         shape: rows and columns if the places are the nodes of a whole grid; points otherwise.
-
-    Raises:
-        InputError: nothing to draw, or a path that cannot be written.
     """
     plot_path(path)
     if not np.isfinite(probability).any():
