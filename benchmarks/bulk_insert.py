@@ -110,8 +110,10 @@ def read(finished: Path) -> tuple[dict[int, list[CombinationRecord]], dict[int, 
                     natural_key=key,
                     motion_id=stored.motion_id,
                     vertical_motion_id=stored.vertical_motion_id,
-                    result=result,
+                    **{name: values[name] for name in ("polarity", "kind", "p2")},
                     settings=stored.settings,
+                    result=result,
+                    block=stored.block,
                     numerics_version=values["numerics_version"],
                 )
             )
@@ -151,6 +153,8 @@ def by_sqlite3(place: Path, rows: dict[int, Rows], motions: list[int] | None) ->
         raw.execute("BEGIN IMMEDIATE")
         for table in TABLES:
             some = [row for motion in group for row in rows[motion][table]]
+            if not some:
+                continue
             marks = ", ".join("?" for _ in some[0])
             raw.executemany(f"INSERT INTO {table} VALUES ({marks})", some)
         raw.execute("COMMIT")
