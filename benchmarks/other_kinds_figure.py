@@ -10,13 +10,13 @@ import numpy as np
 
 from rbfrag.fragility.fit.kind_data import KindData
 from rbfrag.fragility.fit.kind_fitting import ARRAYS
-from rbfrag.fragility.kind_model import KindModel
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.plots.canvas import new_figure, plain_numbers, plot_path, save_figure
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure, written_numbers
 
 
 def plot_other_kinds(
-    sliding: KindModel, slides: KindData, slumping: KindModel, slumps: KindData,
+    sliding: FragilityModel, slides: KindData, slumping: FragilityModel, slumps: KindData,
     path: str | PathLike[str],
 ) -> Path:  # fmt: skip
     """Draw displacements over PGV²/(k_y g) against k_y/PGA, and critical (1 - r)/r against z.
@@ -43,7 +43,7 @@ def plot_other_kinds(
     return save_figure(figure, path)
 
 
-def _slides(axes: Any, model: KindModel, data: KindData) -> None:
+def _slides(axes: Any, model: FragilityModel, data: KindData) -> None:
     v, found = data.values, data.found
     r = v["ky"] / v["pga_g"]
     size = v["pgv_m_s"] ** 2 / (v["ky"] * STANDARD_GRAVITY_M_S2)
@@ -75,7 +75,7 @@ def _slides(axes: Any, model: KindModel, data: KindData) -> None:
     axes.legend(loc="lower left", fontsize=8, frameon=False)
 
 
-def _slumps(axes: Any, model: KindModel, data: KindData) -> None:
+def _slumps(axes: Any, model: FragilityModel, data: KindData) -> None:
     v = data.values
     r = v["ks"] / v["pga_g"]
     z = np.sqrt(v["ps2"]) * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2)
@@ -96,8 +96,8 @@ def _slumps(axes: Any, model: KindModel, data: KindData) -> None:
         )  # fmt: skip
     axes.set_xscale("log")
     axes.set_yscale("log")
-    plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
-    plain_numbers(axes.yaxis, 1.0)
+    written_numbers(axes.xaxis, 1.0, 2.0, 5.0)
+    written_numbers(axes.yaxis, 1.0)
     axes.set_xlabel(r"$z = p_s\,\mathrm{PGV}/(\mathrm{PGA}\,g)$")
     axes.set_ylabel(r"$(1-r)/r$ at failure, $r=k_s/\mathrm{PGA}$")
     axes.set_title("slumping past recovery", fontsize=10)

@@ -24,7 +24,7 @@ from rbfrag.fragility.fit.data import fit_data
 from rbfrag.fragility.fit.variance import Bins
 from rbfrag.fragility.fit.wls import clustered_line, iterate
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.quantiles import student_half_width
+from rbfrag.fragility.model import student_half_width
 from tests.fragility.conftest import critical_values
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
 

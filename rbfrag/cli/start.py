@@ -1,24 +1,114 @@
-"""The console script: a plain question to `predict` is answered without the command-line library.
+"""The console script: a question to `predict` of numbers is answered without typer.
 
-Loading typer, and pydantic for each kind of option, takes several times as long as the answer.
+A question of numbers and names alone is answered here: loading typer, and pydantic for each kind
+of option, takes several times as long as the answer. All else (--help, a typing error, a file, a
+table) is left to the full command, which also says what is wrong; a test proves that both give
+the same output.
 """
 
 from __future__ import annotations
 
+import os
+import re
 import sys
+from collections.abc import Sequence
+from typing import Any
+
+from rbfrag.cli.output import show_prediction
+from rbfrag.errors import RbfragError
+
+BLOCKS = ({"p2", "kr"}, {"ky", "displacement_m"}, {"ks", "ps2"})
+"""What whole blocks are given by."""
+
+NUMBERS = {
+    "--p2": "p2",
+    "--kr": "kr",
+    "--ky": "ky",
+    "--beta": "beta_deg",
+    "--displacement": "displacement_m",
+    "--ks": "ks",
+    "--ps2": "ps2",
+    "--rotation": "rotation_deg",
+    "--pgv": "pgv_m_s",
+    "--pga": "pga_g",
+    "--tm": "tm_s",
+    "--pgd": "pgd_m",
+    "--level": "level",
+}
+"""Options with a number, with the names that `rbfrag.predict` has for them."""
+
+NAMES = {"--kind": "kind", "--model": "model", "--db": "db"}
+"""Options with a text."""
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def run() -> None:
     """Entry point of the console script."""
     if sys.argv[1:2] == ["predict"]:
-        from rbfrag.cli.quick_predict import quick_predict
-
         status = quick_predict(sys.argv[2:])
         if status is not None:
             raise SystemExit(status)
     from rbfrag.cli.main import run as full
 
     full()
+
+
+def quick_predict(arguments: Sequence[str]) -> int | None:
+    """Answer, print, and return the exit status; None leaves it to the full command.
+
+    Args:
+        arguments: what follows the word `predict`.
+    """
+    options = numbers_and_names(arguments)
+    if options is None:
+        return None
+    given, names, json = options
+    stated: dict[str, Any] = {**names}
+    for name in ("level", "rotation_deg"):
+        if name in given:
+            stated[name] = given.pop(name)
+    try:
+        from rbfrag.fragility.predict import prediction_document
+
+        show_prediction(prediction_document(given, **stated), json=json)
+        sys.stdout.flush()
+    except RbfragError as error:
+        print(f"rbfrag: {error}", file=sys.stderr)
+        return error.exit_status
+    except BrokenPipeError:
+        # the reader has gone; nothing more can be written, not even by Python's own last flush
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def numbers_and_names(
+    arguments: Sequence[str],
+) -> tuple[dict[str, float], dict[str, str], bool] | None:
+    """Return numbers and texts by name and whether JSON is wanted, or None if there is more."""
+    numbers: dict[str, float] = {}
+    names: dict[str, str] = {}
+    json = False
+    rest = iter(arguments)
+    for word in rest:
+        if word == "--json":
+            json = True
+            continue
+        option, equals, value = word.partition("=")
+        if not equals:
+            value = next(rest, "")
+        if option in NUMBERS and _NUMBER.fullmatch(value):
+            numbers[NUMBERS[option]] = float(value)
+        elif option in NAMES and value and not value.startswith("-"):
+            names[NAMES[option]] = value
+        else:
+            return None
+    if not any(block <= set(numbers) for block in BLOCKS):
+        return None
+    return numbers, names, json
 
 
 if __name__ == "__main__":

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Model, predict
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.annual_rate import failure_rate, normal_steps, probability_in
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.conversions import velocity_conversion
@@ -43,7 +43,7 @@ class HazardAnswer:
         model: name of the model that answered.
         term: its intensity term.
         method: how it was fitted.
-        edges: levels of the curve's measure between which contributions are told, (k + 1,).
+        edges: levels of the curve's measure between which contributions are given, (k + 1,).
         contribution: part of each rate from each interval [1/a], shape (m, k).
         above: part from beyond the last level, at least [1/a], shape (m,).
         above_at_most: the same at most.

@@ -62,7 +62,6 @@ def film(
     Raises:
         InputError: no history, a factor that is not positive, an unknown suffix, a folder that
             cannot be written, an .mp4 without ffmpeg.
-        MissingExtraError: matplotlib is not installed.
     """
     target = film_path(path)
     if not (math.isfinite(exaggerate) and exaggerate > 0.0):
@@ -112,11 +111,7 @@ def film(
 
 
 def film_path(path: str | os.PathLike[str]) -> Path:
-    """Return the path if a film can be made there; ask before long work.
-
-    Raises:
-        InputError: an unknown suffix, a folder that cannot be written, an .mp4 without ffmpeg.
-    """
+    """Return the path if a film can be made there; ask before long work."""
     target = output_path(path, SUFFIXES, "film")
     if target.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise InputError(
@@ -223,13 +218,13 @@ def _draw_scene(
 
 def _draw_trace(axes: Axes, history: ResponseHistory, time_s: FloatArray) -> Any:
     """Draw the ground below the scene; return the line that marks the present."""
-    drive = history.k_h / (1.0 + history.k_v)
-    axes.plot(history.time_s, drive, color=GROUND, lw=0.7, label="ground: $k_h/(1+k_v)$")
+    driving = history.k_h / (1.0 + history.k_v)
+    axes.plot(history.time_s, driving, color=GROUND, lw=0.7, label="ground: $k_h/(1+k_v)$")
     if history.strength_g is not None:
         axes.plot(history.time_s, history.strength_g, color=STRENGTH, lw=1.1, label="strength")
     axes.legend(loc="upper right", fontsize=7, ncols=2)
     axes.set_xlim(time_s[0], time_s[-1])
-    top = 1.1 * float(np.abs(drive).max())
+    top = 1.1 * float(np.abs(driving).max())
     axes.set_ylim(-top, 1.35 * top)
     axes.set_xlabel("time [s]")
     axes.set_ylabel("[g]")

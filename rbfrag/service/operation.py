@@ -71,10 +71,6 @@ def by_name(parameters: Sequence[Parameter]) -> dict[str, Parameter]:
 def read_query(query: bytes, known: Mapping[str, Parameter]) -> dict[str, Any]:
     """Return the values of a query by name.
 
-    Args:
-        query: what follows the question mark of a URL.
-        known: parameters by name.
-
     Raises:
         InputError: a parameter that is not known, given twice or missing, or whose value is not
             of its kind.
@@ -157,6 +153,50 @@ KR = Parameter(
     {"exclusiveMinimum": 0},
     required=True,
 )
+OTHER_BLOCKS = (
+    Parameter(
+        "kind",
+        "string",
+        "How the block fails. Default: what it is given by.",
+        None,
+        {"minLength": 1},
+    ),
+    Parameter(
+        "ky",
+        "number",
+        "Sliding: yield acceleration coefficient tan(phi - beta).",
+        None,
+        {"exclusiveMinimum": 0},
+    ),
+    Parameter(
+        "displacement",
+        "number",
+        "Sliding: the displacement that is too far [m].",
+        None,
+        {"exclusiveMinimum": 0},
+    ),
+    Parameter("beta", "number", "Sliding: dip of the base, out of the slope positive [deg].", None),
+    Parameter(
+        "ks",
+        "number",
+        "Slumping: yield acceleration coefficient k_s.",
+        None,
+        {"exclusiveMinimum": 0},
+    ),
+    Parameter(
+        "ps2",
+        "number",
+        "Slumping: frequency parameter p_s² at rest [1/s²].",
+        None,
+        {"exclusiveMinimum": 0},
+    ),
+    Parameter(
+        "rotation",
+        "number",
+        "Slumping: rotation that counts as failure [deg]. Default: failure past recovery.",
+        None,
+    ),
+)
 MEASURES = (
     Parameter("pgv", "number", "Peak ground velocity [m/s].", 0.6, {"minimum": 0}),
     Parameter("pga", "number", "Peak ground acceleration [g].", None, {"minimum": 0}),
@@ -188,15 +228,15 @@ def measures_in(values: Mapping[str, Any]) -> dict[str, Any]:
     return {keyword: values[name] for name, keyword in KEYWORD.items() if name in values}
 
 
-class _PlainRoute(APIRoute):
+class _OwnRoute(APIRoute):
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """Return the endpoint itself: there are no dependencies that would have to be solved."""
         return self.endpoint
 
 
-def plain_router() -> APIRouter:
+def own_router() -> APIRouter:
     """Return a router for functions from a request to a response."""
-    return APIRouter(route_class=_PlainRoute)
+    return APIRouter(route_class=_OwnRoute)
 
 
 PROBLEMS = {
@@ -219,16 +259,7 @@ def operation(
     description: str = "",
     problems: tuple[int, ...] = (400, 401, 408, 413, 415, 422, 503),
 ) -> dict[str, Any]:
-    """Return the keywords of a FastAPI operation that reads its request itself.
-
-    Args:
-        summary: what it answers, in a few words.
-        answer: the model of the answer, for the document only.
-        parameters: parameters of its query.
-        body: content of its body by media type, as OpenAPI writes it.
-        description: more words.
-        problems: statuses of the troubles it may have.
-    """
+    """Return the keywords of a FastAPI operation that reads its request itself."""
     extra: dict[str, Any] = {}
     if parameters:
         extra["parameters"] = [each.openapi() for each in parameters.values()]

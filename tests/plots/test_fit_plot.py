@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from rbfrag.db.rows import CombinationTable, ModelRow
+from rbfrag.db.model_file import ModelRow
+from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.plots import fit as fit_module
@@ -109,7 +110,7 @@ def test_the_failure_lines_have_their_probabilities(table, model, tmp_path, draw
 
 
 def test_nothing_overlaps(table, model, tmp_path, drawn):
-    for term in ("pgv", "pgd_tm"):
+    for term in ("pgv", "pga_tm"):
         other = FragilityModel.from_row(replace(model.row, term=term))
         plot_fit(table, other, tmp_path / "fit.png")
         figure = drawn[-1]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rbfrag.cli.output import cell, print_json, print_pairs, print_table, print_warnings
 
 if TYPE_CHECKING:
-    from rbfrag.db.rows import ModelRow
+    from rbfrag.db.model_file import ModelRow
 
 
 def fit_kind(

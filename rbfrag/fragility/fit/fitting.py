@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rbfrag.db.rows import CombinationTable, ModelRow
+from rbfrag.db.model_file import ModelRow
+from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility import formulas
 from rbfrag.fragility.fit.data import FitData, fit_data
@@ -21,10 +22,10 @@ from rbfrag.fragility.fit.method_result import MethodResult
 from rbfrag.fragility.fit.outcomes import fit_outcomes
 from rbfrag.fragility.fit.report import FitReport
 from rbfrag.fragility.fit.source import FitSource, read_source
-from rbfrag.fragility.interval_floor import RICHER, interval_floor, of_motions, of_sizes
+from rbfrag.fragility.interval_floor import interval_floor, of_motions, of_sizes
 from rbfrag.fragility.measures import TERMS, Term, intensity_term
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction_values import pgv_over_pga_s
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
@@ -201,12 +202,12 @@ def _checked(term: str, method: str, *, seed: int, name: str | None, estimate_m:
 def _with_floor(row: ModelRow, source: FitSource, vertical: str) -> ModelRow:
     """Return the model with its table of least widths, where models that know more exist."""
     table: list[float] = []
-    if RICHER[row.term]:
+    if TERMS[row.term].richer:
         model = FragilityModel.from_row(row)
-        others = [_richer_model(name, source, vertical) for name in RICHER[row.term]]
+        others = [_richer_model(name, source, vertical) for name in TERMS[row.term].richer]
         known = [other for other in others if other is not None]
         if known:
-            sample = of_motions(source) if RICHER[row.term] == ("xp",) else of_sizes(source)
+            sample = of_motions(source) if TERMS[row.term].richer == ("xp",) else of_sizes(source)
             table = interval_floor(model, known, sample)
     return replace(row, diagnostics={**row.diagnostics, "interval_floor": table})
 
@@ -248,7 +249,7 @@ def _domain(data: FitData, method: str, term: Term) -> dict[str, tuple[float, fl
             "intensity_m_s": data.x,
             "y_m_s": data.y0_m_s if of_outcomes else data.y,
             "tm_s": data.tm_s,
-            "pgv_over_pga_s": pgv_over_pga_s(data.pgv_m_s, data.pga_g),
+            "pgv_over_pga_s": data.pgv_m_s / (data.pga_g * STANDARD_GRAVITY_M_S2),
         }
     if "pgv_m_s" not in term.inputs or "pga_g" not in term.inputs:
         del columns["pgv_over_pga_s"]

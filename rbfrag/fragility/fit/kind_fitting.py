@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr
 
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.kind_data import KindData, sliding_data, slumping_data
 from rbfrag.fragility.fit.scores import brier, calibration, log_loss
 from rbfrag.fragility.kind_formulas import FORMULAS, METHODS, Formula, Numbers
-from rbfrag.fragility.kind_model import KindModel
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.models.sliding import KY_OVER_PGA, THRESHOLDS_M
 from rbfrag.solver.models.slumping import RATIOS
@@ -57,9 +57,9 @@ class KindFit:
     held_out: FloatArray
 
     @property
-    def model(self) -> KindModel:
+    def model(self) -> FragilityModel:
         """The model, ready to answer."""
-        return KindModel.from_row(self.row)
+        return FragilityModel.from_row(self.row)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.model_file import ModelRow
 
 MEANINGS = {
     "sliding": "probability that the permanent displacement exceeds a stated one",

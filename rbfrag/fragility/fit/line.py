@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import FitError
-from rbfrag.fragility.checks import NEGATIVE_SHARE_LIMIT
 from rbfrag.fragility.fit import scores
 from rbfrag.fragility.fit.data import FEW_EVENTS, FitData
 from rbfrag.fragility.fit.judgement import Outcomes, outcomes_of, score_intervals, scores_of
@@ -26,6 +25,7 @@ from rbfrag.fragility.fit.wls import (
 )
 from rbfrag.fragility.functions import array_functions
 from rbfrag.fragility.measures import Term
+from rbfrag.fragility.methods.wls import NEGATIVE_SHARE_LIMIT
 
 FloatArray = NDArray[np.float64]
 

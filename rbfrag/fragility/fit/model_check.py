@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import FitError, InputError, ModelError
 from rbfrag.fragility.fit.data import fit_data
 from rbfrag.fragility.fit.kind_data import sliding_data, slumping_data
 from rbfrag.fragility.fit.source import FitSource, read_source
-from rbfrag.fragility.kind_model import KindModel
 from rbfrag.fragility.model import FragilityModel
 
 if TYPE_CHECKING:
@@ -82,7 +81,7 @@ def _check_kind(connection: Connection, row: ModelRow) -> ModelCheck:
     told = cast("dict[str, Any]", row.diagnostics)
     selection = {"suite": told.get("suite"), "vertical": told.get("vertical", "without")}
     try:
-        KindModel.from_row(row)
+        FragilityModel.from_row(row)
         if row.kind == "sliding":
             data = sliding_data(connection, **selection)
         else:

@@ -11,7 +11,7 @@ from fastapi import APIRouter, Request, Response
 from rbfrag.errors import InputError
 from rbfrag.service.documents import BlockAnswer, DrawingAnswer
 from rbfrag.service.json_body import json_answer
-from rbfrag.service.operation import KR, P2, Parameter, by_name, operation, plain_router, read_query
+from rbfrag.service.operation import KR, P2, Parameter, by_name, operation, own_router, read_query
 
 if TYPE_CHECKING:
     from rbfrag.solver.block.geometry import Block
@@ -56,9 +56,6 @@ def block_of(values: Mapping[str, Any]) -> tuple[Block, Stability]:
 
     Args:
         values: those of :data:`PARAMETERS` that were given, by name.
-
-    Raises:
-        InputError: a block that is described in no way, or in two.
     """
     from rbfrag.solver.block.file import described
     from rbfrag.solver.stability.single import stability
@@ -121,7 +118,7 @@ def drawing_answer(query: bytes) -> dict[str, Any]:
 
 def router() -> APIRouter:
     """Return the operations on `/v1/block` and `/v1/drawing`."""
-    routes = plain_router()
+    routes = own_router()
 
     @routes.get(
         "/v1/block",
