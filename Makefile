@@ -31,6 +31,7 @@ types: $(VENV)/.installed-dev  ## static types
 docs: $(VENV)/.installed-dev  ## the documentation, into docs/_build/html
 	$(BIN)/python docs/generate_cli_reference.py --check
 	$(BIN)/python docs/generate_data_dictionary.py --check
+	$(BIN)/python docs/draw_architecture.py --check
 	$(RUN) sphinx -E -W --keep-going -q -b html docs docs/_build/html
 
 # The folder of matplotlib's settings is given because HOME may not be writable.
@@ -41,9 +42,10 @@ format: $(VENV)/.installed-dev  ## put the source in the style that lint asks fo
 	$(RUN) ruff check --fix .
 	$(RUN) ruff format .
 
-cli-reference: $(VENV)/.installed-dev  ## write the generated reference pages anew: commands, data dictionary
+cli-reference: $(VENV)/.installed-dev  ## write anew what is generated: commands, data dictionary, figure of the packages
 	$(BIN)/python docs/generate_cli_reference.py
 	$(BIN)/python docs/generate_data_dictionary.py
+	$(BIN)/python docs/draw_architecture.py
 
 wheel: $(VENV)/.installed-dev  ## the wheel, into dist/
 	$(RUN) pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .

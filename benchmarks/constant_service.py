@@ -13,8 +13,7 @@ import sys
 import uvicorn
 from fastapi import FastAPI
 
-from rbfrag.service.run import listener
-from rbfrag.service.workers import Workers
+from rbfrag.service.run import Workers, listener
 
 ANSWER = {
     "probability": 0.11795834662937416,

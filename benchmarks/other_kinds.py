@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 from sqlalchemy import Connection
 
+from benchmarks.other_kinds_figure import plot_other_kinds
 from benchmarks.page import ROOT, replaced
 from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
@@ -33,7 +34,6 @@ from rbfrag.fragility.fit.kind_fitting import (
 from rbfrag.fragility.fit.scores import brier, calibration, log_loss
 from rbfrag.fragility.kind_formulas import FORMULAS
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.plots.other_kinds import plot_other_kinds
 
 FloatArray = NDArray[np.float64]
 

@@ -17,13 +17,13 @@ from benchmarks.page import parser, report
 from rbfrag.bench.tables import markdown
 from rbfrag.fragility import formulas
 from rbfrag.fragility.fit import censored_normal
+from rbfrag.fragility.fit import outcomes as outcome_method
 from rbfrag.fragility.fit.binomial import cr3, effective_freedom, jackknife_steps
 from rbfrag.fragility.fit.censored_normal import CensoredData, maximise
 from rbfrag.fragility.fit.data import fit_data
 from rbfrag.fragility.fit.variance import Bins
 from rbfrag.fragility.fit.wls import clustered_line, iterate
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import outcome as outcome_method
 from rbfrag.fragility.quantiles import student_half_width
 from tests.fragility.conftest import critical_values
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes

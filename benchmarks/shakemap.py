@@ -13,8 +13,8 @@ import time
 
 import numpy as np
 
-from rbfrag.exchange.shakemap_grid import read_shakemap
-from rbfrag.hazards.component import component
+from rbfrag.exchange.shakemap import read_shakemap
+from rbfrag.hazards.conversions import component
 from rbfrag.hazards.site_probability import site_probability
 
 

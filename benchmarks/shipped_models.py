@@ -30,9 +30,9 @@ from rbfrag.fragility import formulas
 from rbfrag.fragility.fit import scores
 from rbfrag.fragility.fit.binomial import maximum_likelihood, newton
 from rbfrag.fragility.fit.data import FitData, fit_data
+from rbfrag.fragility.fit.outcomes import LINKS_BY_CODE, outcome_rows
 from rbfrag.fragility.fit.source import FitSource, kr_over_pga_of_grid, read_source
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods.outcome import LINKS_BY_CODE, outcome_rows
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]

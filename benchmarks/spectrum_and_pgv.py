@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from benchmarks.claims.claim import IntArray, cluster_interval
 from benchmarks.page import ROOT, parser, report
 from benchmarks.reference_agreement import agreement_with_reference
 from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
 from rbfrag.db.queries import combination_table
-from rbfrag.fragility.claims import IntArray, cluster_interval
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 
 PAGE = ROOT / "docs" / "theory" / "toppling-spectrum.md"

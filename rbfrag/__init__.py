@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from rbfrag.errors import RbfragError as RbfragError
     from rbfrag.errors import UnknownModelError as UnknownModelError
     from rbfrag.errors import WorkFailedError as WorkFailedError
-    from rbfrag.exchange.curves.file import read_hazard_curves as read_hazard_curves
-    from rbfrag.exchange.read_table import read_table as read_table
+    from rbfrag.exchange.database_tables import read_table as read_table
+    from rbfrag.exchange.hazard_curves import read_hazard_curves as read_hazard_curves
     from rbfrag.fragility.fit.fitting import fit as fit
     from rbfrag.fragility.fit.kind_fitting import fit_kind as fit_kind
     from rbfrag.fragility.kind_prediction import predict_sliding as predict_sliding
@@ -79,9 +79,9 @@ _HOME = {
     "predict": "rbfrag.fragility.predict",
     "predict_sliding": "rbfrag.fragility.kind_prediction",
     "predict_slumping": "rbfrag.fragility.kind_prediction",
-    "read_hazard_curves": "rbfrag.exchange.curves.file",
+    "read_hazard_curves": "rbfrag.exchange.hazard_curves",
     "read_motions": "rbfrag.motions.recognise",
-    "read_table": "rbfrag.exchange.read_table",
+    "read_table": "rbfrag.exchange.database_tables",
     "respond": "rbfrag.solver.respond",
     "simulate": "rbfrag.campaign.simulate",
     "simulate_kind": "rbfrag.campaign.simulate_kind",

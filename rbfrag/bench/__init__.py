@@ -1,1 +1,1 @@
-"""Speed reported against error: cases, methods, an extended-precision reference, comparisons."""
+"""Speed measured against error, beside other programs."""

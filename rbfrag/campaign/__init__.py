@@ -1,1 +1,1 @@
-"""Campaigns: which runs to make, and the workers that make them."""
+"""Campaigns: which runs to make, the workers that make them, their rows."""

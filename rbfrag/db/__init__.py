@@ -1,1 +1,1 @@
-"""The SQL store: schema, engine, writes and the named queries. SQL lives here alone."""
+"""The database: schema, keys, rows and named queries; the only SQL."""

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.batch_reading import csv_parts, parquet_parts
-from rbfrag.exchange.batch_writing import csv_writer, parquet_writer
+from rbfrag.exchange.batch_table import csv_parts, csv_writer, parquet_parts, parquet_writer
 from rbfrag.exchange.block_table import table_path
 from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.lookup import find_model

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.fragility_function import FragilityFunction
-from rbfrag.exchange.intensity_type import IntensityType
+from rbfrag.exchange.fragility_function import FragilityFunction, IntensityType
 from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.predict import Model, predict

@@ -1,7 +1,8 @@
-"""A fragility as other tools write it: lognormal, or probabilities at levels."""
+"""A fragility as other tools write it: lognormal, or probabilities at levels of a measure."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,58 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtr
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.intensity_type import IntensityType
+
+_SA = re.compile(r"SA\s*\(\s*([0-9.]+)\s*\)", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class IntensityType:
+    """What the levels of a file measure.
+
+    Args:
+        measure: ``pga_g``, ``pgv_m_s`` or ``sa_g``.
+        factor: what a level of the file is multiplied by to be in that unit.
+        period_s: oscillator period of a spectral acceleration [s].
+    """
+
+    measure: str
+    factor: float
+    period_s: float | None = None
+
+    @property
+    def imt(self) -> str:
+        """The name as OpenQuake writes it."""
+        return {"pga_g": "PGA", "pgv_m_s": "PGV"}.get(self.measure, f"SA({self.period_s})")
+
+
+def openquake_type(imt: str, where: str) -> IntensityType:
+    """Return the meaning of an OpenQuake intensity measure type: PGA [g], PGV [cm/s], SA(T) [g].
+
+    Args:
+        imt: the name in the file.
+        where: file and place, for messages.
+
+    Raises:
+        InputError: another measure.
+    """
+    name = imt.strip()
+    if name.upper() == "PGA":
+        return IntensityType("pga_g", 1.0)
+    if name.upper() == "PGV":
+        return IntensityType("pgv_m_s", 0.01)
+    match = _SA.fullmatch(name)
+    if match:
+        try:
+            period = float(match.group(1))
+        except ValueError:
+            period = 0.0
+        if period > 0.0:
+            return IntensityType("sa_g", 1.0, period)
+    raise InputError(
+        f"{where}: intensity measure {imt!r} is not known: PGA [g], PGV [cm/s] and "
+        "SA(period) [g] are"
+    )
+
 
 FloatArray = NDArray[np.float64]
 

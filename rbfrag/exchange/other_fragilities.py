@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.nrml_read import read_nrml
+from rbfrag.exchange.nrml import read_nrml
 from rbfrag.exchange.pelicun_table import read_pelicun
 
 FloatArray = NDArray[np.float64]

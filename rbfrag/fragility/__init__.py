@@ -1,1 +1,1 @@
-"""Fragility models: intensity terms, fits, prediction."""
+"""Fragility models: methods, fits, answers."""

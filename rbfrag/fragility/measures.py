@@ -27,6 +27,9 @@ class Term:
             how strong the shaking is, and is zero when there is none.
         formula: the term from its inputs, in the order of `inputs`.
         variance_degree: degree of the dissertation's variance polynomial in this term.
+        level: how much it knows of the motion: 3 the record itself, 0 one number.
+        richer: the terms of the models that know more, directly or by their own table of least
+            widths of the interval.
     """
 
     name: str
@@ -35,6 +38,8 @@ class Term:
     inputs: tuple[str, ...]
     formula: Callable[..., Any]
     variance_degree: int
+    level: int = 0
+    richer: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
@@ -83,7 +88,16 @@ def pgd_tm_m_s(pgd_m: N, tm_s: N) -> N:
 TERMS: Mapping[str, Term] = {
     term.name: term
     for term in (
-        Term("pgv", "peak ground velocity", "PGV", ("pgv_m_s",), pgv_m_s, 1),
+        Term(
+            "pgv",
+            "peak ground velocity",
+            "PGV",
+            ("pgv_m_s",),
+            pgv_m_s,
+            1,
+            0,
+            ("pgv_pga", "pgv_pga_tm"),
+        ),
         Term(
             "pga_tm",
             "peak ground acceleration over mean frequency",
@@ -91,6 +105,8 @@ TERMS: Mapping[str, Term] = {
             ("pga_g", "tm_s"),
             pga_tm_m_s,
             1,
+            0,
+            ("pgv_pga_tm",),
         ),
         Term(
             "pgd_tm",
@@ -99,6 +115,8 @@ TERMS: Mapping[str, Term] = {
             ("pgd_m", "tm_s"),
             pgd_tm_m_s,
             2,
+            0,
+            ("xp",),
         ),
         Term(
             "pgv_pga",
@@ -107,6 +125,8 @@ TERMS: Mapping[str, Term] = {
             ("pgv_m_s", "pga_g"),
             first_m_s,
             1,
+            1,
+            ("pgv_pga_tm",),
         ),
         Term(
             "pgv_pga_tm",
@@ -115,8 +135,10 @@ TERMS: Mapping[str, Term] = {
             ("pgv_m_s", "pga_g", "tm_s"),
             first_m_s,
             1,
+            2,
+            ("xp",),
         ),
-        Term("xp", "toppling spectrum", "X(p)", ("xp_m_s", "pga_g"), first_m_s, 1),
+        Term("xp", "toppling spectrum", "X(p)", ("xp_m_s", "pga_g"), first_m_s, 1, 3),
     )
 }
 """The terms by name: those of the dissertation, then those that know more of the motion."""
@@ -124,7 +146,7 @@ TERMS: Mapping[str, Term] = {
 SINGLE_TERMS = ("pgv", "pga_tm", "pgd_tm")
 """Terms that are one number: what the dissertation compares."""
 
-BEST_FIRST = ("xp", "pgv_pga_tm", "pgv_pga", "pgv", "pga_tm", "pgd_tm")
+BEST_FIRST = tuple(sorted(TERMS, key=lambda name: -TERMS[name].level))
 """The terms by falling skill on held-out earthquakes (docs/theory/model-choice.md)."""
 
 

@@ -1,1 +1,1 @@
-"""Hazard curves and annual rates of failure."""
+"""Hazard curves, annual rates of failure, survival."""

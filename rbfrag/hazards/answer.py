@@ -16,11 +16,10 @@ from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Model, predict
-from rbfrag.hazards.annual_rate import failure_rate, probability_in
-from rbfrag.hazards.component import component as component_named
+from rbfrag.hazards.annual_rate import failure_rate, normal_steps, probability_in
+from rbfrag.hazards.conversions import component as component_named
+from rbfrag.hazards.conversions import velocity_conversion
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.normal_steps import normal_steps
-from rbfrag.hazards.velocity_conversion import velocity_conversion
 
 FloatArray = NDArray[np.float64]
 

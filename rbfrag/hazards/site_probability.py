@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.predict import Model, predict
-from rbfrag.hazards.component import Component
-from rbfrag.hazards.normal_steps import normal_steps
+from rbfrag.hazards.annual_rate import normal_steps
+from rbfrag.hazards.conversions import Component
 
 FloatArray = NDArray[np.float64]
 

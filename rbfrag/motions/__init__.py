@@ -1,1 +1,1 @@
-"""Accelerograms: readers by format, intensity measures, quality signs."""
+"""Accelerograms: file formats, processing, intensity measures."""

@@ -1,1 +1,1 @@
-"""Every figure, one function each. The only room that imports matplotlib."""
+"""Figures, one a file; the only package that imports matplotlib."""

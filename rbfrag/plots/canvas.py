@@ -1,19 +1,24 @@
-"""The sheet every figure is drawn on, and how it gets into a file.
-
-Figures are made without pyplot: no window, no global state, safe in threads and services.
-"""
+"""The sheet of a figure and its file, numbers beside axes, labels, shaded clouds, modes."""
 
 from __future__ import annotations
 
+import math
 import os
 import tempfile
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rbfrag.errors import InputError, MissingExtraError
+from rbfrag.solver.stability.modes import ModeName
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".pdf", ".svg")
@@ -92,3 +97,123 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
         if unfinished is not None:
             unfinished.unlink(missing_ok=True)
     return target
+
+
+def plain_numbers(axis: Axis, *digits: float) -> None:
+    """Put plain numbers beside a logarithmic axis.
+
+    Args:
+        axis: the axis.
+        digits: leading digits that are written out, such as 1, 2 and 5.
+    """
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=digits))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def spread_out(
+    places: Sequence[float], apart: float, lowest: float = -math.inf, highest: float = math.inf
+) -> list[float]:
+    """Return the places moved as little as keeps neighbours apart, in their order.
+
+    Args:
+        places: where the labels belong, rising.
+        apart: least distance, in the unit of the places.
+        lowest: no label stands below this, if there is room for all.
+        highest: nor above this.
+    """
+    highest -= (len(places) - 1) * apart
+    # labels that touch move as one group, to the mean of where its members belong
+    groups: list[tuple[float, int]] = []
+    for number, place in enumerate(places):
+        start, count = place - number * apart, 1
+        while groups and groups[-1][0] > start:
+            before, members = groups.pop()
+            start = (before * members + start * count) / (members + count)
+            count += members
+        groups.append((start, count))
+    starts = [min(max(start, lowest), highest) for start, count in groups for _ in range(count)]
+    return [start + number * apart for number, start in enumerate(starts)]
+
+
+_CELLS_ACROSS = 60
+_CELLS_UP = 25
+"""As many as make the hexagons regular on a sheet of ordinary shape."""
+
+
+def density(
+    figure: Figure,
+    axes: Axes,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    across: tuple[float, float],
+    up: tuple[float, float],
+    *,
+    beside: Sequence[Axes] = (),
+) -> None:
+    """Shade hexagons by the number of points in each, on linear or logarithmic axes.
+
+    Args:
+        figure: the sheet.
+        axes: where to draw; their scales are set before.
+        x: abscissae, shape (n,).
+        y: ordinates, shape (n,).
+        across: limits of the abscissa, which the axes get.
+        up: limits of the ordinate.
+        beside: other axes that the key of the shades stands to the right of.
+    """
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap, LogNorm
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+
+    # Neither white for a single block nor so dark that a line disappears.
+    greys = ListedColormap(colormaps["Greys"](np.linspace(0.18, 0.72, 256)))
+    scales = axes.get_xscale(), axes.get_yscale()
+    extent = [
+        float(np.log10(edge)) if scale == "log" else edge
+        for edges, scale in ((across, scales[0]), (up, scales[1]))
+        for edge in edges
+    ]
+    cells = axes.hexbin(
+        x,
+        y,
+        gridsize=(_CELLS_ACROSS, _CELLS_UP),
+        extent=(extent[0], extent[1], extent[2], extent[3]),
+        xscale="log" if scales[0] == "log" else "linear",
+        yscale="log" if scales[1] == "log" else "linear",
+        mincnt=1,
+        cmap=greys,
+        linewidths=0.2,
+    )
+    axes.set_xlim(*across)
+    axes.set_ylim(*up)
+    most = max(int(np.asarray(cells.get_array()).max(initial=1)), 2)
+    cells.set_norm(LogNorm(1, most))
+    key = figure.colorbar(cells, ax=[axes, *beside], label="critical blocks per cell")
+    ticks = [t * 10**k for k in range(7) for t in (1, 2, 5) if t * 10**k <= most]
+    key.ax.yaxis.set_major_locator(FixedLocator(ticks))
+    key.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0f}"))
+    key.ax.yaxis.set_minor_locator(NullLocator())
+
+
+# Told apart by people who do not see red and green alike, and in grey.
+MODE_COLOURS: dict[ModeName, str] = {
+    "slide": "#2c6fad",
+    "topple": "#d98c1f",
+    "slump": "#8c2d4f",
+    "confined_topple": "#4c9a6a",
+}
+
+MODE_LINES: dict[ModeName, str] = {
+    "slide": "-",
+    "topple": "-.",
+    "slump": "--",
+    "confined_topple": ":",
+}
+
+
+def mode_words(mode: ModeName) -> str:
+    """Return the name of a mode for people."""
+    return mode.replace("_", " ")

@@ -10,11 +10,8 @@ import numpy as np
 
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure
-from rbfrag.plots.failure_lines import failure_line
-from rbfrag.plots.held_measures import MORE_TERMS, HeldMeasures, held_measures
-from rbfrag.plots.numbers import plain_numbers
-from rbfrag.plots.spread import spread_out
+from rbfrag.plots.canvas import new_figure, plain_numbers, plot_path, save_figure, spread_out
+from rbfrag.plots.model_lines import MORE_TERMS, HeldMeasures, failure_line, held_measures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

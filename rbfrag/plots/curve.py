@@ -13,7 +13,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
-from rbfrag.plots.model_answers import model_answers
+from rbfrag.plots.model_lines import model_answers
 
 FloatArray = NDArray[np.float64]
 

@@ -13,12 +13,13 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.fragility.formulas import EXPONENTS
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure
-from rbfrag.plots.density import density
-from rbfrag.plots.failure_lines import failure_line
-from rbfrag.plots.held_measures import ONE_NUMBER_TERMS
-from rbfrag.plots.numbers import plain_numbers
-from rbfrag.plots.predicted_strengths import predicted_strengths, running_medians
+from rbfrag.plots.canvas import density, new_figure, plain_numbers, plot_path, save_figure
+from rbfrag.plots.model_lines import (
+    ONE_NUMBER_TERMS,
+    failure_line,
+    predicted_strengths,
+    running_medians,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure
-from rbfrag.plots.mode_style import COLOURS, words
+from rbfrag.plots.canvas import MODE_COLOURS, mode_words, new_figure, plot_path, save_figure
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
 from rbfrag.solver.stability.modes import LOCKED, MODES, STABLE, UNSTABLE
@@ -143,7 +142,7 @@ def _draw_regions(
 
     axes.imshow(
         np.ma.masked_where(~is_block, found.mode_code),
-        cmap=ListedColormap([COLOURS[mode] for mode in MODES]),
+        cmap=ListedColormap([MODE_COLOURS[mode] for mode in MODES]),
         norm=BoundaryNorm(np.arange(-0.5, len(MODES)), len(MODES)),
         alpha=0.30,
         zorder=1,
@@ -186,7 +185,7 @@ def _draw_yields(
             nodes,
             np.ma.masked_where(~here, values),
             levels=_LEVELS if np.ptp(values[here]) > _NARROW_G else _FINE_LEVELS,
-            colors=COLOURS[mode],
+            colors=MODE_COLOURS[mode],
             linewidths=1.0,
             zorder=3,
         )
@@ -213,7 +212,7 @@ def _name_regions(
                 break
         else:
             continue
-        text = words(mode)
+        text = mode_words(mode)
         if mode == "slump" and not back_fracture:
             text = "turns back\nabout the heel"
         values = found.yield_acceleration[stable]

@@ -1,15 +1,23 @@
-"""Figure of a rock mass: how many blocks yield below which acceleration, mode by mode."""
+"""Figures of a rock mass: cumulative counts against PGA, and what a motion brings down, by mode."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure
-from rbfrag.plots.mode_style import COLOURS, LINES, words
+from rbfrag.plots.canvas import (
+    MODE_COLOURS,
+    MODE_LINES,
+    mode_words,
+    new_figure,
+    plot_path,
+    save_figure,
+)
 from rbfrag.rockmasses.counts import (
     Crossing,
     crossings,
@@ -17,7 +25,13 @@ from rbfrag.rockmasses.counts import (
     mode_counts,
     sorted_yields,
 )
+from rbfrag.rockmasses.failures import ModeFailures, ScaleFailures, failures
 from rbfrag.rockmasses.joint_sets import Realisations
+from rbfrag.rockmasses.response import ShakenMass
+from rbfrag.solver.stability.modes import ModeName
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _POINTS = 600
 _SHOWN = 0.997
@@ -57,10 +71,10 @@ def plot_rockmass(made: Realisations, path: str | PathLike[str], *, title: str =
         axes.plot(
             pga_g,
             cumulative_counts(made, mode, pga_g),
-            LINES[mode],
-            color=COLOURS[mode],
+            MODE_LINES[mode],
+            color=MODE_COLOURS[mode],
             lw=1.8,
-            label=words(mode),
+            label=mode_words(mode),
         )
     shown = [crossing for crossing in crossings(made) if crossing.pga_g <= right]
     for crossing in shown:
@@ -86,7 +100,7 @@ def plot_rockmass(made: Realisations, path: str | PathLike[str], *, title: str =
 
     at = range(len(present))
     shares = [100.0 * counts[mode].share for mode in present]
-    bars.bar(at, shares, width=0.7, color=[COLOURS[mode] for mode in present])
+    bars.bar(at, shares, width=0.7, color=[MODE_COLOURS[mode] for mode in present])
     for place, share in zip(at, shares, strict=True):
         bars.annotate(
             f"{share:.1f} %",
@@ -97,7 +111,7 @@ def plot_rockmass(made: Realisations, path: str | PathLike[str], *, title: str =
             va="bottom",
             fontsize=8.5,
         )
-    bars.set_xticks(list(at), [words(mode).replace(" ", "\n") for mode in present], fontsize=9)
+    bars.set_xticks(list(at), [mode_words(mode).replace(" ", "\n") for mode in present], fontsize=9)
     bars.set_xlim(-0.6, len(present) - 0.4)
     bars.set_ylim(0.0, 1.12 * max(shares))
     bars.set_ylabel("share of the blocks [%]")
@@ -117,3 +131,156 @@ def _title(made: Realisations) -> str:
     if made.n_blocks < made.n:
         text += f"; {made.n - made.n_blocks} of {made.n} realisations are no block"
     return text
+
+
+PARTS = (
+    ("fails", "fails", "#a3262a"),
+    ("unstable", "fails at rest", "#5b1a4e"),
+    ("open", "not known", "#c9a227"),
+    ("stays", "moves, and stays", "#8fb3d1"),
+    ("still", "does not move", "#d9dde0"),
+)
+"""Parts of a bar: what they are made of, what they are called, and their colours."""
+
+
+def plot_failures(
+    shaken: ShakenMass, path: str | PathLike[str], *, level: float = 0.95, title: str = ""
+) -> Path:
+    """Draw the share of the blocks that fail against the scale of the motion, by mode.
+
+    Beside it, what becomes of the blocks of every mode under the motion as it was recorded, or at
+    the scale nearest to that. With one scale there is that alone.
+
+    Args:
+        shaken: the fates of the blocks.
+        path: file to write: .png, .pdf or .svg.
+        level: confidence level of the bands.
+        title: title of the figure; the motion and the number of blocks if empty.
+
+    Raises:
+        InputError: a path that cannot be written, a level not between 0 and 1.
+        MissingExtraError: matplotlib is not installed.
+    """
+    plot_path(path)
+    found = failures(shaken, level)
+    bars_of = min(found, key=lambda each: abs(np.log(each.scale)))
+    width_in = 1.9 + 0.75 * (1 + len(bars_of.modes))
+    if len(found) > 1:
+        figure = new_figure(5.4 + width_in, 4.6)
+        curves, bars = figure.subplots(1, 2, width_ratios=[5.4, width_in])
+        _draw_curves(curves, found, level)
+    else:
+        figure = new_figure(width_in + 1.2, 4.6)
+        bars = figure.subplots()
+    _draw_bars(bars, bars_of)
+    figure.suptitle(title or _shaken_title(shaken), fontsize=10)
+    return save_figure(figure, path)
+
+
+def _draw_curves(axes: Axes, found: Sequence[ScaleFailures], level: float) -> None:
+    scales = [each.scale for each in found]
+    rows: list[tuple[str, str, str, float, list[ModeFailures]]] = [
+        # broad and below the others, because a mode alone may make up the whole of it
+        ("all blocks", "#404040", "-", 4.0, [each.total for each in found])
+    ]
+    rows += [
+        (
+            mode_words(mode),
+            MODE_COLOURS[mode],
+            MODE_LINES[mode],
+            1.8,
+            [each.modes[mode] for each in found],
+        )
+        for mode in found[0].modes
+    ]
+    for label, colour, line, width, counted in rows:
+        axes.plot(
+            scales,
+            [100.0 * each.of_all.value for each in counted],
+            line,
+            color=colour,
+            lw=width,
+            marker="o",
+            ms=3.5,
+            label=label,
+        )
+        axes.fill_between(
+            scales,
+            [100.0 * each.of_all.low for each in counted],
+            [100.0 * each.of_all.high for each in counted],
+            color=colour,
+            alpha=0.18,
+            lw=0,
+        )
+    unknown = np.array([each.total.open_of_all for each in found])
+    if unknown.any():
+        fails = np.array([each.total.of_all.value for each in found])
+        axes.fill_between(
+            scales,
+            100.0 * fails,
+            100.0 * (fails + unknown),
+            color=PARTS[2][2],
+            alpha=0.3,
+            lw=0,
+            label="not known",
+        )
+    axes.set_xlim(0.0, 1.02 * scales[-1])
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("factor on the motion")
+    axes.set_ylabel(f"share of all blocks that fail [%], {100.0 * level:g} % interval")
+    axes.grid(visible=True, lw=0.3, alpha=0.6)
+    axes.legend(loc="upper left", fontsize=9, frameon=False)
+    above = axes.twiny()
+    above.set_xlim(0.0, 1.02 * found[-1].pga_g)
+    above.set_xlabel("peak ground acceleration, PGA [g]")
+
+
+def _draw_bars(axes: Axes, found: ScaleFailures) -> None:
+    rows: list[tuple[ModeName | None, ModeFailures]] = [(None, found.total), *found.modes.items()]
+    at = np.arange(len(rows))
+    bottom = np.zeros(len(rows))
+    for part, label, colour in PARTS:
+        heights = np.array([100.0 * _part(each, part) / each.count for _, each in rows])
+        if not heights.any():
+            continue
+        axes.bar(at, heights, width=0.7, bottom=bottom, color=colour, label=label)
+        bottom += heights
+    for place, (_, each) in zip(at, rows, strict=True):
+        assert each.of_mode is not None
+        axes.annotate(
+            f"{100.0 * each.of_mode.value:.3g} %\nof {each.count}",
+            (float(place), 100.0),
+            xytext=(0, 3),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=8.5,
+        )
+    names = ["all" if mode is None else mode_words(mode).replace(" ", "\n") for mode, _ in rows]
+    axes.set_xticks(at, names, fontsize=9)
+    axes.set_xlim(-0.6, len(rows) - 0.4)
+    axes.set_ylim(0.0, 113.0)
+    axes.set_yticks([0, 20, 40, 60, 80, 100])
+    axes.set_ylabel("share of the blocks of a mode [%]")
+    axes.set_title(f"motion times {found.scale:g}, PGA {found.pga_g:.3g} g", fontsize=9)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, fontsize=8, frameon=False)
+
+
+def _part(each: ModeFailures, part: str) -> int:
+    if part == "open":
+        return each.open
+    if part == "still":
+        return each.fates["at_rest"] + each.fates["locked"]
+    return each.fates[part]
+
+
+def _shaken_title(shaken: ShakenMass) -> str:
+    limits = shaken.limits
+    turned = "" if limits.rotation_deg is None else f"by more than {limits.rotation_deg:g}° or "
+    return (
+        f"{shaken.shaking.motion.label}: {shaken.made.n_blocks} blocks of a rock mass\n"
+        f"a slide fails beyond {limits.displacement_m:g} m, "
+        f"a block that turns {turned}past recovery"
+    )

@@ -15,8 +15,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES, Polarity
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure
-from rbfrag.plots.numbers import plain_numbers
+from rbfrag.plots.canvas import new_figure, plain_numbers, plot_path, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,1 +1,1 @@
-"""Rock masses: joint sets that scatter, their blocks, and how many fail."""
+"""Rock masses: random joint sets, their blocks, how many fail."""

@@ -1,1 +1,1 @@
-"""The HTTP face of the answers that the command line gives (extra `service`)."""
+"""The HTTP service and its page."""

@@ -5,36 +5,61 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from http import HTTPStatus
+from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI, HTTPException, Request, Response
 from fastapi.concurrency import run_in_threadpool
 from fastapi.middleware.cors import CORSMiddleware
 from fastapi.openapi.utils import get_openapi
+from fastapi.staticfiles import StaticFiles
 
 from rbfrag.errors import RbfragError
 from rbfrag.service import work
 from rbfrag.service.body import Bodies
 from rbfrag.service.documents import Problem
 from rbfrag.service.guard import Guard
-from rbfrag.service.metrics import Metrics
-from rbfrag.service.page_files import PageFiles
 from rbfrag.service.problem import problem, refused
-from rbfrag.service.request_log import RequestLog
-from rbfrag.service.routes import (
-    block,
-    drawing,
-    hazard,
-    health,
-    metrics,
-    models,
-    motion,
-    predict,
-    rockmass,
-)
+from rbfrag.service.request_records import Metrics, RequestLog
+from rbfrag.service.routes import block, hazard, motion, predict, rockmass, stored
 from rbfrag.service.settings import Settings
-from rbfrag.service.workshop import Workshop
+from rbfrag.service.work import WorkerPool
 from rbfrag.version import __version__
+
+FOLDER = Path(__file__).parent / "page"
+
+HEADERS = {
+    # Scripts, styles and answers come from this service alone, and none stands in the document.
+    "Content-Security-Policy": "; ".join(
+        (
+            "default-src 'none'",
+            "script-src 'self'",
+            "style-src 'self'",
+            "img-src 'self'",
+            "connect-src 'self'",
+            "base-uri 'none'",
+            "form-action 'none'",
+            "frame-ancestors 'none'",
+        )
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    # After an update no old module meets a new one; unchanged files are answered in a word.
+    "Cache-Control": "no-cache",
+}
+
+
+class PageFiles(StaticFiles):
+    """What the browser loads; `/` is the page itself."""
+
+    def __init__(self) -> None:
+        super().__init__(directory=FOLDER, html=True)
+
+    async def get_response(self, path: str, scope: Any) -> Response:
+        """Return a file with the headers of the page."""
+        response = await super().get_response(path, scope)
+        response.headers.update(HEADERS)
+        return response
 
 
 def make_app(settings: Settings) -> FastAPI:
@@ -44,14 +69,14 @@ def make_app(settings: Settings) -> FastAPI:
         settings: what it reads, whom it answers and how much it takes on.
     """
     bodies = Bodies(settings)
-    workshop = Workshop(settings.jobs, settings.time_limit_s)
+    pool = WorkerPool(settings.jobs, settings.time_limit_s)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001
         if settings.early:
-            workshop.open().schedule(work.warm_up)
+            pool.open().schedule(work.warm_up)
         yield
-        await run_in_threadpool(workshop.close)
+        await run_in_threadpool(pool.close)
 
     app = FastAPI(
         title="rbfrag",
@@ -66,21 +91,19 @@ def make_app(settings: Settings) -> FastAPI:
         lifespan=lifespan,
     )
     for each in (
-        predict.router(settings, bodies, workshop),
+        predict.router(settings, bodies, pool),
         block.router(),
-        drawing.router(),
-        rockmass.router(settings, bodies, workshop),
-        motion.router(bodies, workshop),
-        hazard.router(settings, bodies, workshop),
-        models.router(settings),
-        health.router(),
+        rockmass.router(settings, bodies, pool),
+        motion.router(bodies, pool),
+        hazard.router(settings, bodies, pool),
+        stored.router(settings),
     ):
         # one flat list: looking through routers in routers takes longer than an answer
         app.router.routes.extend(each.routes)
     document = _document(app)
     app.openapi = lambda: document  # type: ignore[method-assign]
     counts = Metrics([*document["paths"], "/v1/metrics", "/v1/openapi.json"])
-    app.router.routes.extend(metrics.router(counts).routes)
+    app.router.routes.extend(stored.metrics_router(counts).routes)
     app.mount("/", PageFiles(), name="page")
     app.add_middleware(Guard, settings=settings, metrics=counts, log=RequestLog())
     if settings.allowed_origins:

@@ -10,7 +10,7 @@ from typing import Any
 from fastapi import Request
 
 from rbfrag.service.json_body import MalformedError
-from rbfrag.service.refusal import busy, gone, too_long, too_slow
+from rbfrag.service.problem import busy, gone, too_long, too_slow
 from rbfrag.service.settings import Settings
 
 MULTIPART = "multipart/form-data"

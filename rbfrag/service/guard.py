@@ -7,9 +7,8 @@ from collections.abc import Awaitable, Callable, MutableMapping
 from time import perf_counter
 from typing import Any
 
-from rbfrag.service.metrics import Metrics
 from rbfrag.service.problem import problem
-from rbfrag.service.request_log import RequestLog
+from rbfrag.service.request_records import Metrics, RequestLog
 from rbfrag.service.settings import Settings
 
 Message = MutableMapping[str, Any]

@@ -1,9 +1,11 @@
-"""JSON in and out: no number that JSON has no name for, no depth without end."""
+"""JSON in and out: the bodies of requests, and documents as answers."""
 
 from __future__ import annotations
 
 import json
 from typing import Any, NoReturn
+
+from fastapi import Response
 
 from rbfrag.errors import InputError
 
@@ -41,3 +43,13 @@ def read_json(body: bytes) -> Any:
 
 def _refuse(word: str) -> NoReturn:
     raise MalformedError(f"{word} is no JSON number: give a finite one, or null for a missing one")
+
+
+def json_answer(document: object) -> Response:
+    """Return a document as the answer to a request."""
+    return answer(json_text(document))
+
+
+def answer(text: bytes) -> Response:
+    """Return JSON that is written already as the answer to a request."""
+    return Response(text, media_type="application/json")

@@ -10,17 +10,32 @@ from dataclasses import dataclass
 from tempfile import TemporaryDirectory
 
 from fastapi import FastAPI
+from uvicorn.supervisors import Multiprocess
 
 from rbfrag.errors import InputError
-from rbfrag.service.settings import Settings
-from rbfrag.service.token import check_reach, is_loopback, read_token
+from rbfrag.service.settings import Settings, check_reach, is_loopback, read_token
+
+
+class Workers(Multiprocess):
+    """Processes of uvicorn that end together."""
+
+    def terminate_all(self) -> None:
+        """Tell every process to end.
+
+        Nobody may connect any more: this process holds the address too, and what it let in
+        nobody would answer.
+        """
+        for listener in self.sockets:
+            listener.close()
+        super().terminate_all()
+
 
 VARIABLE = "RBFRAG_SERVICE"
 """Environment variable in which the service, and each of its processes, finds what it is told."""
 
 
 @dataclass(frozen=True)
-class Told:
+class ServeOptions:
     """What `rbfrag serve` passes on to the service; the names are those of its options.
 
     Args:
@@ -90,19 +105,18 @@ class Told:
         )
 
 
-def serve_as_told() -> None:
+def serve() -> None:
     """Answer requests until the process is told to stop, as the environment says.
 
     Raises:
         InputError: the environment does not say how.
     """
-    told = _told()
+    told = _options()
     settings = told.settings()
     import uvicorn
 
-    from rbfrag.service.json_log import CONFIGURATION
-    from rbfrag.service.metrics import SHARED_FOLDER
     from rbfrag.service.protocol import BoundedProtocol
+    from rbfrag.service.request_records import CONFIGURATION, SHARED_FOLDER
 
     with TemporaryDirectory(prefix="rbfrag-metrics-") as folder:
         if told.workers > 1:
@@ -130,8 +144,6 @@ def serve_as_told() -> None:
             if told.workers == 1:
                 uvicorn.Server(config).run(sockets=[found])
             else:
-                from rbfrag.service.workers import Workers
-
                 Workers(config, sockets=[found]).run()
 
 
@@ -164,12 +176,12 @@ def app() -> FastAPI:
     """Return the application that the environment describes."""
     from rbfrag.service.app import make_app
 
-    return make_app(_told().settings())
+    return make_app(_options().settings())
 
 
-def _told() -> Told:
+def _options() -> ServeOptions:
     try:
-        told = Told(**json.loads(os.environ.get(VARIABLE, "{}")))
+        told = ServeOptions(**json.loads(os.environ.get(VARIABLE, "{}")))
     except (ValueError, TypeError) as error:
         raise InputError(f"{VARIABLE} cannot be read ({error}): start with  rbfrag serve") from None
     return told

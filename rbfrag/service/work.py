@@ -1,15 +1,19 @@
-"""Answers that take long: functions for a process beside the one that answers.
-
-Each takes plain values and returns JSON, so that nothing else travels between the processes.
-"""
+"""Long work in processes beside the one that answers, each task with a limit of time."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import asyncio
+import multiprocessing
+import signal
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Literal
+
+from fastapi import Request
+from pebble import ProcessExpired, ProcessPool
 
 from rbfrag.errors import InputError, MotionFileError
 from rbfrag.service.json_body import MalformedError, json_text, read_json
+from rbfrag.service.problem import busy, gone, too_much_work
 
 if TYPE_CHECKING:
     from rbfrag.motions.ground_motion import GroundMotion
@@ -172,10 +176,10 @@ def hazard(
         given: further arguments of :func:`rbfrag.hazard`.
         db: database of the models.
     """
-    from rbfrag.exchange.curves.file import hazard_curves_in, suited_curves
+    from rbfrag.exchange.hazard_curves import hazard_curves_in, suited_curves
     from rbfrag.hazards.answer import hazard as answer
+    from rbfrag.hazards.conversions import velocity_conversion
     from rbfrag.hazards.report import as_dict
-    from rbfrag.hazards.velocity_conversion import velocity_conversion
     from rbfrag.solver.quantity import positive
 
     p2, kr = positive(p2, "p2", "1/s²"), positive(kr, "kr", "g")
@@ -220,3 +224,78 @@ def _text(body: bytes) -> str:
     if not text.strip():
         raise MalformedError("the body is empty")
     return text
+
+
+PIECES = 500
+"""So many pieces of work does a process do before a fresh one takes its place."""
+
+
+class WorkerPool:
+    """Processes that work, started when they are first needed.
+
+    Args:
+        jobs: how many.
+        time_limit_s: longest time [s] that a piece of work may take, its waiting included.
+    """
+
+    def __init__(self, jobs: int, time_limit_s: float) -> None:
+        self._jobs = jobs
+        self._limit_s = time_limit_s
+        self._pool: ProcessPool | None = None
+
+    def open(self) -> ProcessPool:
+        """Return the processes, started."""
+        if self._pool is None or not self._pool.active:
+            # a forked copy of a process with threads and sockets would be none to rely on
+            context = multiprocessing.get_context("spawn")
+            self._pool = ProcessPool(
+                max_workers=self._jobs, max_tasks=PIECES, initializer=_begin, context=context
+            )
+        return self._pool
+
+    async def run(self, request: Request, function: Callable[..., bytes], *given: Any) -> bytes:
+        """Return what a function answers.
+
+        Args:
+            request: who wants to know, its body read; the work ends when the client goes.
+            function: a function of a module.
+            given: its arguments.
+
+        Raises:
+            RequestRefusedError: it took too long, or waited too long, or the client has gone.
+            RbfragError: as the function raises.
+        """
+        future = self.open().schedule(function, args=given)
+        answer = asyncio.wrap_future(future)
+        left = asyncio.ensure_future(_disconnected(request))
+        either: list[asyncio.Future[Any]] = [answer, left]
+        try:
+            await asyncio.wait(either, timeout=self._limit_s, return_when=asyncio.FIRST_COMPLETED)
+            if answer.done():
+                return answer.result()
+            if left.done():
+                raise gone()
+            raise too_much_work(self._limit_s) if future.running() else busy()
+        except ProcessExpired:
+            raise busy() from None
+        finally:
+            left.cancel()
+            # ends the process, if it still works on it
+            answer.cancel()
+
+    def close(self) -> None:
+        """End the processes, whatever they do; nobody waits for an answer any more."""
+        if self._pool is not None:
+            self._pool.stop()  # type: ignore[no-untyped-call]
+            self._pool.join()
+
+
+async def _disconnected(request: Request) -> None:
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
+
+
+def _begin() -> None:
+    # Ctrl-C reaches every process of a terminal; only the one that answers decides what it ends
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    warm_up()

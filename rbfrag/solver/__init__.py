@@ -1,1 +1,1 @@
-"""Rigid-block models: response kernels and the critical search."""
+"""Response of rigid blocks to shaking, and the critical strength."""

@@ -27,7 +27,7 @@ from rbfrag.db.outcome_maps import outcome_maps
 from rbfrag.db.queries import combination_table
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.exchange.database_export import export_database
+from rbfrag.exchange.database_tables import export_database
 from rbfrag.fragility.fit.kind_fitting import fit_kind
 from rbfrag.fragility.fit.model_check import check_models
 from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping

@@ -11,7 +11,7 @@ import pytest
 import rbfrag
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
-from rbfrag.exchange.nrml_read import read_nrml
+from rbfrag.exchange.nrml import read_nrml
 from rbfrag.exchange.pelicun_table import read_pelicun
 from tests.cli.conftest import Shell
 from tests.fragility.conftest import model_row

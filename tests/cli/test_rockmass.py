@@ -12,7 +12,7 @@ import pytest
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.db.rows import ModelRow
-from rbfrag.exchange.block_columns import read_columns
+from rbfrag.exchange.block_table import read_columns
 from rbfrag.rockmasses.counts import crossings, mode_counts
 from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.rockmasses.scenario import scenario

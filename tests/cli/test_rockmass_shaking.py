@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rbfrag.exchange.block_columns import read_columns
+from rbfrag.exchange.block_table import read_columns
 from rbfrag.motions.recognise import read_motion
 from rbfrag.rockmasses.failures import failures
 from rbfrag.rockmasses.file import read_rock_mass

@@ -12,10 +12,9 @@ import pytest
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError, MissingExtraError
-from rbfrag.exchange import batch_reading, batch_writing
+from rbfrag.exchange import batch_table
 from rbfrag.exchange.batch import predict_table
-from rbfrag.exchange.block_columns import read_columns, read_texts
-from rbfrag.exchange.block_table import write_block_table
+from rbfrag.exchange.block_table import read_columns, read_texts, write_block_table
 from rbfrag.fragility.predict import predict
 from tests.fragility.conftest import model_row
 
@@ -35,8 +34,7 @@ def answer(
         def missing() -> None:
             raise MissingExtraError("Parquet files need pyarrow", "parquet")
 
-        monkeypatch.setattr(batch_reading, "pyarrow", missing)
-        monkeypatch.setattr(batch_writing, "pyarrow", missing)
+        monkeypatch.setattr(batch_table, "pyarrow", missing)
     database = tmp_path / "model.db"
     with opened_database(str(database), create=True) as engine, engine.begin() as connection:
         save_model(connection, model_row())
@@ -75,7 +73,7 @@ def test_rows_are_answered_or_say_why_not(answer: Answer, tmp_path: Path) -> Non
 def test_parts_join_without_a_seam(
     answer: Answer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(batch_reading, "ROWS", 7)
+    monkeypatch.setattr(batch_table, "ROWS", 7)
     random = np.random.default_rng(3)
     kr = random.uniform(0.02, 0.3, 40)
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"

@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
 from rbfrag.exchange import block_table
-from rbfrag.exchange.block_columns import read_columns
-from rbfrag.exchange.block_table import write_block_table
+from rbfrag.exchange.block_table import read_columns, write_block_table
 
 TABLE = {
     "block_id": np.arange(1, 4),
@@ -129,7 +128,7 @@ def test_without_pyarrow_the_extra_is_named(tmp_path: Path) -> None:
 import sys
 sys.modules["pyarrow"] = None
 from rbfrag.errors import MissingExtraError
-from rbfrag.exchange.block_columns import read_columns
+from rbfrag.exchange.block_table import read_columns
 from rbfrag.exchange.block_table import table_path
 table_path("a.csv")
 for act in (lambda: table_path("a.parquet"), lambda: read_columns("a.parquet", ("kr",))):

@@ -13,13 +13,13 @@ import pytest
 from sqlalchemy import Connection, update
 
 import rbfrag
-import rbfrag.exchange.database_export as database_export
+import rbfrag.exchange.database_tables as database_export
 from rbfrag.campaign.add_motions import add_motions
 from rbfrag.campaign.simulate import simulate
 from rbfrag.db import schema
 from rbfrag.db.engine import opened_database
 from rbfrag.errors import InputError, WorkFailedError
-from rbfrag.exchange.database_export import export_database
+from rbfrag.exchange.database_tables import export_database
 from tests.cli.conftest import Refuses, Shell, refuses, shell
 from tests.synthetic import shaking, write_suite
 

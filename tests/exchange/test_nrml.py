@@ -11,10 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.fragility_function import discrete_function, lognormal_function
-from rbfrag.exchange.intensity_type import IntensityType
-from rbfrag.exchange.nrml_read import read_nrml
-from rbfrag.exchange.nrml_write import nrml_text
+from rbfrag.exchange.fragility_function import IntensityType, discrete_function, lognormal_function
+from rbfrag.exchange.nrml import nrml_text, read_nrml
 
 PGV = IntensityType("pgv_m_s", 0.01)
 PGA = IntensityType("pga_g", 1.0)

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.fragility_function import discrete_function, lognormal_function
-from rbfrag.exchange.intensity_type import IntensityType
+from rbfrag.exchange.fragility_function import IntensityType, discrete_function, lognormal_function
 from rbfrag.exchange.pelicun_table import pelicun_text, read_pelicun
 
 PGV = IntensityType("pgv_m_s", 0.01)

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.grid_interpolation import at_places
-from rbfrag.exchange.shakemap_grid import read_shakemap
+from rbfrag.exchange.shakemap import at_places, read_shakemap
 
 GRID = """<?xml version="1.0"?>
 <shakemap_grid xmlns="http://earthquake.usgs.gov/eqcenter/shakemap" event_id="e1" code_version="4">

@@ -8,14 +8,14 @@ import pytest
 
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility import formulas
+from rbfrag.fragility.fit import outcomes as outcome_method
 from rbfrag.fragility.fit.binomial import jackknife_covariance
 from rbfrag.fragility.fit.data import fit_data
 from rbfrag.fragility.fit.fitting import fit, fit_source
+from rbfrag.fragility.fit.outcomes import fit_parameters
 from rbfrag.fragility.fit.report import FitReport
 from rbfrag.fragility.fit.source import FitSource
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import outcome as outcome_method
-from rbfrag.fragility.methods.outcome import fit_parameters
 from rbfrag.fragility.model import FragilityModel
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
 

@@ -13,9 +13,9 @@ from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility import interval_floor, prediction_array
 from rbfrag.fragility.answers import MotionPrediction
+from rbfrag.fragility.fit import outcomes as outcome_method
 from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.formulas import FLOOR_FROM, FLOOR_NODES, FLOOR_STEP, PARAMETERS, SHAPES
-from rbfrag.fragility.methods import outcome as outcome_method
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import answer_given, predict
 from rbfrag.motions.ground_motion import GroundMotion

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import predict
 from rbfrag.hazards import site_probability as site_module
-from rbfrag.hazards.component import component
+from rbfrag.hazards.conversions import component
 from rbfrag.hazards.site_probability import site_probability
 
 FloatArray = NDArray[np.float64]

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.claims_of_vertical import vertical_pairs
 from rbfrag.fragility.fit.calibration_bins import CalibrationBins
 from rbfrag.plots import calibration as calibration_module
-from rbfrag.plots import vertical as vertical_module
+from rbfrag.plots import critical_strength as vertical_module
 from rbfrag.plots.calibration import plot_calibration
-from rbfrag.plots.vertical import plot_vertical
+from rbfrag.plots.critical_strength import plot_vertical, vertical_pairs
 from tests.plots.critical_values import N, critical_values
 
 P = np.array([0.02, 0.3, 0.7, 0.98])

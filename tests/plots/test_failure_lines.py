@@ -7,7 +7,7 @@ import pytest
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.predict import predict
-from rbfrag.plots.failure_lines import failure_line
+from rbfrag.plots.model_lines import failure_line
 from tests.plots.critical_values import straight_line_model
 
 X = np.array([0.05, 0.3, 1.0])

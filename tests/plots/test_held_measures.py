@@ -12,8 +12,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import predict
 from rbfrag.plots.chart import plot_chart
-from rbfrag.plots.failure_lines import failure_line
-from rbfrag.plots.held_measures import held_measures
+from rbfrag.plots.model_lines import failure_line, held_measures
 
 G = 9.80665
 DOMAIN = {

@@ -7,7 +7,7 @@ import pytest
 
 from rbfrag.fragility.predict import predict
 from rbfrag.plots.fit import plot_fit
-from rbfrag.plots.predicted_strengths import predicted_strengths, running_medians
+from rbfrag.plots.model_lines import predicted_strengths, running_medians
 from tests.fragility.outcome_draws import drawn_outcomes
 from tests.plots.test_held_measures import WITH_TM, model_of
 

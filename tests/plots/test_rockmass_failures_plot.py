@@ -7,8 +7,8 @@ import pytest
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.plots import rockmass_failures as module
-from rbfrag.plots.rockmass_failures import plot_failures
+from rbfrag.plots import rockmass as module
+from rbfrag.plots.rockmass import plot_failures
 from rbfrag.rockmasses.failures import failures
 from rbfrag.rockmasses.joint_sets import RockMass
 from rbfrag.rockmasses.response import plan_shaking

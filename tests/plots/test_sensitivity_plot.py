@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.lobes import lobe_line
-from rbfrag.plots import sensitivity as module
-from rbfrag.plots.sensitivity import plot_sensitivity
+from rbfrag.plots import critical_strength as module
+from rbfrag.plots.critical_strength import lobe_line, plot_sensitivity
 from tests.plots.critical_values import N, critical_values
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rbfrag.plots.spread import spread_out
+from rbfrag.plots.canvas import spread_out
 
 
 def test_what_does_not_touch_stays() -> None:

@@ -1,4 +1,4 @@
-"""Functions that a process of the workshop can be given."""
+"""Functions that a process of the pool can be given."""
 
 import os
 import time

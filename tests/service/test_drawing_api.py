@@ -2,7 +2,7 @@
 
 import pytest
 
-from rbfrag.plots.block_lines import block_lines
+from rbfrag.plots.block import block_lines
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability
 

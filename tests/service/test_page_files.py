@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from rbfrag.service.page_files import FOLDER
+from rbfrag.service.app import FOLDER
 
 SOURCES = sorted(
     path for path in FOLDER.rglob("*.*") if path.suffix in (".html", ".js", ".css", ".svg")

@@ -7,9 +7,8 @@ from fastapi.testclient import TestClient
 
 from rbfrag.errors import InputError
 from rbfrag.service.app import make_app
-from rbfrag.service.run import Told, listener
-from rbfrag.service.settings import Settings
-from rbfrag.service.token import VARIABLE, read_token
+from rbfrag.service.run import ServeOptions, listener
+from rbfrag.service.settings import VARIABLE, Settings, read_token
 from tests.cli.conftest import Shell
 
 TOKEN = "a-token-of-the-tests-0123456789"
@@ -55,14 +54,14 @@ def test_the_page_and_the_health_check_need_none(guarded):
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "example.org"])
 def test_other_computers_need_a_token(host, monkeypatch):
     with pytest.raises(InputError, match="the service needs a token"):
-        Told(host=host).settings()
+        ServeOptions(host=host).settings()
     monkeypatch.setenv(VARIABLE, TOKEN)
-    assert Told(host=host).settings().token == TOKEN
+    assert ServeOptions(host=host).settings().token == TOKEN
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "::1", "localhost"])
 def test_this_computer_needs_none(host):
-    settings = Told(host=host).settings()
+    settings = ServeOptions(host=host).settings()
     assert settings.token is None
     assert {"localhost", "127.0.0.1", "[::1]"} <= set(settings.allowed_hosts)
 
@@ -92,7 +91,7 @@ def test_a_token_comes_from_a_file(tmp_path):
     file = tmp_path / "token"
     file.write_text(f"{TOKEN}\n")
     assert read_token(str(file)) == TOKEN
-    assert TOKEN not in repr(Told(token_file=str(file)).settings())
+    assert TOKEN not in repr(ServeOptions(token_file=str(file)).settings())
     for bad in ("", "short", "with a blank in between", "é" * 20):
         file.write_text(bad)
         with pytest.raises(InputError):

@@ -139,7 +139,7 @@ def export(
     json: options.Json = False,
 ) -> None:
     """Write the tables as Parquet or CSV, with a data dictionary of every column and unit."""
-    from rbfrag.exchange.database_export import export_database
+    from rbfrag.exchange.database_tables import export_database
 
     names = None if tables is None else [name.strip() for name in tables.split(",") if name.strip()]
     report = export_database(out, db=db, format=format, tables=names, arrays=arrays)

@@ -69,8 +69,8 @@ def nrml(
     json: options.Json = False,
 ) -> None:
     """Write an OpenQuake fragility model, NRML 0.5 (.xml); PGV is in cm/s there."""
-    from rbfrag.exchange.nrml_write import nrml_text
-    from rbfrag.exchange.text_output import output_path, write_text
+    from rbfrag.exchange.files import output_path, write_text
+    from rbfrag.exchange.nrml import nrml_text
 
     target = output_path(out, (".xml",), "an NRML file")
     made, about, warnings = _functions(
@@ -99,8 +99,8 @@ def pelicun(
     json: options.Json = False,
 ) -> None:
     """Write a fragility table of pelicun and SimCenter (.csv); PGV is in m/s (mps) there."""
+    from rbfrag.exchange.files import output_path, write_text
     from rbfrag.exchange.pelicun_table import pelicun_text
-    from rbfrag.exchange.text_output import output_path, write_text
 
     target = output_path(out, (".csv",), "a fragility table")
     made, about, warnings = _functions(
@@ -151,7 +151,7 @@ def _functions(
         )
         return [mean], about, warnings
     if blocks is not None:
-        from rbfrag.exchange.waiting_blocks import waiting_blocks
+        from rbfrag.exchange.block_table import waiting_blocks
 
         table = waiting_blocks(blocks)
         names, p2s, krs = table["block_id"].tolist(), table["p2_1_s2"], table["kr"]

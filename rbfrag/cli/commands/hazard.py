@@ -95,10 +95,10 @@ def hazard(
     acceleration --convert.
     """
     from rbfrag.exchange.block_table import table_path, write_block_table
-    from rbfrag.exchange.curves.file import read_hazard_curves, suited_curves
+    from rbfrag.exchange.hazard_curves import read_hazard_curves, suited_curves
     from rbfrag.hazards.answer import hazard as answer
+    from rbfrag.hazards.conversions import velocity_conversion
     from rbfrag.hazards.report import as_dict
-    from rbfrag.hazards.velocity_conversion import velocity_conversion
 
     if out is not None:
         table_path(out)
@@ -180,7 +180,7 @@ def _blocks(
         return {"block_id": [None], "p2_1_s2": sizes[0], "kr": sizes[1]}, remarks
     if p2 is not None or kr is not None or block is not None:
         raise InputError("--blocks does not go with --p2, --kr or --block: the table has them")
-    from rbfrag.exchange.waiting_blocks import waiting_blocks
+    from rbfrag.exchange.block_table import waiting_blocks
 
     table = waiting_blocks(blocks)
     return {**table, "block_id": table["block_id"].tolist()}, ()

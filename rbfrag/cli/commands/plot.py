@@ -84,7 +84,7 @@ def plot_chart(
     """
     from rbfrag.fragility.lookup import find_model
     from rbfrag.plots.chart import plot_chart as draw
-    from rbfrag.plots.held_measures import held_measures
+    from rbfrag.plots.model_lines import held_measures
 
     given = ["pgv_m_s"] if model is None else ["pgv_m_s", "pga_g", "tm_s", "pgd_m"]
     chosen = find_model(model, given, db)
@@ -142,7 +142,7 @@ def plot_sensitivity(out: Out, suite: options.Suite = None, db: options.Db = Non
     """Draw critical k_r/PGA over the frequency ratio omega_m/p, with the lines of single lobes."""
     from rbfrag.db.engine import opened_database
     from rbfrag.db.queries import combination_table
-    from rbfrag.plots.sensitivity import plot_sensitivity as draw
+    from rbfrag.plots.critical_strength import plot_sensitivity as draw
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         table = combination_table(connection, suite=suite)
@@ -189,8 +189,8 @@ def plot_vertical(out: Out, suite: options.Suite = None, db: options.Db = None) 
     """Draw critical strengths with vertical motion beside those without it."""
     from rbfrag.db.engine import opened_database
     from rbfrag.db.queries import combination_table
-    from rbfrag.fragility.claims_of_vertical import vertical_pairs
-    from rbfrag.plots.vertical import plot_vertical as draw
+    from rbfrag.plots.critical_strength import plot_vertical as draw
+    from rbfrag.plots.critical_strength import vertical_pairs
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         without = combination_table(connection, suite=suite)

@@ -230,7 +230,7 @@ def _draw(
     reverse: bool,
 ) -> None:
     if response.kind != "toppling":
-        from rbfrag.plots.motion import plot_motion
+        from rbfrag.plots.response import plot_motion
 
         plot_motion(response, path, title=title, reverse=reverse)
         return

@@ -171,7 +171,7 @@ def rockmass(
 
             plot_rockmass(made, plot)
         else:
-            from rbfrag.plots.rockmass_failures import plot_failures
+            from rbfrag.plots.rockmass import plot_failures
 
             plot_failures(fates, plot, level=level)
     if json:

@@ -89,10 +89,9 @@ def shakemap(
     """
     import numpy as np
 
-    from rbfrag.exchange.grid_interpolation import at_places
-    from rbfrag.exchange.shakemap_grid import read_shakemap
-    from rbfrag.exchange.text_output import output_path
-    from rbfrag.hazards.component import component as component_named
+    from rbfrag.exchange.files import output_path
+    from rbfrag.exchange.shakemap import at_places, read_shakemap
+    from rbfrag.hazards.conversions import component as component_named
     from rbfrag.hazards.site_probability import site_probability
 
     target = output_path(out, SUFFIXES, "a map")
@@ -241,7 +240,7 @@ def _blocks(
             f"{100.0 * share:.3g} % of the rock mass; the others have no part in it"
         ]
     if blocks is not None:
-        from rbfrag.exchange.waiting_blocks import waiting_blocks
+        from rbfrag.exchange.block_table import waiting_blocks
 
         return waiting_blocks(blocks), []
     one_p2, one_kr, remarks = toppling_block(p2, kr, block)
@@ -255,11 +254,11 @@ def _write(columns: dict[str, Any], about: dict[str, Any], target: Any) -> None:
 
         write_block_table(columns, target)
     elif suffix == ".gpkg":
-        from rbfrag.exchange.geopackage import write_geopackage
+        from rbfrag.exchange.points import write_geopackage
 
         write_geopackage(columns, "toppling_probability", target)
     else:
-        from rbfrag.exchange.geojson import write_points
+        from rbfrag.exchange.points import write_points
 
         write_points(columns, about, target)
 

@@ -47,7 +47,7 @@ def charted_blocks(
     warnings: list[str] = []
     names = ("alpha1_deg", "alpha3_deg")
     if blocks is not None:
-        from rbfrag.exchange.block_columns import read_columns
+        from rbfrag.exchange.block_table import read_columns
 
         columns = read_columns(blocks, names)
     elif rockmass is not None:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import FitError
-from rbfrag.fragility.methods.links import Link
+from rbfrag.fragility.fit.links import Link
 
 FloatArray = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.fragility.claims import IntArray
 from rbfrag.fragility.fit.data import FitData
 from rbfrag.fragility.fit.judgement import Outcomes
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
 
 EDGES = np.array([0.0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0])
 """Edges of the bins of predicted probability."""

@@ -14,15 +14,15 @@ from rbfrag.db.rows import CombinationTable, ModelRow
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility import formulas
 from rbfrag.fragility.fit.data import FitData, fit_data
+from rbfrag.fragility.fit.line import fit_wls
 from rbfrag.fragility.fit.log_relations import log_correlations, power_law
+from rbfrag.fragility.fit.lognormal import fit_lognormal
 from rbfrag.fragility.fit.method_result import MethodResult
+from rbfrag.fragility.fit.outcomes import fit_outcomes
 from rbfrag.fragility.fit.report import FitReport
 from rbfrag.fragility.fit.source import FitSource, read_source
 from rbfrag.fragility.interval_floor import RICHER, interval_floor, of_motions, of_sizes
 from rbfrag.fragility.measures import TERMS, Term, intensity_term
-from rbfrag.fragility.methods.lognormal import fit_lognormal
-from rbfrag.fragility.methods.outcome import fit_outcomes
-from rbfrag.fragility.methods.wls import fit_wls
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction_values import pgv_over_pga_s
 
@@ -213,7 +213,7 @@ def _with_floor(row: ModelRow, source: FitSource, vertical: str) -> ModelRow:
 
 def _richer_model(name: str, source: FitSource, vertical: str) -> FragilityModel | None:
     """Return the best model of a term, with clustered covariance and its own table, only that."""
-    from rbfrag.fragility.methods.outcome import fit_parameters
+    from rbfrag.fragility.fit.outcomes import fit_parameters
 
     term = TERMS[name]
     method = "record" if name == "xp" else "bounded"

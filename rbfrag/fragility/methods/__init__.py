@@ -1,1 +1,273 @@
-"""One file a method of fitting."""
+"""The methods of fitting, one file each, and what they are made of. No library is loaded here.
+
+A method says P = F(eta): its parameters, eta with its slopes, the link F, what mechanics rules out
+and how it is fitted. Formulas are written once over a namespace: :data:`SINGLE` for numbers,
+:func:`arrays` for numpy arrays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
+from importlib import import_module
+from typing import Any, Literal, NamedTuple
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.measures import Term
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+_ROOT_HALF = math.sqrt(0.5)
+_LARGEST_EXPONENT = 709.0
+
+
+class Numbers(NamedTuple):
+    """The functions that formulas need, for numbers or for arrays.
+
+    Args:
+        log: natural logarithm.
+        exp: exponential.
+        sqrt: square root.
+        ndtr: standard normal distribution function.
+        expm1: exponential less one.
+        maximum: the larger of two.
+    """
+
+    log: Callable[[Any], Any]
+    exp: Callable[[Any], Any]
+    sqrt: Callable[[Any], Any]
+    ndtr: Callable[[Any], Any]
+    expm1: Callable[[Any], Any]
+    maximum: Callable[[Any, Any], Any]
+
+
+def _exp(x: float) -> float:
+    return math.exp(x) if x < _LARGEST_EXPONENT else math.inf
+
+
+SINGLE = Numbers(
+    math.log, _exp, math.sqrt, lambda z: 0.5 * math.erfc(-z * _ROOT_HALF), math.expm1, max
+)
+"""For single numbers."""
+
+
+@cache
+def arrays() -> Numbers:
+    """Return the same functions for numpy arrays."""
+    import numpy as np
+    from scipy.special import ndtr
+
+    return Numbers(np.log, np.exp, np.sqrt, ndtr, np.expm1, np.maximum)
+
+
+class Eta(NamedTuple):
+    """What a formula gives.
+
+    Args:
+        eta: the argument of the link.
+        slopes: derivatives of eta by the parameters.
+        log_sigma: logarithm of the scatter, for models with normal scatter of a critical value.
+        sigma_slopes: its derivatives by the parameters.
+    """
+
+    eta: Any
+    slopes: tuple[Any, ...]
+    log_sigma: Any = None
+    sigma_slopes: tuple[Any, ...] = ()
+
+
+class Link(NamedTuple):
+    """A function from eta to probability.
+
+    Args:
+        name: as reports call it.
+        probability: F(eta, functions).
+    """
+
+    name: str
+    probability: Callable[[Any, Numbers], Any]
+
+
+NORMAL = Link("normal", lambda eta, ns: ns.ndtr(eta))
+LOGIT = Link("logit", lambda eta, ns: 1.0 / (1.0 + ns.exp(-eta)))
+LOGLOG = Link("loglog", lambda eta, ns: ns.exp(-ns.exp(-eta)))
+COMPLEMENT = Link("complement", lambda eta, ns: -ns.expm1(-ns.maximum(eta, 0.0)))
+
+
+class Bound(NamedTuple):
+    """A case that mechanics forbids: P is 0 whatever the model says.
+
+    Args:
+        holds: whether (where) it is so, from values by name.
+        about: name of the value that it is said of.
+        text: what is said.
+    """
+
+    holds: Callable[[Mapping[str, Any]], Any]
+    about: str
+    text: str
+
+
+ABOVE_TWICE_PGV = Bound(
+    lambda v: v["y_m_s"] >= 2.0 * v["intensity_m_s"],
+    "y_m_s",
+    "is not below 2 PGV, which no excursion from rest exceeds: P = 0 by mechanics, not by the "
+    "model",
+)
+ABOVE_SPECTRUM = Bound(
+    lambda v: v["y_m_s"] >= v["intensity_m_s"],
+    "y_m_s",
+    "is not below the toppling spectrum X(p) of the motion, which no excursion from rest exceeds: "
+    "P = 0 by mechanics, not by the model",
+)
+
+
+@dataclass(frozen=True)
+class BlockParameters:
+    """What describes a block in predictions.
+
+    Args:
+        names: the names of its parameters.
+        kind: the kind of failure that they stand for where none is named.
+        strength: name of the yield acceleration coefficient among them.
+        size: name of the squared frequency parameter [1/s²] among them, if there is one.
+        at_rest: the bound that PGA below the yield acceleration is.
+        criterion: name of the criterion of failure that a model is fitted for, if there are
+            several.
+        options: names of what else a question may state.
+    """
+
+    names: tuple[str, ...]
+    kind: str
+    strength: str
+    size: str | None
+    at_rest: Bound
+    criterion: str | None = None
+    options: tuple[str, ...] = ()
+
+    def completed(self, given: Mapping[str, Any], term: Term, ns: Numbers) -> dict[str, Any]:
+        """Return the given values with what formulas read.
+
+        These are ``intensity_m_s`` and, for a block of a size, ``p`` [1/s] and ``y_m_s`` = k g/p.
+        """
+        values = dict(given)
+        values["intensity_m_s"] = term.intensity_m_s(values)
+        if self.size is not None:
+            values["p"] = p = ns.sqrt(values[self.size])
+            values["y_m_s"] = values[self.strength] * STANDARD_GRAVITY_M_S2 / p
+        return values
+
+
+NOT_LIFTED = Bound(
+    lambda v: v["kr"] >= v["pga_g"],
+    "kr",
+    "is not below PGA: without vertical motion the ground cannot lift this block, P = 0 by "
+    "mechanics, not by the model",
+)
+TOPPLING_BLOCK = BlockParameters(("p2", "kr"), "toppling", "kr", "p2", NOT_LIFTED)
+"""Blocks known by p² [1/s²] and the yield acceleration coefficient k_r."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """A method on one measure.
+
+    Args:
+        parameters: their names; the method's `exponent` stands last and may be missing.
+        eta: eta and its slopes, from the parameters, values by name and functions.
+        rank: place among the methods on this measure by falling skill on held-out earthquakes
+            (docs/theory/model-choice.md).
+        bounds: what mechanics forbids.
+        start: where the search for the likeliest parameters begins; empty where none is needed.
+    """
+
+    parameters: tuple[str, ...]
+    eta: Callable[[Sequence[float], Mapping[str, Any], Numbers], Eta]
+    rank: int
+    bounds: tuple[Bound, ...] = ()
+    start: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Method:
+    """One method of fitting.
+
+    Args:
+        name: name in options and in the database.
+        block: what describes its blocks.
+        link: F in P = F(eta).
+        forms: its formulas by name of the measure.
+        reads: what it is fitted to: ``outcomes`` of blocks on the grid, or ``critical`` values.
+        meaning: what the probability is one of, in words.
+        fit: module and function that fit it, as ``module:function``.
+        exponent: name of the parameter that is fitted where the exponent M is asked for.
+        failure: words for what a question asks the probability of, from its values; None: the
+            name of the kind.
+        median_of: name of the block's parameter whose median is told beside the probability.
+        doubts: yields (holds, name of the value, text) where the model makes no sense, from
+            parameters, values and functions.
+    """
+
+    name: str
+    block: BlockParameters
+    link: Link
+    forms: Mapping[str, Form] = field(repr=False)
+    reads: Literal["outcomes", "critical"]
+    meaning: str
+    fit: str
+    exponent: str | None = None
+    failure: Callable[[Mapping[str, Any]], str] | None = None
+    median_of: str | None = None
+    doubts: (
+        Callable[[Sequence[float], Mapping[str, Any], Numbers], Iterator[tuple[Any, str, str]]]
+        | None
+    ) = None
+
+    def fitter(self) -> Callable[..., Any]:
+        """Return the function that fits it; numpy is loaded only here."""
+        module, _, function = self.fit.partition(":")
+        found: Callable[..., Any] = getattr(import_module(module), function)
+        return found
+
+
+OF_CRITICAL = (
+    "probability that the critical toppling velocity of the motion is at least the block's; "
+    "safe islands below the critical value are not taken off"
+)
+OF_OUTCOME = "probability that the block topples"
+
+
+def method_names() -> tuple[str, ...]:
+    """Return the names of all methods."""
+    from pkgutil import iter_modules
+
+    return tuple(found.name for found in iter_modules(__path__))
+
+
+@lru_cache(maxsize=64)
+def method_named(name: str) -> Method:
+    """Return a method.
+
+    Raises:
+        InputError: there is none of that name.
+    """
+    if not name.isidentifier() or name.startswith("_"):
+        raise _unknown(name)
+    home = f"{__name__}.{name}"
+    try:
+        found: Method = import_module(home).METHOD
+    except ModuleNotFoundError as error:
+        if error.name != home:
+            raise
+        raise _unknown(name) from None
+    return found
+
+
+def methods() -> tuple[Method, ...]:
+    """Return all methods."""
+    return tuple(method_named(name) for name in method_names())
+
+
+def _unknown(name: str) -> InputError:
+    return InputError(f"unknown method {name!r}: use one of {', '.join(method_names())}")

@@ -5,15 +5,23 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 
 from rbfrag.service import work
-from rbfrag.service.answer import answer
 from rbfrag.service.body import MULTIPART, Bodies
 from rbfrag.service.documents import HazardAnswer
-from rbfrag.service.operation import operation
-from rbfrag.service.parameters import Parameter, by_name, read_query
-from rbfrag.service.plain_route import plain_router
-from rbfrag.service.scenario_parameters import KR, LEVEL, MEASURES, MODEL, P2
+from rbfrag.service.json_body import answer
+from rbfrag.service.operation import (
+    KR,
+    LEVEL,
+    MEASURES,
+    MODEL,
+    P2,
+    Parameter,
+    by_name,
+    operation,
+    plain_router,
+    read_query,
+)
 from rbfrag.service.settings import Settings
-from rbfrag.service.workshop import Workshop
+from rbfrag.service.work import WorkerPool
 
 PARAMETERS = by_name(
     (
@@ -50,13 +58,13 @@ EXAMPLE = "pgv_m_s,annual_rate\n0.05,0.05\n0.1,0.02\n0.2,0.006\n0.5,0.0008\n1.0,
 """A made-up hazard curve."""
 
 
-def router(settings: Settings, bodies: Bodies, workshop: Workshop) -> APIRouter:
+def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
     """Return the operation on `/v1/hazard`.
 
     Args:
         settings: the database.
         bodies: reads what is sent.
-        workshop: where the work is done.
+        pool: where the work is done.
     """
     routes = plain_router()
 
@@ -91,7 +99,7 @@ def router(settings: Settings, bodies: Bodies, workshop: Workshop) -> APIRouter:
             **{name: asked.get(name) for name in ("convert", "component", "model")},
         }
         async with bodies.read(request) as body:
-            found = await workshop.do(
+            found = await pool.run(
                 request,
                 work.hazard,
                 body,

@@ -8,14 +8,11 @@ from fastapi import APIRouter, Request, Response
 
 from rbfrag.errors import InputError
 from rbfrag.service import work
-from rbfrag.service.answer import answer
 from rbfrag.service.body import MULTIPART, Bodies
 from rbfrag.service.documents import CriticalAnswer, SpectrumAnswer
-from rbfrag.service.operation import operation
-from rbfrag.service.parameters import Parameter, by_name, read_query
-from rbfrag.service.plain_route import plain_router
-from rbfrag.service.scenario_parameters import P2
-from rbfrag.service.workshop import Workshop
+from rbfrag.service.json_body import answer
+from rbfrag.service.operation import P2, Parameter, by_name, operation, plain_router, read_query
+from rbfrag.service.work import WorkerPool
 
 MOST_SIZES = 100
 """Most values of p² in one request for a spectrum."""
@@ -92,12 +89,12 @@ ACCELEROGRAM = {
 """An accelerogram in any format that rbfrag reads, as the body itself or as a form's one file."""
 
 
-def router(bodies: Bodies, workshop: Workshop) -> APIRouter:
+def router(bodies: Bodies, pool: WorkerPool) -> APIRouter:
     """Return the operations on accelerograms.
 
     Args:
         bodies: reads what is sent.
-        workshop: where the work is done.
+        pool: where the work is done.
     """
     routes = plain_router()
 
@@ -118,7 +115,7 @@ def router(bodies: Bodies, workshop: Workshop) -> APIRouter:
         if len(sizes) > MOST_SIZES:
             raise InputError(f"p2 has {len(sizes)} values; one request may ask for {MOST_SIZES}")
         async with bodies.read(request) as body:
-            found = await workshop.do(
+            found = await pool.run(
                 request,
                 work.spectrum,
                 body,
@@ -144,7 +141,7 @@ def router(bodies: Bodies, workshop: Workshop) -> APIRouter:
     async def critical(request: Request) -> Response:
         asked = read_query(request.scope["query_string"], CRITICAL)
         async with bodies.read(request) as body:
-            found = await workshop.do(
+            found = await pool.run(
                 request,
                 work.critical,
                 body,

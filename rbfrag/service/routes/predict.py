@@ -11,16 +11,24 @@ from fastapi.concurrency import run_in_threadpool
 from rbfrag.db.location import locate
 from rbfrag.errors import InputError
 from rbfrag.fragility.prediction_document import prediction_document
-from rbfrag.service.answer import answer, json_answer
 from rbfrag.service.body import Bodies
 from rbfrag.service.documents import PredictAnswer, PredictArrays
-from rbfrag.service.json_body import json_text, read_json
-from rbfrag.service.operation import operation
-from rbfrag.service.parameters import by_name, read_query
-from rbfrag.service.plain_route import plain_router
-from rbfrag.service.scenario_parameters import KEYWORD, KR, LEVEL, MEASURES, MODEL, P2, measures_in
+from rbfrag.service.json_body import answer, json_answer, json_text, read_json
+from rbfrag.service.operation import (
+    KEYWORD,
+    KR,
+    LEVEL,
+    MEASURES,
+    MODEL,
+    P2,
+    by_name,
+    measures_in,
+    operation,
+    plain_router,
+    read_query,
+)
 from rbfrag.service.settings import Settings
-from rbfrag.service.workshop import Workshop
+from rbfrag.service.work import WorkerPool
 
 PARAMETERS = by_name((P2, KR, *MEASURES, MODEL, LEVEL))
 
@@ -135,13 +143,13 @@ def _number(name: str, value: Any, place: int | None) -> float:
         raise InputError(f"{where} is too large for a number") from None
 
 
-def router(settings: Settings, bodies: Bodies, workshop: Workshop) -> APIRouter:
+def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
     """Return the operations on `/v1/predict`.
 
     Args:
         settings: database and limits.
         bodies: reads what is sent.
-        workshop: where long work is done.
+        pool: where long work is done.
     """
     routes = plain_router()
     # a server's answer is waited for; a file's models are in memory
@@ -209,7 +217,7 @@ def router(settings: Settings, bodies: Bodies, workshop: Workshop) -> APIRouter:
             given = checked(read_json(body), settings.row_limit)
             rows = max((len(each) for each in given.values() if isinstance(each, list)), default=1)
             if rows > ROWS_BESIDE:
-                return answer(await workshop.do(request, answer_many, given, settings.db))
+                return answer(await pool.run(request, answer_many, given, settings.db))
             if rows > ROWS_AT_ONCE or on_server:
                 return answer(await run_in_threadpool(answer_many, given, settings.db))
             return answer(answer_many(given, settings.db))

@@ -7,16 +7,23 @@ from typing import Literal
 from fastapi import APIRouter, Request, Response
 
 from rbfrag.service import work
-from rbfrag.service.answer import answer
 from rbfrag.service.body import Bodies, media_type
 from rbfrag.service.documents import RockmassAnswer
-from rbfrag.service.operation import operation
-from rbfrag.service.parameters import Parameter, by_name, read_query
-from rbfrag.service.plain_route import plain_router
-from rbfrag.service.refusal import RequestRefusedError
-from rbfrag.service.scenario_parameters import LEVEL, MEASURES, MODEL, measures_in
+from rbfrag.service.json_body import answer
+from rbfrag.service.operation import (
+    LEVEL,
+    MEASURES,
+    MODEL,
+    Parameter,
+    by_name,
+    measures_in,
+    operation,
+    plain_router,
+    read_query,
+)
+from rbfrag.service.problem import RequestRefusedError
 from rbfrag.service.settings import Settings
-from rbfrag.service.workshop import Workshop
+from rbfrag.service.work import WorkerPool
 
 PARAMETERS = by_name(
     (
@@ -75,13 +82,13 @@ _FORMS: dict[str, Literal["toml", "json", "csv"]] = {
 }
 
 
-def router(settings: Settings, bodies: Bodies, workshop: Workshop) -> APIRouter:
+def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
     """Return the operation on `/v1/rockmass`.
 
     Args:
         settings: database and limits.
         bodies: reads what is sent.
-        workshop: where the work is done.
+        pool: where the work is done.
     """
     routes = plain_router()
 
@@ -112,7 +119,7 @@ def router(settings: Settings, bodies: Bodies, workshop: Workshop) -> APIRouter:
                 f"a rock mass comes as {', '.join(_FORMS)}: say which by the header Content-Type",
             )
         async with bodies.read(request) as body:
-            found = await workshop.do(
+            found = await pool.run(
                 request,
                 work.rock_mass,
                 body,

@@ -14,7 +14,7 @@ from rbfrag.fragility.fit.binomial import (
     maximum_likelihood,
     newton,
 )
-from rbfrag.fragility.methods.links import COMPLEMENT, LOGIT, LOGLOG
+from rbfrag.fragility.fit.links import COMPLEMENT, LOGIT, LOGLOG
 
 LINKS = [LOGIT, LOGLOG, COMPLEMENT]
 

@@ -126,7 +126,7 @@ def test_scores_know_a_good_model_from_a_bad_one(draw):
 
 
 def test_held_out_scores_are_those_of_separate_fits(draw, monkeypatch):
-    monkeypatch.setattr("rbfrag.fragility.methods.wls.REPLICATES", 10)
+    monkeypatch.setattr("rbfrag.fragility.fit.line.REPLICATES", 10)
     table = draw(events=12, motions=2, event_share=0.4)
     densities = []
     for event in sorted(set(table.event_id)):

@@ -1,0 +1,104 @@
+"""Figure of the models of blocks that slide or slump, with the data they were fitted to."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rbfrag.fragility.fit.kind_data import KindData
+from rbfrag.fragility.fit.kind_fitting import ARRAYS
+from rbfrag.fragility.kind_model import KindModel
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.plots.canvas import new_figure, plain_numbers, plot_path, save_figure
+
+
+def plot_other_kinds(
+    sliding: KindModel, slides: KindData, slumping: KindModel, slumps: KindData,
+    path: str | PathLike[str],
+) -> Path:  # fmt: skip
+    """Draw displacements over PGV²/(k_y g) against k_y/PGA, and critical (1 - r)/r against z.
+
+    Args:
+        sliding: a model on PGV and PGA.
+        slides: what it was fitted to.
+        slumping: a model on PGV and PGA.
+        slumps: what it was fitted to.
+        path: file to write: .png, .pdf or .svg.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: a path that cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    plot_path(path)
+    figure = new_figure(9.2, 4.6)
+    left, right = figure.subplots(1, 2)
+    _slides(left, sliding, slides)
+    _slumps(right, slumping, slumps)
+    return save_figure(figure, path)
+
+
+def _slides(axes: Any, model: KindModel, data: KindData) -> None:
+    v, found = data.values, data.found
+    r = v["ky"] / v["pga_g"]
+    size = v["pgv_m_s"] ** 2 / (v["ky"] * STANDARD_GRAVITY_M_S2)
+    share = v["displacement_m"] / size
+    rng = np.random.default_rng(0)
+    jitter = r + rng.uniform(-0.008, 0.008, r.size)
+    axes.plot(jitter[found], share[found], ".", ms=1.6, color="#9a9a9a", alpha=0.5, rasterized=True)
+    grid = np.linspace(0.01, 0.97, 120)
+    pga, pgv = 0.3, 0.3
+    line = {"ky": grid * pga, "pgv_m_s": np.full(120, pgv), "pga_g": np.full(120, pga)}
+    line["displacement_m"] = np.ones(120)
+    eta = model.formula.eta(model.parameters, line, ARRAYS)
+    sigma = np.exp(eta.log_sigma)
+    norm = pgv**2 / (line["ky"] * STANDARD_GRAVITY_M_S2)
+    axes.plot(grid, np.exp(eta.eta * sigma) / norm, color="#b2182b", lw=1.8,
+              label="median at PGA 0.3 g, PGV 0.3 m/s")  # fmt: skip
+    for side in (-1.645, 1.645):
+        axes.plot(
+            grid, np.exp((eta.eta + side) * sigma) / norm, "--", color="#b2182b", lw=1.0,
+            label="5 % and 95 %" if side > 0 else None,
+        )  # fmt: skip
+    axes.plot(grid, 0.5 * (1.0 - grid), color="black", lw=1.0, label="rectangular pulse")
+    axes.set_yscale("log")
+    axes.set_ylim(1e-5, 20.0)
+    axes.set_xlim(0.0, 1.0)
+    axes.set_xlabel(r"$k_y/\mathrm{PGA}$")
+    axes.set_ylabel(r"displacement over $\mathrm{PGV}^2/(k_y g)$")
+    axes.set_title("sliding", fontsize=10)
+    axes.legend(loc="lower left", fontsize=8, frameon=False)
+
+
+def _slumps(axes: Any, model: KindModel, data: KindData) -> None:
+    v = data.values
+    r = v["ks"] / v["pga_g"]
+    z = np.sqrt(v["ps2"]) * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2)
+    excess = (1.0 - r) / r
+    for chosen, colour, text in (
+        (~data.found, "#7fb2d8", "not failed before the model ends"),
+        (data.found, "#8a8a8a", "fails"),
+    ):
+        axes.plot(z[chosen], excess[chosen], ".", ms=1.8, color=colour, alpha=0.5, rasterized=True)
+        axes.plot([], [], "o", ms=4, color=colour, label=text)
+    grid = np.geomspace(float(z.min()), float(z.max()), 60)
+    c, b, s0 = model.parameters
+    for side in (-1.645, 0.0, 1.645):
+        axes.plot(
+            grid, np.exp(c - b * np.log(grid) + side * np.exp(s0)),
+            color="#b2182b", lw=1.0 if side else 1.8, ls="--" if side else "-",
+            label={0.0: "median", 1.645: "5 % and 95 %"}.get(side),
+        )  # fmt: skip
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
+    plain_numbers(axes.yaxis, 1.0)
+    axes.set_xlabel(r"$z = p_s\,\mathrm{PGV}/(\mathrm{PGA}\,g)$")
+    axes.set_ylabel(r"$(1-r)/r$ at failure, $r=k_s/\mathrm{PGA}$")
+    axes.set_title("slumping past recovery", fontsize=10)
+    axes.legend(loc="upper right", fontsize=8, frameon=False)

@@ -1,1 +1,0 @@
-"""Hazard curves in the files of other tools."""

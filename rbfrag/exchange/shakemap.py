@@ -1,0 +1,406 @@
+"""ShakeMap grids: the shaking of one earthquake over a region (grid.xml, uncertainty.xml)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.exchange.files import parse_xml
+
+FloatArray = NDArray[np.float64]
+
+MOST_NODES = 20_000_000
+"""Larger grids are refused."""
+
+_FIELDS: Mapping[str, tuple[str, Mapping[str, float], str]] = {
+    "PGA": ("pga_g", {"pctg": 0.01, "%g": 0.01, "g": 1.0}, "pctg"),
+    "PGV": ("pgv_m_s", {"cms": 0.01, "cm/s": 0.01, "m/s": 1.0}, "cms"),
+    "STDPGA": ("std_ln_pga", {"ln(pctg)": 1.0, "ln(%g)": 1.0, "ln(g)": 1.0}, "ln(pctg)"),
+    "STDPGV": ("std_ln_pgv", {"ln(cms)": 1.0, "ln(cm/s)": 1.0, "ln(m/s)": 1.0}, "ln(cms)"),
+}
+"""What is read of a grid: our name, units with their factors, and the unit of a blank one."""
+
+_MOST = {"pga_g": 10.0, "pgv_m_s": 20.0, "std_ln_pga": 5.0, "std_ln_pgv": 5.0}
+
+
+@dataclass(frozen=True)
+class ShakeMapEvent:
+    """The earthquake of a ShakeMap.
+
+    Args:
+        event_id: identifier.
+        magnitude: magnitude, or None.
+        depth_km: depth [km], or None.
+        lat: latitude of the epicentre [deg], or None.
+        lon: longitude of the epicentre [deg], or None.
+        time: time of origin as written.
+        description: name for people.
+        version: version of the ShakeMap code.
+    """
+
+    event_id: str
+    magnitude: float | None
+    depth_km: float | None
+    lat: float | None
+    lon: float | None
+    time: str
+    description: str
+    version: str
+
+
+@dataclass
+class GridReading:
+    """A ShakeMap grid while its XML is read.
+
+    Args:
+        source: path of the file.
+        needed: fields that must be there beside LON and LAT.
+    """
+
+    source: str
+    needed: tuple[str, ...]
+    root: Mapping[str, str] = field(default_factory=dict)
+    event: Mapping[str, str] = field(default_factory=dict)
+    size: Mapping[str, str] = field(default_factory=dict)
+    places: dict[str, tuple[int, str, int]] = field(default_factory=dict)
+    blocks: list[FloatArray] = field(default_factory=list)
+    rest: str = ""
+    in_data: bool = False
+    is_grid: bool = False
+    data_line: int = 0
+    values: int = 0
+
+    def start(self, name: str, attributes: Mapping[str, str], line: int) -> None:
+        """Take a start tag."""
+        if name == "shakemap_grid":
+            self.is_grid, self.root = True, attributes
+        elif name == "event":
+            self.event = attributes
+        elif name == "grid_specification":
+            self.size = attributes
+        elif name == "grid_field":
+            where = f"{self.source}, line {line}"
+            index, title = attributes.get("index", ""), attributes.get("name", "").strip()
+            if not index.isdigit() or int(index) < 1:
+                raise InputError(f"{where}: grid_field index {index!r} is not a number from 1 on")
+            if title in self.places:
+                raise InputError(f"{where}: field {title} is there twice")
+            self.places[title] = (int(index) - 1, attributes.get("units", "").strip(), line)
+        elif name == "grid_data":
+            self.in_data, self.data_line = True, line
+            for wanted in ("LON", "LAT", *self.needed):
+                if wanted not in self.places:
+                    have = ", ".join(self.places) or "none"
+                    raise InputError(
+                        f"{self.source}, line {line}: there is no field {wanted}; the fields are "
+                        f"{have}"
+                    )
+
+    def text(self, piece: str) -> None:
+        """Take a piece of text."""
+        if not self.in_data:
+            return
+        # a number may be cut where the parser's buffer ends
+        whole = self.rest + piece
+        cut = max(whole.rfind(" "), whole.rfind("\n"), whole.rfind("\t"), whole.rfind("\r"))
+        self.rest = whole[cut + 1 :]
+        self._take(whole[: cut + 1])
+
+    def end(self, name: str, _line: int) -> None:
+        """Take an end tag."""
+        if name == "grid_data":
+            self._take(self.rest)
+            self.rest, self.in_data = "", False
+
+    def _take(self, text: str) -> None:
+        words = text.split()
+        if not words:
+            return
+        try:
+            block = np.array(words, dtype=np.float64)
+        except ValueError:
+            raise InputError(self._bad_word(words)) from None
+        self.values += block.size
+        if self.values > MOST_NODES * max(len(self.places), 1):
+            raise InputError(f"{self.source}: the grid has more than {MOST_NODES} nodes")
+        self.blocks.append(block)
+
+    def _bad_word(self, words: list[str]) -> str:
+        for i, word in enumerate(words):
+            try:
+                float(word)
+            except ValueError:
+                row = (self.values + i) // max(len(self.places), 1) + 1
+                return f"{self.source}, node {row} of grid_data: {word[:40]!r} is not a number"
+        raise AssertionError("every word is a number")
+
+    def read(
+        self, allow_partial: bool
+    ) -> tuple[ShakeMapEvent, dict[str, FloatArray], int, int, list[str]]:
+        """Return event, fields by name, columns, rows and warnings.
+
+        Args:
+            allow_partial: go on where the number of nodes is not the declared one.
+
+        Raises:
+            InputError: not such a file, or numbers that cannot be used.
+        """
+        parse_xml(self.source, "a ShakeMap grid", start=self.start, end=self.end, text=self.text)
+        if not self.is_grid:
+            raise InputError(f"{self.source}: not a ShakeMap grid: there is no shakemap_grid")
+        if not self.blocks:
+            raise InputError(f"{self.source}: there is no grid_data")
+        warnings: list[str] = []
+        width = len(self.places)
+        highest = max(place for place, _, _ in self.places.values()) + 1
+        if highest != width:
+            raise InputError(
+                f"{self.source}: the fields have indices up to {highest} but there are {width}"
+            )
+        values = np.concatenate(self.blocks)
+        if values.size % width:
+            raise InputError(
+                f"{self.source}, line {self.data_line}: grid_data has {values.size} numbers, which "
+                f"is no multiple of the {width} fields: a row is cut or a field missing"
+            )
+        table = values.reshape(-1, width)
+        columns, rows = (self._count(name) for name in ("nlon", "nlat"))
+        if table.shape[0] != columns * rows:
+            message = (
+                f"{self.source}: grid_data has {table.shape[0]} nodes, grid_specification says "
+                f"{columns} x {rows} = {columns * rows}"
+            )
+            if not allow_partial:
+                raise InputError(f"{message}: with --allow-partial it is read as it is")
+            warnings.append(f"{message}: read as it is")
+        fields = {
+            "lon": self._degrees(table, "LON", 180.0),
+            "lat": self._degrees(table, "LAT", 90.0),
+        }
+        for title in _FIELDS:
+            if title in self.places:
+                fields[_FIELDS[title][0]] = self._field(table, title, warnings)
+        return self._event(), fields, columns, rows, warnings
+
+    def _count(self, name: str) -> int:
+        text = self.size.get(name, "")
+        if not text.strip().isdigit() or int(text) < 1:
+            raise InputError(f"{self.source}: grid_specification {name} = {text!r} is no number")
+        return int(text)
+
+    def _degrees(self, table: FloatArray, title: str, limit: float) -> FloatArray:
+        values = table[:, self.places[title][0]].copy()
+        off = ~(np.abs(values) <= limit)
+        if off.any():
+            node = int(np.flatnonzero(off)[0])
+            raise InputError(
+                f"{self.source}, node {node + 1} of grid_data: {title} = {values[node]:g} lies off "
+                f"the map (-{limit:g} to {limit:g})"
+            )
+        return values
+
+    def _field(self, table: FloatArray, title: str, warnings: list[str]) -> FloatArray:
+        place, unit, line = self.places[title]
+        name, units, usual = _FIELDS[title]
+        if not unit:
+            warnings.append(f"{self.source}, line {line}: {title} has no unit: taken as {usual}")
+            unit = usual
+        if unit not in units:
+            raise InputError(
+                f"{self.source}, line {line}: {title} in {unit!r} is not known: use one of "
+                f"{', '.join(units)}"
+            )
+        values = units[unit] * table[:, place]
+        bad = ~(values >= 0.0) | np.isinf(values)
+        if bad.any():
+            node = int(np.flatnonzero(bad)[0])
+            raise InputError(
+                f"{self.source}, node {node + 1} of grid_data: {title} = {table[node, place]:g}: "
+                "a finite number, not below zero, is wanted"
+            )
+        if values.max() > _MOST[name]:
+            warnings.append(
+                f"{self.source}: {title} reaches {table[:, place].max():g} {unit}: is that its "
+                "unit?"
+            )
+        return values
+
+    def _event(self) -> ShakeMapEvent:
+        def number(name: str) -> float | None:
+            try:
+                value = float(self.event.get(name, ""))
+            except ValueError:
+                return None
+            return value if np.isfinite(value) else None
+
+        return ShakeMapEvent(
+            event_id=self.event.get("event_id", self.root.get("event_id", "")),
+            magnitude=number("magnitude"),
+            depth_km=number("depth"),
+            lat=number("lat"),
+            lon=number("lon"),
+            time=self.event.get("event_timestamp", ""),
+            description=self.event.get("event_description", ""),
+            version=self.root.get("code_version", ""),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ShakeMapGrid:
+    """Nodes of a ShakeMap, rows from west to east, north to south.
+
+    Args:
+        event: the earthquake.
+        lon: longitudes [deg], shape (n,).
+        lat: latitudes [deg], shape (n,).
+        pgv_m_s: peak ground velocity [m/s], shape (n,).
+        pga_g: peak ground acceleration [g], shape (n,).
+        std_ln_pgv: standard deviation of ln PGV, shape (n,), or None.
+        std_ln_pga: standard deviation of ln PGA, shape (n,), or None.
+        columns: declared number of nodes in a row.
+        rows: declared number of rows.
+        warnings: what was noticed on reading.
+    """
+
+    event: ShakeMapEvent
+    lon: FloatArray
+    lat: FloatArray
+    pgv_m_s: FloatArray
+    pga_g: FloatArray
+    std_ln_pgv: FloatArray | None
+    std_ln_pga: FloatArray | None
+    columns: int
+    rows: int
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether there are as many nodes as declared."""
+        return self.lon.size == self.columns * self.rows
+
+
+def read_shakemap(
+    path: str | os.PathLike[str],
+    *,
+    uncertainty: str | os.PathLike[str] | None = None,
+    allow_partial: bool = False,
+) -> ShakeMapGrid:
+    """Return the grid of a ShakeMap, version 3 or 4.
+
+    Columns are found by their names. Units are those stated; where a unit is blank it is that of
+    the ShakeMap manual (percent of g, cm/s), with a warning.
+
+    Args:
+        path: grid.xml.
+        uncertainty: uncertainty.xml of the same map: standard deviations of ln PGA and ln PGV.
+        allow_partial: read a grid with fewer or more nodes than it declares, with a warning.
+
+    Raises:
+        InputError: not such a file, or numbers that cannot be used; the message names the line.
+    """
+    event, fields, columns, rows, warnings = GridReading(str(path), ("PGA", "PGV")).read(
+        allow_partial
+    )
+    grid = ShakeMapGrid(
+        event=event,
+        lon=fields["lon"],
+        lat=fields["lat"],
+        pgv_m_s=fields["pgv_m_s"],
+        pga_g=fields["pga_g"],
+        std_ln_pgv=fields.get("std_ln_pgv"),
+        std_ln_pga=fields.get("std_ln_pga"),
+        columns=columns,
+        rows=rows,
+        warnings=tuple(warnings),
+    )
+    return grid if uncertainty is None else _with_uncertainty(grid, uncertainty, allow_partial)
+
+
+def _with_uncertainty(
+    grid: ShakeMapGrid, path: str | os.PathLike[str], allow_partial: bool
+) -> ShakeMapGrid:
+    event, fields, _, _, warnings = GridReading(str(path), ("STDPGV",)).read(allow_partial)
+    if event.event_id and grid.event.event_id and event.event_id != grid.event.event_id:
+        raise InputError(
+            f"{path}: is of event {event.event_id!r}, the grid of {grid.event.event_id!r}: name "
+            "the uncertainty of the same map"
+        )
+    same = fields["lon"].size == grid.lon.size
+    same = same and np.allclose(fields["lon"], grid.lon, rtol=0.0, atol=1e-4)
+    if not (same and np.allclose(fields["lat"], grid.lat, rtol=0.0, atol=1e-4)):
+        raise InputError(
+            f"{path}: has {fields['lon'].size} nodes that are not those of the grid "
+            f"({grid.lon.size}): name the uncertainty of the same map"
+        )
+    return replace(
+        grid,
+        std_ln_pgv=fields["std_ln_pgv"],
+        std_ln_pga=fields.get("std_ln_pga", grid.std_ln_pga),
+        warnings=(*grid.warnings, *warnings),
+    )
+
+
+def at_places(
+    grid: ShakeMapGrid, lon: FloatArray, lat: FloatArray
+) -> tuple[dict[str, FloatArray | None], NDArray[np.bool_]]:
+    """Return the fields of a grid at places, and which places lie on the map.
+
+    Bilinear between the four nodes around a place, in the logarithm of PGV and PGA; off the map
+    NaN.
+
+    Args:
+        grid: a whole grid.
+        lon: longitudes [deg], shape (n,).
+        lat: latitudes [deg], shape (n,).
+
+    Raises:
+        InputError: the grid is not whole, or its rows are not regular.
+    """
+    if not grid.is_whole:
+        raise InputError(
+            "blocks between nodes need a whole grid: this one has not as many nodes as it declares"
+        )
+    shape = (grid.rows, grid.columns)
+    x, y = grid.lon.reshape(shape)[0], grid.lat.reshape(shape)[:, 0]
+    regular = np.allclose(grid.lon.reshape(shape), x, atol=1e-4)
+    regular = regular and np.allclose(grid.lat.reshape(shape), y[:, None], atol=1e-4)
+    if (
+        not regular
+        or x.size < 2
+        or y.size < 2
+        or not (np.diff(x) > 0).all()
+        or not (np.diff(y) < 0).all()
+    ):
+        raise InputError("the nodes of the grid do not run west to east and north to south")
+    on_map = (lon >= x[0]) & (lon <= x[-1]) & (lat <= y[0]) & (lat >= y[-1])
+    i = np.clip(np.searchsorted(x, lon, side="right") - 1, 0, x.size - 2)
+    j = np.clip(np.searchsorted(-y, -lat, side="right") - 1, 0, y.size - 2)
+    u = (lon - x[i]) / (x[i + 1] - x[i])
+    v = (lat - y[j]) / (y[j + 1] - y[j])
+
+    def between(values: FloatArray | None, logarithmic: bool) -> FloatArray | None:
+        if values is None:
+            return None
+        table = values.reshape(shape)
+        if logarithmic:
+            table = np.log(np.maximum(table, 1e-300))
+        found = (
+            (1 - u) * (1 - v) * table[j, i]
+            + u * (1 - v) * table[j, i + 1]
+            + (1 - u) * v * table[j + 1, i]
+            + u * v * table[j + 1, i + 1]
+        )
+        return np.where(on_map, np.exp(found) if logarithmic else found, np.nan)
+
+    fields = {
+        "pgv_m_s": between(grid.pgv_m_s, True),
+        "pga_g": between(grid.pga_g, True),
+        "std_ln_pgv": between(grid.std_ln_pgv, False),
+        "std_ln_pga": between(grid.std_ln_pga, False),
+    }
+    return fields, on_map

@@ -1,0 +1,78 @@
+"""The method ``capacity``: the strength of shaking at which a slumping block fails, lognormal.
+
+With r = k_s/PGA and z = p_s PGV/(PGA g), and where PGA is not known with y = k_s g/p_s:
+
+    eta = [ln((1 - r)/r) - c + b ln z]/σ,      eta = [ln PGV - c - b ln y]/σ,      ln σ = s0
+
+P = Φ(eta): the PGV at which a block fails, and its PGA, scatter about a line in ln z or ln y.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rbfrag.fragility.methods import (
+    NORMAL,
+    BlockParameters,
+    Bound,
+    Eta,
+    Form,
+    Method,
+    Numbers,
+)
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+BLOCK = BlockParameters(
+    ("ks", "ps2"),
+    "slumping",
+    "ks",
+    "ps2",
+    Bound(
+        lambda v: v["ks"] >= v["pga_g"],
+        "ks",
+        "is not below PGA: the block does not move, P = 0 by mechanics, not by the model",
+    ),
+    criterion="rotation_deg",
+    options=("leaves_g",),
+)
+"""Blocks known by the yield acceleration coefficient k_s and p_s² at rest [1/s²]."""
+
+
+def _pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+    r = v["ks"] / v["pga_g"]
+    z = ns.log(v["p"] * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
+    per = ns.exp(-b[2])
+    eta = (ns.log((1.0 - r) / r) - b[0] + b[1] * z) * per
+    return Eta(eta, (-per, z * per, -eta), b[2], (0.0, 0.0, 1.0))
+
+
+def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+    log_y = ns.log(v["y_m_s"])
+    per = ns.exp(-b[2])
+    eta = (ns.log(v["pgv_m_s"]) - b[0] - b[1] * log_y) * per
+    return Eta(eta, (-per, -log_y * per, -eta), b[2], (0.0, 0.0, 1.0))
+
+
+def _failure(asked: Mapping[str, Any]) -> str:
+    rotation = asked.get("rotation_deg")
+    if rotation is None:
+        return "failure past recovery"
+    return f"a rotation of {rotation:g} degrees or failure past recovery"
+
+
+_NAMES, _START = ("c", "b", "s0"), (0.0, 1.0, -1.0)
+
+METHOD = Method(
+    name="capacity",
+    block=BLOCK,
+    link=NORMAL,
+    forms={
+        "pgv_pga": Form(_NAMES, _pgv_pga, 0, (BLOCK.at_rest,), _START),
+        "pgv": Form(_NAMES, _pgv, 0, (), _START),
+    },
+    reads="critical",
+    meaning="probability that the block slumps past recovery, or by the rotation asked for",
+    fit="rbfrag.fragility.fit.kind_fitting:fit_kind",
+    failure=_failure,
+)

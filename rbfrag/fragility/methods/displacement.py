@@ -1,0 +1,90 @@
+"""The method ``displacement``: the permanent displacement of blocks that slide, lognormal.
+
+Sliding further than d on a level plane, with r = k_y/PGA:
+
+    eta = [c + b1 ln(PGV²/(k_y g)) + b2 ln(1 - r) - ln d]/σ,       ln σ = s0 + s1 r
+
+and, where PGA is not known, with u = ln(1 + k_y/(κ PGV)):
+
+    eta = [c + b1 ln(PGV²/(k_y g)) - b2 u - ln d]/σ,               ln σ = s0 + s1 u
+
+P = Φ(eta). A rectangular pulse gives the first with c = ln(1/2), b1 = b2 = 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rbfrag.fragility.methods import (
+    NORMAL,
+    BlockParameters,
+    Bound,
+    Eta,
+    Form,
+    Method,
+    Numbers,
+)
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+BLOCK = BlockParameters(
+    ("ky", "displacement_m"),
+    "sliding",
+    "ky",
+    None,
+    Bound(
+        lambda v: v["ky"] >= v["pga_g"],
+        "ky",
+        "is not below PGA: the block does not move, P = 0 by mechanics, not by the model",
+    ),
+    options=("beta_deg",),
+)
+"""Blocks known by k_y = tan(φ - β) and the displacement that is too far [m]."""
+
+
+def _pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+    ky, pgv = v["ky"], v["pgv_m_s"]
+    r = ky / v["pga_g"]
+    size = ns.log(pgv * pgv / (ky * STANDARD_GRAVITY_M_S2))
+    left = ns.log(1.0 - r)
+    log_sigma = b[3] + b[4] * r
+    per = ns.exp(-log_sigma)
+    eta = (b[0] + b[1] * size + b[2] * left - ns.log(v["displacement_m"])) * per
+    slopes = (per, size * per, left * per, -eta, -eta * r)
+    return Eta(eta, slopes, log_sigma, (0.0, 0.0, 0.0, 1.0, r))
+
+
+def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+    ky, pgv = v["ky"], v["pgv_m_s"]
+    size = ns.log(pgv * pgv / (ky * STANDARD_GRAVITY_M_S2))
+    a = ky / (ns.exp(b[3]) * pgv)
+    u = ns.log(1.0 + a)
+    w = a / (1.0 + a)
+    log_sigma = b[4] + b[5] * u
+    per = ns.exp(-log_sigma)
+    eta = (b[0] + b[1] * size - b[2] * u - ns.log(v["displacement_m"])) * per
+    slope = (b[2] * per + eta * b[5]) * w
+    slopes = (per, size * per, -u * per, slope, -eta, -eta * u)
+    return Eta(eta, slopes, log_sigma, (0.0, 0.0, 0.0, -b[5] * w, 1.0, u))
+
+
+METHOD = Method(
+    name="displacement",
+    block=BLOCK,
+    link=NORMAL,
+    forms={
+        "pgv_pga": Form(
+            ("c", "b1", "b2", "s0", "s1"), _pgv_pga, 0, (BLOCK.at_rest,),
+            start=(0.3, 0.8, 3.5, -0.5, 1.3),
+        ),
+        "pgv": Form(
+            ("c", "b1", "b2", "ln_kappa", "s0", "s1"), _pgv, 0,
+            start=(0.8, 0.5, 2.9, -2.0, -0.3, 0.6),
+        ),
+    },
+    reads="critical",
+    meaning="probability that the block slides further than the displacement",
+    fit="rbfrag.fragility.fit.kind_fitting:fit_kind",
+    failure=lambda asked: f"permanent displacement above {asked['displacement_m']:g} m",
+    median_of="displacement_m",
+)  # fmt: skip

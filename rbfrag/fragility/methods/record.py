@@ -1,0 +1,41 @@
+"""The method ``record``: outcomes, logistic in ln(X(p)/y) and in the strength of the motion.
+
+    eta = b0 + b1 ln(X(p)/y) + b2 ln s,   s = p X(p)/(PGA g),   P = 1/(1 + exp(-eta)),  0 if y >= X
+
+(8) of docs/theory/fragility.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rbfrag.fragility.methods import (
+    ABOVE_SPECTRUM,
+    LOGIT,
+    OF_OUTCOME,
+    TOPPLING_BLOCK,
+    Eta,
+    Form,
+    Method,
+    Numbers,
+)
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+
+def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+    x = v["intensity_m_s"]
+    f1 = ns.log(x / v["y_m_s"])
+    f2 = ns.log(v["p"] * x / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
+    return Eta(b[0] + b[1] * f1 + b[2] * f2, (1.0, f1, f2))
+
+
+METHOD = Method(
+    name="record",
+    block=TOPPLING_BLOCK,
+    link=LOGIT,
+    forms={"xp": Form(("b0", "b_ln_xp_over_y", "b_ln_s"), _eta, 0, (ABOVE_SPECTRUM,))},
+    reads="outcomes",
+    meaning=OF_OUTCOME,
+    fit="rbfrag.fragility.fit.outcomes:fit_outcomes",
+)

@@ -1,0 +1,106 @@
+"""Published ratios: what a horizontal component means, and PGV out of a spectral acceleration."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from rbfrag.errors import InputError
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+
+@dataclass(frozen=True)
+class Component:
+    """How a definition relates to a single component of unknown direction.
+
+    Args:
+        name: name in options.
+        title: name for people.
+        ratio: median of the definition over the median of a single component.
+        scatter: standard deviation of ln(single component/definition).
+    """
+
+    name: str
+    title: str
+    ratio: float
+    scatter: float
+
+
+COMPONENTS: Mapping[str, Component] = {
+    item.name: item
+    for item in (
+        Component("single", "a single component of any direction", 1.0, 0.0),
+        # log10 scatters of a random component about the geometric mean, 0.07, and of the larger
+        # one, 0.05, are taken as independent for the larger one
+        Component("geometric_mean", "the geometric mean of two", 1.0, 0.07 * math.log(10.0)),
+        Component("rotd50", "the median over all directions", 1.0, 0.07 * math.log(10.0)),
+        Component("larger", "the larger of two", 1.1, math.hypot(0.07, 0.05) * math.log(10.0)),
+    )
+}
+"""Definitions of the horizontal component by name."""
+
+
+def component(name: str) -> Component:
+    """Return the definition of that name.
+
+    Raises:
+        InputError: there is none.
+    """
+    try:
+        return COMPONENTS[name]
+    except KeyError:
+        raise InputError(
+            f"component {name!r} is not known: use one of {', '.join(COMPONENTS)}"
+        ) from None
+
+
+@dataclass(frozen=True)
+class VelocityConversion:
+    """PGV [m/s] = `factor` · SA(`period_s`) [g].
+
+    Args:
+        name: name in options.
+        period_s: oscillator period [s].
+        factor: PGV over spectral acceleration [m/s per g].
+        source: where it is published.
+    """
+
+    name: str
+    period_s: float
+    factor: float
+    source: str
+
+
+CONVERSIONS: Mapping[str, VelocityConversion] = {
+    item.name: item
+    for item in (
+        VelocityConversion(
+            "newmark_hall_1982",
+            1.0,
+            STANDARD_GRAVITY_M_S2 / (2.0 * math.pi * 1.65),
+            "Newmark and Hall (1982), SA(1 s)/PGV = 2π·1.65/g at 5 % damping",
+        ),
+        VelocityConversion(
+            "bommer_alarcon_2006",
+            0.5,
+            STANDARD_GRAVITY_M_S2 / 20.0,
+            "Bommer and Alarcón (2006), PGV [cm/s] = SA(0.5 s) [cm/s²]/20",
+        ),
+    )
+}
+"""The conversions by name."""
+
+
+def velocity_conversion(name: str) -> VelocityConversion:
+    """Return the conversion of that name.
+
+    Raises:
+        InputError: there is none.
+    """
+    try:
+        return CONVERSIONS[name]
+    except KeyError:
+        raise InputError(
+            f"conversion {name!r} is not known: use one of {', '.join(CONVERSIONS)}"
+        ) from None

@@ -1,0 +1,279 @@
+"""Figures of critical strengths: over frequency, and with vertical motion over that without.
+
+In the linear model a lobe of amplitude A and duration t_p topples blocks of critical angle up
+to c·A, c a function of f = p t_p alone (docs/theory/toppling-spectrum.md, properties). Against
+the records a lobe stands for half a mean period, t_p = T_m/2, so that f = π/(ω_m/p): the lines of
+figure 4.20 of Gibson's dissertation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbfrag.db.rows import CombinationTable
+from rbfrag.errors import InputError
+from rbfrag.plots.canvas import density, new_figure, plain_numbers, plot_path, save_figure
+
+FloatArray = NDArray[np.float64]
+
+_HALVINGS = 60
+
+
+def rectangular_lobe(f: ArrayLike) -> FloatArray:
+    """Return the critical angle over the amplitude of a rectangular lobe, f = p t_p > 0."""
+    line: FloatArray = -np.expm1(-np.asarray(f, dtype=np.float64))
+    return line
+
+
+def triangular_lobe(f: ArrayLike) -> FloatArray:
+    """Return the critical angle over the amplitude of a symmetric triangle, f = p t_p > 0."""
+    of = np.asarray(f, dtype=np.float64)
+    # ln(2 - e) as ln(1 + (1 - e)): no cancellation for short lobes; the rest of it by series
+    half = 0.5 * of
+    exact = 1.0 - np.log1p(-np.expm1(-half)) / half
+    series = half * (1.0 - half + 13.0 / 12.0 * half * half)
+    line: FloatArray = np.where(half < 1e-5, series, exact)
+    return line
+
+
+def half_sine_lobe(f: ArrayLike) -> FloatArray:
+    """Return the critical angle over the amplitude of a half-sine, f = p t_p > 0.
+
+    sin s with x sin s − cos s = exp(−(π − s)/x), x = π/f, by bisection in s.
+    """
+    x = np.pi / np.asarray(f, dtype=np.float64)
+    low, high = np.zeros_like(x), np.full_like(x, 0.5 * np.pi)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        below = x * np.sin(middle) - np.cos(middle) < np.exp(-(np.pi - middle) / x)
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    line: FloatArray = np.sin(0.5 * (low + high))
+    return line
+
+
+LOBES: Mapping[str, Callable[[ArrayLike], FloatArray]] = {
+    "rectangular": rectangular_lobe,
+    "half-sine": half_sine_lobe,
+    "triangular": triangular_lobe,
+}
+"""The lobes by name, the one that topples most first."""
+
+
+def lobe_line(name: str, frequency_ratio: ArrayLike) -> FloatArray:
+    """Return the k_r/PGA of a lobe of half a mean period over ω_m/p, > 0.
+
+    Args:
+        name: one of :data:`LOBES`.
+        frequency_ratio: ω_m/p = 2π/(T_m p).
+    """
+    return LOBES[name](np.pi / np.asarray(frequency_ratio, dtype=np.float64))
+
+
+STYLES = {
+    "rectangular": ("-", "#b2182b"),
+    "half-sine": ("--", "#1f4e79"),
+    "triangular": ("-.", "#2e7d32"),
+}
+
+
+def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data: str = "") -> Path:
+    """Draw critical k_r/PGA against ω_m/p with the lines of lobes half a mean period long.
+
+    The legend says how many of the critical values lie above each line.
+
+    Args:
+        table: the critical values.
+        path: file to write: .png, .pdf or .svg.
+        data: what the data are, for the title.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: no critical value of a motion with a mean period, or a path that cannot
+            be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    plot_path(path)
+    ratio = 2.0 * np.pi / (table.tm_s * np.sqrt(table.p2))
+    shown = (table.status == "found") & np.isfinite(ratio) & np.isfinite(table.kr_over_pga)
+    if not shown.any():
+        raise InputError(
+            "there is no critical value of a motion with a mean period to draw: run  "
+            "rbfrag simulate"
+        )
+    x, y = ratio[shown], table.kr_over_pga[shown]
+    censored = np.isin(table.status.astype(str), ("below_limit", "no_motion"))
+    limit = float(table.search_limit[shown | censored].min())
+    figure = new_figure(7.4, 5.6)
+    axes = figure.add_subplot()
+    left, right = 0.8 * float(x.min()), 1.25 * float(x.max())
+    bottom, top = 0.8 * min(limit, float(y.min())), 1.25 * max(1.0, float(y.max()))
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    density(figure, axes, x, y, (left, right), (bottom, top))
+    line_x = np.geomspace(left, right, 300)
+    for name in LOBES:
+        style, colour = STYLES[name]
+        above = int(np.sum(y > lobe_line(name, x)))
+        axes.plot(
+            line_x,
+            lobe_line(name, line_x),
+            style,
+            color=colour,
+            lw=1.8,
+            label=f"{name} lobe: {above} above ({100.0 * above / x.size:.1f} %)",
+        )
+    if censored.any():
+        axes.axhline(limit, color="black", lw=0.8, ls=":")
+        axes.annotate(
+            f"search limit; {int(censored.sum())} critical values lie below it",
+            (0.01, limit),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, 4),
+            textcoords="offset points",
+            fontsize=8,
+        )
+    axes.set_xlabel(r"frequency of the motion over that of the block, $\omega_m/p$")
+    axes.set_ylabel(r"critical strength, $k_r/\mathrm{PGA}$")
+    events = len(set(table.event_id[shown].tolist()))
+    motions = len(set(table.motion_id[shown].tolist()))
+    axes.set_title(
+        f"{x.size} critical blocks, {motions} motions of {events} earthquakes"
+        + (f"\n{data}" if data else ""),
+        fontsize=10,
+    )
+    axes.grid(visible=True, which="major", lw=0.3, alpha=0.5)
+    plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
+    plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.09), fontsize=8.5, frameon=False)
+    return save_figure(figure, path)
+
+
+_NARROWEST, _WIDEST = 0.05, 0.5
+"""Least and greatest change of strength, in ln, that the histogram reaches to."""
+
+
+@dataclass(frozen=True, eq=False)
+class VerticalPairs:
+    """Critical values of the same motion, polarity and p², found with and without vertical motion.
+
+    Args:
+        ln_ratio: ln of the critical value with over that without, shape (n,).
+        without: k_r/PGA without vertical motion, shape (n,).
+        with_vertical: k_r/PGA with it, shape (n,).
+        p2: frequency parameters [1/s²], shape (n,).
+        event_id: earthquakes, shape (n,).
+        one_sided: pairs of which only one was found, and that are left out.
+    """
+
+    ln_ratio: FloatArray
+    without: FloatArray
+    with_vertical: FloatArray
+    p2: FloatArray
+    event_id: NDArray[np.object_]
+    one_sided: int
+
+
+def vertical_pairs(without: CombinationTable, with_vertical: CombinationTable) -> VerticalPairs:
+    """Return the pairs of two tables; what is in one of them alone has no pair."""
+    place = {
+        key: i
+        for i, key in enumerate(
+            zip(
+                without.motion_id.tolist(),
+                without.polarity.tolist(),
+                without.p2.tolist(),
+                strict=True,
+            )
+        )
+    }
+    keys = zip(
+        with_vertical.motion_id.tolist(),
+        with_vertical.polarity.tolist(),
+        with_vertical.p2.tolist(),
+        strict=True,
+    )
+    pairs = np.array(
+        [(place[key], j) for j, key in enumerate(keys) if key in place], dtype=np.intp
+    ).reshape(-1, 2)
+    first, second = pairs[:, 0], pairs[:, 1]
+    one, other = without.status[first] == "found", with_vertical.status[second] == "found"
+    both = one & other
+    a = without.kr_over_pga[first[both]]
+    b = with_vertical.kr_over_pga[second[both]]
+    return VerticalPairs(
+        ln_ratio=np.log(b / a),
+        without=a,
+        with_vertical=b,
+        p2=without.p2[first[both]],
+        event_id=without.event_id[first[both]],
+        one_sided=int(np.sum(one != other)),
+    )
+
+
+def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
+    """Draw the critical k_r/PGA with vertical motion against that without, and their ratio.
+
+    Args:
+        pairs: critical values of the same motion, polarity and p².
+        path: file to write: .png, .pdf or .svg.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: no pair, or a path that cannot be written.
+        MissingExtraError: matplotlib is not installed.
+    """
+    plot_path(path)
+    if not pairs.ln_ratio.size:
+        raise InputError(
+            "no critical value is known both with and without vertical motion: run  "
+            "rbfrag simulate --vertical both"
+        )
+    figure = new_figure(9.2, 4.6)
+    axes, beside = figure.subplots(1, 2, width_ratios=[1.15, 1.0])
+    values = np.concatenate([pairs.without, pairs.with_vertical])
+    edges = 0.85 * float(values.min()), 1.2 * float(values.max())
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    density(figure, axes, pairs.without, pairs.with_vertical, edges, edges)
+    axes.plot(edges, edges, color="#b2182b", lw=1.2, label="no change")
+    plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
+    plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    axes.set_xlabel(r"critical $k_r/\mathrm{PGA}$ without vertical motion")
+    axes.set_ylabel(r"critical $k_r/\mathrm{PGA}$ with it")
+    axes.legend(loc="upper left", fontsize=8.5, frameon=False)
+
+    d = pairs.ln_ratio
+    reach = float(np.clip(1.3 * np.quantile(np.abs(d), 0.995), _NARROWEST, _WIDEST))
+    beside.hist(
+        np.clip(d, -reach, reach),
+        bins=np.linspace(-reach, reach, 58).tolist(),
+        color="#8a8a8a",
+        edgecolor="white",
+        linewidth=0.3,
+    )
+    beside.axvline(0.0, color="#b2182b", lw=1.2)
+    beside.set_xlim(-reach, reach)
+    beside.set_xlabel("ln (with / without)")
+    beside.set_ylabel("critical blocks")
+    outside = int(np.sum(np.abs(d) > reach))
+    beside.set_title(
+        f"mean {d.mean():+.3f}, standard deviation {d.std():.3f}\n"
+        f"{outside} beyond the edges are counted there",
+        fontsize=9,
+    )
+    events = len(set(pairs.event_id.tolist()))
+    figure.suptitle(
+        f"{d.size} critical blocks of {events} earthquakes, the same motion, polarity and $p^2$",
+        fontsize=10,
+    )
+    return save_figure(figure, path)

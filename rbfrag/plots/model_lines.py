@@ -1,0 +1,282 @@
+"""What a model says of many blocks, and the lines where it gives one probability."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.db.rows import CombinationTable
+from rbfrag.errors import InputError
+from rbfrag.fragility.answers import PredictionArray
+from rbfrag.fragility.formulas import EXPONENTS
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.predict import answer_given, predict
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+FloatArray = NDArray[np.float64]
+
+
+def model_answers(
+    model: FragilityModel,
+    p2: float,
+    kr: FloatArray | float,
+    measures: Mapping[str, FloatArray | float],
+    *,
+    level: float = 0.95,
+) -> PredictionArray:
+    """Return the answers of one model for blocks of one size.
+
+    Args:
+        model: the model.
+        p2: frequency parameter [1/s²].
+        kr: rocking acceleration coefficients, a number or an array.
+        measures: measures of the motion by name; at least one of them, or kr, an array.
+        level: confidence level.
+    """
+    given: dict[str, Any] = dict(measures)
+    shape = np.broadcast_shapes(np.shape(kr), *(np.shape(value) for value in given.values()))
+    answer = predict(
+        np.full(shape, p2), np.broadcast_to(kr, shape), model=model, level=level, **given
+    )
+    assert isinstance(answer, PredictionArray)
+    return answer
+
+
+ONE_NUMBER_TERMS = ("pgv", "pga_tm", "pgd_tm")
+"""Terms for which a probability depends on y and the term alone."""
+
+MORE_TERMS = ("pgv_pga", "pgv_pga_tm")
+"""Terms that are drawn over PGV, all else held."""
+
+# Neither matters to models of one number; large blocks and short periods keep k_r below PGA.
+_ANY_P2 = 0.1
+_ANY_TM_S = 0.05
+
+
+@dataclass(frozen=True)
+class HeldMeasures:
+    """Block size and measures that do not change over a figure.
+
+    Args:
+        p2: frequency parameter p² [1/s²].
+        pga_g: PGA [g], or None for one in proportion to PGV.
+        pgv_over_pga_s: PGV/(PGA g) [s] where PGA is in proportion.
+        tm_s: mean period [s].
+        words: what is held, for the caption; empty where nothing matters.
+    """
+
+    p2: float = _ANY_P2
+    pga_g: float | None = None
+    pgv_over_pga_s: float = math.nan
+    tm_s: float = _ANY_TM_S
+    words: str = ""
+
+    def measures(self, model: FragilityModel, x_m_s: FloatArray) -> dict[str, FloatArray]:
+        """Return the measures of motions of some intensities x [m/s], shape (n,)."""
+        name = model.term.name
+        tm = np.full(x_m_s.shape, self.tm_s)
+        if name == "pga_tm":
+            return {"pga_g": x_m_s * (2.0 * math.pi) / (STANDARD_GRAVITY_M_S2 * tm), "tm_s": tm}
+        if name == "pgd_tm":
+            return {"pgd_m": x_m_s * tm / (2.0 * math.pi), "tm_s": tm}
+        measures = {"pgv_m_s": x_m_s}
+        if name in MORE_TERMS:
+            measures["pga_g"] = (
+                x_m_s / (self.pgv_over_pga_s * STANDARD_GRAVITY_M_S2)
+                if self.pga_g is None
+                else np.full(x_m_s.shape, self.pga_g)
+            )
+        if name == "pgv_pga_tm":
+            measures["tm_s"] = tm
+        return measures
+
+    def fitted_range(
+        self, model: FragilityModel, low_m_s: float, high_m_s: float
+    ) -> tuple[float, float]:
+        """Return where PGV [m/s] is fitted: in its range, and PGV/PGA in its own where PGA is held.
+
+        Args:
+            model: the model.
+            low_m_s: lower edge of the fitted intensities [m/s].
+            high_m_s: upper edge.
+        """
+        if self.pga_g is None:
+            return low_m_s, high_m_s
+        ground = self.pga_g * STANDARD_GRAVITY_M_S2
+        low, high = (float(edge) * ground for edge in model.row.domain["pgv_over_pga_s"])
+        return max(low_m_s, low), max(min(high_m_s, high), max(low_m_s, low))
+
+
+def held_measures(
+    model: FragilityModel,
+    *,
+    p2: float | None = None,
+    pga_g: float | None = None,
+    tm_s: float | None = None,
+) -> HeldMeasures:
+    """Return what a figure of a model over one intensity holds.
+
+    What is not given is the middle, of the logarithms, of the range that was fitted: p², Tm, and
+    PGV/(PGA g), to which PGA then keeps.
+
+    Args:
+        model: the model that is drawn.
+        p2: frequency parameter p² [1/s²].
+        pga_g: PGA [g].
+        tm_s: mean period [s].
+
+    Raises:
+        InputError: a model that cannot be drawn so, a value that is not above zero, or one
+            that the model does not read.
+    """
+    name = model.term.name
+    if name not in (*ONE_NUMBER_TERMS, *MORE_TERMS):
+        raise InputError(
+            f"model {model.name!r} reads {' and '.join(model.term.inputs)}, and one intensity "
+            "cannot stand for them: this figure draws models of "
+            f"{', '.join((*ONE_NUMBER_TERMS, *MORE_TERMS))}"
+        )
+    if not EXPONENTS.isdisjoint(model.row.coefficients):
+        raise InputError(
+            f"model {model.name!r} has an estimated exponent M: its probability depends on the "
+            "size of the block too; draw one fitted with M = 1"
+        )
+    read = {"p2": name in MORE_TERMS, "pga": name in MORE_TERMS, "tm": name == "pgv_pga_tm"}
+    for option, value in (("p2", p2), ("pga", pga_g), ("tm", tm_s)):
+        if value is None:
+            continue
+        if not read[option]:
+            raise InputError(
+                f"--{option} = {value:g} changes nothing: the lines of model {model.name!r} do "
+                "not depend on it; leave it out"
+            )
+        if not 0.0 < value < math.inf:
+            raise InputError(f"--{option} = {value:g} is not above zero")
+    if name not in MORE_TERMS:
+        return HeldMeasures()
+    size = _middle(model, "p2") if p2 is None else p2
+    ratio = _middle(model, "pgv_over_pga_s")
+    words = [f"p² = {size:.3g} 1/s²"]
+    words.append(f"PGA = {pga_g:g} g" if pga_g is not None else f"PGV/(PGA g) = {ratio:.3g} s")
+    period = _ANY_TM_S
+    if name == "pgv_pga_tm":
+        period = _middle(model, "tm_s") if tm_s is None else tm_s
+        words.append(f"Tm = {period:.3g} s")
+    return HeldMeasures(size, pga_g, ratio, period, "at " + ", ".join(words))
+
+
+def _middle(model: FragilityModel, name: str) -> float:
+    try:
+        low, high = model.row.domain[name]
+    except KeyError:
+        raise InputError(
+            f"model {model.name!r} does not say what range of {name} it was fitted to: fit it again"
+        ) from None
+    return math.sqrt(float(low) * float(high))
+
+
+_LOWEST, _HIGHEST = 1e-4, 50.0
+"""Range of y/x in which a block of given probability is looked for."""
+
+_HALVINGS = 50
+
+
+def failure_line(
+    model: FragilityModel, x_m_s: FloatArray, probability: float, held: HeldMeasures | None = None
+) -> FloatArray:
+    """Return the toppling velocity y [m/s] that fails with a given probability.
+
+    Args:
+        model: a model of a term that is one number, or of PGV with PGA.
+        x_m_s: intensities [m/s], shape (n,), > 0.
+        probability: between 0 and 1.
+        held: what does not change along the line; None for the middle of the fitted ranges.
+
+    Returns:
+        y, shape (n,); NaN where even the weakest block is less likely to fail, which is where
+        a model of no bound runs below zero.
+
+    Raises:
+        InputError: a model of another term.
+    """
+    held = held_measures(model) if held is None else held
+
+    def toppling(y_m_s: FloatArray) -> FloatArray:
+        return toppling_probability(model, x_m_s, y_m_s, held)
+
+    none = toppling(_LOWEST * x_m_s) < probability
+    line: FloatArray = np.where(none, np.nan, _of_probability(toppling, x_m_s, probability))
+    return line
+
+
+def _of_probability(
+    toppling: Callable[[FloatArray], FloatArray], x_m_s: FloatArray, probability: float
+) -> FloatArray:
+    """Return y [m/s] of a given probability, which falls with y, by bisection of its logarithm."""
+    low, high = np.log(_LOWEST * x_m_s), np.log(_HIGHEST * x_m_s)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        likely = toppling(np.exp(middle)) >= probability
+        low, high = np.where(likely, middle, low), np.where(likely, high, middle)
+    y: FloatArray = np.exp(0.5 * (low + high))
+    return y
+
+
+def toppling_probability(
+    model: FragilityModel, x_m_s: FloatArray, y_m_s: FloatArray, held: HeldMeasures
+) -> FloatArray:
+    """Return the probability of blocks y [m/s] at intensities x [m/s], arrays of one shape."""
+    kr = y_m_s * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
+    return model_answers(model, held.p2, kr, held.measures(model, x_m_s)).probability
+
+
+def predicted_strengths(
+    model: FragilityModel, table: CombinationTable, xp_m_s: FloatArray, probability: float
+) -> FloatArray:
+    """Return the toppling velocity y [m/s] at which each motion topples a block so likely.
+
+    Args:
+        model: the model.
+        table: motions and block sizes, n rows.
+        xp_m_s: toppling spectrum of each row [m/s], shape (n,).
+        probability: between 0 and 1.
+
+    Returns:
+        Shape (n,); NaN where what the model reads is not known.
+    """
+    columns = {name: getattr(table, name) for name in ("p2", "pgv_m_s", "pga_g", "tm_s", "pgd_m")}
+    columns["xp_m_s"] = xp_m_s
+    given = {name: columns[name] for name in ("p2", *model.term.inputs)}
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = np.asarray(model.term.intensity_m_s(given), dtype=np.float64)
+    known = np.isfinite(x) & (x > 0.0)
+    for name in model.term.inputs:
+        known &= np.isfinite(given[name])
+    given = {name: column[known] for name, column in given.items()}
+
+    def toppling(y_m_s: FloatArray) -> FloatArray:
+        kr = y_m_s * np.sqrt(given["p2"]) / STANDARD_GRAVITY_M_S2
+        answer = answer_given(model, {**given, "kr": kr}, 0.95)
+        assert isinstance(answer, PredictionArray)
+        return answer.probability
+
+    result = np.full(x.shape, np.nan)
+    result[known] = _of_probability(toppling, x[known], probability)
+    return result
+
+
+def running_medians(
+    x: FloatArray, y: FloatArray, *, bins: int = 24
+) -> tuple[FloatArray, FloatArray]:
+    """Return medians of x and of y in bins of equal count along x, for a line."""
+    order = np.argsort(x, kind="stable")
+    parts = [part for part in np.array_split(order, bins) if part.size]
+    return (
+        np.array([np.median(x[part]) for part in parts]),
+        np.array([np.median(y[part]) for part in parts]),
+    )

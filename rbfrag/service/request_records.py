@@ -1,0 +1,147 @@
+"""What is recorded of requests: counts for Prometheus, and lines of JSON."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sys
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
+from json.encoder import encode_basestring_ascii as _quoted
+from time import gmtime, strftime, time
+from typing import Any, TextIO
+
+from prometheus_client import (
+    CONTENT_TYPE_LATEST,
+    CollectorRegistry,
+    Counter,
+    Histogram,
+    generate_latest,
+)
+from prometheus_client.multiprocess import MultiProcessCollector
+
+SHARED_FOLDER = "PROMETHEUS_MULTIPROC_DIR"
+"""Environment variable of the folder in which several processes keep their counts."""
+
+CONTENT_TYPE = CONTENT_TYPE_LATEST
+
+_SECONDS = (0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+_METHODS = frozenset({"GET", "POST", "HEAD", "OPTIONS", "PUT", "DELETE", "PATCH"})
+
+
+class Metrics:
+    """Requests by operation, method and status, and how long they took.
+
+    Args:
+        paths: the operations; any other path counts as ``page`` or ``other``, so that what is
+            asked cannot make the list grow.
+    """
+
+    def __init__(self, paths: Iterable[str]) -> None:
+        self._paths = frozenset(paths)
+        self._registry = CollectorRegistry()
+        self._requests = Counter(
+            "rbfrag_requests",
+            "Requests that were answered.",
+            ("operation", "method", "status"),
+            registry=self._registry,
+        )
+        self._seconds = Histogram(
+            "rbfrag_request_seconds",
+            "Time from the headers of a request to the end of its answer [s].",
+            ("operation",),
+            buckets=_SECONDS,
+            registry=self._registry,
+        )
+
+        self._found: dict[tuple[str, str, int], tuple[Counter, Histogram]] = {}
+
+    def count(self, scope: Mapping[str, Any], status: int, elapsed_s: float) -> None:
+        """Count one request.
+
+        Args:
+            scope: the request.
+            status: HTTP status of the answer.
+            elapsed_s: how long it took [s].
+        """
+        path, method = scope["path"], scope["method"]
+        if path not in self._paths:
+            path = "other" if status >= 400 or path.startswith("/v1/") else "page"
+        if method not in _METHODS:
+            method = "other"
+        found = self._found.get((path, method, status))
+        if found is None:
+            found = self._requests.labels(path, method, str(status)), self._seconds.labels(path)
+            self._found[path, method, status] = found
+        requests, seconds = found
+        requests.inc()
+        seconds.observe(elapsed_s)
+
+    def text(self) -> bytes:
+        """Return the counts of all processes as Prometheus reads them."""
+        registry = self._registry
+        if os.environ.get(SHARED_FOLDER):
+            registry = CollectorRegistry()
+            MultiProcessCollector(registry)  # type: ignore[no-untyped-call]
+        return generate_latest(registry)
+
+
+class RequestLog:
+    """Writes down what was asked and how it ended; not the query, which is the asker's.
+
+    Args:
+        stream: where to; None for standard error.
+    """
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream = stream
+        self._second, self._clock = 0, ""
+
+    def write(self, scope: Mapping[str, Any], status: int, size: int, elapsed_s: float) -> None:
+        """Write one line.
+
+        Args:
+            scope: the request.
+            status: HTTP status of the answer.
+            size: length of the answer [bytes].
+            elapsed_s: how long it took [s].
+        """
+        now = time()
+        second = int(now)
+        if second != self._second:
+            self._second = second
+            self._clock = strftime("%Y-%m-%dT%H:%M:%S", gmtime(second))
+        client = scope.get("client")
+        (self._stream or sys.stderr).write(
+            f'{{"time": "{self._clock}.{int(1e3 * (now - second)):03d}+00:00", "level": "info", '
+            f'"event": "request", "method": {_quoted(scope["method"])}, '
+            f'"path": {_quoted(scope["path"])}, "status": {status}, "bytes": {size}, '
+            f'"ms": {1e3 * elapsed_s:.3f}, "client": {_quoted(client[0] if client else "")}}}\n'
+        )
+
+
+class JsonFormatter(logging.Formatter):
+    """Writes a message of the logging library as one line of JSON."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line."""
+        line = {
+            "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
+            "level": record.levelname.lower(),
+            "event": "message",
+            "message": record.getMessage(),
+        }
+        if record.exc_info:
+            line["exception"] = self.formatException(record.exc_info)
+        return json.dumps(line)
+
+
+CONFIGURATION: dict[str, Any] = {
+    "version": 1,
+    "disable_existing_loggers": False,
+    "formatters": {"json": {"()": f"{__name__}.{JsonFormatter.__name__}"}},
+    "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "json"}},
+    "root": {"handlers": ["stderr"], "level": "INFO"},
+}
+"""What the logging library is told."""
