@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility import formulas
-from rbfrag.fragility.fit.source import FitSource
+from rbfrag.fragility.fit.data import FitSource
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.quantiles import student_half_width
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2

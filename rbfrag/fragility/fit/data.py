@@ -11,7 +11,7 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from functools import cache, partial
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.scores import Judged, critical_outcomes
 from rbfrag.fragility.measures import Term
-from rbfrag.fragility.methods import BlockParameters, Method, arrays
+from rbfrag.fragility.methods import BlockParameters, Method
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ def read_source(
         vertical: ``without`` vertical motion, ``with`` it, or ``both``.
         doubtful_pgd: read the PGD of records with a doubtful baseline too.
     """
-    from rbfrag.db.queries import combination_table, outcome_grid, stored_blocks
+    from rbfrag.db.queries import combination_table, outcome_grid
     from rbfrag.db.spectra import spectrum_values
 
     asked = kind or block.kind
@@ -156,7 +156,7 @@ def read_source(
         grid.k_over_pga,
         grid.outcome,
         grid.displacement_m,
-        _yields(asked, stored_blocks(connection, table.combination_id)),
+        np.array([_yield_g(asked, block or "{}") for block in table.block], dtype=np.float64),
     )
     if grid.outcome.shape[1] == 0 and block.strength == "kr":
         return FitSource(table, source.xp_m_s, *_nothing_known(table))
@@ -168,13 +168,9 @@ def _nothing_known(table: CombinationTable) -> tuple[FloatArray, FloatArray]:
     return k, np.full(k.shape, np.nan)
 
 
-def _yields(kind: str, blocks: list[str]) -> FloatArray:
-    """Return k of stored blocks at rest, NaN where the block is of any strength, shape (n,)."""
-    return np.array([_yield_g(kind, block) if block else np.nan for block in blocks])
-
-
 @cache
 def _yield_g(kind: str, block: str) -> float:
+    """Return k of a stored block at rest [g]; NaN where it stands for blocks of any strength."""
     from rbfrag.solver.block.geometry import Block
     from rbfrag.solver.mechanism import shaken_mechanism
 
@@ -248,6 +244,11 @@ class FitData:
     def y0_m_s(self) -> FloatArray:
         """Toppling velocities of the blocks of the grid [m/s], shape (n, m)."""
         return self.blocks["y_m_s"]
+
+    @property
+    def censored(self) -> NDArray[np.bool_]:
+        """Rows of which a limit is known alone, shape (n,)."""
+        return np.asarray(~self.found & np.isfinite(self.values.get("y_m_s", self.x)))
 
     @property
     def events(self) -> int:
@@ -324,7 +325,7 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         outcomes=points.outcomes,
         domain=_domain({name: v[chosen] for name, v in points.ranges.items()}),
         n_total=int(table.p2.size),
-        n_excluded=int((points.found & ~points.usable).sum()),
+        n_excluded=int((points.found & ~np.isfinite(points.values["intensity_m_s"])).sum()),
         n_outside_model=int((table.status == "outside_model").sum()),
         guessed_events=len(set(table.event_id[own][table.event_guessed[own]].tolist())),
         fingerprint=_fingerprint(keys[chosen], names[event], values, found, failed, of_outcomes),
