@@ -38,14 +38,12 @@ if TYPE_CHECKING:
     from rbfrag.motions.toppling_spectrum import toppling_spectrum as toppling_spectrum
     from rbfrag.solver.block.arrays import BlockArray as BlockArray
     from rbfrag.solver.block.geometry import Block as Block
+    from rbfrag.solver.critical import critical as critical
+    from rbfrag.solver.models.sliding import sliding_displacements as sliding_displacements
     from rbfrag.solver.respond import respond as respond
     from rbfrag.solver.results import CriticalResult as CriticalResult
     from rbfrag.solver.results import Outcome as Outcome
     from rbfrag.solver.results import Response as Response
-    from rbfrag.solver.search.critical import critical as critical
-    from rbfrag.solver.search.displacement import critical_sliding as critical_sliding
-    from rbfrag.solver.search.displacement import sliding_displacements as sliding_displacements
-    from rbfrag.solver.search.scale import critical_scale as critical_scale
     from rbfrag.solver.stability.arrays import StabilityArray as StabilityArray
     from rbfrag.solver.stability.arrays import stability_arrays as stability_arrays
     from rbfrag.solver.stability.single import Stability as Stability
@@ -70,9 +68,7 @@ _HOME = {
     "UnknownModelError": "rbfrag.errors",
     "WorkFailedError": "rbfrag.errors",
     "add_motions": "rbfrag.campaign.add_motions",
-    "critical": "rbfrag.solver.search.critical",
-    "critical_scale": "rbfrag.solver.search.scale",
-    "critical_sliding": "rbfrag.solver.search.displacement",
+    "critical": "rbfrag.solver.critical",
     "fit": "rbfrag.fragility.fit.fitting",
     "fit_kind": "rbfrag.fragility.fit.kind_fitting",
     "hazard": "rbfrag.hazards.answer",
@@ -85,7 +81,7 @@ _HOME = {
     "respond": "rbfrag.solver.respond",
     "simulate": "rbfrag.campaign.simulate",
     "simulate_kind": "rbfrag.campaign.simulate_kind",
-    "sliding_displacements": "rbfrag.solver.search.displacement",
+    "sliding_displacements": "rbfrag.solver.models.sliding",
     "stability": "rbfrag.solver.stability.single",
     "stability_arrays": "rbfrag.solver.stability.arrays",
     "toppling_spectrum": "rbfrag.motions.toppling_spectrum",

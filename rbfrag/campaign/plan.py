@@ -13,8 +13,7 @@ from rbfrag.db.queries import Vertical
 from rbfrag.db.rows import MotionRow
 from rbfrag.db.vertical_pairs import VerticalPair, vertical_pairs
 from rbfrag.errors import InputError
-from rbfrag.solver.results import NUMERICS_VERSION, POLARITIES, SEARCH_LIMIT, Polarity
-from rbfrag.solver.search.certified import MAP_DEPTH
+from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION, POLARITIES, SEARCH_LIMIT, Polarity
 from rbfrag.solver.toppling_run import positive
 
 SETTINGS = {"search_limit": SEARCH_LIMIT, "map": "full", "map_depth": MAP_DEPTH}

@@ -8,10 +8,8 @@ from sqlalchemy import Connection
 
 from rbfrag.campaign.kind_plan import KindCase
 from rbfrag.campaign.kind_worker import KindWork, run_kind_work
-from rbfrag.campaign.slumping_family import BlockClass
 from rbfrag.db.motions import load_motion
 from rbfrag.db.stored_combination import StoredCombination
-from rbfrag.errors import InputError
 from rbfrag.solver.results import CriticalResult
 
 
@@ -23,14 +21,6 @@ def recompute_kind(connection: Connection, stored: StoredCombination) -> Critica
     """
     kind = str(stored.values["kind"])
     block: dict[str, Any] = dict(stored.block or {})
-    one = None
-    if kind == "slumping":
-        try:
-            one = BlockClass(**block)
-        except TypeError:
-            raise InputError(f"its block {block} is not described as slumping ones are") from None
-    elif kind != "sliding":
-        raise InputError(f"campaigns of kind {kind} are not known to this rbfrag")
     vertical = None
     if stored.vertical_motion_id is not None:
         vertical = load_motion(connection, stored.vertical_motion_id)
@@ -40,7 +30,6 @@ def recompute_kind(connection: Connection, stored: StoredCombination) -> Critica
         polarity=stored.values["polarity"],
         vertical_id=stored.vertical_motion_id,
         block=block,
-        block_class=one,
         settings=stored.settings,
     )
     motion = load_motion(connection, stored.motion_id)

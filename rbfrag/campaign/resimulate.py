@@ -23,8 +23,7 @@ from rbfrag.db.stored_combination import (
 from rbfrag.errors import InputError, RbfragError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult
-from rbfrag.solver.search.certified import MAP_DEPTH
+from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION, CriticalResult
 from rbfrag.solver.search.critical import critical
 from rbfrag.solver.toppling_run import respond
 

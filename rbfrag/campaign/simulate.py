@@ -31,8 +31,7 @@ from rbfrag.db.queries import Vertical
 from rbfrag.db.responses import insert_responses
 from rbfrag.db.spectra import store_spectrum
 from rbfrag.errors import WorkFailedError
-from rbfrag.solver.results import DEFAULT_P2, NUMERICS_VERSION
-from rbfrag.solver.search.certified import MAP_DEPTH
+from rbfrag.solver.results import DEFAULT_P2, MAP_DEPTH, NUMERICS_VERSION
 
 
 @dataclass(frozen=True)
@@ -186,7 +185,7 @@ class _Run:
             if result.search is not None:
                 found = result.search
                 self._known[result.case.natural_key] = KnownCombination(
-                    0, found.status, found.kr_over_pga, found.certified, found.reentrant
+                    0, found.status, found.kr_over_pga, found.certified, bool(found.reentrant)
                 )
         self.tell()
 

@@ -12,19 +12,14 @@ from sqlalchemy import Engine
 
 from rbfrag.campaign.executors.choice import CLUSTER, check_workers, executor
 from rbfrag.campaign.kind_plan import (
-    ROTATIONS_DEG,
-    Criterion,
     KindCase,
     KindMotionPlan,
     KindPlan,
     plan_kind,
-    sliding_criteria,
-    slumping_criteria,
 )
 from rbfrag.campaign.kind_worker import KindResults, KindWork, run_kind_work
 from rbfrag.campaign.made_on import made_on
 from rbfrag.campaign.progress import CampaignProgress
-from rbfrag.campaign.slumping_family import FAMILY, BlockClass
 from rbfrag.db.campaigns import (
     CombinationRecord,
     KnownCombination,
@@ -37,8 +32,11 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
 from rbfrag.db.queries import Vertical
 from rbfrag.errors import InputError, WorkFailedError
+from rbfrag.solver.kind import Case
+from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.models.sliding import THRESHOLDS_M
+from rbfrag.solver.models.slumping import FAMILY, ROTATIONS_DEG, BlockClass
 from rbfrag.solver.results import NUMERICS_VERSION
-from rbfrag.solver.search.displacement import THRESHOLDS_M
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,7 @@ def simulate_kind(
     """Find the critical values of blocks that slump, or slide, under every motion; store them.
 
     Slumping: the factor on each record that brings each block of the documented family down
-    (`rbfrag.campaign.slumping_family`). Sliding: the strength that slides each stated
+    (`rbfrag.solver.models.slumping`). Sliding: the strength that slides each stated
     displacement, and the displacements of blocks of 23 strengths, on a level plane. What is
     stored already is not computed again; each motion is stored in one transaction, and a run that
     was interrupted is resumed by the same call.
@@ -119,10 +117,10 @@ def simulate_kind(
     """
     check_workers(jobs, scheduler)
     if kind == "slumping":
-        criteria = slumping_criteria(rotations_deg, family)
+        criteria = model_of_kind(kind).cases(rotations_deg=rotations_deg, family=family)
         asked: dict[str, object] = {"rotations_deg": list(rotations_deg)}
     elif kind == "sliding":
-        criteria = sliding_criteria(displacements_m)
+        criteria = model_of_kind(kind).cases(displacements_m=displacements_m)
         asked = {"displacements_m": list(displacements_m)}
     else:
         raise InputError(f"--kind {kind}: campaigns are of toppling, slumping or sliding")
@@ -148,7 +146,11 @@ def simulate_kind(
                 _store(engine, campaign_id, answer)
                 for case, result in answer.results:
                     known[case.natural_key] = KnownCombination(
-                        0, result.status, result.kr_over_pga, result.certified, result.reentrant
+                        0,
+                        result.status,
+                        result.kr_over_pga,
+                        result.certified,
+                        bool(result.reentrant),
                     )
                     runs += result.n_runs
                 done += len(answer.results)
@@ -173,7 +175,7 @@ def simulate_kind(
 
 
 def _plan(
-    engine: Engine, criteria: Sequence[Criterion], suite: str | None, vertical: Vertical
+    engine: Engine, criteria: Sequence[Case], suite: str | None, vertical: Vertical
 ) -> tuple[KindPlan, dict[str, KnownCombination]]:
     with engine.connect() as connection:
         plan = plan_kind(connection, criteria, suite=suite, vertical=vertical)

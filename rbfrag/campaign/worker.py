@@ -15,8 +15,7 @@ from rbfrag.fragility.fit.source import kr_over_pga_of_grid
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
 from rbfrag.solver.excitation import kept_excitation
-from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, SearchPoints
-from rbfrag.solver.search.certified import MAP_DEPTH
+from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION, CriticalResult, SearchPoints
 from rbfrag.solver.search.critical import critical
 from rbfrag.solver.toppling_run import respond
 

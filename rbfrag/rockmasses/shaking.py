@@ -13,11 +13,10 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.kind import BlockOnPlanes, RunEnd, Runner
 from rbfrag.solver.kinds import model_of_mode
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import Outcome
-from rbfrag.solver.run_end import Fate, Runner
 from rbfrag.solver.stability.modes import CONFINED_TOPPLE, MODES, SLIDE, SLUMP
 
 FloatArray = NDArray[np.float64]
@@ -70,7 +69,7 @@ class FailureLimits:
         if self.rotation_deg is not None:
             positive(self.rotation_deg, "rotation", "degrees")
 
-    def code(self, mode_code: int, fate: Fate) -> int:
+    def code(self, mode_code: int, fate: RunEnd) -> int:
         """Return the code in :data:`FATES` of a block that was run.
 
         Args:

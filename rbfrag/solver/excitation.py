@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity, driving_acceleration_g
+from rbfrag.motions.quality import quality_flags
 
 FloatArray = NDArray[np.float64]
 
@@ -190,3 +191,14 @@ def _refuse_different_sampling(motion: GroundMotion, vertical: GroundMotion) -> 
         return
     if not np.array_equal(motion.time_s, vertical.time_s):
         raise InputError("the vertical component must have the same node times as the horizontal")
+
+
+def motion_remarks(
+    motion: GroundMotion, vertical: GroundMotion | None, drive: Excitation
+) -> tuple[str, ...]:
+    """Return the sentences about suspicious motions that an answer carries."""
+    remarks = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion))]
+    remarks += drive.warnings
+    if vertical is not None:
+        remarks += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
+    return tuple(remarks)

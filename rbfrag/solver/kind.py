@@ -1,20 +1,37 @@
-"""What a response model is: a kind, the failure mode it belongs to, and how it answers."""
+"""What a kind of failure is: how a block of it answers, what describes it, what is stored of it.
+
+A kind is one object, ``MODEL``, in one file of `rbfrag/solver/models`; `rbfrag.solver.kinds` finds
+it there. Campaigns, the database, fits and predictions ask that object, never for its name.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.integrator.one_freedom.equation import Mechanism
-from rbfrag.solver.results import Polarity, Response
+from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.results import (
+    MAP_DEPTH,
+    CriticalResult,
+    FloatArray,
+    Outcome,
+    Polarity,
+    Response,
+    SearchPoints,
+)
 from rbfrag.solver.stability.modes import ModeName
 
-if TYPE_CHECKING:
-    from rbfrag.solver.run_end import Runner
+PLANES = ("beta_deg", "phi_deg", "phi_back_deg")
+"""Options that describe the planes of a block."""
+
+SHAKING = ("vertical", "polarity", "search_limit")
+"""Options of every search."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +39,7 @@ class BlockOnPlanes:
     """A block, its planes and the settings of its motion, as a model sees them.
 
     Args:
-        block: its shape and size; None for a sliding block, which needs neither.
+        block: its shape and size; None where numbers describe it.
         beta_rad: dip of the base, out of the slope positive [rad].
         phi_rad: friction angle of the base [rad].
         phi_back_rad: friction angle of the back plane [rad].
@@ -31,6 +48,7 @@ class BlockOnPlanes:
         yield_g: yield acceleration of the model's mode where 1 + k_v = 1 [g]; None if the
             block's mode is another one.
         settings: options of one model or another, by name.
+        p2: frequency parameter p² of a block without a shape [1/s²].
     """
 
     block: Block | None
@@ -41,6 +59,7 @@ class BlockOnPlanes:
     cohesive: bool
     yield_g: float | None
     settings: Mapping[str, Any]
+    p2: float | None = None
 
     @property
     def centroid_m(self) -> tuple[float, float]:
@@ -67,69 +86,166 @@ class Shaking:
     remarks: tuple[str, ...] = ()
 
 
-class ResponseModel(Protocol):
-    """What the search for models expects to find as ``MODEL`` in a file."""
+@dataclass(frozen=True)
+class RunEnd:
+    """The end of one run, without its history.
 
-    @property
-    def kind(self) -> str:
-        """Name of the model."""
+    Args:
+        outcome: how it ended.
+        moved: whether the block moved at all.
+        peak_rad: peak rotation [rad]; None for a block that slides, or that has failed.
+        peak_displacement_m: greatest displacement of the contact on the base along it [m]; None
+            for a block that rocks, or that has failed.
+        error: bound on the error of the peak [rad], of a sliding block [m].
+        about_block: what the model takes for granted about this block, whatever the motion.
+    """
 
-    @property
-    def mode(self) -> ModeName:
-        """Failure mode of the blocks that it describes."""
+    outcome: Outcome
+    moved: bool
+    peak_rad: float | None
+    peak_displacement_m: float | None
+    error: float
+    about_block: tuple[str, ...] = ()
 
-    @property
-    def settings(self) -> tuple[str, ...]:
-        """Names of the options that it understands."""
 
-    def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
-        """Return what the block does."""
-
-    def runner(self, site: BlockOnPlanes) -> Runner:
-        """Return a function that says what becomes of the block under an excitation."""
+Runner = Callable[[Excitation], RunEnd]
+"""One block, made ready: says how it ends under an excitation."""
 
 
 @dataclass(frozen=True)
-class MechanismModel:
-    """A model that states a mechanism; the engine for one degree of freedom runs it.
+class Case:
+    """One combination of a campaign, whatever the motion.
 
     Args:
         kind: name of the model.
-        mode: failure mode of the blocks that it describes.
-        mechanism: makes the mechanism of a block.
-        settings: names of the options that it understands.
+        p2: frequency parameter of the block [1/s²]; None where it has none.
+        block: what else describes the block, as it is stored; None where p² is all.
+        settings: what else decides the answer, as it goes into the natural key.
     """
 
     kind: str
-    mode: ModeName
-    mechanism: Callable[[BlockOnPlanes], Mechanism]
+    p2: float | None
+    block: Mapping[str, object] | None = None
+    settings: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class CaseResult:
+    """What one motion does to the blocks of a case.
+
+    Args:
+        critical: the critical value; None of a kind without a search.
+        grid: the blocks of the outcome grid, entry i that of strength i of :meth:`Kind.grid`.
+            ``toppled`` says that a block fails by the measure of its case. Without entries where
+            the motion has no acceleration.
+    """
+
+    critical: CriticalResult | None
+    grid: SearchPoints | None
+
+
+class Measures(Protocol):
+    """What an outcome grid reads of a motion."""
+
+    @property
+    def pga_g(self) -> float:
+        """PGA [g]."""
+
+    @property
+    def pgv_m_s(self) -> float:
+        """PGV [m/s]."""
+
+
+class Kind:
+    """Base of the kinds: what one without a search and without a campaign answers.
+
+    Attributes:
+        kind: its name.
+        mode: failure mode of its blocks; None where no geometry chooses it.
+        settings: options of `rbfrag.respond` that it understands.
+        parameters: what describes its block in predictions; () where no fragility is fitted.
+        searchable: whether it has a critical value.
+        search_needs: the option without which there is no search.
+        search_options: options of `rbfrag.critical` that it understands.
+        campaign: whether campaigns store it.
+        campaign_options: what :meth:`cases` may be asked.
+    """
+
+    kind: str
+    mode: ModeName | None = None
     settings: tuple[str, ...] = ()
+    parameters: tuple[str, ...] = ()
+    searchable: bool = False
+    search_needs: str = ""
+    search_options: tuple[str, ...] = ()
+    campaign: bool = False
+    campaign_options: tuple[str, ...] = ()
 
     def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
-        """Return what the block does.
-
-        Raises:
-            InputError: the base has cohesion.
-        """
-        from rbfrag.solver.mechanism_response import mechanism_response
-
-        return mechanism_response(self.kind, self._made(site), shaking)
+        """Return what the block does."""
+        raise NotImplementedError
 
     def runner(self, site: BlockOnPlanes) -> Runner:
-        """Return a function that says what becomes of the block under an excitation.
+        """Return a function that says how the block ends under an excitation."""
+        raise NotImplementedError
+
+    def critical(self, motion: GroundMotion, **options: Any) -> CriticalResult:
+        """Return the critical value of one motion.
 
         Raises:
-            InputError: the base has cohesion.
+            InputError: there is no search, or an option is that of another kind.
         """
-        from rbfrag.solver.run_end import mechanism_runner
+        raise InputError(f"there is no search for the critical value of kind {self.kind}")
 
-        return mechanism_runner(self._made(site))
+    def cases(self, **asked: Any) -> tuple[Case, ...]:
+        """Return the combinations of a campaign, whatever the motion.
 
-    def _made(self, site: BlockOnPlanes) -> Mechanism:
-        if site.cohesive:
+        Raises:
+            InputError: campaigns do not store this kind, or an option is that of another one.
+        """
+        raise InputError(f"campaigns of kind {self.kind} are not known to this rbfrag")
+
+    def grid(self, case: Case, measures: Measures) -> FloatArray:
+        """Return the strengths k/PGA of the outcome grid, which depend on no outcome.
+
+        Empty where the motion has no acceleration.
+        """
+        return np.empty(0)
+
+    def run_cases(
+        self,
+        motion: GroundMotion,
+        vertical: GroundMotion | None,
+        polarity: Polarity,
+        cases: Sequence[Case],
+        *,
+        full_map: bool = False,
+        map_depth: float = MAP_DEPTH,
+    ) -> list[CaseResult]:
+        """Return critical value and outcome grid of every case under one motion."""
+        raise NotImplementedError
+
+    def refuse_foreign(self, given: Iterable[str], own: Sequence[str]) -> None:
+        """Refuse an option that is not among the kind's own."""
+        foreign = sorted(set(given) - set(own))
+        if foreign:
             raise InputError(
-                f"cohesion_pa does not go with {self.kind} in time: a bond is broken by the first "
-                "slip, which the model does not describe; its effect on the yield is told by  "
-                "rbfrag block --cohesion"
+                f"{foreign[0]} does not go with {self.kind}, which knows "
+                f"{' and '.join(own) or 'no such option'}"
             )
-        return self.mechanism(site)
+
+
+def each_once(values: Sequence[float | None], option: str, for_none: str = "None") -> None:
+    """Refuse an empty list, and one that names a value twice.
+
+    Args:
+        values: the values.
+        option: their name, for the message.
+        for_none: what None is called there.
+    """
+    if not values:
+        raise InputError(f"{option}: the list is empty: name at least one value")
+    for value in values:
+        if values.count(value) > 1:
+            word = for_none if value is None else f"{value:g}"
+            raise InputError(f"{option}: {word} is in the list twice: name each value once")

@@ -1,4 +1,4 @@
-"""The response models that there are: every file of `rbfrag/solver/models` with a ``MODEL``."""
+"""The kinds that there are: every file of `rbfrag/solver/models` with a ``MODEL``."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from importlib import import_module
 
 import rbfrag.solver.models
 from rbfrag.errors import InputError
-from rbfrag.solver.kind import ResponseModel
+from rbfrag.solver.kind import Kind
 from rbfrag.solver.stability.modes import ModeName
 
 
 @cache
-def models() -> dict[str, ResponseModel]:
+def models() -> dict[str, Kind]:
     """Return all models by kind."""
-    found: dict[str, ResponseModel] = {}
+    found: dict[str, Kind] = {}
     for module in pkgutil.iter_modules(rbfrag.solver.models.__path__):
         model = getattr(import_module(f"rbfrag.solver.models.{module.name}"), "MODEL", None)
         if model is not None:
@@ -23,7 +23,7 @@ def models() -> dict[str, ResponseModel]:
     return found
 
 
-def model_of_kind(kind: str) -> ResponseModel:
+def model_of_kind(kind: str) -> Kind:
     """Return the model of that name.
 
     Raises:
@@ -35,6 +35,6 @@ def model_of_kind(kind: str) -> ResponseModel:
     return known[kind]
 
 
-def model_of_mode(mode: ModeName) -> ResponseModel:
+def model_of_mode(mode: ModeName) -> Kind:
     """Return the model of blocks that fail in this mode."""
     return next(model for model in models().values() if model.mode == mode)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.kind import BlockOnPlanes, ResponseModel, Shaking
+from rbfrag.solver.kind import BlockOnPlanes, Kind, Shaking
 from rbfrag.solver.kinds import model_of_kind, model_of_mode
 from rbfrag.solver.quantity import angle, positive
 from rbfrag.solver.results import Polarity, Response
+from rbfrag.solver.stability.modes import ModeName, words_of_mode
 from rbfrag.solver.stability.single import Stability, stability
 
 
@@ -94,14 +96,15 @@ def respond(
             density_kg_m3=density_kg_m3,
         )
         return _by_mode(block, found, kind, settings, Shaking(motion, vertical, polarity, history))
+    shaking = Shaking(motion, vertical, polarity, history)
     if ky is not None:
         if p2 is not None or kr is not None:
             raise InputError("ky belongs to sliding, p2 and kr to toppling: give one or the other")
         if extra := [name for name in given if name != "beta_deg"]:
             raise InputError(f"{extra[0]} does not go with ky: it follows from ky and beta_deg")
-        model = _asked_for(kind, "slide", "ky")
+        model = _by_numbers(kind, "slide", ("ky",))
         site = _sliding_site(ky, beta_deg or 0.0, _known(model, settings))
-        return model.respond(site, Shaking(motion, vertical, polarity, history))
+        return model.respond(site, shaking)
     if p2 is None or kr is None:
         missing = "p2" if p2 is None else "kr"
         raise InputError(
@@ -109,18 +112,22 @@ def respond(
         )
     if given:
         raise InputError(f"{given[0]} does not go with p2 and kr, which say all about the block")
-    model = _asked_for(kind, "topple", "p2 and kr")
-    _known(model, settings)
-    from rbfrag.solver.toppling_run import respond as toppling
+    model = _by_numbers(kind, "topple", ("p2", "kr"))
+    return model.respond(block_of_numbers(p2, kr, _known(model, settings)), shaking)
 
-    return toppling(
-        motion,
+
+def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> BlockOnPlanes:
+    """Return a block of which frequency parameter [1/s²] and yield acceleration [g] are known."""
+    return BlockOnPlanes(
+        block=None,
+        beta_rad=0.0,
+        phi_rad=0.0,
+        phi_back_rad=0.0,
+        back_fracture=True,
+        cohesive=False,
+        yield_g=kr,
+        settings=settings,
         p2=p2,
-        kr=kr,
-        vertical=vertical,
-        polarity=polarity,
-        linear=linear,
-        history=history,
     )
 
 
@@ -138,8 +145,8 @@ def _by_mode(
     if model.mode != found.mode:
         remarks = (
             *remarks,
-            f"the mode of the block is {_words(found.mode)}: by it, {model.kind} is not what it "
-            "would do",
+            f"the mode of the block is {words_of_mode(found.mode)}: by it, {model.kind} is not "
+            "what it would do",
         )
     site = BlockOnPlanes(
         block=block,
@@ -178,18 +185,20 @@ def _sliding_site(ky: float, beta_deg: float, settings: dict[str, Any]) -> Block
     )
 
 
-def _asked_for(kind: str | None, mode: Any, numbers: str) -> ResponseModel:
-    """Return the model that numbers alone suffice for, unless another was asked for."""
-    model = model_of_mode(mode)
-    if kind is not None and model_of_kind(kind) is not model:
+def _by_numbers(kind: str | None, mode: ModeName, numbers: tuple[str, ...]) -> Kind:
+    """Return the model that numbers alone suffice for, unless another one that they describe."""
+    if kind is None:
+        return model_of_mode(mode)
+    model = model_of_kind(kind)
+    if not set(numbers) <= set(model.parameters):
         raise InputError(
             f"{kind} needs the shape of the block: give a block with beta_deg and phi_deg instead "
-            f"of {numbers}, which mean {model.kind}"
+            f"of {' and '.join(numbers)}, which mean {model_of_mode(mode).kind}"
         )
     return model
 
 
-def _known(model: ResponseModel, settings: dict[str, bool]) -> dict[str, Any]:
+def _known(model: Kind, settings: dict[str, bool]) -> dict[str, Any]:
     given = {name: value for name, value in settings.items() if value}
     unknown = sorted(set(given) - set(model.settings))
     if unknown:
@@ -205,16 +214,12 @@ def _refuse_what_no_motion_decides(found: Stability) -> None:
     k = found.yield_acceleration
     if found.state == "locked":
         raise InputError(
-            f"the block is locked in its mode, {_words(found.mode)}: no horizontal acceleration "
-            "moves it"
+            f"the block is locked in its mode, {words_of_mode(found.mode)}: no horizontal "
+            "acceleration moves it"
         )
     if found.state == "unstable" or k <= 0.0:
         name = {"topple": "k_r", "slide": "k_y", "slump": "k_s"}.get(found.mode, "k_ct")
         raise InputError(
-            f"the block is {found.state} at rest (mode {_words(found.mode)}, {name} = {k:.4g} g): "
-            "no earthquake decides about it"
+            f"the block is {found.state} at rest (mode {words_of_mode(found.mode)}, "
+            f"{name} = {k:.4g} g): no earthquake decides about it"
         )
-
-
-def _words(mode: str) -> str:
-    return mode.replace("_", " ")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,9 @@ SEARCH_LIMIT = 0.01
 
 DEFAULT_P2 = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1)
 """The dissertation's block sizes, as p² [1/s²]: 0.25 m to 74 m from centroid to toe."""
+
+MAP_DEPTH = 1e-4
+"""Width of k_r/PGA that a map leaves undecided below the critical value, at every border."""
 
 RESOLUTION = 1e-6
 """Islands of k_r/PGA narrower than this are below the rounding of a recorded accelerogram."""
@@ -158,7 +162,8 @@ class Response:
 
 @dataclass(frozen=True, eq=False)
 class SearchPoints:
-    """Blocks simulated for themselves in one critical search, by falling k_r/PGA.
+    """Blocks simulated for themselves: those of a search by falling k_r/PGA, those of an outcome
+    grid in its order.
 
     Args:
         kr_over_pga: block strength over PGA, shape (n,).
@@ -200,9 +205,13 @@ def no_intervals() -> OutcomeIntervals:
 
 @dataclass(frozen=True, eq=False)
 class CriticalResult:
-    """The critical block of one motion: the strongest one that it topples.
+    """The critical block of one motion: the strongest one that it brings down.
+
+    For kinds whose record is scaled, k/PGA is the block's yield acceleration over the PGA of the
+    scaled record, and takes the place of k_r/PGA; for sliding it is k_y/PGA.
 
     Args:
+        kind: name of the model.
         p2: the block's frequency parameter p² [1/s²]; NaN for sliding, which has none.
         polarity: ``forward`` or ``reverse``.
         linear: True for the linear verification model.
@@ -217,21 +226,25 @@ class CriticalResult:
         y_m_s: critical toppling velocity k_r g/p [m/s].
         certified: True when every k_r above the bracket is proven not to topple, slivers of
             the total length `undecided` (at most 1e-9) excepted.
-        k_up_over_pga: proven upper bound over fresh starts: nothing above it topples.
+        k_up_over_pga: proven upper bound over excursions from rest: nothing above it topples.
         undecided: length of k_r/PGA above `upper` for which safety is not proven.
-        island_width: width in k_r/PGA of the toppling interval that the bracket caps. Without
-            a full map its lower end is looked for by single blocks.
-        kr_over_pga_resolved: the same search with islands narrower than 1e-6 ignored.
-        reentrant: True when a safe island wider than 1e-6 lies below the critical value. With
-            a full map False is proven but for what the map leaves undecided; otherwise it means
-            that none was met.
+        island_width: width in k_r/PGA of the toppling interval that the bracket caps; None
+            without a full map.
+        kr_over_pga_resolved: the same search with islands narrower than 1e-6 ignored; None
+            without a full map.
+        reentrant: True when a safe island wider than 1e-6 lies below the critical value; False is
+            proven but for what the map leaves undecided. None without a full map, except of kinds
+            whose search sees it: then False means that none was met.
         n_runs: number of simulations made.
         warnings: sentences about suspicious input or an uncertain answer.
         points: the blocks that were simulated for themselves.
-        intervals: what the search proved: the whole range from the search limit upwards if a
-            full map was asked for, otherwise the part from the bracket upwards.
+        intervals: what becomes of every block from the search limit upwards, if a full map was
+            asked for; of kinds whose record is scaled, what was seen.
+        of_kind: values that the kind alone has, by name: `displacement_m` of sliding; `scale`
+            and the other values of its JSON answer for a record that is scaled.
     """
 
+    kind: str
     p2: float
     polarity: Polarity
     linear: bool
@@ -248,8 +261,9 @@ class CriticalResult:
     undecided: float | None
     island_width: float | None
     kr_over_pga_resolved: float | None
-    reentrant: bool
+    reentrant: bool | None
     n_runs: int
     warnings: tuple[str, ...]
     points: SearchPoints
     intervals: OutcomeIntervals = field(default_factory=no_intervals)
+    of_kind: Mapping[str, Any] = field(default_factory=dict)

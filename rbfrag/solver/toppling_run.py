@@ -10,8 +10,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.quality import quality_flags
-from rbfrag.solver.excitation import Excitation, excitation
+from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.integrator.single_run import TOPPLED, Run, run_toppling
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
 from rbfrag.solver.results import FloatArray, Outcome, Polarity, Response, ResponseHistory
@@ -219,9 +218,7 @@ def _warnings(
     outcome: Outcome,
     run: Run,
 ) -> tuple[str, ...]:
-    said = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion)), *drive.warnings]
-    if vertical is not None:
-        said += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
+    said = list(motion_remarks(motion, vertical, drive))
     if outcome is Outcome.UNDETERMINED:
         said.append(outcome.advice)
     if outcome is Outcome.JUMP:

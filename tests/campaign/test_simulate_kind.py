@@ -15,7 +15,6 @@ from rbfrag.campaign.progress import CampaignProgress
 from rbfrag.campaign.resimulate import resimulate
 from rbfrag.campaign.simulate import simulate
 from rbfrag.campaign.simulate_kind import KindSummary, simulate_kind
-from rbfrag.campaign.slumping_family import FAMILY, BlockClass
 from rbfrag.db import schema
 from rbfrag.db.check.database import check_database
 from rbfrag.db.content import table_rows_by_natural_key
@@ -32,9 +31,10 @@ from rbfrag.fragility.fit.kind_fitting import fit_kind
 from rbfrag.fragility.fit.model_check import check_models
 from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.search.displacement import KY_OVER_PGA, critical_sliding, sliding_displacements
-from rbfrag.solver.search.scale import critical_scale
-from rbfrag.solver.shaken_mechanism import shaken_mechanism
+from rbfrag.solver.critical import critical
+from rbfrag.solver.mechanism import shaken_mechanism
+from rbfrag.solver.models.sliding import KY_OVER_PGA, sliding_displacements
+from rbfrag.solver.models.slumping import FAMILY, BlockClass
 from tests.synthetic import shaking
 
 TWO = (FAMILY[0], FAMILY[2])
@@ -94,9 +94,9 @@ def test_slumps_are_stored_as_the_search_finds_them(place: str) -> None:
             with engine.connect() as connection:
                 motion = load_motion(connection, row["motion_id"])
             block = BlockClass(**json.loads(row["block"]))
-            found = critical_scale(
+            found = critical(
                 motion,
-                block.block,
+                block=block.block,
                 beta_deg=block.beta_deg,
                 phi_deg=block.phi_deg,
                 rotation_deg=json.loads(row["settings"])["rotation_deg"],
@@ -104,8 +104,8 @@ def test_slumps_are_stored_as_the_search_finds_them(place: str) -> None:
             )
             assert (row["status"], row["n_runs"]) == (found.status, found.n_runs)
             assert row["p2"] == found.p2
-            if found.scale is not None:
-                assert row["kr_over_pga"] == found.k_over_pga(found.scale)
+            if found.kr_over_pga is not None:
+                assert row["kr_over_pga"] == found.kr_over_pga
                 assert row["y_m_s"] == pytest.approx(found.y_m_s, rel=1e-12)
         assert findings(engine) == []
     finally:
@@ -127,8 +127,8 @@ def test_slides_are_stored_with_their_displacements(place: str) -> None:
                     .where(schema.simulation.c.combination_id == row["id"])
                     .order_by(schema.simulation.c.kr_over_pga)
                 ).all()
-            found = critical_sliding(motion, displacement_m=distance, polarity=row["polarity"])
-            assert (row["kr_over_pga"], row["status"]) == (found.ky_over_pga, found.status)
+            found = critical(motion, displacement_m=distance, polarity=row["polarity"])
+            assert (row["kr_over_pga"], row["status"]) == (found.kr_over_pga, found.status)
             assert (row["p2"], row["y_m_s"]) == (None, None)
             if distance == 0.0:
                 assert [point.kr_over_pga for point in points] == list(KY_OVER_PGA)

@@ -8,8 +8,8 @@ import pytest
 
 from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.search.displacement import KY_OVER_PGA, critical_sliding, sliding_displacements
-from rbfrag.solver.search.scale import critical_scale
+from rbfrag.solver.critical import critical
+from rbfrag.solver.models.sliding import KY_OVER_PGA, sliding_displacements
 from tests.cli.conftest import Refuses, Shell
 from tests.synthetic import shaking, write_at2
 
@@ -31,16 +31,19 @@ def slump(tmp_path: Path) -> Path:
 def test_slumping_answers_as_python_does(shell: Shell, record: Path, slump: Path) -> None:
     asked = ("critical", record, "--kind", "slumping", "--block", slump, "--rotation", "2")
     told = shell.json(*asked, "--reverse")
-    found = critical_scale(
+    found = critical(
         read_motions(record)[0],
-        Block.from_angles(56, 76, 0.7),
+        block=Block.from_angles(56, 76, 0.7),
         beta_deg=22,
         phi_deg=30,
         rotation_deg=2.0,
         polarity="reverse",
     )
-    assert (told["scale"], told["lower"], told["status"]) == (found.scale, found.lower, "found")
-    assert (told["ks"], told["ps2"], told["y_m_s"]) == (found.yield_g, found.p2, found.y_m_s)
+    its = found.of_kind
+    assert (told["scale"], told["lower"]) == (its["scale"], its["lower_scale"])
+    assert (told["status"], told["k_over_pga"]) == ("found", found.kr_over_pga)
+    assert (told["ks"], told["ps2"]) == (its["yield_g"], found.p2)
+    assert told["y_m_s"] == pytest.approx(found.y_m_s, rel=1e-14)
     assert told["certified"] is False
     printed = shell(*asked).stdout
     assert "brings the block down" in printed
@@ -50,7 +53,7 @@ def test_sliding_answers_as_python_does(shell: Shell, record: Path) -> None:
     told = shell.json("critical", record, "--kind", "sliding", "--displacement", "0.02,0.1")
     motion = read_motions(record)[0]
     for each, distance in zip(told["thresholds"], (0.02, 0.1), strict=True):
-        assert each["ky_over_pga"] == critical_sliding(motion, displacement_m=distance).ky_over_pga
+        assert each["ky_over_pga"] == critical(motion, displacement_m=distance).kr_over_pga
     assert told["ky_over_pga"] == told["thresholds"][0]["ky_over_pga"]
     curve = [row["displacement_m"] for row in told["displacements"]]
     assert curve == sliding_displacements(motion, KY_OVER_PGA).tolist()
@@ -62,8 +65,8 @@ def test_sliding_answers_as_python_does(shell: Shell, record: Path) -> None:
     [
         (("--kind", "slumping"), "--block is missing"),
         (("--kind", "sliding", "--p2", "3"), "--p2 goes with --kind toppling"),
-        (("--rotation", "3"), "--rotation goes with --kind slumping and confined_toppling"),
-        (("--kind", "falling"), "use one of toppling, sliding"),
+        (("--rotation", "3"), "--rotation goes with --kind confined_toppling and slumping"),
+        (("--kind", "falling"), "use one of confined_toppling, sliding"),
         ((), "--p2 is missing"),
         (("--kind", "sliding", "--displacement", "far"), "'far' is no number"),
     ],
@@ -72,6 +75,15 @@ def test_what_does_not_fit_the_kind_is_refused(
     refuses: Refuses, record: Path, options: tuple[str, ...], words: str
 ) -> None:
     assert words in refuses("critical", record, *options)
+
+
+def test_a_block_chooses_its_kind_by_its_mode(shell: Shell, record: Path, slump: Path) -> None:
+    by_mode = shell.json("critical", record, "--block", slump)
+    assert by_mode == shell.json("critical", record, "--kind", "slumping", "--block", slump)
+    slump.write_text(SLUMP.replace("phi_deg = 30", "phi_deg = 60").replace("= 56", "= -10"))
+    block = Block.from_angles(-10, 76, 0.7)
+    topples = shell.json("critical", record, "--kind", "toppling", "--block", slump)
+    assert topples == shell.json("critical", record, "--p2", repr(block.p2))
 
 
 def test_a_block_of_another_mode_is_refused(refuses: Refuses, record: Path, slump: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.shaken_mechanism import shaken_mechanism
+from rbfrag.solver.mechanism import shaken_mechanism
 from tests.cli.conftest import Refuses, Shell
 from tests.synthetic import write_suite
 

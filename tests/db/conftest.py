@@ -79,6 +79,7 @@ def make_result() -> Callable[..., CriticalResult]:
             outcome=("stable", "stable", *["toppled" if found else "undetermined"] * 2),
         )
         values: dict[str, Any] = {
+            "kind": "toppling",
             "p2": p2,
             "polarity": "forward",
             "linear": False,

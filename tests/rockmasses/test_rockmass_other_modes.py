@@ -12,7 +12,7 @@ from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping
 from rbfrag.rockmasses.joint_sets import RockMass
 from rbfrag.rockmasses.scenario import Scenario, scenario
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.shaken_mechanism import shaken_mechanism
+from rbfrag.solver.mechanism import shaken_mechanism
 from rbfrag.solver.stability.modes import SLIDE, SLUMP, STABLE
 
 TABLE_3_4 = {

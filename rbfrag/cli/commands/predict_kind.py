@@ -133,7 +133,7 @@ def _sliding_block(path: str) -> tuple[float, float, tuple[str, ...]]:
 
 
 def _slumping_block(path: str) -> tuple[float, float, float, tuple[str, ...]]:
-    from rbfrag.solver.shaken_mechanism import shaken_mechanism
+    from rbfrag.solver.mechanism import shaken_mechanism
 
     block, conditions = _read(path)
     for name, nothing in (("cohesion_pa", 0.0), ("back_fracture", True)):

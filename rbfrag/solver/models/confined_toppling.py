@@ -30,8 +30,9 @@ from rbfrag.solver.integrator.one_freedom.equation import (
 from rbfrag.solver.integrator.one_freedom.harmonics import Harmonics, Vector, constant, turning
 from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
 from rbfrag.solver.integrator.one_freedom.two_contacts import Contact, two_contact_equation
-from rbfrag.solver.kind import BlockOnPlanes, MechanismModel
+from rbfrag.solver.kind import BlockOnPlanes
 from rbfrag.solver.results import Outcome
+from rbfrag.solver.search.scale import ScaledKind
 
 
 def mechanism(site: BlockOnPlanes) -> Mechanism:
@@ -212,4 +213,16 @@ def _positive(angle_rad: float) -> float | None:
     return angle_rad if angle_rad > 0.0 else None
 
 
-MODEL = MechanismModel(kind="confined_toppling", mode="confined_topple", mechanism=mechanism)
+class ConfinedToppling(ScaledKind):
+    """Toppling between a back plane and the base; no fragility of it is fitted."""
+
+    kind = "confined_toppling"
+    mode = "confined_topple"
+    yield_name = "kct"
+
+    def mechanism(self, site: BlockOnPlanes) -> Mechanism:
+        """Return the confined toppling block."""
+        return mechanism(site)
+
+
+MODEL = ConfinedToppling()

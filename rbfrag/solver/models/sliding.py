@@ -12,9 +12,15 @@ samples and the answer exact.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
 
 from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.integrator.one_freedom.equation import (
     Condition,
     Ending,
@@ -24,9 +30,39 @@ from rbfrag.solver.integrator.one_freedom.equation import (
     Phase,
     Pose,
 )
+from rbfrag.solver.integrator.one_freedom.follow import follow
 from rbfrag.solver.integrator.one_freedom.harmonics import constant
-from rbfrag.solver.kind import BlockOnPlanes, MechanismModel
-from rbfrag.solver.results import Outcome
+from rbfrag.solver.kind import (
+    PLANES,
+    BlockOnPlanes,
+    Case,
+    CaseResult,
+    Measures,
+    each_once,
+)
+from rbfrag.solver.mechanism import MechanismKind
+from rbfrag.solver.quantity import positive
+from rbfrag.solver.results import (
+    MAP_DEPTH,
+    SEARCH_LIMIT,
+    CriticalResult,
+    FloatArray,
+    Outcome,
+    Polarity,
+)
+from rbfrag.solver.search.displacement import TOLERANCE, SlidingBlocks, critical_of
+
+THRESHOLDS_M = (0.01, 0.05, 0.15, 0.30)
+"""Displacements that are asked about when nothing else is said [m]."""
+
+KY_OVER_PGA = (
+    0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6,
+    0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95,
+)  # fmt: skip
+"""Strengths of the outcome grid, whose displacements are stored."""
+
+LEVEL_PLANE = {"plane": "level"}
+"""The block of a campaign: on a base that dips, a displacement is a factor times its."""
 
 
 def mechanism(site: BlockOnPlanes) -> Mechanism:
@@ -100,9 +136,151 @@ def _warnings(site: BlockOnPlanes) -> tuple[str, ...]:
     )
 
 
-MODEL = MechanismModel(
-    kind="sliding",
-    mode="slide",
-    mechanism=mechanism,
-    settings=("two_way", "horizontal"),
-)
+def sliding_displacements(
+    motion: GroundMotion,
+    ky_over_pga: Sequence[float] = KY_OVER_PGA,
+    *,
+    vertical: GroundMotion | None = None,
+    polarity: Polarity = "forward",
+) -> FloatArray:
+    """Return how far blocks slide down a level plane, downslope only [m].
+
+    On a base of dip beta the displacement is cos(phi - beta)/cos(phi) times this, k_y being
+    tan(phi - beta).
+
+    Args:
+        motion: horizontal ground motion; its PGA must be above zero.
+        ky_over_pga: strengths over PGA, shape (n,).
+        vertical: vertical motion of the same recording, upward positive.
+        polarity: ``forward`` or ``reverse``.
+
+    Returns:
+        Displacements, shape (n,); NaN where the vertical motion throws the block off its base.
+
+    Raises:
+        InputError: a strength that is not above zero, a motion of no acceleration.
+    """
+    drive = excitation(motion, vertical, polarity)
+    positive(drive.pga_g, "PGA", "g")
+    strengths = [positive(value, "ky_over_pga", "k_y/PGA") for value in ky_over_pga]
+    slid = SlidingBlocks(drive, slide_m).points(strengths).displacement_m
+    assert slid is not None
+    return slid
+
+
+def slide_m(drive: Excitation, ky: float) -> float:
+    """Return the permanent displacement down a level plane [m]; NaN where it is thrown."""
+    friction_rad = math.atan(ky)
+    level = BlockOnPlanes(
+        block=None,
+        beta_rad=0.0,
+        phi_rad=friction_rad,
+        phi_back_rad=friction_rad,
+        back_fracture=False,
+        cohesive=False,
+        yield_g=ky,
+        settings={},
+    )
+    course = follow(mechanism(level), drive)
+    return course.x if course.outcome is Outcome.STABLE else math.nan
+
+
+class Sliding(MechanismKind):
+    """The sliding model; its critical strength slides a stated distance."""
+
+    kind = "sliding"
+    mode = "slide"
+    yield_name = "ky"
+    settings = ("two_way", "horizontal")
+    parameters = ("ky", "displacement_m")
+    searchable = True
+    search_needs = "displacement_m"
+    search_options = ("displacement_m", "tolerance", "block", *PLANES)
+    campaign = True
+    campaign_options = ("displacements_m",)
+
+    def mechanism(self, site: BlockOnPlanes) -> Mechanism:
+        """Return the sliding block."""
+        return mechanism(site)
+
+    def critical(
+        self,
+        motion: GroundMotion,
+        *,
+        vertical: GroundMotion | None = None,
+        polarity: Polarity = "forward",
+        search_limit: float = SEARCH_LIMIT,
+        **options: Any,
+    ) -> CriticalResult:
+        """Return the greatest k_y/PGA with which a block slides `displacement_m` on a level plane.
+
+        It is that of any shape and any dip: on a base that dips, divide a displacement by
+        cos(phi - beta)/cos(phi).
+        """
+        self.refuse_foreign(options, self.search_options)
+        if "displacement_m" not in options:
+            raise InputError("displacement_m is missing: give the distance on a level plane [m]")
+        drive = excitation(motion, vertical, polarity)
+        return critical_of(
+            self.kind,
+            SlidingBlocks(drive, slide_m),
+            options["displacement_m"],
+            polarity=polarity,
+            search_limit=search_limit,
+            tolerance=options.get("tolerance", TOLERANCE),
+            warnings=motion_remarks(motion, vertical, drive),
+        )
+
+    def cases(self, **asked: Any) -> tuple[Case, ...]:
+        """Return the first motion and every stated displacement.
+
+        Raises:
+            InputError: a displacement that is not above zero, or repeats.
+        """
+        self.refuse_foreign(asked, self.campaign_options)
+        stated = asked.get("displacements_m", THRESHOLDS_M)
+        stated = [positive(value, "--displacement", "m") for value in stated]
+        each_once(stated, "--displacement")
+        settings = {"search_limit": SEARCH_LIMIT, "tolerance": TOLERANCE}
+        return tuple(
+            Case(self.kind, None, LEVEL_PLANE, {**settings, "displacement_m": value})
+            for value in (0.0, *stated)
+        )
+
+    def grid(self, case: Case, measures: Measures) -> FloatArray:
+        """Return the stored strengths k_y/PGA."""
+        return np.array(KY_OVER_PGA if measures.pga_g > 0.0 else (), dtype=np.float64)
+
+    def run_cases(
+        self,
+        motion: GroundMotion,
+        vertical: GroundMotion | None,
+        polarity: Polarity,
+        cases: Sequence[Case],
+        *,
+        full_map: bool = False,
+        map_depth: float = MAP_DEPTH,
+    ) -> list[CaseResult]:
+        """Return critical strength and displacements of every case under one motion."""
+        drive = excitation(motion, vertical, polarity)
+        thrown = drive.jump_node < drive.w.size
+        strengths = () if thrown else tuple(self.grid(cases[0], motion).tolist())
+        grid = SlidingBlocks(drive, slide_m).points(strengths)
+        results = []
+        for case in cases:
+            settings: dict[str, Any] = dict(case.settings)
+            # each for itself, so that an answer does not depend on what else was asked for
+            found = critical_of(
+                self.kind,
+                SlidingBlocks(drive, slide_m),
+                settings["displacement_m"],
+                polarity=polarity,
+                search_limit=settings["search_limit"],
+                tolerance=settings["tolerance"],
+                warnings=drive.warnings,
+            )
+            results.append(CaseResult(found, grid))
+        return results
+
+
+MODEL = Sliding()

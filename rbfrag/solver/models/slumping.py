@@ -10,14 +10,28 @@ derived in `rbfrag.solver.integrator.one_freedom.two_contacts`; it has the form 
 and reads, as all mechanisms here do, inertia θ'' = drive k_h - resistance (1 + k_v) - braking θ'².
 The dissertation's own chapter on slumping is not available; this is derived from rigid-body
 mechanics.
+
+Strength and frequency do not fix a slump: shape, friction and dip do. Campaigns shake a family that
+spans the slumping blocks of the dissertation's rock mass (its Table 3.4: base 20 and back 45
+degrees, spacings 1 and 0.6 m, friction 40 degrees) and weaker ones. Every block of it slumps and is
+stable at rest.
 """
 
 from __future__ import annotations
 
 import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
 
 from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.one_freedom.equation import (
     Ending,
     Equation,
@@ -26,10 +40,29 @@ from rbfrag.solver.integrator.one_freedom.equation import (
     Phase,
     Pose,
 )
+from rbfrag.solver.integrator.one_freedom.follow import follow
 from rbfrag.solver.integrator.one_freedom.harmonics import Harmonics, Vector, constant, turning
 from rbfrag.solver.integrator.one_freedom.two_contacts import Contact, two_contact_equation
-from rbfrag.solver.kind import BlockOnPlanes, MechanismModel
-from rbfrag.solver.results import Outcome
+from rbfrag.solver.kind import (
+    BlockOnPlanes,
+    Case,
+    CaseResult,
+    Measures,
+    each_once,
+)
+from rbfrag.solver.mechanism import ShakenMechanism, shaken_mechanism
+from rbfrag.solver.quantity import positive
+from rbfrag.solver.results import MAP_DEPTH, SEARCH_LIMIT, FloatArray, Outcome, Polarity
+from rbfrag.solver.search.scale import (
+    BRACKET,
+    SCAN_RATIO,
+    ScaledKind,
+    critical_rad,
+    critical_scales,
+    grid_points,
+    judged,
+    rotation_rad,
+)
 
 
 def mechanism(site: BlockOnPlanes) -> Mechanism:
@@ -129,4 +162,164 @@ def centroid_path(block: Block) -> Vector:
     return Vector(heel_slip(block), constant(0.0)) - turning(block.heel)
 
 
-MODEL = MechanismModel(kind="slumping", mode="slump", mechanism=mechanism)
+@dataclass(frozen=True)
+class BlockClass:
+    """A parallelogram and its planes: all that decides how it slumps.
+
+    Args:
+        s1_m: thickness normal to the base [m].
+        s2_m: thickness normal to the back plane [m].
+        gamma_deg: dip of the back plane less dip of the base [deg].
+        beta_deg: dip of the base, out of the slope positive [deg].
+        phi_deg: friction angle of both planes [deg].
+    """
+
+    s1_m: float
+    s2_m: float
+    gamma_deg: float
+    beta_deg: float
+    phi_deg: float
+
+    @property
+    def block(self) -> Block:
+        """Shape and size."""
+        return Block.from_fractures(self.s1_m, self.s2_m, self.gamma_deg)
+
+    def as_dict(self) -> dict[str, float]:
+        """Return the block as it is stored."""
+        return asdict(self)
+
+
+GAMMA_DEG = (20.0, 25.0, 30.0)
+SPACING_RATIO = 0.4
+"""S2/S1: thinner between the back planes than between the base planes, or the blocks slide."""
+PLANES_DEG = ((20.0, 30.0), (20.0, 40.0), (10.0, 35.0))
+"""Dip of the base and friction angle."""
+SIZES_M = (0.25, 1.0)
+"""S1: larger blocks leave their back plane before they have turned far."""
+
+FAMILY = tuple(
+    BlockClass(size, SPACING_RATIO * size, gamma, beta, phi)
+    for gamma, (beta, phi), size in product(GAMMA_DEG, PLANES_DEG, SIZES_M)
+)
+"""Three shapes, three pairs of dip and friction, two sizes."""
+
+ROTATIONS_DEG: tuple[float | None, ...] = (2.0, None)
+"""Rotations that count as failure of a slump [deg]; None for failure past recovery."""
+
+RATIOS = np.geomspace(0.02, 0.95, 25)
+"""k_s/PGA of the outcome grid: the record is scaled to them."""
+
+
+class Slumping(ScaledKind):
+    """The slumping model; campaigns shake the blocks of the family."""
+
+    kind = "slumping"
+    mode = "slump"
+    yield_name = "ks"
+    parameters = ("ks", "ps2")
+    campaign = True
+    campaign_options = ("rotations_deg", "family")
+    one_phase = True
+
+    def mechanism(self, site: BlockOnPlanes) -> Mechanism:
+        """Return the slumping block."""
+        return mechanism(site)
+
+    def cases(self, **asked: Any) -> tuple[Case, ...]:
+        """Return every block of the family with every rotation that counts as failure.
+
+        Raises:
+            InputError: no rotation, one that repeats or that a block of the family cannot reach; a
+                block that does not slump.
+        """
+        self.refuse_foreign(asked, self.campaign_options)
+        family: Sequence[BlockClass] = asked.get("family", FAMILY)
+        rotations = [
+            None if value is None else positive(value, "--rotation", "degrees")
+            for value in asked.get("rotations_deg", ROTATIONS_DEG)
+        ]
+        each_once(rotations, "--rotation", for_none="recovery")
+        least = min(each.gamma_deg for each in family)
+        for rotation in rotations:
+            if rotation is not None and rotation >= least:
+                raise InputError(
+                    f"--rotation {rotation:g}: a block of the family lies on its back edge at "
+                    f"{least:g} degrees; give less, or the word recovery for failure past recovery"
+                )
+        settings = {"search_limit": SEARCH_LIMIT, "scan_ratio": SCAN_RATIO, "bracket": BRACKET}
+        return tuple(
+            Case(
+                self.kind,
+                self._shaken(each).p2,
+                each.as_dict(),
+                {**settings, "rotation_deg": rotation, "map": "seen"},
+            )
+            for each in family
+            for rotation in rotations
+        )
+
+    def grid(self, case: Case, measures: Measures) -> FloatArray:
+        """Return k_s/PGA to which the record is scaled."""
+        return RATIOS if measures.pga_g > 0.0 else np.empty(0)
+
+    def run_cases(
+        self,
+        motion: GroundMotion,
+        vertical: GroundMotion | None,
+        polarity: Polarity,
+        cases: Sequence[Case],
+        *,
+        full_map: bool = False,
+        map_depth: float = MAP_DEPTH,
+    ) -> list[CaseResult]:
+        """Return critical scale and outcome grid of every case under one motion.
+
+        Cases of one block share their runs. What the search saw is there with or without a map.
+
+        Raises:
+            InputError: a stored block is none of this rbfrag's.
+        """
+        drive = excitation(motion, vertical, polarity)
+        together: defaultdict[BlockClass, list[int]] = defaultdict(list)
+        for number, case in enumerate(cases):
+            together[_class_of(case)].append(number)
+        results: dict[int, CaseResult] = {}
+        for block, numbers in together.items():
+            settings: dict[str, Any] = dict(cases[numbers[0]].settings)
+            rotations: list[Any] = [cases[i].settings["rotation_deg"] for i in numbers]
+            found = critical_scales(
+                motion,
+                block.block,
+                kind=self.kind,
+                rotations_deg=rotations,
+                beta_deg=block.beta_deg,
+                phi_deg=block.phi_deg,
+                vertical=vertical,
+                polarity=polarity,
+                **{name: settings[name] for name in ("search_limit", "scan_ratio", "bracket")},
+            )
+            shaken = self._shaken(block)
+            ratios = self.grid(cases[numbers[0]], motion)
+            scales = [shaken.yield_g / (k * drive.pga_g) for k in ratios.tolist()]
+            courses = [follow(shaken.mechanism, drive.scaled(scale)) for scale in scales]
+            for i, rotation, result in zip(numbers, rotations, found, strict=True):
+                fails = rotation_rad(rotation, shaken)
+                runs = [judged(*each, fails) for each in zip(courses, scales, strict=True)]
+                results[i] = CaseResult(result, grid_points(ratios, runs, critical_rad(shaken)))
+        return [results[i] for i in range(len(cases))]
+
+    def _shaken(self, each: BlockClass) -> ShakenMechanism:
+        return shaken_mechanism(
+            each.block, kind=self.kind, beta_deg=each.beta_deg, phi_deg=each.phi_deg
+        )
+
+
+def _class_of(case: Case) -> BlockClass:
+    try:
+        return BlockClass(**case.block)  # type: ignore[arg-type]
+    except TypeError:
+        raise InputError(f"its block {case.block} is not described as slumping ones are") from None
+
+
+MODEL = Slumping()

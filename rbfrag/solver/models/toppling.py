@@ -3,42 +3,69 @@
     θ'' = p² cos(θc - θ) [k_h - (1 + k_v) tan(θc - θ)],    tan θc = k_r
 
 It has a kernel of its own, `rbfrag.solver.integrator.single_run`, which campaigns and searches
-call by the
-million, and whose results are stored.
+call by the million, and whose results are stored.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.solver.kind import BlockOnPlanes, Shaking
-from rbfrag.solver.results import Response
-from rbfrag.solver.stability.modes import ModeName
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.excitation import Excitation, kept_excitation
+from rbfrag.solver.kind import (
+    PLANES,
+    SHAKING,
+    BlockOnPlanes,
+    Case,
+    CaseResult,
+    Kind,
+    Measures,
+    RunEnd,
+    Runner,
+    Shaking,
+    each_once,
+)
+from rbfrag.solver.results import (
+    DEFAULT_P2,
+    MAP_DEPTH,
+    SEARCH_LIMIT,
+    CriticalResult,
+    FloatArray,
+    Polarity,
+    Response,
+    SearchPoints,
+)
+from rbfrag.solver.toppling_run import OUTCOMES, positive, refuse_endless, respond, simulate
 
-if TYPE_CHECKING:
-    from rbfrag.solver.excitation import Excitation
-    from rbfrag.solver.run_end import Runner
+Y_OVER_PGV = np.concatenate([0.1 * 40.0 ** (np.arange(-10, 0) / 24.0), np.geomspace(0.1, 4.0, 25)])
+"""Toppling velocity of the blocks of the outcome grid over PGV: 35 values in steps of ln(40)/24."""
 
 
-@dataclass(frozen=True)
-class Toppling:
-    """The toppling model, behind the interface that all models have."""
+class Toppling(Kind):
+    """The toppling model."""
 
-    kind: str = "toppling"
-    mode: ModeName = "topple"
-    settings: tuple[str, ...] = ("linear",)
+    kind = "toppling"
+    mode = "topple"
+    settings = ("linear",)
+    parameters = ("p2", "kr")
+    searchable = True
+    search_needs = "p2"
+    search_options = ("p2", "linear", "full_map", "map_depth", "block", *PLANES)
+    campaign = True
+    campaign_options = ("p2",)
 
     def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
         """Return what the block does."""
-        from rbfrag.solver.toppling_run import respond
-
-        assert site.block is not None
         answer = respond(
             shaking.motion,
-            p2=site.block.p2,
+            p2=_size(site),
             kr=_strength(site),
             vertical=shaking.vertical,
             polarity=shaking.polarity,
@@ -48,18 +75,14 @@ class Toppling:
         return replace(answer, warnings=(*shaking.remarks, *answer.warnings))
 
     def runner(self, site: BlockOnPlanes) -> Runner:
-        """Return a function that says what becomes of the block under an excitation."""
-        from rbfrag.solver.run_end import Fate
-        from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless, simulate
-
-        assert site.block is not None
-        p2, kr = site.block.p2, _strength(site)
+        """Return a function that says how the block ends under an excitation."""
+        p2, kr = _size(site), _strength(site)
         linear = bool(site.settings.get("linear", False))
 
-        def run(drive: Excitation) -> Fate:
+        def run(drive: Excitation) -> RunEnd:
             refuse_endless(drive, p2)
             found = simulate(drive, p2=p2, kr=kr, linear=linear)
-            return Fate(
+            return RunEnd(
                 outcome=OUTCOMES[found.outcome],
                 moved=math.isfinite(found.started_s),
                 peak_rad=found.peak_rad if math.isfinite(found.peak_rad) else None,
@@ -68,6 +91,96 @@ class Toppling:
             )
 
         return run
+
+    def critical(self, motion: GroundMotion, **options: Any) -> CriticalResult:
+        """Return the largest k_r/PGA that topples; p² [1/s²] is given, or that of a block."""
+        from rbfrag.solver.search.critical import critical
+
+        self.refuse_foreign(options, (*self.search_options, *SHAKING))
+        block = options.pop("block", None)
+        for name in PLANES:
+            options.pop(name, None)
+        if block is not None:
+            options["p2"] = block.p2
+        if "p2" not in options:
+            raise InputError("p2 is missing: the critical block is searched for one p² [1/s²]")
+        return critical(motion, kind=self.kind, **options)
+
+    def cases(self, **asked: Any) -> tuple[Case, ...]:
+        """Return the block sizes.
+
+        Raises:
+            InputError: a p² that is not positive or repeats.
+        """
+        self.refuse_foreign(asked, self.campaign_options)
+        sizes = [positive(value, "p2", "1/s²") for value in asked.get("p2", DEFAULT_P2)]
+        each_once(sizes, "p2")
+        settings = {"search_limit": SEARCH_LIMIT}
+        return tuple(Case(self.kind, p2, settings=settings) for p2 in sizes)
+
+    def grid(self, case: Case, measures: Measures) -> FloatArray:
+        """Return k_r/PGA of the blocks whose toppling velocities are fixed ratios of PGV."""
+        assert case.p2 is not None
+        ground = measures.pga_g * STANDARD_GRAVITY_M_S2
+        if not (ground > 0.0 and measures.pgv_m_s > 0.0):
+            return np.empty(0)
+        strengths: FloatArray = math.sqrt(case.p2) * measures.pgv_m_s / ground * Y_OVER_PGV
+        return strengths
+
+    def run_cases(
+        self,
+        motion: GroundMotion,
+        vertical: GroundMotion | None,
+        polarity: Polarity,
+        cases: Sequence[Case],
+        *,
+        full_map: bool = False,
+        map_depth: float = MAP_DEPTH,
+    ) -> list[CaseResult]:
+        """Return critical block and outcome grid of every case under one motion."""
+        drive = kept_excitation(motion, vertical, polarity)
+        results = []
+        for case in cases:
+            assert case.p2 is not None
+            settings: dict[str, Any] = dict(case.settings)
+            found = self.critical(
+                motion,
+                p2=case.p2,
+                vertical=vertical,
+                polarity=polarity,
+                search_limit=settings["search_limit"],
+                full_map=full_map,
+                map_depth=map_depth,
+            )
+            grid = run_blocks_at(drive, case.p2, self.grid(case, motion))
+            results.append(CaseResult(found, grid))
+        return results
+
+
+def run_blocks_at(drive: Excitation, p2: float, kr_over_pga: FloatArray) -> SearchPoints:
+    """Run one block at each strength, in its order.
+
+    Args:
+        drive: the excitation; its PGA must be positive.
+        p2: frequency parameter p² [1/s²].
+        kr_over_pga: block strengths over PGA.
+    """
+    from rbfrag.solver.integrator.batch import simulate_many
+
+    runs = simulate_many(drive, p2=p2, kr=kr_over_pga * drive.pga_g)
+    return SearchPoints(
+        kr_over_pga=kr_over_pga,
+        theta_n=runs.theta_n,
+        outcome=tuple(OUTCOMES[code].value for code in runs.outcome.tolist()),
+    )
+
+
+def _size(site: BlockOnPlanes) -> float:
+    """Return p² [1/s²]."""
+    if site.block is not None:
+        return site.block.p2
+    assert site.p2 is not None
+    return site.p2
 
 
 def _strength(site: BlockOnPlanes) -> float:

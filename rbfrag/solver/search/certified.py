@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.block_excitation import Ground, ground_of
-from rbfrag.solver.results import RESOLUTION
+from rbfrag.solver.results import MAP_DEPTH, RESOLUTION
 from rbfrag.solver.search.lower_bound import all_topple_below
 from rbfrag.solver.search.march import (
     ORDERLESS,
@@ -40,9 +40,6 @@ DEPTH = 1e-9
 
 ORDERLESS_DEPTH = 1e-3
 """The same where the order of motions is lost, which no narrower interval brings back."""
-
-MAP_DEPTH = 1e-4
-"""Width of k_r/PGA that a map leaves undecided below the critical value, at every border."""
 
 FIRST_STEP = 1e-3
 """Relative width of the first interval below K_up."""

@@ -12,12 +12,12 @@ from __future__ import annotations
 import math
 
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.excitation import Excitation, kept_excitation
+from rbfrag.solver.excitation import Excitation, kept_excitation, motion_remarks
 from rbfrag.solver.integrator.block_excitation import ground_of
 from rbfrag.solver.integrator.single_run import TOPPLED
 from rbfrag.solver.results import (
+    MAP_DEPTH,
     RESOLUTION,
     SEARCH_LIMIT,
     CriticalResult,
@@ -28,7 +28,6 @@ from rbfrag.solver.results import (
     no_intervals,
 )
 from rbfrag.solver.search.certified import (
-    MAP_DEPTH,
     MAP_SPAN_PH,
     CertifiedMap,
     bracket_of,
@@ -49,6 +48,7 @@ def critical(
     p2: float,
     vertical: GroundMotion | None = None,
     polarity: Polarity = "forward",
+    kind: str = "toppling",
     linear: bool = False,
     search_limit: float = SEARCH_LIMIT,
     full_map: bool = False,
@@ -61,6 +61,7 @@ def critical(
         p2: frequency parameter p² of the block [1/s²], > 0.
         vertical: vertical motion of the same recording, upward positive.
         polarity: ``forward`` or ``reverse``.
+        kind: name of the model, for the answer.
         linear: the linear model, for verification only.
         search_limit: smallest k_r/PGA looked at.
         full_map: go on below the critical value and map every toppling and safe interval down
@@ -79,15 +80,13 @@ def critical(
     map_depth = positive(map_depth, "map_depth", "a width of k_r/PGA")
     drive = kept_excitation(motion, vertical, polarity)
     refuse_endless(drive, p2)
-    said = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion)), *drive.warnings]
-    if vertical is not None:
-        said += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
     search = _Search(drive, p2, linear, search_limit)
     search.run(full_map, map_depth)
     points = search.points()
     found = search.status == "found"
     kr = search.lower * drive.pga_g if found else None
     return CriticalResult(
+        kind=kind,
         p2=p2,
         polarity=polarity,
         linear=linear,
@@ -106,7 +105,7 @@ def critical(
         kr_over_pga_resolved=search.resolved,
         reentrant=search.reentrant,
         n_runs=search.n_runs + len(points.outcome),
-        warnings=(*said, *search.warnings),
+        warnings=(*motion_remarks(motion, vertical, drive), *search.warnings),
         points=points,
         intervals=search.intervals,
     )
@@ -128,7 +127,7 @@ class _Search:
         self.undecided: float | None = None
         self.island_width: float | None = None
         self.resolved: float | None = None
-        self.reentrant = False
+        self.reentrant: bool | None = None
         self.intervals: OutcomeIntervals = no_intervals()
         self.warnings: list[str] = []
         self.n_runs = 0
@@ -159,7 +158,9 @@ class _Search:
             map_depth=map_depth,
         )
         self.n_runs += found.runs
-        self.intervals = outcome_intervals(found, pga, drive.max_q, bottom if full_map else None)
+        if full_map:
+            self.intervals = outcome_intervals(found, pga, drive.max_q, bottom)
+            self.reentrant = False
         bracket = bracket_of(found)
         scan = self._scan
         if found.k_up > bottom:
@@ -183,9 +184,15 @@ class _Search:
             return
         self.status = "found"
         self._take_bracket(bracket)
+        if full_map:
+            self._islands(found, bottom)
+
+    def _islands(self, found: CertifiedMap, bottom: float) -> None:
+        """Look for what lies below the critical value: in the map, or by single blocks."""
+        drive, pga = self.drive, self.drive.pga_g
         resolution = RESOLUTION * pga
         lower = self.lower * pga
-        if full_map and found.complete:
+        if found.complete:
             ground = ground_of(drive, p2=self.p2, linear=self.linear)
             islands, made = islands_of_map(found, ground, lower, resolution)
         else:

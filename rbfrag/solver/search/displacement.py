@@ -14,66 +14,25 @@ as the block stays on its base.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.quality import quality_flags
-from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.integrator.one_freedom.follow import follow
-from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.quantity import not_negative, positive
-from rbfrag.solver.results import SEARCH_LIMIT, FloatArray, Outcome, Polarity, Status
-
-THRESHOLDS_M = (0.01, 0.05, 0.15, 0.30)
-"""Displacements that are asked about when nothing else is said [m]."""
-
-KY_OVER_PGA = (
-    0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6,
-    0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95,
-)  # fmt: skip
-"""Strengths at which displacements are stored."""
+from rbfrag.solver.results import (
+    SEARCH_LIMIT,
+    CriticalResult,
+    Outcome,
+    Polarity,
+    SearchPoints,
+    Status,
+)
 
 TOLERANCE = 1e-9
 """Width of the bracket of a critical strength, over PGA."""
-
-
-@dataclass(frozen=True, eq=False)
-class SlidingResult:
-    """The strength below which a block slides further than a stated distance.
-
-    Args:
-        polarity: ``forward`` or ``reverse``.
-        displacement_m: the distance, along a level plane [m]; 0 for any motion at all.
-        pga_g: PGA of the horizontal motion [g].
-        status: ``found``; ``below_limit`` (no block down to `search_limit` slides so far);
-            ``no_motion`` (none slides at all); ``outside_model`` (the vertical motion throws it).
-        search_limit: least k_y/PGA looked at.
-        ky_over_pga: the critical k_y/PGA: every block below it slides further; None unless found.
-        lower: lower end of its bracket (slides further), k_y/PGA.
-        upper: upper end (does not), k_y/PGA.
-        n_runs: number of simulations made.
-        warnings: sentences about suspicious input.
-    """
-
-    polarity: Polarity
-    displacement_m: float
-    pga_g: float
-    status: Status
-    search_limit: float
-    ky_over_pga: float | None
-    lower: float | None
-    upper: float | None
-    n_runs: int
-    warnings: tuple[str, ...]
-
-    @property
-    def ky(self) -> float | None:
-        """The critical k_y itself [g]."""
-        return None if self.ky_over_pga is None else self.ky_over_pga * self.pga_g
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +41,11 @@ class SlidingBlocks:
 
     Args:
         drive: the excitation.
+        slide_m: displacement [m] of the block of a yield acceleration [g]; NaN where it is thrown.
     """
 
     drive: Excitation
+    slide_m: Callable[[Excitation, float], float]
 
     @cached_property
     def known(self) -> dict[float, float]:
@@ -98,78 +59,22 @@ class SlidingBlocks:
             ky_over_pga: strength over PGA, above zero.
         """
         if ky_over_pga not in self.known:
-            self.known[ky_over_pga] = _displacement_m(self.drive, ky_over_pga * self.drive.pga_g)
+            self.known[ky_over_pga] = self.slide_m(self.drive, ky_over_pga * self.drive.pga_g)
         return self.known[ky_over_pga]
 
-
-def sliding_displacements(
-    motion: GroundMotion,
-    ky_over_pga: Sequence[float] = KY_OVER_PGA,
-    *,
-    vertical: GroundMotion | None = None,
-    polarity: Polarity = "forward",
-) -> FloatArray:
-    """Return how far blocks slide down a level plane, downslope only [m].
-
-    On a base of dip beta the displacement is cos(phi - beta)/cos(phi) times this, k_y being
-    tan(phi - beta).
-
-    Args:
-        motion: horizontal ground motion; its PGA must be above zero.
-        ky_over_pga: strengths over PGA, shape (n,).
-        vertical: vertical motion of the same recording, upward positive.
-        polarity: ``forward`` or ``reverse``.
-
-    Returns:
-        Displacements, shape (n,); NaN where the vertical motion throws the block off its base.
-
-    Raises:
-        InputError: a strength that is not above zero, a motion of no acceleration.
-    """
-    blocks = SlidingBlocks(excitation(motion, vertical, polarity))
-    positive(blocks.drive.pga_g, "PGA", "g")
-    strengths = [positive(value, "ky_over_pga", "k_y/PGA") for value in ky_over_pga]
-    return np.array([blocks.displacement_m(value) for value in strengths], dtype=np.float64)
-
-
-def critical_sliding(
-    motion: GroundMotion,
-    *,
-    displacement_m: float,
-    vertical: GroundMotion | None = None,
-    polarity: Polarity = "forward",
-    search_limit: float = SEARCH_LIMIT,
-    tolerance: float = TOLERANCE,
-) -> SlidingResult:
-    """Return the greatest k_y/PGA with which a block slides further than a distance.
-
-    Args:
-        motion: horizontal ground motion.
-        displacement_m: the distance on a level plane [m]; on a base that dips, divide yours by
-            cos(phi - beta)/cos(phi). 0 asks for the strength that first moves.
-        vertical: vertical motion of the same recording, upward positive.
-        polarity: ``forward`` or ``reverse``.
-        search_limit: least k_y/PGA looked at.
-        tolerance: width of the bracket, k_y/PGA.
-
-    Raises:
-        InputError: a value outside its range.
-    """
-    drive = excitation(motion, vertical, polarity)
-    remarks = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion)), *drive.warnings]
-    if vertical is not None:
-        remarks += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
-    return critical_of(
-        SlidingBlocks(drive),
-        displacement_m,
-        polarity=polarity,
-        search_limit=search_limit,
-        tolerance=tolerance,
-        warnings=tuple(remarks),
-    )
+    def points(self, ky_over_pga: Sequence[float]) -> SearchPoints:
+        """Return the displacements of blocks of these strengths."""
+        slid = np.array([self.displacement_m(k) for k in ky_over_pga], dtype=np.float64)
+        return SearchPoints(
+            kr_over_pga=np.array(ky_over_pga, dtype=np.float64),
+            theta_n=np.full(slid.size, np.nan),
+            outcome=(Outcome.STABLE.value,) * slid.size,
+            displacement_m=slid,
+        )
 
 
 def critical_of(
+    kind: str,
     blocks: SlidingBlocks,
     displacement_m: float,
     *,
@@ -177,10 +82,20 @@ def critical_of(
     search_limit: float = SEARCH_LIMIT,
     tolerance: float = TOLERANCE,
     warnings: tuple[str, ...] = (),
-) -> SlidingResult:
-    """Return the same for blocks of which some displacements may be known already.
+) -> CriticalResult:
+    """Return the greatest k_y/PGA with which a block slides further than a distance.
 
-    Arguments as for :func:`critical_sliding`.
+    Args:
+        kind: name of the model, for the answer.
+        blocks: the blocks, of which some displacements may be known.
+        displacement_m: the distance on a level plane [m]; 0 for the strength that first moves.
+        polarity: ``forward`` or ``reverse``.
+        search_limit: least k_y/PGA looked at.
+        tolerance: width of the bracket, k_y/PGA.
+        warnings: sentences about the motion.
+
+    Raises:
+        InputError: a value outside its range.
     """
     distance = not_negative(displacement_m, "displacement_m", "m")
     limit = positive(search_limit, "search_limit", "k_y/PGA")
@@ -188,6 +103,7 @@ def critical_of(
     drive = blocks.drive
     before = len(blocks.known)
     low = high = None
+    ends: list[float] = []
     status: Status = "no_motion"
     top = drive.max_q / drive.pga_g if drive.pga_g > 0.0 else 0.0
     if drive.jump_node < drive.w.size:
@@ -200,17 +116,32 @@ def critical_of(
         else:
             status = "found"
             low, high = _bracket(blocks, distance, limit, top, width)
-    return SlidingResult(
+            ends = sorted({low, high}, reverse=True)
+    runs = len(blocks.known) - before
+    return CriticalResult(
+        kind=kind,
+        p2=math.nan,
         polarity=polarity,
-        displacement_m=distance,
+        linear=False,
         pga_g=drive.pga_g,
         status=status,
         search_limit=limit,
-        ky_over_pga=low,
+        kr_over_pga=low,
         lower=low,
         upper=high,
-        n_runs=len(blocks.known) - before,
+        kr=None if low is None else low * drive.pga_g,
+        y_m_s=None,
+        # the displacement falls with the strength: there is one border, and it is bracketed
+        certified=status != "outside_model",
+        k_up_over_pga=None,
+        undecided=None,
+        island_width=None,
+        kr_over_pga_resolved=None,
+        reentrant=False,
+        n_runs=runs,
         warnings=warnings,
+        points=blocks.points(ends),
+        of_kind={"displacement_m": distance},
     )
 
 
@@ -232,21 +163,3 @@ def _bracket(
         else:
             high = middle
     return low, high
-
-
-def _displacement_m(drive: Excitation, ky: float) -> float:
-    from rbfrag.solver.models.sliding import mechanism
-
-    friction_rad = math.atan(ky)
-    level = BlockOnPlanes(
-        block=None,
-        beta_rad=0.0,
-        phi_rad=friction_rad,
-        phi_back_rad=friction_rad,
-        back_fracture=False,
-        cohesive=False,
-        yield_g=ky,
-        settings={},
-    )
-    course = follow(mechanism(level), drive)
-    return course.x if course.outcome is Outcome.STABLE else math.nan

@@ -13,21 +13,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.excitation import Excitation, excitation
+from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.integrator.one_freedom.follow import Course, follow
+from rbfrag.solver.kind import PLANES
+from rbfrag.solver.mechanism import MechanismKind, ShakenMechanism, shaken_mechanism
 from rbfrag.solver.quantity import number, positive
 from rbfrag.solver.results import (
     SEARCH_LIMIT,
     CriticalResult,
+    FloatArray,
     IntervalOutcome,
     Outcome,
     OutcomeIntervals,
@@ -35,7 +37,6 @@ from rbfrag.solver.results import (
     SearchPoints,
     Status,
 )
-from rbfrag.solver.shaken_mechanism import ShakenMechanism, shaken_mechanism
 
 SCAN_RATIO = 1.05
 """Ratio of two scales that are looked at one after the other; its square beyond the answer."""
@@ -67,104 +68,72 @@ class ScaledRun:
     verdict: Verdict
     sentence: str
 
+    def theta_n(self, critical_rad: float) -> float:
+        """Return the peak over the critical rotation; NaN where the block is past recovery."""
+        return math.nan if self.outcome is Outcome.TOPPLED else self.peak_rad / critical_rad
+
 
 @dataclass(frozen=True, eq=False)
-class ScaledResult:
-    """The critical scale of one record for one block.
+class Found:
+    """What the search found of one record and block, before it is put in terms of k/PGA.
 
     Args:
-        kind: ``slumping`` or ``confined_toppling``.
-        polarity: ``forward`` or ``reverse``.
         rotation_deg: rotation that counts as failure [deg]; None for failure past recovery.
         pga_g: PGA of the record as it is [g].
         yield_g: yield acceleration of the block [g].
-        p2: its frequency parameter p_s² at rest [1/s²].
-        leaves_g: k_h at which a contact opens as the motion starts [g].
-        critical_rotation_rad: rotation without strength left, or at the end of the model [rad].
-        status: ``found``; ``below_limit`` (nothing fails up to `scale_limit`); ``no_motion`` (the
-            block does not move up to there).
-        scale: smallest factor on the record known to bring the block down; None unless found.
-        lower: lower end of the bracket of it (safe); None unless found.
-        upper: upper end (fails); equals `scale`.
         starts: factor at which the block first moves; None for a record that never drives it.
         scale_limit: greatest factor that the answer covers: that of k/PGA = 0.01, or the last
             safe one before the model ended.
+        status: as of the answer.
+        lower: lower end of the bracket of the scale (safe); None unless found.
+        scale: upper end (fails); None unless found.
         ended: why the answer covers no more; empty if it goes on to k/PGA = 0.01.
-        certified: False: what lies between the scales that were looked at is not proven.
+        certified: whether a proof covers the scales between those that were looked at.
         reentrant: True when a stronger record was seen to spare the block.
-        n_runs: number of simulations made.
-        runs: all of them, by rising scale.
-        warnings: sentences about suspicious input or an uncertain answer.
+        runs: all runs, by rising scale.
+        warnings: sentences about an uncertain answer.
     """
 
-    kind: str
-    polarity: Polarity
     rotation_deg: float | None
     pga_g: float
     yield_g: float
-    p2: float
-    leaves_g: float
-    critical_rotation_rad: float
-    status: Status
-    scale: float | None
-    lower: float | None
-    upper: float | None
     starts: float | None
     scale_limit: float
-    ended: str
-    certified: bool
-    reentrant: bool
-    n_runs: int
-    runs: tuple[ScaledRun, ...]
-    warnings: tuple[str, ...]
+    status: Status = "no_motion"
+    lower: float | None = None
+    scale: float | None = None
+    ended: str = ""
+    certified: bool = False
+    reentrant: bool = False
+    runs: tuple[ScaledRun, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def k_over_pga(self, scale: float) -> float:
         """Return the yield acceleration over the PGA of the scaled record."""
         return self.yield_g / (scale * self.pga_g)
 
-    @property
-    def y_m_s(self) -> float | None:
-        """Critical velocity k_s g/p_s over the scale [m/s]: what the record as it is can do."""
-        if self.scale is None:
-            return None
-        return self.yield_g / self.scale * STANDARD_GRAVITY_M_S2 / math.sqrt(self.p2)
-
-    @property
-    def search_limit(self) -> float:
-        """Least k/PGA that the answer covers."""
-        return self.k_over_pga(self.scale_limit) if self.pga_g > 0.0 else SEARCH_LIMIT
-
-    @property
-    def points(self) -> SearchPoints:
-        """The two runs of the bracket, or the last safe one, by falling k/PGA."""
-        ends = (self.lower, self.upper, None if self.scale else self.scale_limit)
+    def points(self, critical_rad: float) -> SearchPoints:
+        """Return the two runs of the bracket, or the last safe one, by falling k/PGA."""
+        ends = (self.lower, self.scale, None if self.scale else self.scale_limit)
         kept = [run for run in self.runs if run.scale in ends]
         return SearchPoints(
             kr_over_pga=np.array([self.k_over_pga(run.scale) for run in kept]),
-            theta_n=np.array(
-                [
-                    np.nan
-                    if run.outcome is Outcome.TOPPLED
-                    else run.peak_rad / self.critical_rotation_rad
-                    for run in kept
-                ]
-            ),
+            theta_n=np.array([run.theta_n(critical_rad) for run in kept]),
             outcome=tuple(run.outcome.value for run in kept),
         )
 
-    @property
     def intervals(self) -> OutcomeIntervals:
-        """What was seen, by rising k/PGA: neighbours of one verdict, the gaps left out.
+        """Return what was seen, by rising k/PGA: neighbours of one verdict, the gaps left out.
 
         Blocks that do not move, and those between them and the first that was looked at, are safe.
-        Where the model ended before the block failed, nothing is told of stronger records, even if
+        Where the model ended before the block failed, nothing is said of stronger records, even if
         one of those that were looked at brought it down.
         """
         rows: list[tuple[float, float, IntervalOutcome]] = []
         before: ScaledRun | None = None
-        still = () if self.starts is None else (_at_rest(self.starts),)
-        told = [run for run in self.runs if self.scale is not None or run.scale <= self.scale_limit]
-        for run in sorted((*told, *still), key=lambda each: -each.scale):
+        at_rest = () if self.starts is None else (_at_rest(self.starts),)
+        seen = [run for run in self.runs if self.scale is not None or run.scale <= self.scale_limit]
+        for run in sorted((*seen, *at_rest), key=lambda each: -each.scale):
             word = _MAP_WORDS.get(run.verdict)
             if word is not None:
                 k = self.k_over_pga(run.scale)
@@ -181,31 +150,79 @@ class ScaledResult:
         )
 
 
-def critical_scale(
+class ScaledKind(MechanismKind):
+    """A kind whose critical value is the smallest factor on the record that brings a block down."""
+
+    searchable = True
+    search_needs = "block"
+    search_options = ("block", *PLANES, "rotation_deg", "scan_ratio", "bracket")
+
+    def critical(
+        self,
+        motion: GroundMotion,
+        *,
+        vertical: GroundMotion | None = None,
+        polarity: Polarity = "forward",
+        search_limit: float = SEARCH_LIMIT,
+        rotation_deg: float | None = None,
+        **options: Any,
+    ) -> CriticalResult:
+        """Return the smallest factor on a record that brings a block down.
+
+        Options: `block` with `beta_deg`, `phi_deg`, `phi_back_deg`; `rotation_deg`, the peak
+        rotation that counts as failure [deg], None for failure past recovery; `scan_ratio`;
+        `bracket`. The vertical motion is scaled with the horizontal one.
+
+        Raises:
+            InputError: a value outside its range, a block of another mode, or one that no
+                earthquake decides about.
+        """
+        self.refuse_foreign(options, self.search_options)
+        for name in ("block", "beta_deg", "phi_deg"):
+            if options.get(name) is None:
+                raise InputError(
+                    f"{name} is missing: shape, friction and dip of a block decide about "
+                    f"{self.kind}"
+                )
+        (found,) = critical_scales(
+            motion,
+            options.pop("block"),
+            kind=self.kind,
+            rotations_deg=[rotation_deg],
+            vertical=vertical,
+            polarity=polarity,
+            search_limit=search_limit,
+            **options,
+        )
+        return found
+
+
+def critical_scales(
     motion: GroundMotion,
     block: Block,
     *,
+    kind: str,
+    rotations_deg: Sequence[float | None],
     beta_deg: float,
     phi_deg: float,
     phi_back_deg: float | None = None,
-    kind: str = "slumping",
-    rotation_deg: float | None = None,
     vertical: GroundMotion | None = None,
     polarity: Polarity = "forward",
     search_limit: float = SEARCH_LIMIT,
     scan_ratio: float = SCAN_RATIO,
     bracket: float = BRACKET,
-) -> ScaledResult:
-    """Return the smallest factor on a record that brings a block down.
+) -> tuple[CriticalResult, ...]:
+    """Return the smallest factors on a record that turn a block so far; they share their runs.
 
     Args:
         motion: horizontal ground motion.
         block: shape and size.
+        kind: name of the model; the block's mode must be its.
+        rotations_deg: peak rotations that count as failure [deg]; None among them for failure
+            past recovery.
         beta_deg: dip of the base, out of the slope positive [deg].
         phi_deg: friction angle of the base [deg].
         phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
-        kind: ``slumping`` or ``confined_toppling``; the block's mode must be that one.
-        rotation_deg: peak rotation that counts as failure [deg]; None for failure past recovery.
         vertical: vertical motion of the same recording, upward positive; scaled with the
             horizontal one.
         polarity: ``forward`` or ``reverse``.
@@ -218,57 +235,6 @@ def critical_scale(
         InputError: a value outside its range, a block of another mode, or one that no earthquake
             decides about.
     """
-    (found,) = critical_scales(
-        motion,
-        block,
-        rotations_deg=[rotation_deg],
-        beta_deg=beta_deg,
-        phi_deg=phi_deg,
-        phi_back_deg=phi_back_deg,
-        kind=kind,
-        vertical=vertical,
-        polarity=polarity,
-        search_limit=search_limit,
-        scan_ratio=scan_ratio,
-        bracket=bracket,
-    )
-    return found
-
-
-def critical_scales(
-    motion: GroundMotion,
-    block: Block,
-    *,
-    rotations_deg: Sequence[float | None],
-    beta_deg: float,
-    phi_deg: float,
-    phi_back_deg: float | None = None,
-    kind: str = "slumping",
-    vertical: GroundMotion | None = None,
-    polarity: Polarity = "forward",
-    search_limit: float = SEARCH_LIMIT,
-    scan_ratio: float = SCAN_RATIO,
-    bracket: float = BRACKET,
-) -> tuple[ScaledResult, ...]:
-    """Return the same for several rotations that count as failure; they share their runs.
-
-    Args:
-        motion: horizontal ground motion.
-        block: shape and size.
-        rotations_deg: the rotations [deg]; None among them for failure past recovery.
-        beta_deg: the others as for :func:`critical_scale`, whose answers these are.
-        phi_deg: likewise.
-        phi_back_deg: likewise.
-        kind: likewise.
-        vertical: likewise.
-        polarity: likewise.
-        search_limit: likewise.
-        scan_ratio: likewise.
-        bracket: likewise.
-
-    Raises:
-        InputError: as for :func:`critical_scale`.
-    """
     limit = positive(search_limit, "search_limit", "k/PGA")
     ratio = number(scan_ratio, "scan_ratio", "a ratio above 1")
     if not ratio > 1.0:
@@ -277,53 +243,34 @@ def critical_scales(
     shaken = shaken_mechanism(
         block, kind=kind, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg
     )
-    failures_rad = [_rotation_rad(rotation_deg, shaken) for rotation_deg in rotations_deg]
+    failures_rad = [rotation_rad(rotation_deg, shaken) for rotation_deg in rotations_deg]
     drive = excitation(motion, vertical, polarity)
-    remarks = [*shaken.remarks, *motion.remarks]
-    remarks += [flag.sentence for flag in quality_flags(motion)]
-    if vertical is not None:
-        remarks += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
-    remarks += drive.warnings
-    nothing = ScaledResult(
-        kind=kind,
-        polarity=polarity,
-        rotation_deg=None,
-        pga_g=drive.pga_g,
-        yield_g=shaken.yield_g,
-        p2=shaken.p2,
-        leaves_g=shaken.leaves_g,
-        critical_rotation_rad=_critical_rad(shaken),
-        status="no_motion",
-        scale=None,
-        lower=None,
-        upper=None,
-        starts=first_motion(drive, shaken.yield_g),
-        scale_limit=shaken.yield_g / (limit * drive.pga_g) if drive.pga_g > 0.0 else math.inf,
-        ended="",
-        certified=False,
-        reentrant=False,
-        n_runs=0,
-        runs=(),
-        warnings=tuple(remarks),
-    )
+    remarks = (*shaken.remarks, *motion_remarks(motion, vertical, drive))
     courses: dict[float, Course] = {}
 
     def runner(fails_rad: float) -> Callable[[float], ScaledRun]:
         def run(scale: float) -> ScaledRun:
             if scale not in courses:
                 courses[scale] = follow(shaken.mechanism, drive.scaled(scale))
-            return _judged(courses[scale], scale, fails_rad)
+            return judged(courses[scale], scale, fails_rad)
 
         return run
 
-    found = []
+    answers = []
     for rotation_deg, fails_rad in zip(rotations_deg, failures_rad, strict=True):
-        empty = replace(nothing, rotation_deg=rotation_deg)
-        if empty.starts is None or empty.starts >= empty.scale_limit:
-            found.append(replace(empty, certified=True))
+        found = Found(
+            rotation_deg=rotation_deg,
+            pga_g=drive.pga_g,
+            yield_g=shaken.yield_g,
+            starts=first_motion(drive, shaken.yield_g),
+            scale_limit=shaken.yield_g / (limit * drive.pga_g) if drive.pga_g > 0.0 else math.inf,
+        )
+        if found.starts is None or found.starts >= found.scale_limit:
+            found = replace(found, certified=True)
         else:
-            found.append(_search(empty, runner(fails_rad), ratio, width))
-    return tuple(found)
+            found = _search(found, runner(fails_rad), ratio, width)
+        answers.append(_answer(found, shaken, polarity, remarks))
+    return tuple(answers)
 
 
 def first_motion(drive: Excitation, yield_g: float) -> float | None:
@@ -344,21 +291,22 @@ def _at_rest(scale: float) -> ScaledRun:
     return ScaledRun(scale, 0.0, Outcome.STABLE, "safe", "")
 
 
-def _rotation_rad(rotation_deg: float | None, shaken: ShakenMechanism) -> float:
+def rotation_rad(rotation_deg: float | None, shaken: ShakenMechanism) -> float:
+    """Return the rotation that counts as failure [rad]; infinite for failure past recovery."""
     if rotation_deg is None:
         return math.inf
     stated = math.radians(positive(rotation_deg, "rotation_deg", "degrees"))
-    highest = shaken.mechanism.first.highest
-    if shaken.kind == "slumping" and stated >= highest:
+    if stated >= shaken.most_rad:
         raise InputError(
-            f"rotation_deg = {rotation_deg:g}: at {math.degrees(highest):.4g} degrees the back "
-            "edge of the block lies on its base plane; give less, or leave it out for failure "
+            f"rotation_deg = {rotation_deg:g}: at {math.degrees(shaken.most_rad):.4g} degrees the "
+            "back edge of the block lies on its base plane; give less, or leave it out for failure "
             "past recovery"
         )
     return stated
 
 
-def _critical_rad(shaken: ShakenMechanism) -> float:
+def critical_rad(shaken: ShakenMechanism) -> float:
+    """Return the rotation without strength left, or at the end of the model [rad]."""
     critical = shaken.mechanism.critical
     if critical is not None:
         return critical
@@ -366,7 +314,8 @@ def _critical_rad(shaken: ShakenMechanism) -> float:
     return highest if math.isfinite(highest) else 0.5 * math.pi
 
 
-def _judged(course: Course, scale: float, fails_rad: float) -> ScaledRun:
+def judged(course: Course, scale: float, fails_rad: float) -> ScaledRun:
+    """Return a run with its verdict: whether it reaches the rotation that counts as failure."""
     return ScaledRun(
         scale, course.peak, course.outcome, _verdict(course, fails_rad), _ending(course)
     )
@@ -386,9 +335,21 @@ def _ending(course: Course) -> str:
     return course.sentences[-1] if course.sentences else course.outcome.advice
 
 
-def _search(
-    nothing: ScaledResult, run: Callable[[float], ScaledRun], ratio: float, width: float
-) -> ScaledResult:
+def grid_points(ratios: FloatArray, runs: Sequence[ScaledRun], critical_rad: float) -> SearchPoints:
+    """Return the runs of an outcome grid; ``toppled`` where a block fails by its measure."""
+    outcomes: dict[Verdict, str] = {
+        "safe": Outcome.STABLE.value,
+        "fails": Outcome.TOPPLED.value,
+        "undecided": Outcome.UNDETERMINED.value,
+    }
+    return SearchPoints(
+        kr_over_pga=ratios,
+        theta_n=np.array([run.theta_n(critical_rad) for run in runs]),
+        outcome=tuple(outcomes.get(run.verdict, run.outcome.value) for run in runs),
+    )
+
+
+def _search(nothing: Found, run: Callable[[float], ScaledRun], ratio: float, width: float) -> Found:
     """Scan upward, close in on the first scale that is not safe, and look further."""
     assert nothing.starts is not None
     runs: list[ScaledRun] = []
@@ -424,12 +385,12 @@ def _search(
 
 
 def _result(
-    nothing: ScaledResult,
+    nothing: Found,
     runs: list[ScaledRun],
     found: tuple[float, float] | None,
     limit: float,
     ended: str,
-) -> ScaledResult:
+) -> Found:
     runs = sorted(runs, key=lambda each: each.scale)
     warnings = list(nothing.warnings)
     if ended:
@@ -447,45 +408,54 @@ def _result(
         status="below_limit" if found is None else "found",
         scale=None if found is None else found[1],
         lower=None if found is None else found[0],
-        upper=None if found is None else found[1],
         scale_limit=limit,
         ended=ended,
         reentrant=reentrant,
-        n_runs=len(runs),
         runs=tuple(runs),
         warnings=tuple(warnings),
     )
 
 
-def as_critical_result(found: ScaledResult) -> CriticalResult:
-    """Return a critical scale in the terms of toppling, as it is stored.
-
-    k/PGA takes the place of k_r/PGA: the yield acceleration over the PGA of the scaled record. The
-    critical k is that over the critical scale, which the record as it is brings down.
-    """
+def _answer(
+    found: Found, shaken: ShakenMechanism, polarity: Polarity, remarks: tuple[str, ...]
+) -> CriticalResult:
     k = None if found.scale is None else found.k_over_pga(found.scale)
-    safe = None if found.lower is None else found.k_over_pga(found.lower)
     kr = None if k is None else k * found.pga_g
+    critical = critical_rad(shaken)
     return CriticalResult(
-        p2=found.p2,
-        polarity=found.polarity,
+        kind=shaken.kind,
+        p2=shaken.p2,
+        polarity=polarity,
         linear=False,
         pga_g=found.pga_g,
         status=found.status,
-        search_limit=found.search_limit,
+        search_limit=found.k_over_pga(found.scale_limit) if found.pga_g > 0.0 else SEARCH_LIMIT,
         kr_over_pga=k,
         lower=k,
-        upper=safe,
+        upper=None if found.lower is None else found.k_over_pga(found.lower),
         kr=kr,
-        y_m_s=None if kr is None else kr * STANDARD_GRAVITY_M_S2 / math.sqrt(found.p2),
+        y_m_s=None if kr is None else kr * STANDARD_GRAVITY_M_S2 / math.sqrt(shaken.p2),
         certified=found.certified,
         k_up_over_pga=None if found.starts is None else found.k_over_pga(found.starts),
         undecided=None,
         island_width=None,
         kr_over_pga_resolved=None,
         reentrant=found.reentrant,
-        n_runs=found.n_runs,
-        warnings=found.warnings,
-        points=found.points,
-        intervals=found.intervals,
+        n_runs=len(found.runs),
+        warnings=(*remarks, *found.warnings),
+        points=found.points(critical),
+        intervals=found.intervals(),
+        of_kind={
+            "rotation_deg": found.rotation_deg,
+            "scale": found.scale,
+            "lower_scale": found.lower,
+            "starts_scale": found.starts,
+            "scale_limit": found.scale_limit,
+            "yield_name": shaken.yield_name,
+            "yield_g": shaken.yield_g,
+            "leaves_g": shaken.leaves_g,
+            "critical_rotation_rad": critical,
+            "ended": found.ended,
+            "runs": found.runs,
+        },
     )

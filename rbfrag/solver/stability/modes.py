@@ -199,3 +199,8 @@ def slump_bond(heel_x: N, heel_y: N, back_x: N, back_y: N, cot: N, mu2: N) -> N:
 def confined_bond(toe_x: N, toe_y: N, low_x: N, low_y: N, cot: N, mu2: N) -> N:
     """Return the same of confined toppling; the arguments are those of that function."""
     return (low_x - toe_x) * (cot - mu2) - (low_y - toe_y) * (1.0 + cot * mu2)
+
+
+def words_of_mode(mode: str) -> str:
+    """Return the name of a mode as it stands in a sentence."""
+    return mode.replace("_", " ")

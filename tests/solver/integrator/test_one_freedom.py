@@ -285,7 +285,7 @@ FIFTH = '''
 """A block on a belt: a model of a test."""
 from rbfrag.solver.integrator.one_freedom.equation import Ending, Equation, Mechanism, Phase, Pose
 from rbfrag.solver.integrator.one_freedom.harmonics import constant
-from rbfrag.solver.kind import MechanismModel
+from rbfrag.solver.mechanism import MechanismKind
 from rbfrag.solver.results import Outcome
 
 
@@ -299,7 +299,15 @@ def mechanism(site):
     )
 
 
-MODEL = MechanismModel(kind="belt", mode="slide", mechanism=mechanism)
+class Belt(MechanismKind):
+    kind = "belt"
+    mode = "slide"
+
+    def mechanism(self, site):
+        return mechanism(site)
+
+
+MODEL = Belt()
 '''
 
 

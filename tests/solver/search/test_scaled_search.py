@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,14 +13,15 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.critical import critical
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.one_freedom.follow import follow
+from rbfrag.solver.mechanism import shaken_mechanism
+from rbfrag.solver.models.sliding import sliding_displacements
 from rbfrag.solver.respond import respond
-from rbfrag.solver.results import Outcome
-from rbfrag.solver.search.displacement import sliding_displacements
-from rbfrag.solver.search.scale import ScaledResult, critical_scale, first_motion
-from rbfrag.solver.search.scale_report import scaled_as_dict
-from rbfrag.solver.shaken_mechanism import shaken_mechanism
+from rbfrag.solver.results import CriticalResult, Outcome
+from rbfrag.solver.search.report import as_dict
+from rbfrag.solver.search.scale import Found, first_motion
 from tests.synthetic import shaking as samples
 
 PLANES = {"beta_deg": 22.0, "phi_deg": 30.0}
@@ -46,8 +46,8 @@ def times(motion: GroundMotion, factor: float) -> GroundMotion:
     return GroundMotion(factor * motion.acceleration_g, motion.dt_s)
 
 
-def search(motion: GroundMotion, block: Block, **more: object) -> ScaledResult:
-    return critical_scale(motion, block, **PLANES, **more)  # type: ignore[arg-type]
+def search(motion: GroundMotion, block: Block, **more: object) -> CriticalResult:
+    return critical(motion, block=block, **PLANES, **more)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("with_vertical", [False, True])
@@ -69,10 +69,8 @@ def test_a_brute_force_scan_finds_the_same_scale(rotation_deg: float | None) -> 
     motion, block = shaking(), slump()
     found = search(motion, block, rotation_deg=rotation_deg)
     assert found.status == "found"
-    assert found.lower is not None
-    assert found.upper is not None
-    assert found.upper - found.lower <= 1e-6 * found.upper
-    assert found.starts is not None
+    lower, upper = found.of_kind["lower_scale"], found.of_kind["scale"]
+    assert upper - lower <= 1e-6 * upper
 
     def fails(scale: float) -> bool:
         answer = respond(times(motion, scale), block=block, **PLANES)
@@ -81,35 +79,33 @@ def test_a_brute_force_scan_finds_the_same_scale(rotation_deg: float | None) -> 
         assert answer.peak_theta_rad is not None
         return rotation_deg is not None and answer.peak_theta_rad >= math.radians(rotation_deg)
 
-    scan = np.geomspace(found.starts, found.upper * 1.3, 150)
-    assert not any(fails(s) for s in scan[scan <= found.lower])
-    assert fails(found.upper)
+    scan = np.geomspace(found.of_kind["starts_scale"], upper * 1.3, 150)
+    assert not any(fails(s) for s in scan[scan <= lower])
+    assert fails(upper)
 
 
 def test_the_critical_scale_is_the_inverse_of_the_strength_of_the_record() -> None:
     motion, block = shaking(), slump()
     one, three = (search(times(motion, f), block, rotation_deg=2.0) for f in (1.0, 3.0))
-    assert one.scale is not None
-    assert three.scale is not None
-    assert three.scale == pytest.approx(one.scale / 3.0, rel=3e-6)
+    assert three.of_kind["scale"] == pytest.approx(one.of_kind["scale"] / 3.0, rel=3e-6)
     assert three.y_m_s == pytest.approx(3.0 * (one.y_m_s or 0.0), rel=3e-6)
-    assert three.k_over_pga(three.scale) == pytest.approx(one.k_over_pga(one.scale), rel=3e-6)
+    assert three.kr_over_pga == pytest.approx(one.kr_over_pga, rel=3e-6)
 
 
 def test_a_small_slump_turns_as_far_as_a_level_slide_says() -> None:
     # θ'' = p_s² (k_h - k_s) is Newmark's block times p_s²/g while θ is small
     motion, block = shaking(), slump(2.0)
     found = search(motion, block, rotation_deg=0.02)
-    assert found.scale is not None
-    ratio = found.k_over_pga(found.scale)
-    slid = sliding_displacements(motion, [ratio])[0] * found.scale
+    assert found.kr_over_pga is not None
+    slid = sliding_displacements(motion, [found.kr_over_pga])[0] * found.of_kind["scale"]
     turned = found.p2 * slid / STANDARD_GRAVITY_M_S2
     assert turned == pytest.approx(math.radians(0.02), rel=2e-3)
 
 
 def test_rotations_are_reached_one_after_the_other_and_failure_last() -> None:
     motion, block = shaking(), slump()
-    scales = [search(motion, block, rotation_deg=d).scale for d in (0.5, 1.0, 2.0, 5.0, None)]
+    answers = [search(motion, block, rotation_deg=d) for d in (0.5, 1.0, 2.0, 5.0, None)]
+    scales = [found.of_kind["scale"] for found in answers]
     known = [scale for scale in scales if scale is not None]
     assert len(known) == 5
     assert known == sorted(known)
@@ -117,39 +113,37 @@ def test_rotations_are_reached_one_after_the_other_and_failure_last() -> None:
 
 def test_where_the_block_leaves_its_back_plane_first_the_answer_ends() -> None:
     big = Block.from_angles(45.0, 70.0, 60.0)
-    found = critical_scale(shaking(), big, beta_deg=10.0, phi_deg=40.0)
-    assert found.status == "below_limit"
-    assert found.scale is None
-    assert "leaves its back plane" in found.ended
-    assert found.scale_limit * found.pga_g >= found.leaves_g * (1.0 - 1e-5)
+    found = critical(shaking(), block=big, beta_deg=10.0, phi_deg=40.0)
+    its = found.of_kind
+    assert (found.status, its["scale"]) == ("below_limit", None)
+    assert "leaves its back plane" in its["ended"]
+    assert its["scale_limit"] * found.pga_g >= its["leaves_g"] * (1.0 - 1e-5)
     assert any("no answer" in sentence for sentence in found.warnings)
-    assert found.search_limit == found.k_over_pga(found.scale_limit)
+    assert found.search_limit == its["yield_g"] / (its["scale_limit"] * found.pga_g)
 
 
 def test_a_record_that_drives_only_uphill_never_moves_the_block() -> None:
     pulse = GroundMotion(-np.hanning(60), 0.01)
     found = search(pulse, slump())
-    assert (found.status, found.starts, found.n_runs) == ("no_motion", None, 0)
+    assert (found.status, found.of_kind["starts_scale"], found.n_runs) == ("no_motion", None, 0)
     assert found.certified
     still = search(GroundMotion(np.zeros(20), 0.01), slump())
     assert still.status == "no_motion"
-    assert scaled_as_dict(still)["scale_limit"] is None
+    assert as_dict(still)["scale_limit"] is None
 
 
 def test_what_was_seen_is_told_as_intervals_and_points() -> None:
     found = search(shaking(), slump(), rotation_deg=2.0)
-    assert found.scale is not None
-    assert found.lower is not None
+    assert found.status == "found"
     seen = found.intervals
-    critical = found.k_over_pga(found.scale)
     assert seen.outcome[-1] == "safe"
-    assert seen.k_lo[-1] == found.k_over_pga(found.lower)
+    assert seen.k_lo[-1] == found.upper
     assert "topples" in seen.outcome
     assert np.all(np.diff(seen.k_lo) > 0.0)
-    assert seen.k_hi[seen.outcome.index("topples")] == critical
-    assert critical in found.points.kr_over_pga
+    assert seen.k_hi[seen.outcome.index("topples")] == found.kr_over_pga
+    assert found.kr_over_pga in found.points.kr_over_pga
     assert not found.certified
-    assert "not proven" in scaled_as_dict(found)["warnings"][-1]
+    assert "not proven" in as_dict(found)["warnings"][-1]
 
 
 @settings(max_examples=10, deadline=None)
@@ -158,30 +152,37 @@ def test_everything_that_was_looked_at_below_the_critical_scale_is_safe(
     seed: int, size: float
 ) -> None:
     found = search(shaking(seed), slump(size), rotation_deg=1.0)
-    limit = found.scale if found.scale is not None else math.inf
-    assert all(
-        run.verdict == "safe" for run in found.runs if run.scale < min(limit, found.scale_limit)
-    )
-    scales = [run.scale for run in found.runs]
+    its = found.of_kind
+    limit = min(its["scale"] if its["scale"] is not None else math.inf, its["scale_limit"])
+    assert all(run.verdict == "safe" for run in its["runs"] if run.scale < limit)
+    scales = [run.scale for run in its["runs"]]
     assert scales == sorted(set(scales))
     assert found.n_runs == len(scales)
 
 
 def test_a_confined_block_is_searched_too() -> None:
     block = Block.from_angles(-40.0, 20.0, 0.5)
-    found = critical_scale(
-        shaking(), block, beta_deg=5.0, phi_deg=30.0, kind="confined_toppling", rotation_deg=0.5
+    found = critical(
+        shaking(),
+        block=block,
+        beta_deg=5.0,
+        phi_deg=30.0,
+        kind="confined_toppling",
+        rotation_deg=0.5,
     )
     assert found.status in ("found", "below_limit")
-    if found.scale is not None:
-        answer = respond(times(shaking(), found.scale), block=block, beta_deg=5.0, phi_deg=30.0)
+    scale = found.of_kind["scale"]
+    if scale is not None:
+        answer = respond(times(shaking(), scale), block=block, beta_deg=5.0, phi_deg=30.0)
         assert answer.outcome is Outcome.TOPPLED or (answer.peak_theta_rad or 0.0) > 0.008
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"kind": "toppling"}, "slumping and confined_toppling"),
+        ({"kind": "toppling", "rotation_deg": 2.0}, "rotation_deg does not go with toppling"),
+        ({"kind": "sliding"}, "displacement_m is missing"),
+        ({"full_map": True}, "full_map does not go with slumping"),
         ({"kind": "confined_toppling"}, "its mode is slump"),
         ({"rotation_deg": 0.0}, "above zero"),
         ({"rotation_deg": 40.0}, "lies on its base plane"),
@@ -195,16 +196,22 @@ def test_what_cannot_be_searched_is_refused(options: dict[str, object], words: s
 
 def test_a_block_that_slumps_at_rest_is_refused() -> None:
     with pytest.raises(InputError, match="no earthquake decides"):
-        critical_scale(shaking(), slump(), beta_deg=29.0, phi_deg=30.0)
+        critical(shaking(), block=slump(), beta_deg=29.0, phi_deg=30.0)
 
 
 def test_beyond_the_end_of_the_model_nothing_is_told() -> None:
     found = search(shaking(), slump(), rotation_deg=2.0)
-    assert found.scale is not None
-    last = found.runs[0].scale
-    ended = replace(
-        found, scale=None, lower=None, upper=None, scale_limit=last, status="below_limit"
+    its = found.of_kind
+    last = its["runs"][0].scale
+    ended = Found(
+        rotation_deg=2.0,
+        pga_g=found.pga_g,
+        yield_g=its["yield_g"],
+        starts=its["starts_scale"],
+        scale_limit=last,
+        status="below_limit",
+        runs=its["runs"],
     )
     assert any(run.verdict == "fails" for run in ended.runs)
-    assert ended.intervals.outcome == ("safe",)
-    assert ended.intervals.k_lo[0] == ended.k_over_pga(last)
+    assert ended.intervals().outcome == ("safe",)
+    assert ended.intervals().k_lo[0] == ended.k_over_pga(last)

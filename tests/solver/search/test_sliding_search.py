@@ -12,13 +12,9 @@ from hypothesis import strategies as st
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.critical import critical
+from rbfrag.solver.models.sliding import KY_OVER_PGA, THRESHOLDS_M, sliding_displacements
 from rbfrag.solver.respond import respond
-from rbfrag.solver.search.displacement import (
-    KY_OVER_PGA,
-    THRESHOLDS_M,
-    critical_sliding,
-    sliding_displacements,
-)
 from tests.synthetic import shaking as samples
 
 
@@ -40,11 +36,11 @@ def test_the_strength_of_a_rectangular_pulse_is_the_closed_form(
     threshold_m: float, amplitude_g: float, duration_s: float
 ) -> None:
     # D = A g T²/2 (A/k_y - 1)
-    found = critical_sliding(pulse(amplitude_g, duration_s), displacement_m=threshold_m)
+    found = critical(pulse(amplitude_g, duration_s), displacement_m=threshold_m)
     drive = amplitude_g * STANDARD_GRAVITY_M_S2 * duration_s**2
     expected = 1.0 / (1.0 + 2.0 * threshold_m / drive)
     assert found.status == "found"
-    assert found.ky_over_pga == pytest.approx(expected, abs=1.1e-9)
+    assert found.kr_over_pga == pytest.approx(expected, abs=1.1e-9)
     assert found.lower is not None
     assert found.upper is not None
     assert found.lower <= expected + 1e-12
@@ -84,7 +80,7 @@ def test_the_bracket_lies_between_strengths_that_do_and_do_not_slide_so_far(
 ) -> None:
     motion, up = pair(11)
     vertical = up if with_vertical else None
-    found = critical_sliding(motion, displacement_m=0.01, vertical=vertical, polarity="reverse")
+    found = critical(motion, displacement_m=0.01, vertical=vertical, polarity="reverse")
     assert found.status == "found"
     assert found.lower is not None
     assert found.upper is not None
@@ -104,22 +100,22 @@ def test_displacement_scales_with_record_and_strength() -> None:
 def test_no_distance_at_all_is_the_strength_that_first_moves() -> None:
     motion, _ = pair(7)
     for polarity, sign in (("forward", 1.0), ("reverse", -1.0)):
-        found = critical_sliding(motion, displacement_m=0.0, polarity=polarity)  # type: ignore[arg-type]
+        found = critical(motion, displacement_m=0.0, polarity=polarity)  # type: ignore[arg-type]
         most = float(np.max(sign * motion.acceleration_g))
-        assert found.ky_over_pga == most / motion.pga_g
+        assert found.kr_over_pga == most / motion.pga_g
         assert found.n_runs == 0
 
 
 def test_what_never_slides_so_far_says_so() -> None:
     weak = GroundMotion(1e-3 * np.hanning(50), 0.01)
-    assert critical_sliding(weak, displacement_m=0.3).status == "below_limit"
+    assert critical(weak, displacement_m=0.3).status == "below_limit"
     away = GroundMotion(-np.hanning(50), 0.01)
-    assert critical_sliding(away, displacement_m=0.01).status == "no_motion"
+    assert critical(away, displacement_m=0.01).status == "no_motion"
     still = GroundMotion(np.zeros(50), 0.01)
-    assert critical_sliding(still, displacement_m=0.01).status == "no_motion"
+    assert critical(still, displacement_m=0.01).status == "no_motion"
     thrown = GroundMotion(-2.0 * np.hanning(50), 0.01)
     motion = GroundMotion(np.hanning(50), 0.01)
-    found = critical_sliding(motion, displacement_m=0.01, vertical=thrown)
+    found = critical(motion, displacement_m=0.01, vertical=thrown)
     assert found.status == "outside_model"
     assert np.isnan(sliding_displacements(motion, [0.1], vertical=thrown)).all()
 
@@ -129,6 +125,6 @@ def test_impossible_numbers_are_refused() -> None:
     with pytest.raises(InputError, match="ky_over_pga"):
         sliding_displacements(motion, [0.1, 0.0])
     with pytest.raises(InputError, match="displacement_m"):
-        critical_sliding(motion, displacement_m=-0.1)
+        critical(motion, displacement_m=-0.1)
     with pytest.raises(InputError, match="PGA"):
         sliding_displacements(GroundMotion(np.zeros(10), 0.01), KY_OVER_PGA)

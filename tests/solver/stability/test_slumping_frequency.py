@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rbfrag.campaign.slumping_family import FAMILY
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.shaken_mechanism import shaken_mechanism
+from rbfrag.solver.mechanism import shaken_mechanism
+from rbfrag.solver.models.slumping import FAMILY
 from rbfrag.solver.stability.slumping_frequency import slumping_p2
 
 

@@ -1,0 +1,118 @@
+"""The critical value of one accelerogram: the one function that every kind answers through."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.kind import Kind
+from rbfrag.solver.kinds import model_of_kind, model_of_mode
+from rbfrag.solver.results import SEARCH_LIMIT, CriticalResult, Polarity
+from rbfrag.solver.stability.single import stability
+
+
+def critical(
+    motion: GroundMotion,
+    *,
+    kind: str | None = None,
+    p2: float | None = None,
+    block: Block | None = None,
+    beta_deg: float | None = None,
+    phi_deg: float | None = None,
+    phi_back_deg: float | None = None,
+    rotation_deg: float | None = None,
+    displacement_m: float | None = None,
+    vertical: GroundMotion | None = None,
+    polarity: Polarity = "forward",
+    linear: bool = False,
+    search_limit: float = SEARCH_LIMIT,
+    full_map: bool = False,
+    map_depth: float | None = None,
+    tolerance: float | None = None,
+    scan_ratio: float | None = None,
+    bracket: float | None = None,
+) -> CriticalResult:
+    """Return the strongest block that a ground motion brings down, with its bracket.
+
+    Toppling: the largest k_r/PGA that topples at `p2`. Sliding: the largest k_y/PGA that slides
+    further than `displacement_m`. Slumping and confined toppling: the smallest factor on the record
+    that brings `block` down, and the k/PGA that it means; nothing is proven of the factors between
+    those that were looked at.
+
+    Args:
+        motion: horizontal ground motion.
+        kind: ``toppling``, ``sliding``, ``slumping`` or ``confined_toppling``; None for the
+            model of the block's mode, for toppling with `p2` and sliding with `displacement_m`.
+        p2: toppling: frequency parameter p² of the block [1/s²], > 0.
+        block: shape and size.
+        beta_deg: dip of the base, out of the slope positive [deg].
+        phi_deg: friction angle of the base [deg].
+        phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
+        rotation_deg: scaled records: peak rotation that counts as failure [deg]; None for failure
+            past recovery.
+        displacement_m: sliding: the distance on a level plane [m]; on a base that dips, divide
+            yours by cos(φ - β)/cos φ. 0 asks for the strength that first moves.
+        vertical: vertical motion of the same recording, upward positive.
+        polarity: ``forward`` or ``reverse``.
+        linear: toppling by the linear model, for verification only.
+        search_limit: smallest k/PGA looked at.
+        full_map: toppling: map every toppling and safe interval down to the limit, and look for
+            islands.
+        map_depth: width of k_r/PGA at which the map leaves an interval undecided; None for 1e-4.
+        tolerance: sliding: width of the bracket [k_y/PGA]; None for 1e-9.
+        scan_ratio: scaled records: ratio of two factors looked at one after the other, above 1;
+            None for 1.05.
+        bracket: scaled records: width of the bracket over the factor; None for 1e-6.
+
+    Raises:
+        InputError: a value outside its range, an option of another kind, a kind without a search,
+            a block of another mode or that no earthquake decides about, components that cannot be
+            brought together.
+    """
+    asked: dict[str, Any] = {
+        "p2": p2,
+        "block": block,
+        "beta_deg": beta_deg,
+        "phi_deg": phi_deg,
+        "phi_back_deg": phi_back_deg,
+        "rotation_deg": rotation_deg,
+        "displacement_m": displacement_m,
+        "linear": linear or None,
+        "full_map": full_map or None,
+        "map_depth": map_depth,
+        "tolerance": tolerance,
+        "scan_ratio": scan_ratio,
+        "bracket": bracket,
+    }
+    given = {name: value for name, value in asked.items() if value is not None}
+    return kind_of(kind, given).critical(
+        motion, vertical=vertical, polarity=polarity, search_limit=search_limit, **given
+    )
+
+
+def kind_of(kind: str | None, given: Mapping[str, Any]) -> Kind:
+    """Return the model that a search was asked of, by name or by what it was given."""
+    if kind is not None:
+        return model_of_kind(kind)
+    if "p2" in given:
+        return model_of_mode("topple")
+    if "block" not in given:
+        if "displacement_m" in given:
+            return model_of_mode("slide")
+        raise InputError("give p2, or displacement_m, or a block with beta_deg and phi_deg")
+    for name in ("beta_deg", "phi_deg"):
+        if name not in given:
+            raise InputError(f"{name} is missing: the mode of a block depends on dip and friction")
+    found = stability(
+        given["block"],
+        beta_deg=given["beta_deg"],
+        phi_deg=given["phi_deg"],
+        phi_back_deg=given.get("phi_back_deg"),
+    )
+    if found.state != "stable" or not 0.0 < found.yield_acceleration < math.inf:
+        raise InputError(f"the block is {found.state} in its mode: no earthquake decides about it")
+    return model_of_mode(found.mode)
