@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from sqlalchemy import Connection, bindparam, delete, select, update
+from sqlalchemy import Connection, delete, select, true
 
 from benchmarks.all_outcomes import with_all_outcomes
 from benchmarks.page import ROOT
@@ -35,6 +35,7 @@ from rbfrag.db import schema
 from rbfrag.db.check.database import check_database
 from rbfrag.db.content import content_digest
 from rbfrag.db.engine import opened_database
+from rbfrag.db.insert import update_rows
 from rbfrag.db.keys import canonical_json, combination_key
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
@@ -145,7 +146,7 @@ def reduce(full: Path, made: Path) -> None:
     raw.execute("VACUUM INTO ?", (str(made),))
     raw.close()
     with opened_database(made) as engine, engine.begin() as connection:
-        connection.execute(update(schema.motion).values(samples=None))
+        update_rows(connection, schema.motion, true(), {"samples": None})
         keep_curves_alone(connection)
         connection.execute(delete(schema.response))
         keep_what_is_asked_for(connection)
@@ -218,8 +219,7 @@ def keep_what_is_not_of_the_record(connection: Connection) -> None:
             and sentence not in remarks
         ]
         if len(kept) < len(json.loads(said)):
-            row = update(table).where(table.c.id == number)
-            connection.execute(row.values(warnings=canonical_json(kept)))
+            update_rows(connection, table, table.c.id == number, {"warnings": canonical_json(kept)})
 
 
 def keep_curves_alone(connection: Connection) -> None:
@@ -285,35 +285,26 @@ def rename(connection: Connection) -> None:
             select(schema.motion.c.id, schema.motion.c.samples_sha256, schema.motion.c.dt_s)
         )
     }
-    rows = []
     toppling = schema.combination.c.kind == "toppling"
     for key in connection.scalars(select(schema.combination.c.natural_key).where(toppling)).all():
         stored = stored_combination(connection, key)
         settings = {**stored.settings, "map": "decided"}
         up = stored.vertical_motion_id
-        rows.append(
-            {
-                "row": stored.id,
-                "text": canonical_json(settings),
-                "key": combination_key(
-                    motion_sha256=motions[stored.motion_id].samples_sha256,
-                    dt_s=motions[stored.motion_id].dt_s,
-                    vertical_sha256=None if up is None else motions[up].samples_sha256,
-                    polarity=stored.values["polarity"],
-                    kind=stored.values["kind"],
-                    p2=stored.values["p2"],
-                    settings=settings,
-                    numerics_version=stored.values["numerics_version"],
-                    linear=stored.values["linear"],
-                ),
-            }
-        )
-    statement = (
-        update(schema.combination)
-        .where(schema.combination.c.id == bindparam("row"))
-        .values(settings=bindparam("text"), natural_key=bindparam("key"))
-    )
-    connection.execute(statement, rows)
+        named = {
+            "settings": canonical_json(settings),
+            "natural_key": combination_key(
+                motion_sha256=motions[stored.motion_id].samples_sha256,
+                dt_s=motions[stored.motion_id].dt_s,
+                vertical_sha256=None if up is None else motions[up].samples_sha256,
+                polarity=stored.values["polarity"],
+                kind=stored.values["kind"],
+                p2=stored.values["p2"],
+                settings=settings,
+                numerics_version=stored.values["numerics_version"],
+                linear=stored.values["linear"],
+            ),
+        }
+        update_rows(connection, schema.combination, schema.combination.c.id == stored.id, named)
 
 
 def examine(made: Path) -> None:

@@ -207,7 +207,7 @@ class _Run:
             no_motion=status.count("no_motion"),
             outside_model=status.count("outside_model"),
             certified=sum(each.certified for each in known),
-            reentrant=sum(each.reentrant for each in known),
+            reentrant=sum(bool(each.reentrant) for each in known),
             runs=self._runs,
             grid_runs=self._grid_runs,
             responses=self._responses,

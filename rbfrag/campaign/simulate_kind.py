@@ -165,7 +165,7 @@ def simulate_kind(
         below_limit=status.count("below_limit"),
         no_motion=status.count("no_motion"),
         outside_model=status.count("outside_model"),
-        reentrant=sum(each.reentrant for each in known.values()),
+        reentrant=sum(bool(each.reentrant) for each in known.values()),
         runs=runs,
         without_vertical=plan.without_vertical,
         seconds=time.perf_counter() - started,

@@ -8,17 +8,16 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import Connection, bindparam, insert, select, update
+from sqlalchemy import Connection, bindparam, exists, select
 
 from rbfrag.db.clock import utc_now
-from rbfrag.db.insert import insert_rows
+from rbfrag.db.insert import insert_row, insert_rows, update_rows
 from rbfrag.db.keys import canonical_json, combination_key
 from rbfrag.db.schema import campaign, combination, outcome_interval, simulation
 from rbfrag.errors import InputError
 from rbfrag.solver.results import (
     NUMERICS_VERSION,
     CriticalResult,
-    OutcomeIntervals,
     SearchPoints,
 )
 from rbfrag.version import __version__
@@ -26,6 +25,8 @@ from rbfrag.version import __version__
 __all__ = [
     "CombinationRecord",
     "KnownCombination",
+    "add_grids",
+    "add_maps",
     "combination_key",
     "combinations_with_points",
     "finish_campaign",
@@ -43,7 +44,14 @@ _COLUMNS = (
     "upper", "kr", "y_m_s", "certified", "k_up_over_pga", "undecided", "island_width",
     "kr_over_pga_resolved", "reentrant", "n_runs", "warnings",
 )  # fmt: skip
-_POINT_COLUMNS = ("combination_id", "kr_over_pga", "theta_n", "outcome", "displacement_m")
+_POINT_COLUMNS = ("combination_id", "kr_over_pga", "theta_n", "outcome", "displacement_m", "grid")
+GRID_MEETS_POINT = (
+    "(combination_id, kr_over_pga) DO UPDATE SET theta_n = excluded.theta_n, "
+    "outcome = excluded.outcome, displacement_m = excluded.displacement_m, "
+    "grid = excluded.grid, digest = excluded.digest WHERE simulation.grid IS NULL"
+)
+"""What becomes of a block that was run before, for another reason, where the grid meets it."""
+
 _INTERVAL_COLUMNS = ("combination_id", "k_lo", "k_hi", "outcome")
 
 _KEYS_AT_ONCE = 500  # below the number of variables that any SQLite build takes
@@ -51,38 +59,56 @@ _KEYS_AT_ONCE = 500  # below the number of variables that any SQLite build takes
 
 @dataclass(frozen=True)
 class CombinationRecord:
-    """One critical search as it is stored.
+    """One combination as it is stored.
 
     Args:
         natural_key: from :func:`rbfrag.db.keys.combination_key`.
         motion_id: the horizontal motion.
         vertical_motion_id: the vertical one, or None.
-        result: what the solver answered.
+        result: the critical value; None where none was looked for.
         settings: the same that went into the key.
         kind: response kind.
         numerics_version: the same that went into the key.
-        block: which block it is, the same that went into the key; None for toppling.
+        block: which block it is, the same that went into the key; None where p² says all.
+        grid: the blocks of the kind's grid, number i of it at place i; None to add them later.
+        polarity: ``forward`` or ``reverse``; that of the result where it is left out.
+        p2: the same that went into the key [1/s²]; that of the result where it is left out.
     """
 
     natural_key: str
     motion_id: int
     vertical_motion_id: int | None
-    result: CriticalResult
+    result: CriticalResult | None
     settings: Mapping[str, object]
     kind: str = "toppling"
     numerics_version: str = NUMERICS_VERSION
     block: Mapping[str, object] | None = None
+    grid: SearchPoints | None = None
+    polarity: str | None = None
+    p2: float | None = None
 
 
 @dataclass(frozen=True)
 class KnownCombination:
-    """What a campaign asks about a combination that is stored already."""
+    """What a campaign asks about a combination that is stored already.
+
+    Args:
+        id: its row.
+        status: of its search.
+        kr_over_pga: its critical value, if one was found.
+        certified: whether that is proven.
+        reentrant: whether a safe island lies below it; None where no map was made.
+        gridded: whether the blocks of the kind's grid are stored.
+        mapped: whether a map of intervals is stored.
+    """
 
     id: int
     status: str
     kr_over_pga: float | None
     certified: bool
-    reentrant: bool
+    reentrant: bool | None
+    gridded: bool = False
+    mapped: bool = False
 
 
 def start_campaign(
@@ -98,23 +124,21 @@ def start_campaign(
         settings: what the user asked for; plain values.
         numerics_version: of the solver.
     """
-    done = connection.execute(
-        insert(campaign).values(
-            settings=canonical_json(settings),
-            numerics_version=numerics_version,
-            rbfrag_version=__version__,
-            started=utc_now(),
-        )
+    return insert_row(
+        connection,
+        campaign,
+        {
+            "settings": canonical_json(settings),
+            "numerics_version": numerics_version,
+            "rbfrag_version": __version__,
+            "started": utc_now(),
+        },
     )
-    assert done.inserted_primary_key is not None
-    return int(done.inserted_primary_key[0])
 
 
 def finish_campaign(connection: Connection, campaign_id: int) -> None:
     """Record that a campaign did all it was asked for."""
-    connection.execute(
-        update(campaign).where(campaign.c.id == campaign_id).values(finished=utc_now())
-    )
+    update_rows(connection, campaign, campaign.c.id == campaign_id, {"finished": utc_now()})
 
 
 def known_combinations(connection: Connection, keys: Iterable[str]) -> dict[str, KnownCombination]:
@@ -132,6 +156,8 @@ def known_combinations(connection: Connection, keys: Iterable[str]) -> dict[str,
         column.kr_over_pga,
         column.certified,
         column.reentrant,
+        exists().where(simulation.c.combination_id == column.id, simulation.c.grid.is_not(None)),
+        exists().where(outcome_interval.c.combination_id == column.id),
     ).where(column.natural_key.in_(bindparam("keys", expanding=True)))
     found: dict[str, KnownCombination] = {}
     for some in _portions(keys):
@@ -180,7 +206,7 @@ def insert_combination(
     kind: str = "toppling",
     numerics_version: str = NUMERICS_VERSION,
 ) -> bool:
-    """Store one critical search with its simulated points and its map of outcomes.
+    """Store one critical search with its simulated points and, where it has one, its map.
 
     The arguments are those of :class:`CombinationRecord`.
 
@@ -202,13 +228,13 @@ def insert_combination(
 def insert_combinations(
     connection: Connection, campaign_id: int, records: Sequence[CombinationRecord]
 ) -> int:
-    """Store many critical searches, each with its simulated points and its map of outcomes.
+    """Store many combinations, each with its simulated points, its grid and, if any, its map.
 
     Args:
         connection: inside the caller's transaction, so that a combination is never there
             without what belongs to it.
         campaign_id: the campaign that made them; not part of what makes databases equal.
-        records: the searches; one whose key is there already is left alone.
+        records: the combinations; one whose key is there already is left alone.
 
     Returns:
         How many were new.
@@ -223,11 +249,11 @@ def insert_combinations(
     # maps that differ in the last bits, and a mixture of both would be none.
     own = _of_campaign(connection, campaign_id, new)
     new = {key: record for key, record in new.items() if key in own}
-    intervals: list[tuple[object, ...]] = []
-    for key, record in new.items():
-        intervals += _interval_rows(known[key].id, record.result.intervals)
-    insert_rows(connection, outcome_interval, _INTERVAL_COLUMNS, intervals)
-    _insert_points(connection, known, {key: record.result.points for key, record in new.items()})
+    results = {key: record.result for key, record in new.items() if record.result is not None}
+    _insert_intervals(connection, known, results)
+    points = {key: result.points for key, result in results.items()}
+    grids = {key: record.grid for key, record in new.items() if record.grid is not None}
+    _insert_points(connection, known, points, grids)
     return len(new)
 
 
@@ -252,22 +278,77 @@ def insert_points(connection: Connection, points: Mapping[str, SearchPoints]) ->
     Raises:
         InputError: there is no such combination.
     """
-    known = known_combinations(connection, points)
-    missing = [key for key in points if key not in known]
-    if missing:
-        raise InputError(f"there is no combination {missing[0]} in the database")
-    _insert_points(connection, known, points)
+    _insert_points(connection, _all_known(connection, points), points, {})
+
+
+def add_grids(connection: Connection, grids: Mapping[str, SearchPoints]) -> None:
+    """Store the blocks of the kind's grid of combinations that are there without them.
+
+    Args:
+        connection: inside the caller's transaction.
+        grids: the blocks by the natural key of their combination, number i of the grid at place i.
+
+    Raises:
+        InputError: there is no such combination.
+    """
+    known = _all_known(connection, grids)
+    _insert_points(connection, known, {}, {k: v for k, v in grids.items() if not known[k].gridded})
+
+
+def add_maps(connection: Connection, results: Mapping[str, CriticalResult]) -> None:
+    """Store the maps of combinations that are there without one, and what only a map tells.
+
+    Args:
+        connection: inside the caller's transaction.
+        results: searches with their maps, by the natural key of their combination.
+
+    Raises:
+        InputError: there is no such combination.
+    """
+    known = _all_known(connection, results)
+    new = {key: result for key, result in results.items() if not known[key].mapped}
+    _insert_intervals(connection, known, new)
+    for key, result in new.items():
+        values = {
+            "island_width": _number(result.island_width),
+            "kr_over_pga_resolved": _number(result.kr_over_pga_resolved),
+            "reentrant": result.reentrant,
+        }
+        update_rows(connection, combination, combination.c.id == known[key].id, values)
+
+
+def _all_known(connection: Connection, keys: Iterable[str]) -> dict[str, KnownCombination]:
+    wanted = list(keys)
+    known = known_combinations(connection, wanted)
+    for key in wanted:
+        if key not in known:
+            raise InputError(f"there is no combination {key} in the database")
+    return known
 
 
 def _insert_points(
     connection: Connection,
     known: Mapping[str, KnownCombination],
     points: Mapping[str, SearchPoints],
+    grids: Mapping[str, SearchPoints],
 ) -> None:
-    rows: list[tuple[object, ...]] = []
-    for key, simulated in points.items():
-        rows += _point_rows(known[key].id, simulated)
-    insert_rows(connection, simulation, _POINT_COLUMNS, rows)
+    rows = [row for key, blocks in points.items() for row in _point_rows(known[key].id, blocks)]
+    insert_rows(connection, simulation, _POINT_COLUMNS, [(*row, None) for row in rows])
+    rows = [
+        (*row, number)
+        for key, blocks in grids.items()
+        for number, row in enumerate(_point_rows(known[key].id, blocks))
+    ]
+    insert_rows(connection, simulation, _POINT_COLUMNS, rows, on_conflict=GRID_MEETS_POINT)
+
+
+def _insert_intervals(
+    connection: Connection,
+    known: Mapping[str, KnownCombination],
+    results: Mapping[str, CriticalResult],
+) -> None:
+    rows = [row for key, result in results.items() for row in _interval_rows(known[key].id, result)]
+    insert_rows(connection, outcome_interval, _INTERVAL_COLUMNS, rows)
 
 
 def _portions(keys: Iterable[str]) -> Iterator[list[str]]:
@@ -278,18 +359,27 @@ def _portions(keys: Iterable[str]) -> Iterator[list[str]]:
 
 def _combination_row(campaign_id: int, record: CombinationRecord) -> tuple[object, ...]:
     result = record.result
-    return (
+    polarity, p2 = record.polarity, record.p2
+    if result is not None:
+        polarity, p2 = polarity or result.polarity, result.p2 if p2 is None else p2
+    inputs = (
         record.natural_key,
         campaign_id,
         record.motion_id,
         record.vertical_motion_id,
-        result.polarity,
+        polarity,
         record.kind,
-        bool(result.linear),
-        _number(result.p2),
+        result is not None and bool(result.linear),
+        _number(p2),
         None if record.block is None else canonical_json(record.block),
         canonical_json(record.settings),
         record.numerics_version,
+    )
+    if result is None:
+        nothing = (None,) * 6
+        return (*inputs, "not_searched", *nothing, False, *nothing[:5], 0, "[]")
+    return (
+        *inputs,
         result.status,
         float(result.search_limit),
         _number(result.kr_over_pga),
@@ -302,15 +392,14 @@ def _combination_row(campaign_id: int, record: CombinationRecord) -> tuple[objec
         _number(result.undecided),
         _number(result.island_width),
         _number(result.kr_over_pga_resolved),
-        bool(result.reentrant),
+        None if result.reentrant is None else bool(result.reentrant),
         int(result.n_runs),
         json.dumps(list(result.warnings)),
     )
 
 
-def _interval_rows(
-    combination_id: int, intervals: OutcomeIntervals
-) -> Iterator[tuple[object, ...]]:
+def _interval_rows(combination_id: int, result: CriticalResult) -> Iterator[tuple[object, ...]]:
+    intervals = result.intervals
     for low, high, outcome in zip(
         intervals.k_lo.tolist(), intervals.k_hi.tolist(), intervals.outcome, strict=True
     ):

@@ -26,8 +26,8 @@ from rbfrag.db.schema import (
     toppling_spectrum,
 )
 
-# When, by which run and under which row number something was written.
-_INCIDENTAL = {"id", "campaign_id", "added", "created"}
+# When, by which run and under which row number something was written; a digest is of these too.
+_INCIDENTAL = {"id", "campaign_id", "added", "created", "digest"}
 
 _motion_key = (motion.c.samples_sha256, motion.c.dt_s)
 _vertical = motion.alias("vertical")

@@ -15,7 +15,8 @@ from rbfrag.db.revision import SCHEMA_REVISION
 from rbfrag.db.schema import metadata
 
 _POLARITY = "forward: positive samples drive toppling out of the slope; reverse: negative ones do"
-_KIND = "response kind: toppling, sliding, slumping, confined_toppling"
+_KIND = "response kind: the model that answers, such as toppling or sliding"
+_DIGEST = ("", "hash of the row's other values, by which rbfrag db check finds altered ones")
 _LINEAR = "true for the linear verification model, in which k_r is the critical angle in rad"
 _NUMERICS = "version of the solver; results of different versions are never mixed"
 _P2 = "frequency parameter p² of the block, m g r3 over the inertia about the toe"
@@ -138,9 +139,10 @@ _MEANINGS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "status": (
                 "",
                 "found; below_limit: nothing topples down to the search limit (censored); "
-                "no_motion: no such block ever lifts; outside_model: 1 + k_v <= 0",
+                "no_motion: no such block ever lifts; outside_model: 1 + k_v <= 0; not_searched: "
+                "only the blocks of the grid were run",
             ),
-            "search_limit": ("k_r/PGA", "smallest strength looked at"),
+            "search_limit": ("k_r/PGA", "smallest strength looked at; missing without a search"),
             "kr_over_pga": (
                 "k_r/PGA",
                 "greatest strength known to topple; missing unless found",
@@ -152,18 +154,27 @@ _MEANINGS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "certified": ("", "true: everything above the bracket is proven safe"),
             "k_up_over_pga": ("k_r/PGA", "proven bound of fresh starts: nothing above it topples"),
             "undecided": ("k_r/PGA", "length above the bracket that is not proven safe"),
-            "island_width": ("k_r/PGA", "width of the toppling interval that ends at the bracket"),
+            "island_width": (
+                "k_r/PGA",
+                "width of the toppling interval that ends at the bracket; missing without a map",
+            ),
             "kr_over_pga_resolved": (
                 "k_r/PGA",
-                "critical value when toppling intervals narrower than 1e-6 are ignored",
+                "critical value when toppling intervals narrower than 1e-6 are ignored; missing "
+                "without a map",
             ),
-            "reentrant": ("", "true: a safe island wider than 1e-6 lies below the critical value"),
+            "reentrant": (
+                "",
+                "true: a safe island wider than 1e-6 lies below the critical value; missing "
+                "without a map",
+            ),
             "n_runs": ("", "simulations made, most of which are not stored"),
             "warnings": ("", "JSON list of sentences about the input or the answer"),
         },
     ),
     "outcome_interval": (
-        "The certified map: what becomes of every block of an interval of strengths.",
+        "The certified map, made on request: what becomes of every block of an interval of "
+        "strengths.",
         {
             "combination_id": ("", "the combination"),
             "k_lo": ("k_r/PGA", "lower end"),
@@ -172,8 +183,8 @@ _MEANINGS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
         },
     ),
     "simulation": (
-        "Single blocks that were run: the critical one, those of a requested grid, and those that "
-        "fits look at where the map leaves them open.",
+        "Single blocks that were run: the critical one, those of the grid that fits read, and "
+        "others that were asked for.",
         {
             "combination_id": ("", "the combination"),
             "kr_over_pga": ("k_r/PGA", "strength of the block"),
@@ -182,6 +193,11 @@ _MEANINGS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "displacement_m": (
                 "m",
                 "permanent displacement of a sliding block down a level plane; missing for others",
+            ),
+            "grid": (
+                "",
+                "number of the block in the grid of its kind, which does not depend on outcomes; "
+                "missing for a block beside it",
             ),
         },
     ),
@@ -276,7 +292,7 @@ def data_dictionary() -> tuple[TableMeaning, ...]:
             meaning=meaning,
             columns=tuple(
                 _column(metadata.tables[name].c[column], unit, text)
-                for column, (unit, text) in columns.items()
+                for column, (unit, text) in {**columns, "digest": _DIGEST}.items()
             ),
         )
         for name, (meaning, columns) in _MEANINGS.items()

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from sqlalchemy import Connection, select, update
+from sqlalchemy import Connection, select
 
-from rbfrag.db.insert import insert_if_new
+from rbfrag.db.insert import insert_if_new, update_rows
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.schema import earthquake
 from rbfrag.db.stored_text import storable
@@ -46,5 +46,5 @@ def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording
     ).one()
     missing = {key: value for key, value in known.items() if value and not row._mapping[key]}
     if missing:
-        connection.execute(update(earthquake).where(earthquake.c.id == row.id).values(**missing))
+        update_rows(connection, earthquake, earthquake.c.id == row.id, missing)
     return int(row.id)

@@ -1,11 +1,26 @@
-"""Inserts that may be repeated: a row whose natural key is there already is left alone."""
+"""The one place that writes rows: inserts that may be repeated, updates, and their digests."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
 
-from sqlalchemy import Connection, Table
+from sqlalchemy import (
+    Boolean,
+    ColumnElement,
+    Connection,
+    Float,
+    Integer,
+    LargeBinary,
+    Table,
+    insert,
+    select,
+    update,
+)
 from sqlalchemy.dialects import postgresql, sqlite
+
+from rbfrag.db.digest import NOT_DIGESTED, ValueType, row_digests
 
 
 def insert_if_new(connection: Connection, table: Table, values: Mapping[str, object]) -> bool:
@@ -21,9 +36,22 @@ def insert_if_new(connection: Connection, table: Table, values: Mapping[str, obj
     """
     build = postgresql.insert if connection.dialect.name == "postgresql" else sqlite.insert
     # psycopg forgets the count when the cursor closes, unless it is asked to keep it.
-    statement = build(table).values(**values).on_conflict_do_nothing().inline()
+    statement = build(table).values(**_digested(table, values)).on_conflict_do_nothing().inline()
     done = connection.execute(statement, execution_options={"preserve_rowcount": True})
     return done.rowcount == 1
+
+
+def insert_row(connection: Connection, table: Table, values: Mapping[str, object]) -> int:
+    """Insert one row and return its id.
+
+    Args:
+        connection: inside the caller's transaction.
+        table: a table with an id.
+        values: column values by name.
+    """
+    done = connection.execute(insert(table).values(**_digested(table, values)))
+    assert done.inserted_primary_key is not None
+    return int(done.inserted_primary_key[0])
 
 
 def insert_rows(
@@ -31,6 +59,8 @@ def insert_rows(
     table: Table,
     columns: Sequence[str],
     rows: Sequence[tuple[object, ...]],
+    *,
+    on_conflict: str = "DO NOTHING",
 ) -> None:
     """Insert many rows at the speed of the driver; those whose key is there are left alone.
 
@@ -43,15 +73,79 @@ def insert_rows(
         columns: names of the columns that the rows fill.
         rows: tuples of None, bool, int, float, str and bytes, in the order of `columns`; numpy's
             scalars are not understood by every driver.
+        on_conflict: SQL that says what becomes of a row whose key is there.
     """
     if not rows:
         return
     unknown = [name for name in columns if name not in table.c]
     if unknown:
         raise ValueError(f"table {table.name} has no column {unknown[0]!r}")
+    digests = table_digests(table, columns, rows)
     mark = "?" if connection.dialect.paramstyle == "qmark" else "%s"
     connection.exec_driver_sql(
-        f"INSERT INTO {table.name} ({', '.join(columns)}) "
-        f"VALUES ({', '.join(mark for _ in columns)}) ON CONFLICT DO NOTHING",
-        list(rows),
+        f"INSERT INTO {table.name} ({', '.join(columns)}, digest) "
+        f"VALUES ({', '.join(mark for _ in columns)}, {mark}) ON CONFLICT {on_conflict}",
+        [(*row, digest) for row, digest in zip(rows, digests, strict=True)],
     )
+
+
+def update_rows(
+    connection: Connection,
+    table: Table,
+    where: ColumnElement[bool],
+    values: Mapping[str, object],
+) -> None:
+    """Change columns of the rows that meet a condition.
+
+    Args:
+        connection: inside the caller's transaction.
+        table: the table.
+        where: the condition.
+        values: new column values by name.
+    """
+    keys = table.primary_key.columns
+    for row in connection.execute(select(table).where(where).with_for_update()).mappings().all():
+        changed = _digested(table, {**row, **values})
+        connection.execute(
+            update(table)
+            .where(*(column == row[column.name] for column in keys))
+            .values(**values, digest=changed["digest"])
+        )
+
+
+def table_digests(
+    table: Table, columns: Sequence[str], rows: Sequence[Sequence[object]]
+) -> list[int]:
+    """Return the digests of rows of a table.
+
+    Args:
+        table: the table.
+        columns: names of the columns that the rows fill; the others are NULL.
+        rows: their values, in the order of `columns`.
+    """
+    filled = dict(zip(columns, zip(*rows, strict=True), strict=True))
+    missing = (None,) * len(rows)
+    types = _digested_columns(table)
+    return row_digests(list(types.values()), [filled.get(name, missing) for name in types])
+
+
+def _digested(table: Table, values: Mapping[str, object]) -> dict[str, object]:
+    (digest,) = table_digests(table, list(values), [list(values.values())])
+    return {**values, "digest": digest}
+
+
+@cache
+def _digested_columns(table: Table) -> dict[str, ValueType]:
+    """Return the types of the columns that the digest is of, by name, in the order of names."""
+    names = sorted(column.name for column in table.c if column.name not in NOT_DIGESTED)
+    return {name: _value_type(table.c[name].type) for name in names}
+
+
+def _value_type(column_type: Any) -> ValueType:
+    if isinstance(column_type, Boolean):
+        return "boolean"
+    if isinstance(column_type, Float):
+        return "float"
+    if isinstance(column_type, Integer):
+        return "integer"
+    return "bytes" if isinstance(column_type, LargeBinary) else "text"

@@ -19,14 +19,17 @@ from rbfrag.errors import UnknownModelError
 _SELECT = f"SELECT {', '.join(COLUMNS)} FROM fragility_model"
 
 
-def read_model(path: str | PathLike[str], name: str | None = None) -> ModelRow:
+def read_model(
+    path: str | PathLike[str], name: str | None = None, *, kind: str = "toppling"
+) -> ModelRow:
     """Return one model of an SQLite database.
 
     Works while another process writes to it, and in a folder that cannot be written.
 
     Args:
         path: the database file.
-        name: the model's name; None for the default of toppling.
+        name: the model's name; None for the default of a kind.
+        kind: the kind whose default is meant.
 
     Raises:
         DatabaseError: one of its kinds, as for :func:`rbfrag.db.engine.open_database`.
@@ -35,7 +38,8 @@ def read_model(path: str | PathLike[str], name: str | None = None) -> ModelRow:
     file = Path(path)
     with _opened(file) as connection:
         if name is None:
-            row = connection.execute(f"{_SELECT} WHERE is_default AND kind = 'toppling'").fetchone()
+            default = f"{_SELECT} WHERE is_default AND kind = ?"
+            row = connection.execute(default, (kind,)).fetchone()
         else:
             row = connection.execute(f"{_SELECT} WHERE name = ?", (name,)).fetchone()
         if row is not None:

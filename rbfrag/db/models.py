@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import Connection, Select, delete, insert, select, update
+from sqlalchemy import Connection, Select, and_, delete, select
 
 from rbfrag.db.clock import utc_now
 from rbfrag.db.engine import database_label
+from rbfrag.db.insert import insert_row, update_rows
 from rbfrag.db.model_record import COLUMNS, decode_model, encode_model, unknown_model
 from rbfrag.db.rows import ModelRow
 from rbfrag.db.schema import fragility_model
@@ -45,7 +46,7 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
     if values["is_default"]:
         _clear_default(connection, row.kind)
     connection.execute(delete(fragility_model).where(fragility_model.c.name == row.name))
-    connection.execute(insert(fragility_model).values(**values))
+    insert_row(connection, fragility_model, values)
     return load_model(connection, row.name)
 
 
@@ -55,19 +56,22 @@ def model_rows(connection: Connection) -> list[ModelRow]:
     return sorted(rows, key=lambda model: model.name)
 
 
-def load_model(connection: Connection, name: str | None = None) -> ModelRow:
+def load_model(
+    connection: Connection, name: str | None = None, *, kind: str = "toppling"
+) -> ModelRow:
     """Return one model.
 
     Args:
         connection: the database.
-        name: its name; None for the default of toppling.
+        name: its name; None for the default of a kind.
+        kind: the kind whose default is meant.
 
     Raises:
         UnknownModelError: there is none; the message lists the names there are.
     """
     query = _model_query()
     if name is None:
-        query = query.where(fragility_model.c.is_default, fragility_model.c.kind == "toppling")
+        query = query.where(fragility_model.c.is_default, fragility_model.c.kind == kind)
     else:
         query = query.where(fragility_model.c.name == name)
     row = connection.execute(query).one_or_none()
@@ -83,17 +87,13 @@ def set_default(connection: Connection, name: str) -> None:
         UnknownModelError: there is none of that name.
     """
     _clear_default(connection, load_model(connection, name).kind)
-    connection.execute(
-        update(fragility_model).where(fragility_model.c.name == name).values(is_default=True)
-    )
+    named = fragility_model.c.name == name
+    update_rows(connection, fragility_model, named, {"is_default": True})
 
 
 def _clear_default(connection: Connection, kind: str) -> None:
-    connection.execute(
-        update(fragility_model)
-        .where(fragility_model.c.is_default, fragility_model.c.kind == kind)
-        .values(is_default=False)
-    )
+    default = and_(fragility_model.c.is_default, fragility_model.c.kind == kind)
+    update_rows(connection, fragility_model, default, {"is_default": False})
 
 
 def _model_query() -> Select[Any]:

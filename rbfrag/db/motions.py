@@ -20,13 +20,12 @@ from sqlalchemy import (
     exists,
     or_,
     select,
-    update,
 )
 
 from rbfrag.db import schema
 from rbfrag.db.clock import utc_now
 from rbfrag.db.earthquakes import earthquake_id_for
-from rbfrag.db.insert import insert_if_new
+from rbfrag.db.insert import insert_if_new, update_rows
 from rbfrag.db.keys import canonical_json
 from rbfrag.db.rows import EarthquakeInfo, MotionRow
 from rbfrag.db.stored_text import storable
@@ -118,9 +117,7 @@ def add_motion(
         new = False
         if stored["guessed"] and not earthquake.guessed:
             labels["recording_id"] = _recording_id_for(connection, *place)
-            connection.execute(
-                update(schema.motion).where(schema.motion.c.id == stored["id"]).values(**labels)
-            )
+            update_rows(connection, schema.motion, schema.motion.c.id == stored["id"], labels)
             _delete_orphans(connection, stored["recording_id"])
         elif not earthquake.guessed:
             _refuse_contradiction(motion, stored, earthquake, is_vertical)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
-from sqlalchemy import Connection, RowMapping, Select, and_, func, select
+from numpy.typing import ArrayLike, NDArray
+from sqlalchemy import Connection, RowMapping, Select, and_, case, func, select
 
 from rbfrag.db.revision import SCHEMA_REVISION
 from rbfrag.db.rows import CombinationTable
@@ -39,7 +41,7 @@ class DatabaseInfo:
         rows: number of rows by table.
         combinations_by_status: number of combinations by status.
         numerics_versions: versions of the solver that made its combinations.
-        default_model: name of the model that answers when none is named, if there is one.
+        default_model: name of the model of the kind asked about that answers when none is named.
     """
 
     revision: str
@@ -60,7 +62,7 @@ def combination_table(
     numerics_version: str = NUMERICS_VERSION,
     doubtful_pgd: bool = False,
 ) -> CombinationTable:
-    """Return the critical values of the non-linear model with their motions' intensity.
+    """Return the combinations of a kind, with critical values and their motions' intensity.
 
     A pair of motion, polarity and block appears once, though several campaigns may have searched
     it with different settings: the search that went lowest counts (of equals, the one of the
@@ -70,9 +72,9 @@ def combination_table(
         connection: the database.
         suite: only motions of this suite.
         vertical: ``without`` vertical motion, ``with`` it, or ``both``.
-        kind: response kind other than sliding, which has no critical velocity.
-        rotation_deg: slumping and confined toppling: the rotation that counts as failure [deg];
-            None for failure past recovery.
+        kind: response kind.
+        rotation_deg: the rotation that counts as failure [deg]; None for failure past recovery
+            and of kinds that know none.
         numerics_version: of the solver.
         doubtful_pgd: True to return the PGD of motions that are flagged for an implausible
             final velocity or displacement; by default it is NaN, so that no fit reads it.
@@ -100,9 +102,10 @@ def combination_table(
             and_(suite_motion.c.motion_id == motion.c.id, suite_motion.c.suite_id == suite_id),
         )
     order = (combination.c.search_limit, combination.c.natural_key)
+    settings_of = cache(json.loads)
     rows: dict[tuple[Any, ...], Any] = {}
     for row in connection.execute(query.order_by(*order)).mappings():
-        if kind != "toppling" and json.loads(row["settings"]).get("rotation_deg") != rotation_deg:
+        if settings_of(row["settings"]).get("rotation_deg") != rotation_deg:
             continue
         block = (row["p2"], row["block"])
         rows.setdefault((row["motion_id"], row["vertical_motion_id"], row["polarity"], block), row)
@@ -135,7 +138,64 @@ def combination_table(
         else floats("pgd_m"),
         tm_s=floats("tm_s"),
         natural_key=objects("natural_key"),
+        block=objects("block"),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class OutcomeGrid:
+    """The blocks of a kind's grid, of shape (n, m): combination by number in the grid.
+
+    Args:
+        k_over_pga: strength over PGA; NaN where a block is not stored.
+        outcome: 1 where the block fails, 0 where it does not, NaN where that is not known: not
+            stored, undetermined, or outside the model.
+        theta_n: peak rotation over the critical angle; NaN where it fails.
+        displacement_m: displacement down a level plane [m]; NaN for blocks that do not slide.
+    """
+
+    k_over_pga: NDArray[np.float64]
+    outcome: NDArray[np.float64]
+    theta_n: NDArray[np.float64]
+    displacement_m: NDArray[np.float64]
+
+
+def outcome_grid(connection: Connection, combination_id: ArrayLike) -> OutcomeGrid:
+    """Return what the blocks of the grid do in some combinations, of one kind.
+
+    Args:
+        connection: the database.
+        combination_id: row ids, such as ``CombinationTable.combination_id``, shape (n,).
+
+    Returns:
+        Arrays of shape (n, m), m being the greatest number in the grid that is stored plus one.
+    """
+    wanted = np.atleast_1d(np.asarray(combination_id, dtype=np.int64))
+    column = simulation.c
+    rows: list[Any] = []
+    if wanted.size:
+        fails = case((column.outcome == "toppled", 1.0), (column.outcome == "stable", 0.0))
+        query = select(
+            column.combination_id,
+            column.grid,
+            column.kr_over_pga,
+            fails,
+            column.theta_n,
+            column.displacement_m,
+        ).where(
+            column.combination_id.between(int(wanted.min()), int(wanted.max())),
+            column.grid.is_not(None),
+        )
+        rows = list(connection.execute(query))
+    values = np.array([tuple(row) for row in rows], dtype=np.float64).reshape(-1, 6)
+    owner, number = values[:, 0].astype(np.int64), values[:, 1].astype(np.int64)
+    grid = np.full((4, wanted.size, int(number.max(initial=-1)) + 1), np.nan)
+    order = np.argsort(wanted)
+    at = np.searchsorted(wanted, owner, sorter=order)
+    at = order[np.minimum(at, wanted.size - 1)]
+    mine = wanted[at] == owner
+    grid[:, at[mine], number[mine]] = values[mine, 2:].T
+    return OutcomeGrid(*grid)
 
 
 def simulation_points(connection: Connection, combination_id: int) -> SearchPoints:
@@ -159,8 +219,8 @@ def simulation_points(connection: Connection, combination_id: int) -> SearchPoin
     )
 
 
-def database_info(connection: Connection) -> DatabaseInfo:
-    """Return what the database holds, counted."""
+def database_info(connection: Connection, *, kind: str = "toppling") -> DatabaseInfo:
+    """Return what the database holds, counted, and which model of a kind is its default."""
     by_status = select(combination.c.status, func.count().label("number")).group_by(
         combination.c.status
     )
@@ -178,7 +238,7 @@ def database_info(connection: Connection) -> DatabaseInfo:
         numerics_versions=tuple(sorted(connection.scalars(versions))),
         default_model=connection.scalar(
             select(fragility_model.c.name).where(
-                fragility_model.c.is_default, fragility_model.c.kind == "toppling"
+                fragility_model.c.is_default, fragility_model.c.kind == kind
             )
         ),
     )

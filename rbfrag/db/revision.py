@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from rbfrag.errors import SchemaVersionError
 
-REVISIONS = ("0001", "0002", "0003")
+REVISIONS = ("0001", "0002", "0003", "0004")
 """Every schema revision this rbfrag knows, oldest first."""
 
 SCHEMA_REVISION = REVISIONS[-1]

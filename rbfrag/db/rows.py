@@ -72,7 +72,7 @@ class CombinationTable:
 
     What the fits read. `kr_over_pga`, `kr` and `y_m_s` are NaN unless `status` is ``found``;
     `tm_s` is NaN where the mean period is not defined, `pgd_m` where the baseline of the record
-    is in doubt, unless it was asked for.
+    is in doubt, unless it was asked for. `block` is JSON text, None where p² says all.
     """
 
     combination_id: NDArray[np.int64]
@@ -91,6 +91,7 @@ class CombinationTable:
     pgd_m: NDArray[np.float64]
     tm_s: NDArray[np.float64]
     natural_key: NDArray[np.object_]
+    block: NDArray[np.object_]
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,13 @@
 """The tables. Units are in the column names; natural unique keys hold no NULL.
 
-The tables are made by the migrations; a test proves that these definitions equal them.
+The tables are made by the migrations; a test proves that these definitions equal them. Each row
+carries a digest of its values, which :mod:`rbfrag.db.insert` writes.
 """
 
 from __future__ import annotations
 
 from sqlalchemy import (
+    BigInteger,
     Boolean,
     CheckConstraint,
     Column,
@@ -33,15 +35,12 @@ metadata = MetaData(
 )
 
 POLARITY = "polarity IN ('forward', 'reverse')"
-KIND = "kind IN ('toppling', 'sliding', 'slumping', 'confined_toppling')"
-# Two numbers say all about a block that topples freely; the others need more.
-BLOCK_OF_KIND = "(kind = 'toppling') = (block IS NULL)"
-P2_OF_KIND = "p2 IS NOT NULL OR kind = 'sliding'"
+KIND = "kind <> ''"
 FOUND_HAS_VALUE = (
     "status <> 'found' OR (kr_over_pga > 0 AND kr > 0 AND kr_over_pga IS NOT NULL "
-    "AND kr IS NOT NULL AND (kind = 'sliding' OR (y_m_s > 0 AND y_m_s IS NOT NULL)))"
+    "AND kr IS NOT NULL)"
 )
-STATUS = "status IN ('found', 'below_limit', 'no_motion', 'outside_model')"
+STATUS = "status IN ('found', 'below_limit', 'no_motion', 'outside_model', 'not_searched')"
 OUTCOME = (
     "outcome IN ('stable', 'toppled', 'undetermined', 'jump', 'contact_lost', 'indeterminate')"
 )
@@ -57,6 +56,7 @@ earthquake = Table(
     Column("name", Text, nullable=False),
     Column("magnitude", Double),
     Column("time", Text),
+    Column("digest", BigInteger, nullable=False),
     UniqueConstraint("event_id", "guessed"),
     CheckConstraint("event_id <> ''", name="event_id"),
     CheckConstraint("magnitude > -5 AND magnitude < 11", name="magnitude"),
@@ -69,6 +69,7 @@ recording = Table(
     Column("earthquake_id", ForeignKey("earthquake.id", ondelete="RESTRICT"), nullable=False),
     Column("name", Text, nullable=False),
     Column("station", Text, nullable=False),
+    Column("digest", BigInteger, nullable=False),
     UniqueConstraint("earthquake_id", "name", "station"),
     CheckConstraint("name <> ''", name="name"),
 )
@@ -101,6 +102,7 @@ motion = Table(
     Column("samples_sha256", Text, nullable=False),
     Column("samples", LargeBinary),  # little-endian float64 [g]; NULL in a reference file
     Column("added", Text, nullable=False),
+    Column("digest", BigInteger, nullable=False),
     UniqueConstraint("samples_sha256", "dt_s"),
     CheckConstraint("dt_s > 0", name="dt_s"),
     CheckConstraint("npts > 0", name="npts"),
@@ -117,6 +119,7 @@ suite = Table(
     metadata,
     Column("id", Integer, primary_key=True),
     Column("name", Text, nullable=False),
+    Column("digest", BigInteger, nullable=False),
     UniqueConstraint("name"),
     CheckConstraint("name <> ''", name="name"),
 )
@@ -126,6 +129,7 @@ suite_motion = Table(
     metadata,
     Column("suite_id", ForeignKey("suite.id", ondelete="CASCADE"), nullable=False),
     Column("motion_id", ForeignKey("motion.id", ondelete="CASCADE"), nullable=False),
+    Column("digest", BigInteger, nullable=False),
     PrimaryKeyConstraint("suite_id", "motion_id"),
     Index(None, "motion_id"),
     sqlite_with_rowid=False,
@@ -139,6 +143,7 @@ toppling_spectrum = Table(
     Column("p2", Double, nullable=False),  # 1/s²
     Column("numerics_version", Text, nullable=False),
     Column("x_m_s", Double, nullable=False),
+    Column("digest", BigInteger, nullable=False),
     PrimaryKeyConstraint("motion_id", "polarity", "p2", "numerics_version"),
     CheckConstraint(POLARITY, name="polarity"),
     CheckConstraint("p2 > 0 AND x_m_s >= 0", name="ranges"),
@@ -154,6 +159,7 @@ campaign = Table(
     Column("rbfrag_version", Text, nullable=False),
     Column("started", Text, nullable=False),
     Column("finished", Text),  # NULL while it runs, and for ever if it was killed
+    Column("digest", BigInteger, nullable=False),
 )
 
 combination = Table(
@@ -167,12 +173,12 @@ combination = Table(
     Column("polarity", Text, nullable=False),
     Column("kind", Text, nullable=False),
     Column("linear", Boolean, nullable=False),
-    Column("p2", Double),  # 1/s²; NULL for sliding
-    Column("block", Text),  # JSON object; NULL for toppling
+    Column("p2", Double),  # 1/s²; NULL where the block needs none
+    Column("block", Text),  # JSON object; NULL where p2 says all
     Column("settings", Text, nullable=False),  # JSON
     Column("numerics_version", Text, nullable=False),
     Column("status", Text, nullable=False),
-    Column("search_limit", Double, nullable=False),  # kr/PGA
+    Column("search_limit", Double),  # kr/PGA; NULL without a search
     Column("kr_over_pga", Double),
     Column("lower", Double),  # kr/PGA
     Column("upper", Double),  # kr/PGA
@@ -183,17 +189,18 @@ combination = Table(
     Column("undecided", Double),  # kr/PGA
     Column("island_width", Double),  # kr/PGA
     Column("kr_over_pga_resolved", Double),
-    Column("reentrant", Boolean, nullable=False),
+    Column("reentrant", Boolean),
     Column("n_runs", Integer, nullable=False),
     Column("warnings", Text, nullable=False),  # JSON list
+    Column("digest", BigInteger, nullable=False),
     UniqueConstraint("natural_key"),
     CheckConstraint("length(natural_key) = 64", name="natural_key"),
     CheckConstraint(POLARITY, name="polarity"),
     CheckConstraint(KIND, name="kind"),
     CheckConstraint(STATUS, name="status"),
-    CheckConstraint("p2 > 0 AND search_limit > 0 AND n_runs >= 0", name="ranges"),
-    CheckConstraint(BLOCK_OF_KIND, name="block_of_kind"),
-    CheckConstraint(P2_OF_KIND, name="p2_of_kind"),
+    CheckConstraint("p2 > 0 AND search_limit > 0 AND n_runs >= 0 AND y_m_s > 0", name="ranges"),
+    CheckConstraint("p2 IS NOT NULL OR block IS NOT NULL", name="block"),
+    CheckConstraint("status = 'not_searched' OR search_limit IS NOT NULL", name="search_limit"),
     CheckConstraint(FOUND_HAS_VALUE, name="found_has_value"),
     CheckConstraint(
         "status = 'found' OR (kr_over_pga IS NULL AND kr IS NULL AND y_m_s IS NULL)",
@@ -211,6 +218,7 @@ outcome_interval = Table(
     Column("k_lo", Double, nullable=False),  # kr/PGA
     Column("k_hi", Double, nullable=False),  # kr/PGA
     Column("outcome", Text, nullable=False),
+    Column("digest", BigInteger, nullable=False),
     PrimaryKeyConstraint("combination_id", "k_lo"),
     CheckConstraint("k_lo >= 0 AND k_hi >= k_lo", name="ranges"),
     CheckConstraint("outcome IN ('topples', 'safe', 'undecided')", name="outcome"),
@@ -224,10 +232,13 @@ simulation = Table(
     Column("kr_over_pga", Double, nullable=False),
     Column("theta_n", Double),  # peak rotation over the critical angle; NULL where it toppled
     Column("outcome", Text, nullable=False),
-    Column("displacement_m", Double),  # down a level plane; sliding only
+    Column("displacement_m", Double),  # down a level plane, of blocks that slide
+    Column("grid", Integer),  # number in the grid of outcomes; NULL for a block beside it
+    Column("digest", BigInteger, nullable=False),
     PrimaryKeyConstraint("combination_id", "kr_over_pga"),
     CheckConstraint("kr_over_pga > 0", name="kr_over_pga"),
     CheckConstraint("theta_n >= 0", name="theta_n"),
+    CheckConstraint("grid >= 0", name="grid"),
     CheckConstraint(OUTCOME, name="outcome"),
     sqlite_with_rowid=False,
 )
@@ -255,6 +266,7 @@ response = Table(
     Column("theta_dot_rad_s", LargeBinary, nullable=False),
     Column("k_h", LargeBinary, nullable=False),
     Column("k_v", LargeBinary, nullable=False),
+    Column("digest", BigInteger, nullable=False),
     UniqueConstraint("natural_key"),
     CheckConstraint("length(natural_key) = 64", name="natural_key"),
     CheckConstraint(POLARITY, name="polarity"),
@@ -280,6 +292,7 @@ fragility_model = Table(
     Column("diagnostics", Text, nullable=False),  # JSON object
     Column("is_default", Boolean, nullable=False),
     Column("created", Text, nullable=False),
+    Column("digest", BigInteger, nullable=False),
     UniqueConstraint("name"),
     CheckConstraint("name <> ''", name="name"),
     CheckConstraint(KIND, name="kind"),

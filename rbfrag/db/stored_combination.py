@@ -110,7 +110,7 @@ def stored_combination(connection: Connection, natural_key: str) -> StoredCombin
             theta_n=_floats([point.theta_n for point in points]),
             outcome=tuple(point.outcome for point in points),
             displacement_m=None
-            if row["kind"] != "sliding"
+            if all(point.displacement_m is None for point in points)
             else _floats([point.displacement_m for point in points]),
         ),
         intervals=OutcomeIntervals(

@@ -88,7 +88,8 @@ def read_columns(
     """Return a table as numpy arrays by column name, in the order of its key.
 
     A missing number is NaN, and an integer column that may miss a value is float64; text,
-    times and JSON are arrays of str, None where missing; samples and histories are arrays of
+    times and JSON are arrays of str, and a true/false column that may miss a value is one of
+    objects, None where missing; samples and histories are arrays of
     float64 arrays.
 
     Args:
@@ -117,7 +118,7 @@ def _as_array(column: ColumnMeaning, values: Sequence[Any]) -> NDArray[Any]:
         return np.array(values, dtype=np.float64)  # None becomes NaN
     if column.type == "integer":
         return np.array(values, dtype=np.int64)
-    if column.type == "true/false":
+    if column.type == "true/false" and not column.may_be_missing:
         return np.array(values, dtype=np.bool_)
     made = np.empty(len(values), dtype=object)
     if column.type == "array":

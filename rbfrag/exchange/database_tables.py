@@ -156,7 +156,7 @@ def _write_csv(
 
 def _cells(column: ColumnMeaning, values: Sequence[Any]) -> Sequence[Any]:
     if column.type == "true/false":
-        return ["true" if value else "false" for value in values]
+        return [None if value is None else str(value).lower() for value in values]
     return values  # csv writes None as an empty cell, and numbers with all their digits
 
 

@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sqlalchemy import Engine, func, insert, select
+from sqlalchemy import Engine, func, select
 
 import rbfrag.db.create
 import rbfrag.db.revision
 from rbfrag.db.engine import database_label, database_url, open_database, opened_database
+from rbfrag.db.insert import insert_row
 from rbfrag.db.location import locate
 from rbfrag.db.schema import suite
 from rbfrag.db.upgrade import upgrade_database
@@ -92,7 +93,7 @@ class TestCreation:
 
     def test_creating_again_keeps_the_content(self, place: str) -> None:
         with opened_database(place, create=True) as engine, engine.begin() as connection:
-            connection.execute(insert(suite).values(name="kept"))
+            insert_row(connection, suite, {"name": "kept"})
         with opened_database(place, create=True) as engine:
             assert _count(engine) == 1
 
@@ -138,7 +139,7 @@ class TestCreation:
         def overtaken(engine: Engine) -> None:
             monkeypatch.setattr(rbfrag.db.create, "migrate", real)
             with opened_database(path, create=True) as other, other.begin() as connection:
-                connection.execute(insert(suite).values(name="theirs"))
+                insert_row(connection, suite, {"name": "theirs"})
             real(engine)
 
         monkeypatch.setattr(rbfrag.db.create, "migrate", overtaken)
@@ -275,7 +276,7 @@ class TestRefusals:
             with engine.begin() as connection:
                 connection.exec_driver_sql("PRAGMA max_page_count = 1")
                 with pytest.raises(DatabaseError, match="disk is full"):
-                    connection.execute(insert(suite).values(name="x" * 100_000))
+                    insert_row(connection, suite, {"name": "x" * 100_000})
             assert _count(engine) == 0
 
     def test_postgres_without_psycopg(self, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -303,7 +304,7 @@ class TestReadOnly:
             engine.connect() as connection,
             pytest.raises(DatabaseReadOnlyError),
         ):
-            connection.execute(insert(suite).values(name="x"))
+            insert_row(connection, suite, {"name": "x"})
 
     def test_reading_leaves_nothing_behind(self, sqlite_file: Path) -> None:
         with opened_database(sqlite_file, read_only=True) as engine:
@@ -313,7 +314,7 @@ class TestReadOnly:
     def test_in_a_folder_that_cannot_be_written(self, locked_folder: Any) -> None:
         path = locked_folder.folder / "x.db"
         with opened_database(path, create=True) as engine, engine.begin() as connection:
-            connection.execute(insert(suite).values(name="a"))
+            insert_row(connection, suite, {"name": "a"})
         with locked_folder():
             assert not os.access(path.parent, os.W_OK, effective_ids=True)
             with opened_database(path, read_only=True) as engine:
@@ -329,7 +330,7 @@ class TestReadOnly:
         source = tmp_path / "x.db"
         with opened_database(source, create=True) as engine:
             with engine.begin() as connection:
-                connection.execute(insert(suite).values(name="only in the log"))
+                insert_row(connection, suite, {"name": "only in the log"})
             for tail in ("", "-wal"):
                 copy = locked_folder.folder / f"x.db{tail}"
                 copy.write_bytes(source.with_name(f"x.db{tail}").read_bytes())
@@ -347,7 +348,7 @@ def test_a_message_never_shows_the_password() -> None:
 def test_two_writers_take_turns(sqlite_file: Path) -> None:
     # BEGIN IMMEDIATE: the second waits at its beginning instead of failing in its middle.
     with opened_database(sqlite_file) as engine, engine.begin() as first:
-        first.execute(insert(suite).values(name="a"))
+        insert_row(first, suite, {"name": "a"})
         with pytest.raises(DatabaseBusyError):
             open_database(sqlite_file, busy_timeout_s=0.01)
     with opened_database(sqlite_file) as engine:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from sqlalchemy import Engine, delete, func, insert, select, update
+from sqlalchemy import Engine, delete, func, select, true, update
 
 from rbfrag.db import schema
 from rbfrag.db.campaigns import start_campaign
@@ -18,6 +18,7 @@ from rbfrag.db.check.compare_maps import contradictions
 from rbfrag.db.check.database import check_database
 from rbfrag.db.content import CONTENT_TABLES, content_digest, table_rows_by_natural_key
 from rbfrag.db.engine import open_database, opened_database
+from rbfrag.db.insert import insert_if_new, insert_row, update_rows
 from rbfrag.db.keys import response_key
 from rbfrag.db.merge.databases import MergeReport, merge_databases
 from rbfrag.db.models import load_model, model_rows, save_model
@@ -64,6 +65,8 @@ def _change(engine: Engine, *statements: Any) -> None:
     with engine.begin() as connection:
         for statement in statements:
             connection.execute(statement)
+        for table in schema.metadata.tables.values():
+            update_rows(connection, table, true(), {})  # the digests of what is said now
 
 
 class TestTogether:
@@ -180,26 +183,22 @@ class TestTogether:
             block_of_key: dict[str, Any] = {"polarity": "forward", "p2": 3.0}
             block = {"motion_id": motion_id, **block_of_key}
             x = {**block, "numerics_version": "0", "x_m_s": 0.3}
-            connection.execute(insert(schema.toppling_spectrum).values(**x))
+            insert_if_new(connection, schema.toppling_spectrum, x)
             for low, high, outcome in ((0.01, 0.1, "topples"), (0.1, 1.0, "safe")):
-                row = {"k_lo": low, "k_hi": high, "outcome": outcome}
-                connection.execute(
-                    insert(schema.outcome_interval).values(combination_id=combination_id, **row)
-                )
+                row = {"combination_id": combination_id, "k_lo": low, "k_hi": high}
+                insert_if_new(connection, schema.outcome_interval, {**row, "outcome": outcome})
             sha = select(schema.motion.c.samples_sha256).where(schema.motion.c.id == motion_id)
             key = response_key(
                 motion_sha256=str(connection.scalar(sha)), dt_s=0.01, kind="toppling", kr=0.1,
                 vertical_sha256=connection.scalar(sha), numerics_version="2", **block_of_key,
             )  # fmt: skip
             arrays = ("time_s", "theta_rad", "theta_dot_rad_s", "k_h", "k_v")
-            connection.execute(
-                insert(schema.response).values(
-                    natural_key=key, kind="toppling", linear=False, kr=0.1, npts=1,
-                    numerics_version="2", outcome="stable", peak_theta_n=0.5,
-                    vertical_motion_id=motion_id, **block,
-                    **dict.fromkeys(arrays, b"\x00" * 8),
-                )
-            )  # fmt: skip
+            values = {
+                "natural_key": key, "kind": "toppling", "linear": False, "kr": 0.1, "npts": 1,
+                "numerics_version": "2", "outcome": "stable", "peak_theta_n": 0.5,
+                "vertical_motion_id": motion_id, **block, **dict.fromkeys(arrays, b"\x00" * 8),
+            }  # fmt: skip
+            insert_row(connection, schema.response, values)
         for _ in range(2):
             _merge(filled, theirs)
             assert _digest(theirs) == _digest(filled)
@@ -207,7 +206,7 @@ class TestTogether:
     def test_a_campaign_is_one_campaign(self, filled: Engine, theirs: Engine) -> None:
         _merge(filled, theirs)
         with theirs.begin() as connection:
-            connection.execute(update(schema.campaign).values(finished=None))
+            update_rows(connection, schema.campaign, true(), {"finished": None})
         _merge(filled, theirs)
         with theirs.connect() as connection:
             assert connection.scalar(select(func.count()).select_from(schema.campaign)) == 1
@@ -218,7 +217,9 @@ class TestTogether:
         least = select(func.min(schema.combination.c.id)).scalar_subquery()
         for place, k in ((filled, 0.2), (theirs, 0.3)):
             row = {"kr_over_pga": k, "theta_n": k, "outcome": "stable"}
-            _change(place, insert(schema.simulation).values(combination_id=least, **row))
+            with place.begin() as connection:
+                number = connection.scalar(select(least))
+                insert_if_new(connection, schema.simulation, {**row, "combination_id": number})
         report = _merge(filled, theirs)
         assert report.added == {"simulation": 1}
         _merge(theirs, filled)

@@ -55,7 +55,7 @@ class TestDictionary:
         assert column["vertical_motion_id"].may_be_missing
         assert column["certified"].type == "true/false"
         assert column["kr"].type == "number"
-        assert TABLES["motion"].columns[-2].type == "array"
+        assert TABLES["motion"].columns[-3].type == "array"
 
     def test_json_and_markdown_name_every_column(self) -> None:
         document, text = dictionary_as_json(), dictionary_as_markdown()
@@ -80,8 +80,8 @@ class TestColumns:
         assert list(found) == [column.name for column in schema.combination.c]
         assert {name: values.dtype.kind for name, values in found.items()} | {} == {
             **dict.fromkeys(found, "O"),
-            **dict.fromkeys(("id", "campaign_id", "motion_id", "n_runs"), "i"),
-            **dict.fromkeys(("linear", "certified", "reentrant"), "b"),
+            **dict.fromkeys(("id", "campaign_id", "motion_id", "n_runs", "digest"), "i"),
+            **dict.fromkeys(("linear", "certified"), "b"),
             **dict.fromkeys(
                 ("vertical_motion_id", "p2", "search_limit", "kr_over_pga", "lower", "upper", "kr",
                  "y_m_s", "k_up_over_pga", "undecided", "island_width", "kr_over_pga_resolved"),

@@ -12,7 +12,7 @@ from sqlalchemy import Connection, Row, RowMapping, Select, select
 
 from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
 from rbfrag.db.check.intervals import interval_problems
-from rbfrag.db.check.kinds import rotation_of, sliding_problems
+from rbfrag.db.check.kinds import displacement_problems, fails_by_outcome
 from rbfrag.db.keys import combination_key
 from rbfrag.db.schema import campaign, combination, motion, outcome_interval, simulation
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -97,12 +97,10 @@ def _problems(
     except ValueError as error:
         yield f"its warnings cannot be read: {error}"
     yield from _value_problems(row)
-    if row["kind"] == "sliding":
-        yield from sliding_problems(row, points)
-        return
+    yield from displacement_problems(row, points)
     toppled = [point.kr_over_pga for point in points if point.outcome == "toppled"]
     unsure = [point.kr_over_pga for point in points if point.outcome == "undetermined"]
-    if rotation_of(row["settings"]) is None:
+    if fails_by_outcome(row["settings"]):
         yield from _point_problems(row, toppled, unsure)
     stable = [point.kr_over_pga for point in points if point.outcome == "stable"]
     yield from interval_problems(row, intervals, toppled, stable)

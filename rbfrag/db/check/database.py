@@ -10,7 +10,7 @@ from sqlalchemy import Connection, exists, select
 from rbfrag.db.check.combinations import check_combinations
 from rbfrag.db.check.finding import FIT_AGAIN, RESTORE, Finding
 from rbfrag.db.check.motions import check_motions
-from rbfrag.db.check.numbers import check_numbers
+from rbfrag.db.check.numbers import check_digests, check_numbers
 from rbfrag.db.check.responses import check_responses
 from rbfrag.db.check.spectra import check_spectra
 from rbfrag.db.schema import earthquake, fragility_model, motion, recording
@@ -22,7 +22,8 @@ def check_database(connection: Connection) -> list[Finding]:
     Looks at the file itself (SQLite), references, the samples against their sha256 and their
     intensity measures, toppling spectra, keys against what they are hashes of, brackets,
     y = kr·g/p, the map of intervals, simulations against both, histories, rows that nothing
-    refers to, numbers that are not finite, and the models. Makes no simulation.
+    refers to, the digest of each row, numbers that are not finite, and the models. Makes no
+    simulation.
 
     Args:
         connection: the database, inside one transaction.
@@ -31,6 +32,7 @@ def check_database(connection: Connection) -> list[Finding]:
     if connection.dialect.name == "sqlite":
         found += _check_sqlite_file(connection)
     found += check_numbers(connection)
+    found += check_digests(connection)
     found += check_motions(connection)
     found += check_spectra(connection)
     found += _check_unused(connection)

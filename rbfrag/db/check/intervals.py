@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -25,7 +24,7 @@ def interval_problems(
     """Yield what is wrong with a map.
 
     Searches that did not ask for one hold none, nor do motions outside the model or that never
-    lift a block.
+    lift a block. A gap says that nothing is known in it.
 
     Args:
         row: the combination.
@@ -34,8 +33,6 @@ def interval_problems(
         stable: kr/PGA of those that did not.
     """
     if not intervals:
-        if row["status"] in ("found", "below_limit") and _maps_all(row["settings"]):
-            yield "its map of intervals is missing"
         return
     yield from _cover_problems(row, intervals)
     yield from _bracket_problems(row, intervals)
@@ -49,41 +46,16 @@ def interval_problems(
                 )
 
 
-def _maps_all(settings: str) -> bool:
-    return _setting(settings, "map") == "full"
-
-
-def _states_depth(settings: str) -> bool:
-    return _setting(settings, "map_depth") is not None
-
-
-def _setting(settings: str, name: str) -> object:
-    try:
-        return json.loads(settings).get(name)
-    except (ValueError, AttributeError):
-        return None  # its own finding
-
-
 def _said(outcome: str) -> str:
     return "safe" if outcome == "safe" else "said to topple"
 
 
 def _cover_problems(row: RowMapping, intervals: Sequence[Row[Any]]) -> Iterator[str]:
     limit, bottom = row["search_limit"], intervals[0].k_lo
-    # The shipped reference keeps decided intervals alone; other kinds say what they saw.
-    gaps = _setting(row["settings"], "map") in ("decided", "seen")
-    needed = limit
-    if not _states_depth(row["settings"]) and row["status"] == "found" and row["lower"] is not None:
-        # earlier maps end where a search was given up, which may be anywhere below the bracket
-        needed = row["lower"]
-    if bottom < limit * (1.0 - _ROUNDING):
+    if limit is not None and bottom < limit * (1.0 - _ROUNDING):
         yield f"its map begins at kr/PGA {bottom!r}, below the search limit {limit!r}"
-    elif not gaps and bottom > needed * (1.0 + _CLEARANCE):
-        yield f"its map begins at kr/PGA {bottom!r}, above {needed!r}"
     for below, above in itertools.pairwise(intervals):
-        if below.k_hi < above.k_lo and not gaps:
-            yield f"its map has a gap from kr/PGA {below.k_hi!r} to {above.k_lo!r}"
-        elif below.k_hi > above.k_lo:
+        if below.k_hi > above.k_lo:
             yield f"two of its intervals overlap from kr/PGA {above.k_lo!r} to {below.k_hi!r}"
     top, k_up = intervals[-1].k_hi, row["k_up_over_pga"]
     if k_up is not None and top < k_up * (1.0 - _ROUNDING):

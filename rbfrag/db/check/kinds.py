@@ -1,4 +1,4 @@
-"""Stored combinations of the other kinds: what holds of sliding, and what counts as failure."""
+"""What counts as failure of a stored combination, and its displacements."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from sqlalchemy import Row, RowMapping
 _ROUNDING = 1e-9
 
 
-def rotation_of(settings: str) -> float | None:
-    """Return the rotation that counts as failure [deg]; None for failure past recovery."""
+def fails_by_outcome(settings: str) -> bool:
+    """Return whether failure is the outcome itself, not a stated rotation or displacement."""
     try:
-        stated = json.loads(settings).get("rotation_deg")
+        stated = json.loads(settings)
+        return stated.get("rotation_deg") is None and stated.get("displacement_m") is None
     except (ValueError, AttributeError):
-        return None  # its own finding
-    return None if stated is None else float(stated)
+        return True  # its own finding
 
 
-def sliding_problems(row: RowMapping, points: Sequence[Row[Any]]) -> Iterator[str]:
-    """Yield what cannot be of a sliding block: displacements fall with its strength.
+def displacement_problems(row: RowMapping, points: Sequence[Row[Any]]) -> Iterator[str]:
+    """Yield what cannot be of blocks that slide: displacements fall with strength.
 
     Args:
         row: the combination.
@@ -37,7 +37,11 @@ def sliding_problems(row: RowMapping, points: Sequence[Row[Any]]) -> Iterator[st
                 f"a block of ky/PGA {strong!r} slides {near!r} m, further than the {far!r} m of a "
                 f"weaker one, ky/PGA {weak!r}"
             )
-    if row["status"] == "found" and json.loads(row["settings"]).get("displacement_m") == 0.0:
+    if (
+        slid
+        and row["status"] == "found"
+        and json.loads(row["settings"]).get("displacement_m") == 0.0
+    ):
         for k, d in slid:
             if d > 0.0 and k >= row["kr_over_pga"]:
                 yield f"a block of ky/PGA {k!r} slides, yet none moves from {row['kr_over_pga']!r}"

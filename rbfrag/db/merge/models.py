@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sqlalchemy import Connection, insert
+from sqlalchemy import Connection
 
+from rbfrag.db.insert import insert_row
 from rbfrag.db.merge.ledger import Ledger
 from rbfrag.db.model_record import encode_model
 from rbfrag.db.models import model_rows
@@ -35,7 +36,7 @@ def merge_models(source: Connection, target: Connection, ledger: Ledger) -> None
             ledger.same["fragility_model"] += 1
             continue
         row = replace(theirs, name=name, is_default=theirs.is_default and theirs.kind not in had)
-        target.execute(insert(fragility_model).values(**encode_model(row)))
+        insert_row(target, fragility_model, encode_model(row))
         ours[name] = row
         ledger.added["fragility_model"] += 1
         if name != theirs.name:

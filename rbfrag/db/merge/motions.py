@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy import Connection, RowMapping, Select, delete, exists, func, insert, select, update
+from sqlalchemy import Connection, RowMapping, Select, delete, exists, func, select
 
-from rbfrag.db.insert import insert_if_new
+from rbfrag.db.insert import insert_if_new, insert_row, update_rows
 from rbfrag.db.merge.ledger import Ledger
 from rbfrag.db.schema import earthquake, motion, recording, suite, suite_motion
 
@@ -21,7 +21,7 @@ _MEASURED = (
     "final_velocity_m_s",
     "final_displacement_m",
 )
-_OWN = ("id", "recording_id", "dt_s", "npts", "samples_sha256", "samples", "added")
+_OWN = ("id", "recording_id", "dt_s", "npts", "samples_sha256", "samples", "added", "digest")
 _LABELS = tuple(c.name for c in motion.c if c.name not in (*_OWN, *_MEASURED))
 # Sums over some 1e5 samples, in another order on another processor.
 _ROUNDING = 1e-9
@@ -70,12 +70,12 @@ def merge_motions(source: Connection, target: Connection, ledger: Ledger) -> Mer
         _compare_measures(ours, theirs, ledger)
         same_bits = theirs["id"] not in merged.other_bits
         if same_bits and ours["no_samples"] and not theirs["no_samples"]:
-            filled = update(motion).where(motion.c.id == ours["id"])
-            target.execute(filled.values(samples=_samples(source, theirs["id"])))
+            samples = {"samples": _samples(source, theirs["id"])}
+            update_rows(target, motion, motion.c.id == ours["id"], samples)
         if ours["guessed"] and not theirs["guessed"]:
             values = {name: theirs[name] for name in _LABELS}
             values["recording_id"] = _recording_id(target, theirs, ledger)
-            target.execute(update(motion).where(motion.c.id == ours["id"]).values(**values))
+            update_rows(target, motion, motion.c.id == ours["id"], values)
             left.add(ours["recording_id"])
             ledger.restated += 1
         else:
@@ -154,9 +154,7 @@ def _add(source: Connection, target: Connection, theirs: RowMapping, ledger: Led
     values = {name: theirs[name] for name in copied}
     values["samples"] = _samples(source, theirs["id"])
     values["recording_id"] = _recording_id(target, theirs, ledger)
-    done = target.execute(insert(motion).values(**values))
-    assert done.inserted_primary_key is not None
-    return int(done.inserted_primary_key[0])
+    return insert_row(target, motion, values)
 
 
 def _recording_id(target: Connection, theirs: RowMapping, ledger: Ledger) -> int:
@@ -218,7 +216,7 @@ def _earthquake_id(target: Connection, theirs: RowMapping, event_id: str, ledger
         else:
             ledger.keep("earthquake", event_id, column, here, there)
     if missing:
-        target.execute(update(earthquake).where(earthquake.c.id == ours["id"]).values(**missing))
+        update_rows(target, earthquake, earthquake.c.id == ours["id"], missing)
     return int(ours["id"])
 
 

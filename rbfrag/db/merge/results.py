@@ -8,11 +8,12 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import Connection, RowMapping, Table, insert, select, update
+from sqlalchemy import Connection, RowMapping, Table, select
 
-from rbfrag.db.campaigns import known_combinations
+from rbfrag.db.campaigns import GRID_MEETS_POINT, known_combinations
 from rbfrag.db.check.compare_maps import BORDER_ERROR, contradictions
-from rbfrag.db.insert import insert_if_new, insert_rows
+from rbfrag.db.digest import NOT_DIGESTED
+from rbfrag.db.insert import insert_if_new, insert_row, insert_rows, update_rows
 from rbfrag.db.keys import combination_key
 from rbfrag.db.merge.ledger import Ledger
 from rbfrag.db.merge.motions import MergedMotions
@@ -27,17 +28,18 @@ from rbfrag.db.schema import (
 )
 
 _AT_ONCE = 500
-_COLUMNS = tuple(column.name for column in combination.c if column.name != "id")
+_COLUMNS = tuple(c.name for c in combination.c if c.name not in ("id", "digest"))
 _INPUTS = (
     "natural_key", "polarity", "kind", "linear", "p2", "block", "settings", "numerics_version",
 )  # fmt: skip
 _INCIDENTAL = ("campaign_id", "motion_id", "vertical_motion_id", "warnings")
-_VALUES = tuple(name for name in _COLUMNS if name not in (*_INPUTS, *_INCIDENTAL))
+_OF_A_MAP = ("island_width", "kr_over_pga_resolved", "reentrant")
+_VALUES = tuple(name for name in _COLUMNS if name not in (*_INPUTS, *_INCIDENTAL, *_OF_A_MAP))
 
 ROTATION_ERROR = 1e-6
 """Relative error of a rotation that another processor's last bits can make."""
 
-Point = tuple[float, float | None, str, float | None]
+Point = tuple[float, float | None, str, float | None, int | None]
 AnyRow = RowMapping | Mapping[str, Any]
 
 
@@ -66,11 +68,9 @@ def merge_campaigns(source: Connection, target: Connection, ledger: Ledger) -> d
             ids[theirs["id"]] = ours.id
             if ours.finished is None and theirs["finished"] is not None:
                 values = {"finished": theirs["finished"]}
-                target.execute(update(campaign).where(campaign.c.id == ours.id).values(**values))
+                update_rows(target, campaign, campaign.c.id == ours.id, values)
             continue
-        done = target.execute(insert(campaign).values(**key, finished=theirs["finished"]))
-        assert done.inserted_primary_key is not None
-        ids[theirs["id"]] = int(done.inserted_primary_key[0])
+        ids[theirs["id"]] = insert_row(target, campaign, {**key, "finished": theirs["finished"]})
         ledger.added["campaign"] += 1
     return ids
 
@@ -132,7 +132,7 @@ def _add(
     ids = known_combinations(target, (row["natural_key"] for row in rows))
     here = {row["id"]: ids[row["natural_key"]].id for row in rows}
     for table in (outcome_interval, simulation):
-        names = tuple(column.name for column in table.c)
+        names = _written(table)
         children = [
             (here[their_id], *child)
             for their_id, of_it in _children(source, table, list(here)).items()
@@ -174,13 +174,17 @@ def _children(
     connection: Connection, table: Table, ids: Sequence[int]
 ) -> defaultdict[int, list[tuple[Any, ...]]]:
     """Return the rows of a table that belong to combinations, in the order of its key."""
-    query = (
-        select(table).where(table.c.combination_id.in_(ids)).order_by(*table.primary_key.columns)
-    )
+    columns = [table.c[name] for name in _written(table)]
+    query = select(*columns).where(table.c.combination_id.in_(ids))
+    query = query.order_by(*table.primary_key.columns)
     by_id: defaultdict[int, list[tuple[Any, ...]]] = defaultdict(list)
     for combination_id, *rest in connection.execute(query):
         by_id[combination_id].append(tuple(rest))
     return by_id
+
+
+def _written(table: Table) -> tuple[str, ...]:
+    return tuple(column.name for column in table.c if column.name != "digest")
 
 
 def _compare(
@@ -198,19 +202,30 @@ def _compare(
             _children(source, outcome_interval, their_ids))  # fmt: skip
     runs = (_children(target, simulation, our_ids), _children(source, simulation, their_ids))
     more: list[tuple[object, ...]] = []
+    intervals: list[tuple[object, ...]] = []
     for theirs in rows:
         ours = ours_by_key[theirs["natural_key"]]
         name = f"{theirs['natural_key'][:12]}…"
         here_map, there_map = maps[0][ours["id"]], maps[1][theirs["id"]]
-        exact = here_map == there_map and all(ours[c] == theirs[c] for c in _VALUES)
+        both_mapped = bool(here_map and there_map)
+        compared = (*_VALUES, *_OF_A_MAP) if both_mapped else _VALUES
+        exact = all(ours[c] == theirs[c] for c in compared) and (
+            not both_mapped or here_map == there_map
+        )
         if not exact and not _within_error(name, ours, theirs, here_map, there_map, ledger):
             continue
         ledger.same["combination"] += 1
         ledger.within_error += not exact
+        if there_map and not here_map:
+            intervals += ((ours["id"], *interval) for interval in there_map)
+            found = {column: theirs[column] for column in _OF_A_MAP}
+            update_rows(target, combination, combination.c.id == ours["id"], found)
         band = None if exact else _band(ours, theirs)
         points = (runs[0][ours["id"]], runs[1][theirs["id"]])
         more += ((ours["id"], *point) for point in _more_points(name, *points, band, ledger))
-    insert_rows(target, simulation, tuple(column.name for column in simulation.c), more)
+    insert_rows(target, outcome_interval, _written(outcome_interval), intervals)
+    insert_rows(target, simulation, _written(simulation), more, on_conflict=GRID_MEETS_POINT)
+    ledger.added["outcome_interval"] += len(intervals)
     ledger.added["simulation"] += len(more)
 
 
@@ -263,28 +278,38 @@ def _more_points(
     band: tuple[float, float] | None,
     ledger: Ledger,
 ) -> list[Point]:
-    known = {k: rest for k, *rest in here}
+    known: dict[float, Point] = {point[0]: point for point in here}
+    numbered: dict[int, Point] = {point[4]: point for point in here if point[4] is not None}
     more: list[Point] = []
-    for k, theta, outcome, slid in there:
-        if k not in known:
-            if band is None or not band[0] <= k <= band[1]:
-                more.append((k, theta, outcome, slid))
+    for point in there:
+        k, theta, outcome, slid, number = point
+        # another processor may have given a block of the grid a strength of other last bits
+        mine = known.get(k) if number is None else numbered.get(number, known.get(k))
+        in_band = band is not None and band[0] <= k <= band[1]
+        if mine is None:
+            if number is not None or not in_band:
+                more.append(point)
             continue
-        our_theta, our_outcome, our_slid = known[k]
-        if None not in (slid, our_slid) and not math.isclose(
-            slid, our_slid, rel_tol=ROTATION_ERROR, abs_tol=1e-12
-        ):
+        if number is not None and mine[4] is None:
+            more.append((*mine[:4], number))
+        _, our_theta, our_outcome, our_slid, _ = mine
+        if _differ(slid, our_slid):
             column = f"displacement_m at ky/PGA {k!r}"
             ledger.conflict("simulation", name, column, our_slid, slid)
-        if outcome != our_outcome and (band is None or not band[0] <= k <= band[1]):
-            column = f"the outcome at kr/PGA {k!r}"
-            ledger.conflict("simulation", name, column, our_outcome, outcome)
-        elif None not in (theta, our_theta) and not math.isclose(
-            theta, our_theta, rel_tol=ROTATION_ERROR, abs_tol=1e-12
-        ):
+        if outcome != our_outcome:
+            if not in_band:
+                column = f"the outcome at kr/PGA {k!r}"
+                ledger.conflict("simulation", name, column, our_outcome, outcome)
+        elif _differ(theta, our_theta):
             column = f"theta_n at kr/PGA {k!r}"
             ledger.conflict("simulation", name, column, our_theta, theta)
     return more
+
+
+def _differ(one: float | None, other: float | None) -> bool:
+    if one is None or other is None:
+        return False
+    return not math.isclose(one, other, rel_tol=ROTATION_ERROR, abs_tol=1e-12)
 
 
 def merge_spectra(
@@ -300,6 +325,7 @@ def merge_spectra(
     """
     for theirs in source.execute(select(toppling_spectrum)).mappings():
         values = {**theirs, "motion_id": motions.ids[theirs["motion_id"]]}
+        del values["digest"]
         if insert_if_new(target, toppling_spectrum, values):
             ledger.added["toppling_spectrum"] += 1
             continue
@@ -330,7 +356,7 @@ def merge_responses(
                 "are other here: rbfrag simulate  makes it again"
             )
             continue
-        values = {name: value for name, value in theirs.items() if name != "id"}
+        values = {name: value for name, value in theirs.items() if name not in NOT_DIGESTED}
         values["motion_id"] = motions.ids[theirs["motion_id"]]
         values["vertical_motion_id"] = _vertical(motions, theirs["vertical_motion_id"])
         if insert_if_new(target, response, values):
