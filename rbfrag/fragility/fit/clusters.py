@@ -79,7 +79,7 @@ def bootstrap(
     *,
     replicates: int,
     seed: int,
-    enough: Callable[[FloatArray], bool] = lambda times: True,
+    enough: Callable[[FloatArray], bool] | None = None,
 ) -> FloatArray:
     """Return parameters fitted to resampled earthquakes, shape (replicates, k).
 
@@ -103,7 +103,7 @@ def bootstrap(
     samples = []
     for _ in range(replicates):
         times = drawn()
-        while not enough(times):
+        while enough is not None and not enough(times):
             times = drawn()
         samples.append(fit(times))
     return np.array(samples)

@@ -12,7 +12,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -480,11 +480,10 @@ def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
     block["y_m_s"] = strength * STANDARD_GRAVITY_M_S2 / size
     k = source.k_over_pga if source.k_over_pga.shape[1] else np.tile(K_OVER_PGA, (ratio.size, 1))
 
-    def shaking(k_over_pga: FloatArray, strength: FloatArray, per_pga: FloatArray) -> dict[str, Any]:
+    def shaking(k: FloatArray, strength: FloatArray, per_pga: FloatArray) -> dict[str, FloatArray]:
         # the scaled record: its PGA is k over the ratio, and PGV goes with it
-        pga = strength / k_over_pga
-        pgv = pga * per_pga
-        return {"pga_g": pga, "pgv_m_s": pgv, "intensity_m_s": pgv}
+        of_record = {"pga_g": strength / k, "pgv_m_s": strength / k * per_pga}
+        return {**of_record, "intensity_m_s": term.intensity_m_s(of_record)}
 
     if not source.k_over_pga.shape[1]:
         source = FitSource(table, source.xp_m_s, k, np.full(k.shape, np.nan))
@@ -510,17 +509,19 @@ def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
 
 def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
     """Return the points of blocks of every stored strength: how far each slides."""
-    from rbfrag.solver.search.displacement import THRESHOLDS_M
+    from rbfrag.solver.models.sliding import THRESHOLDS_M
 
-    table, k = source.table, source.k_over_pga
-    n, m = k.shape
-    own = np.repeat(np.arange(n), m)
-    k = k.ravel()
-    slid = np.full(n * m, np.nan) if source.displacement_m is None else source.displacement_m.ravel()
+    n, m = source.k_over_pga.shape
+    own, k = np.repeat(np.arange(n), m), source.k_over_pga.ravel()
+    given = source.displacement_m
+    slid = np.full(n * m, np.nan) if given is None else given.ravel()
     measures = {name: value[own] for name, value in _measures(source).items()}
     beyond = np.maximum(slid, LEAST_DISPLACEMENT_M)
     values = {name: measures[name] for name in ("pgv_m_s", "pga_g")}
-    values |= {"intensity_m_s": measures["pgv_m_s"], method.block.strength: k * values["pga_g"]}
+    values |= {
+        method.block.strength: k * values["pga_g"],
+        "intensity_m_s": term.intensity_m_s(values),
+    }
     distances = np.broadcast_to(np.array(THRESHOLDS_M), (k.size, len(THRESHOLDS_M)))
     with np.errstate(invalid="ignore"):
         usable = (k < 1.0) & (values["pgv_m_s"] > 0.0) & np.isfinite(slid)
