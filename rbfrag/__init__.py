@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from rbfrag.exchange.database_tables import read_table as read_table
     from rbfrag.exchange.hazard_curves import read_hazard_curves as read_hazard_curves
     from rbfrag.fragility.fit.fitting import fit as fit
-    from rbfrag.fragility.fit.kind_fitting import fit_kind as fit_kind
     from rbfrag.fragility.kind_prediction import predict_sliding as predict_sliding
     from rbfrag.fragility.kind_prediction import predict_slumping as predict_slumping
     from rbfrag.fragility.predict import predict as predict
@@ -70,7 +69,6 @@ _HOME = {
     "add_motions": "rbfrag.campaign.add_motions",
     "critical": "rbfrag.solver.critical",
     "fit": "rbfrag.fragility.fit.fitting",
-    "fit_kind": "rbfrag.fragility.fit.kind_fitting",
     "hazard": "rbfrag.hazards.answer",
     "predict": "rbfrag.fragility.predict",
     "predict_sliding": "rbfrag.fragility.kind_prediction",

@@ -21,7 +21,7 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.scores import Judged, critical_outcomes
 from rbfrag.fragility.measures import Term
-from rbfrag.fragility.methods import BlockParameters, Method
+from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, Method
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def kr_over_pga_of_grid(p2: ArrayLike, pgv_m_s: ArrayLike, pga_g: ArrayLike) -> 
 
 def read_source(
     connection: Connection,
-    block: BlockParameters,
+    block: BlockParameters = TOPPLING_BLOCK,
     *,
     kind: str | None = None,
     rotation_deg: float | None = None,
