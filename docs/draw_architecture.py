@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "rbfrag"
 FIGURE = ROOT / "docs" / "figures" / "architecture.svg"
 
-BESIDE = {"rbfrag", "errors", "version", "migrations"}
+BESIDE = {"rbfrag", "errors", "files", "version", "migrations"}
 """What the figure leaves out: the public face, what everybody may import, the schema's steps."""
 
 Graph = Mapping[str, set[str]]

@@ -24,7 +24,7 @@ def study(combinations: Sequence[Combination]) -> dict[str, Any]:
         samples = np.round(motion.acceleration_g / ROUNDED_TO_G) * ROUNDED_TO_G
         rounded = replace(motion, acceleration_g=samples)
         first, second = (
-            critical(m, p2=one.p2, vertical=one.vertical, polarity=one.polarity)
+            critical(m, p2=one.p2, vertical=one.vertical, polarity=one.polarity, full_map=True)
             for m in (motion, rounded)
         )
         if first.kr is not None and second.kr is not None:

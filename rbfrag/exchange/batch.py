@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Mapping
 from contextlib import ExitStack
 from os import PathLike
@@ -14,8 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.batch_table import csv_parts, csv_writer, parquet_parts, parquet_writer
+from rbfrag.exchange.batch_table import (
+    csv_parts,
+    csv_writer,
+    numbers,
+    parquet_parts,
+    parquet_writer,
+)
 from rbfrag.exchange.block_table import table_path
+from rbfrag.files import reading, written_whole
 from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
@@ -69,13 +75,13 @@ def predict_table(
         raise InputError(f"{origin}: a block table ends in .csv or .parquet, not {suffix!r}")
     if origin.exists() and goal.exists() and origin.samefile(goal):
         raise InputError(f"--out {goal} is the table itself: name another file")
-    partial = goal.with_name(f".{goal.name}.{os.getpid()}.part")
     try:
-        with ExitStack() as stack:
+        with reading(origin, "a block table"), ExitStack() as stack:
             opened = csv_parts if suffix == ".csv" else parquet_parts
             header, parts = opened(origin, NUMERIC, stack)
             names = _columns(origin, header, measures)
             chosen = find_model(model, [*BLOCK_COLUMNS.values(), *names.values(), *measures], db)
+            partial = stack.enter_context(written_whole(goal))
             writer = csv_writer if goal.suffix.lower() == ".csv" else parquet_writer
             kept = [name for name in header if name not in ANSWERS]
             write = writer(partial, kept, ANSWERS, NUMERIC, stack)
@@ -87,16 +93,8 @@ def predict_table(
                 write(part, answer)
                 known = np.isfinite(answer["probability"])
                 counts += [known.size, int(known.sum()), int(answer["in_domain"].sum())]
-        partial.replace(goal)
-    except OSError as error:
-        where = error.filename or str(origin)
-        raise InputError(f"{where}: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{origin}: not a text file (UTF-8)") from None
     except csv.Error as error:
         raise InputError(f"{origin}: not a CSV file: {error}") from None
-    finally:
-        partial.unlink(missing_ok=True)
     rows, answered, inside = counts.tolist()
     return {
         "rows": rows,
@@ -137,7 +135,7 @@ def _answer(
     model: FragilityModel,
     level: float,
 ) -> dict[str, NDArray[Any]]:
-    values = {names[column]: _numbers(origin, column, part[column], first_line) for column in names}
+    values = {names[column]: numbers(origin, column, part[column], first_line) for column in names}
     predicted = answer_given(model, {**values, **measures}, level)
     assert isinstance(predicted, PredictionArray)
     answer: dict[str, NDArray[Any]] = {
@@ -156,20 +154,3 @@ def _answer(
         for i in np.flatnonzero(other).tolist():
             answer["reason"][i] = NOT_TOPPLING.format(mode=str(modes[i]).replace("_", " "))
     return answer
-
-
-def _numbers(origin: Path, column: str, cells: Any, first_line: int) -> FloatArray:
-    if isinstance(cells, np.ndarray):
-        return cells
-    try:
-        return np.array([float(cell) if cell.strip() else np.nan for cell in cells])
-    except ValueError:
-        for number, cell in enumerate(cells):
-            try:
-                float(cell.strip() or "nan")
-            except ValueError:
-                raise InputError(
-                    f"{origin}, line {first_line + number}: {column} = {cell.strip()!r} is not a "
-                    "number"
-                ) from None
-        raise

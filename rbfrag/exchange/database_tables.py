@@ -24,7 +24,7 @@ from rbfrag.db.data_dictionary import (
 from rbfrag.db.engine import opened_database
 from rbfrag.db.table_columns import TABLES, Batch, chosen_columns, column_batches, read_columns
 from rbfrag.errors import InputError, WorkFailedError
-from rbfrag.exchange.block_table import pyarrow
+from rbfrag.exchange.batch_table import pyarrow
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.files import source_text
 from rbfrag.exchange.fragility_function import openquake_type
+from rbfrag.files import source_text
 from rbfrag.hazards.curve import HazardCurve, hazard_curve, rates_from_probabilities
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 

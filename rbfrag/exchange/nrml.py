@@ -12,7 +12,6 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.files import parse_xml
 from rbfrag.exchange.fragility_function import (
     FragilityFunction,
     IntensityType,
@@ -20,6 +19,7 @@ from rbfrag.exchange.fragility_function import (
     lognormal_function,
     openquake_type,
 )
+from rbfrag.exchange.xml_source import parse_xml
 
 _UNITS = {"g": 1.0, "cm/s": 0.01, "m/s": 1.0}
 

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.files import source_text
 from rbfrag.exchange.fragility_function import (
     FragilityFunction,
     IntensityType,
     discrete_function,
     lognormal_function,
 )
+from rbfrag.files import source_text
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 _DEMANDS = {"pga_g": ("Peak Ground Acceleration", "g"), "pgv_m_s": ("Peak Ground Velocity", "mps")}

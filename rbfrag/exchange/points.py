@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, MissingExtraError
-from rbfrag.exchange.files import source_text
+from rbfrag.files import source_text, written_whole
 
 SUFFIXES = (".geojson", ".json")
 """File types of GeoJSON."""
@@ -74,34 +74,30 @@ def write_points(
     """
     names = [name for name in columns if name not in ("lon", "lat")]
     size = len(columns["lon"])
-    partial = target.with_name(f".{target.name}.{os.getpid()}.part")
     head = json.dumps({"type": "FeatureCollection", **about}, ensure_ascii=False)[:-1]
-    try:
-        with partial.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(head + ', "features": [\n')
-            for start in range(0, size, _ROWS):
-                some = slice(start, start + _ROWS)
-                lists = [_plain(columns[name][some]) for name in names]
-                places = zip(columns["lon"][some].tolist(), columns["lat"][some].tolist())  # noqa: B905
-                lines = [
-                    json.dumps(
-                        {
-                            "type": "Feature",
-                            "geometry": {"type": "Point", "coordinates": list(place)},
-                            "properties": dict(zip(names, row, strict=True)),
-                        },
-                        ensure_ascii=False,
-                        allow_nan=False,
-                    )
-                    for place, row in zip(places, zip(*lists, strict=True), strict=True)
-                ]
-                file.write((",\n" if start else "") + ",\n".join(lines))
-            file.write("\n]}\n")
-        partial.replace(target)
-    except OSError as error:
-        raise InputError(f"{target} cannot be written: {error.strerror or error}") from None
-    finally:
-        partial.unlink(missing_ok=True)
+    with (
+        written_whole(target) as partial,
+        partial.open("w", encoding="utf-8", newline="\n") as file,
+    ):
+        file.write(head + ', "features": [\n')
+        for start in range(0, size, _ROWS):
+            some = slice(start, start + _ROWS)
+            lists = [_plain(columns[name][some]) for name in names]
+            places = zip(columns["lon"][some].tolist(), columns["lat"][some].tolist())  # noqa: B905
+            lines = [
+                json.dumps(
+                    {
+                        "type": "Feature",
+                        "geometry": {"type": "Point", "coordinates": list(place)},
+                        "properties": dict(zip(names, row, strict=True)),
+                    },
+                    ensure_ascii=False,
+                    allow_nan=False,
+                )
+                for place, row in zip(places, zip(*lists, strict=True), strict=True)
+            ]
+            file.write((",\n" if start else "") + ",\n".join(lines))
+        file.write("\n]}\n")
 
 
 def _plain(column: NDArray[Any]) -> list[Any]:
@@ -148,14 +144,11 @@ def write_geopackage(columns: Mapping[str, NDArray[Any]], layer: str, target: Pa
         else columns[name]
         for name in names
     ]
-    partial = target.with_name(f".{target.stem}.{os.getpid()}.part.gpkg")
-    try:
-        raw.write(
-            str(partial), points, data, fields=names, layer=layer, driver="GPKG",
-            geometry_type="Point", crs="EPSG:4326",
-        )  # fmt: skip
-        partial.replace(target)
-    except (OSError, RuntimeError) as error:
-        raise InputError(f"{target} cannot be written: {error}") from None
-    finally:
-        partial.unlink(missing_ok=True)
+    with written_whole(target) as partial:
+        try:
+            raw.write(
+                str(partial), points, data, fields=names, layer=layer, driver="GPKG",
+                geometry_type="Point", crs="EPSG:4326",
+            )  # fmt: skip
+        except RuntimeError as error:
+            raise OSError(str(error)) from None

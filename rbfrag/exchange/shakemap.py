@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.files import parse_xml
+from rbfrag.exchange.xml_source import parse_xml
 
 FloatArray = NDArray[np.float64]
 

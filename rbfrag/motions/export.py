@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import secrets
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rbfrag.errors import InputError
+from rbfrag.files import written_whole
 from rbfrag.motions.formats import peer_at2, rbfrag_csv
 from rbfrag.motions.ground_motion import GroundMotion
 
@@ -49,14 +49,5 @@ def export_motions(
 
 
 def _write(target: Path, lines: Iterator[str]) -> None:
-    draft = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
-    try:
-        with draft.open("w", newline="\n", encoding="utf-8") as file:
-            file.writelines(f"{line}\n" for line in lines)
-        draft.replace(target)
-    except OSError as error:
-        raise InputError(
-            f"cannot write {target}: {error.strerror}; name a folder you may write"
-        ) from None
-    finally:
-        draft.unlink(missing_ok=True)
+    with written_whole(target) as draft, draft.open("w", newline="\n", encoding="utf-8") as file:
+        file.writelines(f"{line}\n" for line in lines)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import tempfile
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
@@ -13,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.errors import InputError, MissingExtraError
+from rbfrag.errors import MissingExtraError
+from rbfrag.files import output_path, written_whole
 from rbfrag.solver.stability.modes import ModeName
 
 if TYPE_CHECKING:
@@ -48,54 +47,22 @@ def plot_path(path: str | PathLike[str]) -> Path:
     Raises:
         InputError: the suffix is none of png, pdf, svg, or the folder cannot be written.
     """
-    target = Path(path)
-    if target.suffix.lower() not in SUFFIXES:
-        raise InputError(
-            f"plot file {target}: the suffix {target.suffix!r} is none of "
-            f"{', '.join(SUFFIXES)}: name the file with one of them"
-        )
-    if target.is_dir():
-        raise InputError(f"plot file {target} is a folder: name a file in it")
-    if not target.parent.is_dir():
-        raise InputError(f"plot file {target}: there is no folder {target.parent}: make it first")
-    if not os.access(target.parent, os.W_OK):
-        raise InputError(f"plot file {target}: the folder cannot be written: choose another")
-    return target
+    return output_path(path, SUFFIXES, "plot file")
 
 
 def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
-    """Write a figure as PNG, PDF or SVG by the suffix of the path.
-
-    The file appears whole or not at all.
+    """Write a figure as PNG, PDF or SVG by the suffix of the path, whole or not at all.
 
     Args:
         figure: the figure.
-        path: file to write; an existing file is replaced.
-
-    Returns:
-        The path.
+        path: file to write, which is returned; an existing file is replaced.
 
     Raises:
         InputError: as for :func:`plot_path`, or the disk refuses.
     """
     target = plot_path(path)
-    kind = target.suffix.lower()[1:]
-    unfinished: Path | None = None
-    try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-")
-        unfinished = Path(name)
-        with os.fdopen(handle, "wb") as stream:
-            figure.savefig(stream, format=kind, dpi=160)
-        # A temporary file is private; a figure has the permissions of any new file.
-        mask = os.umask(0)
-        os.umask(mask)
-        unfinished.chmod(0o666 & ~mask)
-        unfinished.replace(target)
-    except OSError as error:
-        raise InputError(f"plot file {target} cannot be written: {error.strerror}") from error
-    finally:
-        if unfinished is not None:
-            unfinished.unlink(missing_ok=True)
+    with written_whole(target, "plot file") as partial, partial.open("wb") as stream:
+        figure.savefig(stream, format=target.suffix.lower()[1:], dpi=160)
     return target
 
 

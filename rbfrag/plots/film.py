@@ -6,13 +6,13 @@ import math
 import os
 import shutil
 import subprocess
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rbfrag.errors import InputError
+from rbfrag.files import output_path, written_whole
 from rbfrag.plots.canvas import new_figure
 from rbfrag.plots.response import BLOCK, GROUND, STRENGTH
 from rbfrag.solver.block.geometry import Block
@@ -103,15 +103,9 @@ def film(
     figure.canvas.draw()
     figure.set_layout_engine("none")
     moving = FuncAnimation(figure, show, frames=time_s.size, interval=1000 // FRAMES_PER_S)
-    writer = _writer(target.suffix.lower())
     try:
-        # the film appears whole or not at all
-        with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}-") as folder:
-            unfinished = Path(folder) / f"film{target.suffix.lower()}"
-            moving.save(str(unfinished), writer=writer, dpi=80)
-            unfinished.replace(target)
-    except OSError as error:
-        raise InputError(f"film {target} cannot be written: {error.strerror}") from error
+        with written_whole(target, "film") as partial:
+            moving.save(str(partial), writer=_writer(target.suffix.lower()), dpi=80)
     except subprocess.CalledProcessError as error:
         raise InputError(
             f"film {target}: ffmpeg failed (exit status {error.returncode}), perhaps because it "
@@ -126,15 +120,8 @@ def film_path(path: str | os.PathLike[str]) -> Path:
     Raises:
         InputError: an unknown suffix, a folder that cannot be written, an .mp4 without ffmpeg.
     """
-    target = Path(path)
-    suffix = target.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise InputError(
-            f"film {target}: the suffix {target.suffix!r} is none of {', '.join(SUFFIXES)}"
-        )
-    if not target.parent.is_dir() or not os.access(target.parent, os.W_OK):
-        raise InputError(f"film {target}: the folder {target.parent} cannot be written")
-    if suffix == ".mp4" and shutil.which("ffmpeg") is None:
+    target = output_path(path, SUFFIXES, "film")
+    if target.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise InputError(
             f"film {target}: an .mp4 needs the program ffmpeg, which is not on the PATH: install "
             "it (apt install ffmpeg, brew install ffmpeg, conda install ffmpeg), or name the film "

@@ -35,6 +35,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from rbfrag.errors import InputError
+from rbfrag.files import source_text
 from rbfrag.rockmasses.joint_sets import RockMass
 
 COLUMNS = (
@@ -61,7 +62,7 @@ def read_rock_mass(path: str | os.PathLike[str]) -> RockMass:
     suffix = source.suffix.lower()
     if suffix not in (".toml", ".csv"):
         raise InputError(f"{source}: a rock mass file ends in .toml or .csv, not {suffix!r}")
-    text = _text(source)
+    text = source_text(source, "a rock mass", _LARGEST_BYTES)
     try:
         return rock_mass_of_toml(text) if suffix == ".toml" else rock_mass_of_csv(text)
     except InputError as error:
@@ -109,21 +110,6 @@ def rock_mass_of_tables(document: Mapping[str, object]) -> RockMass:
             raise InputError(f"{name} = {content!r} is not a table: write [{name}] and its keys")
         stated |= {f"{name}.{key}": value for key, value in content.items()}
     return RockMass.of(stated)
-
-
-def _text(source: Path) -> str:
-    try:
-        if source.is_dir():
-            raise InputError(f"{source} is a folder: name a rock mass file in it")
-        if source.stat().st_size > _LARGEST_BYTES:
-            raise InputError(f"{source}: larger than a rock mass file can be (10 MB)")
-        return source.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{source}: no such file; name a .toml or .csv rock mass file") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{source}: not a text file (UTF-8)") from None
-    except OSError as error:
-        raise InputError(f"{source}: cannot be read: {error.strerror}") from None
 
 
 def _from_csv(text: str) -> dict[str, object]:

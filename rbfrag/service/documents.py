@@ -183,7 +183,7 @@ class CriticalAnswer(_Document):
     undecided: float | None
     island_width: float | None
     kr_over_pga_resolved: float | None
-    reentrant: bool
+    reentrant: bool | None
     n_runs: int
     p2: float
     polarity: str

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rbfrag.errors import InputError
+from rbfrag.files import written_whole
 from rbfrag.solver.results import Response, ResponseHistory
 
 HISTORY_COLUMNS = (
@@ -72,19 +73,13 @@ def write_history(response: Response, path: str | os.PathLike[str]) -> None:
     history = response.history
     if history is None:
         raise InputError("this response holds no history: ask for it with history=True")
-    target = Path(path)
-    partial = target.with_name(target.name + ".part")
-    try:
-        with partial.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.writer(file)
-            writer.writerow(HISTORY_COLUMNS if history.displacement_m is None else MOTION_COLUMNS)
-            writer.writerows(_rows(response, history))
-        partial.replace(target)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise InputError(
-            f"cannot write {target}: {error.strerror}; name a folder you may write"
-        ) from None
+    with (
+        written_whole(Path(path)) as partial,
+        partial.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = csv.writer(file)
+        writer.writerow(HISTORY_COLUMNS if history.displacement_m is None else MOTION_COLUMNS)
+        writer.writerows(_rows(response, history))
 
 
 def _rows(response: Response, history: ResponseHistory) -> Iterator[tuple[float | str, ...]]:

@@ -14,7 +14,7 @@ from rbfrag.db.models import save_model
 from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange import batch_table
 from rbfrag.exchange.batch import predict_table
-from rbfrag.exchange.block_table import read_columns, read_texts, write_block_table
+from rbfrag.exchange.block_table import read_columns, write_block_table
 from rbfrag.fragility.predict import predict
 from tests.fragility.conftest import model_row
 
@@ -166,6 +166,9 @@ def test_parquet(answer: Answer, tmp_path: Path) -> None:
     ).probability  # fmt: skip
     assert np.array_equal(found["probability"], expected, equal_nan=True)
     assert np.array_equal(found["kr"], columns["kr"])
-    assert read_texts(target, "block_id").tolist() == columns["block_id"].tolist()
+    assert (
+        read_columns(target, (), texts=["block_id"])["block_id"].tolist()
+        == columns["block_id"].tolist()
+    )
     answer(source, tmp_path / "c.csv")
     assert len(rows_of(tmp_path / "c.csv")) == 50

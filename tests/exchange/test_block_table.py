@@ -119,7 +119,7 @@ def test_missing_tables_and_columns(tmp_path: Path) -> None:
     path = write_block_table(TABLE, tmp_path / "a.parquet")
     with pytest.raises(InputError, match="no column p2; the columns are block_id, kr"):
         read_columns(path, ("p2",))
-    with pytest.raises(InputError, match="not a Parquet file of numbers"):
+    with pytest.raises(InputError, match="the column mode holds no numbers"):
         read_columns(path, ("mode",))
 
 

@@ -165,7 +165,7 @@ def test_refused(tmp_path: Path) -> None:
         ([], "m.csv", "no motion"),
         ([GroundMotion.from_nodes([0.0, 1.0], [0.0, 1.0])], "m.csv", "equally spaced"),
         ([motion, GroundMotion.from_nodes([0.0, 1.0], [0.0, 1.0])], "m.csv", "equally spaced"),
-        ([motion], "nowhere/m.csv", "cannot write"),
+        ([motion], "nowhere/m.csv", "cannot be written"),
     ):
         with pytest.raises(InputError, match=words):
             export_motions(motions, tmp_path / name)

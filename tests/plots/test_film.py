@@ -100,7 +100,7 @@ def test_an_ffmpeg_that_fails_is_told(
     ("name", "exaggerate", "word"),
     [
         ("film.avi", 1.0, "none of .gif, .mp4, .html"),
-        ("nowhere/film.gif", 1.0, "cannot be written"),
+        ("nowhere/film.gif", 1.0, "there is no folder"),
         ("film.gif", 0.0, "exaggerate = 0"),
     ],
 )

@@ -122,7 +122,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         ("folder.toml", "is a folder"),
         ("bytes.csv", "not a text file"),
         ("mass.json", "ends in .toml or .csv"),
-        ("empty.csv", "base.dip_deg is missing"),
+        ("empty.csv", "is empty"),
     ):
         with pytest.raises(InputError, match=words):
             read_rock_mass(tmp_path / name)

@@ -69,10 +69,10 @@ def nrml(
     json: options.Json = False,
 ) -> None:
     """Write an OpenQuake fragility model, NRML 0.5 (.xml); PGV is in cm/s there."""
-    from rbfrag.exchange.files import output_path, write_text
     from rbfrag.exchange.nrml import nrml_text
+    from rbfrag.files import output_path, write_text
 
-    target = output_path(out, (".xml",), "an NRML file")
+    target = output_path(out, (".xml",), "NRML file")
     made, about, warnings = _functions(
         p2, kr, block, blocks, rockmass, name, imt, tm, levels, model, db
     )
@@ -99,10 +99,10 @@ def pelicun(
     json: options.Json = False,
 ) -> None:
     """Write a fragility table of pelicun and SimCenter (.csv); PGV is in m/s (mps) there."""
-    from rbfrag.exchange.files import output_path, write_text
     from rbfrag.exchange.pelicun_table import pelicun_text
+    from rbfrag.files import output_path, write_text
 
-    target = output_path(out, (".csv",), "a fragility table")
+    target = output_path(out, (".csv",), "fragility table")
     made, about, warnings = _functions(
         p2, kr, block, blocks, rockmass, name, imt, tm, levels, model, db
     )

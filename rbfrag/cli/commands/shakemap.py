@@ -89,12 +89,12 @@ def shakemap(
     """
     import numpy as np
 
-    from rbfrag.exchange.files import output_path
     from rbfrag.exchange.shakemap import at_places, read_shakemap
+    from rbfrag.files import output_path
     from rbfrag.hazards.conversions import component as component_named
     from rbfrag.hazards.site_probability import site_probability
 
-    target = output_path(out, SUFFIXES, "a map")
+    target = output_path(out, SUFFIXES, "map")
     if plot is not None:
         from rbfrag.plots.canvas import plot_path
 

@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from rbfrag.errors import InputError
+from rbfrag.files import source_text
 from rbfrag.solver.block.geometry import Block
 
 ANGLES = ("alpha1_deg", "alpha3_deg", "r3_m")
@@ -72,7 +73,7 @@ def read_block(path: str | os.PathLike[str], *, gamma_deg: float | None = None) 
     suffix = source.suffix.lower()
     if suffix not in (".toml", ".csv"):
         raise InputError(f"{source}: a block file ends in .toml or .csv, not {suffix!r}")
-    text = _text(source)
+    text = source_text(source, "a block file", _LARGEST_BYTES)
     stated = _from_toml(source, text) if suffix == ".toml" else _from_csv(source, text)
     if gamma_deg is not None:
         if "gamma_deg" in stated:
@@ -90,21 +91,6 @@ def read_block(path: str | os.PathLike[str], *, gamma_deg: float | None = None) 
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
     return BlockFile(os.fspath(path), block, conditions)
-
-
-def _text(source: Path) -> str:
-    try:
-        if source.is_dir():
-            raise InputError(f"{source} is a folder: name a block file in it")
-        if source.stat().st_size > _LARGEST_BYTES:
-            raise InputError(f"{source}: larger than a block file can be (1 MB)")
-        return source.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{source}: no such file; name a .toml or .csv block file") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{source}: not a text file (UTF-8)") from None
-    except OSError as error:
-        raise InputError(f"{source}: cannot be read: {error.strerror}") from None
 
 
 def _block(stated: dict[str, Any]) -> Block:

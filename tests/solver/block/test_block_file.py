@@ -86,7 +86,7 @@ def test_a_byte_order_mark_and_windows_lines(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("a.csv", "", ["a.csv", "no outline"]),
+        ("a.csv", "", ["a.csv", "is empty"]),
         ("a.csv", CSV.replace("1,0, Toe", "1,zero,toe"), ["line 7", "y_m", "'zero'"]),
         ("a.csv", CSV.replace("1,0, Toe", "1,0,nose"), ["line 7", "'nose'", "heel, back, toe"]),
         ("a.csv", CSV.replace("1,0, Toe", "1,0,heel"), ["line 7", "second heel"]),

@@ -1,0 +1,121 @@
+"""Files that are read with words for every trouble, and written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rbfrag.errors import InputError
+
+MOST_BYTES = 1 << 28
+"""Larger texts are refused: no curve, model or description is 256 MB long."""
+
+
+@contextmanager
+def reading(source: Path, what: str) -> Iterator[None]:
+    """Say in words why a file cannot be read.
+
+    Args:
+        source: the file.
+        what: what it should hold, for messages: "a hazard curve".
+
+    Raises:
+        InputError: there is no such file, or it cannot be read or is not text (UTF-8).
+    """
+    try:
+        if source.is_dir():
+            raise InputError(f"{source} is a folder: name a file with {what} in it")
+        yield
+    except FileNotFoundError:
+        raise InputError(f"{source}: no such file; name a file with {what}") from None
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{source}: not a text file (byte {error.start} is not UTF-8): this is not {what}"
+        ) from None
+    except OSError as error:
+        raise InputError(f"{source}: cannot be read: {error.strerror or error}") from None
+
+
+def source_text(path: str | os.PathLike[str], what: str, most_bytes: int = MOST_BYTES) -> str:
+    """Return the whole text of a file.
+
+    Args:
+        path: the file.
+        what: as for :func:`reading`.
+        most_bytes: larger files are refused.
+
+    Raises:
+        InputError: the file cannot be read, is empty, too large or not text (UTF-8).
+    """
+    source = Path(path)
+    with reading(source, what):
+        size = source.stat().st_size
+        if size > most_bytes:
+            raise InputError(f"{source} has {size} bytes: larger than {what} can be")
+        text = source.read_bytes().decode("utf-8-sig")
+    if not text.strip():
+        raise InputError(f"{source} is empty: name a file with {what}")
+    return text
+
+
+def output_path(path: str | os.PathLike[str], suffixes: tuple[str, ...], what: str) -> Path:
+    """Return the path if such a file can be written there; ask before long work.
+
+    Args:
+        path: file to write.
+        suffixes: what its name may end in.
+        what: what messages call it: "table", "plot file".
+
+    Raises:
+        InputError: another suffix, or a folder that cannot be written.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in suffixes:
+        raise InputError(
+            f"{what} {target}: the suffix {target.suffix!r} is none of {', '.join(suffixes)}: "
+            "name the file with one of them"
+        )
+    if target.is_dir():
+        raise InputError(f"{what} {target} is a folder: name a file in it")
+    if not target.parent.is_dir():
+        raise InputError(f"{what} {target}: there is no folder {target.parent}: make it first")
+    if not os.access(target.parent, os.W_OK):
+        raise InputError(f"{what} {target}: the folder cannot be written: choose another")
+    return target
+
+
+@contextmanager
+def written_whole(target: Path, what: str = "file") -> Iterator[Path]:
+    """Yield a path of the same suffix that takes the target's place at the end, or vanishes.
+
+    Args:
+        target: file to write; an existing file is replaced at the end, not before.
+        what: what messages call it.
+
+    Raises:
+        InputError: the disk refuses.
+    """
+    partial = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.part{target.suffix}")
+    try:
+        yield partial
+        partial.replace(target)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(
+            f"{what} {target} cannot be written: {reason}; name a folder you may write"
+        ) from None
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def write_text(text: str, target: Path) -> None:
+    """Write a text (UTF-8), whole or not at all.
+
+    Raises:
+        InputError: the disk refuses.
+    """
+    with written_whole(target) as partial:
+        partial.write_text(text, encoding="utf-8", newline="\n")
