@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from sqlalchemy import Connection, delete, select, true
+from sqlalchemy import Connection, bindparam, delete, select, true
 
 from benchmarks.all_outcomes import with_all_outcomes
 from benchmarks.page import ROOT

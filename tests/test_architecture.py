@@ -195,7 +195,7 @@ def test_sql_is_written_in_db_only() -> None:
 
 
 def test_package_files_import_nothing() -> None:
-    for path in PACKAGE.glob("*/**/__init__.py"):
+    for path in PACKAGE.glob("*/__init__.py"):
         assert imported(path.read_text(encoding="utf-8")) == set(), path
 
 

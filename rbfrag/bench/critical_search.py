@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rbfrag.bench import cvode_peer
 from rbfrag.bench.cases import Case
-from rbfrag.bench.cvode_peer import cvode_run
 from rbfrag.bench.methods import taylor_run
+from rbfrag.bench.peers import cvode_is_installed, cvode_run
 from rbfrag.bench.timing import spread, timed
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
@@ -75,8 +74,8 @@ def compare_searches(
     """
     rng = np.random.default_rng(seed)
     names = ["critical search", "23 runs, rbfrag, side by side", "23 runs, rbfrag, one by one"]
-    works: list[Callable[[tuple[Case, ...]], object]] = [_search, _runs_in_lanes, _runs_by_kernel]
-    if cvode_peer.is_installed():
+    works: list[Callable[[tuple[Case, ...]], object]] = [_search, _runs_in_batch, _runs_by_kernel]
+    if cvode_is_installed():
         for rtol in tolerances:
             names.append(f"23 runs, CVODE in Python, rtol {rtol:.0e}")
             works.append(_runs_by_cvode(rtol))
@@ -145,7 +144,7 @@ def _search(cases: tuple[Case, ...]) -> object:
     return critical(cases[0].motion, p2=cases[0].p2, polarity=cases[0].polarity)
 
 
-def _runs_in_lanes(cases: tuple[Case, ...]) -> tuple[str, ...]:
+def _runs_in_batch(cases: tuple[Case, ...]) -> tuple[str, ...]:
     runs = simulate_many(cases[0].drive, p2=cases[0].p2, kr=np.array([case.kr for case in cases]))
     return tuple(OUTCOMES[code].value for code in runs.outcome.tolist())
 

@@ -6,12 +6,16 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from rbfrag.bench import cvode_peer
 from rbfrag.bench.cases import Case
-from rbfrag.bench.cvode_peer import cvode_run
-from rbfrag.bench.euler import euler
-from rbfrag.bench.free_motion import Answer
-from rbfrag.bench.scipy_peer import Solver, solve_ivp_run
+from rbfrag.bench.peers import (
+    CVODE_INSTALL,
+    Answer,
+    Solver,
+    cvode_is_installed,
+    cvode_run,
+    euler,
+    solve_ivp_run,
+)
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
 from rbfrag.solver.toppling_run import OUTCOMES, simulate
 
@@ -59,14 +63,14 @@ def methods(*, quick: bool = False) -> tuple[Method, ...]:
     solvers: tuple[Solver, ...] = ("RK45", "DOP853", "LSODA")
     tolerances = (1e-6,) if quick else (1e-4, 1e-6)
     found += [_scipy(solver, rtol) for solver in solvers for rtol in tolerances]
-    if cvode_peer.is_installed():
+    if cvode_is_installed():
         found += [_cvode(rtol) for rtol in ((1e-6, 1e-8) if quick else (1e-6, 1e-8, 1e-10))]
     return tuple(found)
 
 
 def missing_peers() -> tuple[str, ...]:
     """Return the packages of peers that are not installed here."""
-    return () if cvode_peer.is_installed() else (cvode_peer.INSTALL,)
+    return () if cvode_is_installed() else (CVODE_INSTALL,)
 
 
 def _taylor(order: int, ph_max: float) -> Method:

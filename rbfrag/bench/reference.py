@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from rbfrag.bench.cases import Case
-from rbfrag.bench.free_motion import STABLE, TOPPLED, Answer, free_motion
+from rbfrag.bench.peers import STABLE, TOPPLED, Answer, free_motion
 
 Real = np.longdouble
 ORDER = 16

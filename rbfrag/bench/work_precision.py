@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rbfrag.bench.cases import Case
-from rbfrag.bench.free_motion import STABLE, Answer
 from rbfrag.bench.methods import Method
+from rbfrag.bench.peers import STABLE, Answer
 from rbfrag.bench.reference import reference
 from rbfrag.bench.timing import spread, timed
 

@@ -17,6 +17,7 @@ from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.vertical_pairs import recordings_of_mixed_dt
 from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions.companions import upward
+from rbfrag.motions.formats.delimited_text import INDEX
 from rbfrag.motions.metadata import read_metadata
 from rbfrag.motions.processing import (
     DEFAULT_HIGH_PASS,
@@ -25,7 +26,6 @@ from rbfrag.motions.processing import (
     processed,
 )
 from rbfrag.motions.quality import quality_flags
-from rbfrag.motions.text.dt_index import INDEX
 
 AS_SUPPLIED = "as supplied"
 

@@ -28,6 +28,7 @@ from rbfrag.motions.formats import (
 )
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.file import cut_number, decoded, read_text
+from rbfrag.motions.text.record_file import RecordFile
 from rbfrag.motions.units import acceleration_unit
 
 READERS: tuple[ModuleType, ...] = (
@@ -147,7 +148,7 @@ def _read(
     reader = _reader(file, text)
     try:
         motions: list[GroundMotion] = reader.read(
-            file, text, units=units, dt_s=dt_s, allow_partial=allow_partial
+            RecordFile(file, text, reader.FORMAT, units, dt_s, allow_partial)
         )
     except MotionFileError:
         raise

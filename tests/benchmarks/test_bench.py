@@ -23,7 +23,7 @@ from benchmarks import (
     start_up,
     work_precision,
 )
-from rbfrag.bench import cvode_peer, run
+from rbfrag.bench import peers, run
 from rbfrag.bench.cases import (
     RECORDS_VARIABLE,
     Records,
@@ -32,8 +32,8 @@ from rbfrag.bench.cases import (
     find_records,
 )
 from rbfrag.bench.critical_search import compare_searches, search_runs
-from rbfrag.bench.free_motion import Answer
 from rbfrag.bench.methods import Method, methods, missing_peers, taylor_run
+from rbfrag.bench.peers import Answer
 from rbfrag.bench.reference import reference
 from rbfrag.bench.tables import ratio, seconds
 from rbfrag.bench.work_precision import measure
@@ -114,7 +114,7 @@ def test_a_wrong_outcome_and_an_error_are_seen(records: Records) -> None:
 def test_without_the_peer_it_is_named_and_left_out(
     records: Records, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cvode_peer, "PACKAGE", "a_package_that_is_nowhere")
+    monkeypatch.setattr(peers, "CVODE_PACKAGE", "a_package_that_is_nowhere")
     assert missing_peers() == ("scikit-sundae",)
     assert not [m for m in methods() if "CVODE" in m.family]
     rows = compare_searches(choose_combinations(records, 1))
@@ -125,7 +125,7 @@ def test_without_the_peer_it_is_named_and_left_out(
 
 
 def test_with_the_peer_it_runs_the_same_values(records: Records) -> None:
-    installed = cvode_peer.is_installed()
+    installed = peers.cvode_is_installed()
     assert missing_peers() == (() if installed else ("scikit-sundae",))
     motion, polarity, p2 = choose_combinations(records, 1)[0]
     assert len(search_runs(motion, polarity, p2)) == 23
@@ -179,7 +179,7 @@ def test_command_prints_tables_writes_files_and_json(
     }  # fmt: skip
     with (out / "work-precision.csv").open() as file:
         assert {row["cases"] for row in csv.DictReader(file)} == {"2"}
-    monkeypatch.setattr(cvode_peer, "PACKAGE", "a_package_that_is_nowhere")
+    monkeypatch.setattr(peers, "CVODE_PACKAGE", "a_package_that_is_nowhere")
     answer = CliRunner().invoke(app, [*arguments[:4], "--json"])
     document = json.loads(answer.stdout)
     assert document["not_installed"] == ["scikit-sundae"]

@@ -219,8 +219,7 @@ def test_damage_is_found(database: Path) -> None:
             connection.execute(
                 update(table).where(table.c.kr_over_pga == 0.2).values(displacement_m=99.0)
             )
-        (first, *_) = findings(engine)
-        assert "further than" in first.problem
+        assert any("further than" in each.problem for each in findings(engine))
         with engine.connect() as connection:
             again = resimulate(connection, sample=100)
         assert any("computed again" in each.problem for each in again.findings)

@@ -141,7 +141,6 @@ def test_campaigns_say_whether_they_finished(engine: Engine) -> None:
         {"p2": -1.0},
         {"kr_over_pga": None},
         {"y_m_s": -1.0},
-        {"p2": None},
     ],
 )
 def test_the_schema_refuses_nonsense(

@@ -13,7 +13,7 @@ from rbfrag.motions.companions import companion, upward
 from rbfrag.motions.direction import is_downward_name, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.processing import processed
-from rbfrag.motions.text.clock import first_sample_time
+from rbfrag.motions.text.times import first_sample_time
 from rbfrag.solver.toppling_run import respond
 from tests.synthetic import shaking
 

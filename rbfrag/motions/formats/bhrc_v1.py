@@ -8,26 +8,16 @@ There is no sampling interval: it is duration / number of points.
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.formats.volume_1 import data_lines
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.file import fixed_width_numbers, sample_count
-from rbfrag.motions.text.header import (
-    agreed_dt,
-    agreed_unit_in_g,
-    blocks,
-    find_field,
-    interval_of_duration,
-    optional_field,
-    other_count,
-)
+from rbfrag.motions.text.record_file import RecordFile
 
 FORMAT = "BHRC V1"
 
-WIDTH = 13
-PER_LINE = 10
+LAYOUT = (10, 13)
+"""Fields a line and characters a field."""
 
 _BLOCK = re.compile(r"\s*\*\s*VOL1DS FILE", re.IGNORECASE)
 _RECORD = re.compile(r"VOL1DS FILE:\s*(\S+)", re.IGNORECASE)
@@ -44,73 +34,40 @@ def recognises(head: str) -> bool:
     return bool(_BLOCK.match(head))
 
 
-def read(
-    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
-) -> list[GroundMotion]:
-    """Return the components of a BHRC file in their order, with one recording id.
-
-    Args:
-        path: for labels and messages.
-        text: the file's text.
-        units: unit that the caller states; refused, as the file's own is g/10.
-        dt_s: sampling interval that the caller states [s]; refused when the file has another.
-        allow_partial: True to read a file whose header states another number of samples than
-            follow; the motion is then marked as partial.
-
-    Raises:
-        MotionFileError: a header or value that cannot be used, with its line.
-    """
-    lines = text.split("\n")
-    return [
-        _component(path, lines, span, index, units, dt_s, allow_partial)
-        for index, span in enumerate(blocks(path, lines, _BLOCK))
-    ]
+def read(file: RecordFile) -> list[GroundMotion]:
+    """Return the components of a BHRC file in their order, with one recording id."""
+    return [_component(file, span, index) for index, span in enumerate(file.blocks(_BLOCK))]
 
 
-def _component(
-    path: Path,
-    lines: list[str],
-    span: range,
-    index: int,
-    units: str | None,
-    dt_s: float | None,
-    allow_partial: bool,
-) -> GroundMotion:
-    points = find_field(path, lines, span, _POINTS, "number of points")
-    npts = sample_count(path, points.text, points.line, "number of points")
-    duration = find_field(path, lines, span, _DURATION, "duration")
-    unit = find_field(path, lines, span, _UNIT, "unit of acceleration")
-    factor = agreed_unit_in_g(path, unit, units)
-    dt = agreed_dt(path, interval_of_duration(path, duration, npts), duration.line, dt_s)
-    first, rows = data_lines(path, lines, span, unit.line)
-    values = fixed_width_numbers(path, rows, first + 1, WIDTH, PER_LINE, "acceleration")
-    remarks = other_count(
-        path, npts, values.size, points.line, f"component {index}", allow_partial=allow_partial
-    )
+def _component(file: RecordFile, span: range, index: int) -> GroundMotion:
+    points = file.find(span, _POINTS, "number of points")
+    npts = file.count(points, "number of points")
+    duration = file.find(span, _DURATION, "duration")
+    unit = file.find(span, _UNIT, "unit of acceleration")
+    factor = file.unit_in_g(unit)
+    dt = file.dt_of_duration(duration, npts)
+    first, rows = data_lines(file, span, unit.line)
+    values = file.fixed_width(rows, first + 1, LAYOUT, "acceleration")
+    remarks = file.remarks(npts, values.size, points.line, f"component {index}")
     if remarks:
         remarks += (f"dt = {dt:g} s is the duration over the number of points of the header",)
 
-    component = find_field(path, lines, span, _COMPONENT, "line 'COMP'").text
-    station = optional_field(lines, span, _STATION)
-    origin = optional_field(lines, span, _ORIGIN)
+    component = file.find(span, _COMPONENT, "line 'COMP'").text
     # L1, V2, T3: the letter is the axis, the number counts the channels
     axis = component.rstrip("0123456789")
-    azimuth = optional_field(
-        lines, span, re.compile(rf"\bAzimuth\b.*\b{re.escape(axis)}\s+(\d+(?:\.\d+)?)", re.ASCII)
+    azimuth = file.words(
+        span, re.compile(rf"\bAzimuth\b.*\b{re.escape(axis)}\s+(\d+(?:\.\d+)?)", re.ASCII)
     )
-    return GroundMotion(
+    return file.motion(
         values * factor,
         dt,
-        station=station.text if station else "",
-        event=" ".join(origin.text.split()) if origin else "",
+        station=file.words(span, _STATION),
+        event=" ".join(file.words(span, _ORIGIN).split()),
         component=component,
-        orientation_deg=azimuth_deg(azimuth.text) if azimuth else None,
+        orientation_deg=azimuth_deg(azimuth),
         is_vertical=is_vertical_name(axis),
-        recording=find_field(path, lines, span, _RECORD, "name of the record").text,
-        source_file=path.name,
+        recording=file.find(span, _RECORD, "name of the record").text,
         trace_index=index,
-        file_format=FORMAT,
         remarks=remarks,
-        is_partial=bool(remarks),
         is_corrected=False,
     )

@@ -8,30 +8,16 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
-from rbfrag.errors import MotionFileError
-from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.formats.volume_1 import data_lines
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.clock import first_sample_time
-from rbfrag.motions.text.file import fixed_width_numbers, sample_count
-from rbfrag.motions.text.header import (
-    agreed_dt,
-    agreed_unit_in_g,
-    blocks,
-    find_field,
-    interval_of_duration,
-    missing_channels,
-    optional_field,
-    other_count,
-)
-from rbfrag.motions.text.times import refuse_other_times
+from rbfrag.motions.text.record_file import RecordFile
 
 FORMAT = "CDMG V1"
 
-WIDTH = 7
-PER_LINE = 10
+LAYOUT = (10, 7)
+"""Fields a line and characters a field."""
+
 TIME_DECIMALS = 3
 
 _BLOCK = re.compile(r"uncorrected accelerogram data", re.IGNORECASE)
@@ -48,33 +34,19 @@ def recognises(head: str) -> bool:
     return bool(_BLOCK.match(head)) and bool(_POINTS.search(head))
 
 
-def read(
-    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
-) -> list[GroundMotion]:
+def read(file: RecordFile) -> list[GroundMotion]:
     """Return the channels of a V1 file in their order, with one recording id.
 
     A channel of zeros alone belongs to no sensor (the fourth channel of three-axis recorders);
     it is left out, and a remark of the others says so.
-
-    Args:
-        path: for labels and messages.
-        text: the file's text.
-        units: unit that the caller states; refused, as the file's own is g/10.
-        dt_s: sampling interval that the caller states [s]; refused when the file states another.
-        allow_partial: True to read a file whose header states another number of samples than
-            follow; the motion is then marked as partial.
-
-    Raises:
-        MotionFileError: a header or value that cannot be used, with its line.
     """
-    lines = text.split("\n")
-    spans = blocks(path, lines, _BLOCK)
-    channels = [_channel(path, lines, span, units, dt_s, allow_partial) for span in spans]
+    spans = file.blocks(_BLOCK)
+    channels = [_channel(file, span) for span in spans]
     moving = [channel for channel in channels if channel.acceleration_g.any()]
     still = [channel.component for channel in channels if not channel.acceleration_g.any()]
     if not moving:
-        raise MotionFileError(path, "every sample of every channel is zero: this is no record")
-    remarks = missing_channels(lines, spans[0], len(spans))
+        raise file.error("every sample of every channel is zero: this is no record")
+    remarks = file.missing_channels(spans[0], len(spans))
     if still:
         remarks += (f"the channel {', '.join(still)} holds zeros only and is left out",)
     return [
@@ -83,47 +55,30 @@ def read(
     ]
 
 
-def _channel(
-    path: Path,
-    lines: list[str],
-    span: range,
-    units: str | None,
-    dt_s: float | None,
-    allow_partial: bool,
-) -> GroundMotion:
-    points = find_field(path, lines, span, _POINTS, "number of points")
-    npts = sample_count(path, points.text, points.line, "number of points")
-    duration = find_field(path, lines, span, _DURATION, "record length")
-    unit = find_field(path, lines, span, _UNIT, "unit of acceleration")
-    factor = agreed_unit_in_g(path, unit, units)
-    dt = agreed_dt(path, interval_of_duration(path, duration, npts), duration.line, dt_s)
-    first, rows = data_lines(path, lines, span, unit.line)
-    numbers = fixed_width_numbers(path, rows, first + 1, WIDTH, PER_LINE, "time or acceleration")
+def _channel(file: RecordFile, span: range) -> GroundMotion:
+    points = file.find(span, _POINTS, "number of points")
+    npts = file.count(points, "number of points")
+    duration = file.find(span, _DURATION, "record length")
+    unit = file.find(span, _UNIT, "unit of acceleration")
+    factor = file.unit_in_g(unit)
+    dt = file.dt_of_duration(duration, npts)
+    first, rows = data_lines(file, span, unit.line)
+    numbers = file.fixed_width(rows, first + 1, LAYOUT, "time or acceleration")
     times, values = numbers[0::2], numbers[1::2]
-    remarks = other_count(path, npts, values.size, points.line, allow_partial=allow_partial)
+    remarks = file.remarks(npts, values.size, points.line)
     if times.size != values.size:
-        raise MotionFileError(
-            path, "the last time has no acceleration: the file is truncated", line=first + len(rows)
+        raise file.error(
+            "the last time has no acceleration: the file is truncated", first + len(rows)
         )
-    refuse_other_times(path, times, dt, TIME_DECIMALS, first + 1, PER_LINE // 2)
-    channel = find_field(path, lines, span, _CHANNEL, "line 'CHAN'")
-    station = optional_field(lines, span, _STATION)
-    trigger = optional_field(lines, span, _TRIGGER)
-    event = lines[span.start + 1].strip() if len(span) > 1 else ""
-    name = " ".join(lines[station.line].split()) if station else ""
-    return GroundMotion(
+    file.refuse_other_times(times, dt, TIME_DECIMALS, first + 1, LAYOUT[0] // 2)
+    station = file.optional(span, _STATION)
+    return file.motion(
         values * factor,
         dt,
-        station=name,
-        event=event,
-        component=channel.text,
-        orientation_deg=azimuth_deg(channel.text),
-        is_vertical=is_vertical_name(channel.text),
-        recording=f"{event} {name}".strip(),
-        source_file=path.name,
-        file_format=FORMAT,
+        station=" ".join(file.lines[station.line].split()) if station else "",
+        event=file.lines[span.start + 1].strip() if len(span) > 1 else "",
+        component=file.find(span, _CHANNEL, "line 'CHAN'").text,
         remarks=remarks,
-        is_partial=bool(remarks),
         is_corrected=False,
-        start_time=first_sample_time(trigger.text) if trigger else None,
+        start=file.words(span, _TRIGGER),
     )

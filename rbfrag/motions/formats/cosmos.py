@@ -12,28 +12,11 @@ differ. A file may hold several channels, and velocities and displacements, whic
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
-from rbfrag.errors import MotionFileError
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.clock import first_sample_time
-from rbfrag.motions.text.file import (
-    field_layout,
-    finite_number,
-    fixed_width_numbers,
-    sample_count,
-    without_blank_end,
-)
-from rbfrag.motions.text.header import (
-    Field,
-    agreed_dt,
-    agreed_unit_in_g,
-    blocks,
-    find_field,
-    optional_field,
-    other_count,
-)
+from rbfrag.motions.text.file import field_layout, finite_number
+from rbfrag.motions.text.record_file import Field, RecordFile
 
 FORMAT = "COSMOS V1c/V2c"
 
@@ -64,133 +47,89 @@ def recognises(head: str) -> bool:
     return bool(_BLOCK.match(head.split("\n", 1)[0]))
 
 
-def read(
-    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
-) -> list[GroundMotion]:
-    """Return the accelerations of a COSMOS file in their order.
-
-    Args:
-        path: for labels and messages.
-        text: the file's text.
-        units: unit that the caller states; refused when the file states another.
-        dt_s: sampling interval that the caller states [s]; likewise.
-        allow_partial: True to read a file whose header states another number of samples than
-            follow; the motion is then marked as partial.
-
-    Raises:
-        MotionFileError: a header or value that cannot be used, with its line.
-    """
-    lines = text.split("\n")
+def read(file: RecordFile) -> list[GroundMotion]:
+    """Return the accelerations of a COSMOS file in their order."""
     motions: list[GroundMotion] = []
     others: list[str] = []
-    for span in blocks(path, lines, _BLOCK):
-        series = find_field(path, lines, span, _SERIES, "line '... acceleration pts, ...'")
+    for span in file.blocks(_BLOCK):
+        series = file.find(span, _SERIES, "line '... acceleration pts, ...'")
         quantity = _POINTS.search(series.text)
         if quantity and not quantity[2].lower().startswith("accel"):
             others.append(quantity[2])
             continue
-        motions.append(_trace(path, lines, span, series, len(motions), units, dt_s, allow_partial))
+        motions.append(_trace(file, span, series, len(motions)))
     if not motions:
-        raise MotionFileError(
-            path, f"the file holds {', '.join(others)}: the acceleration is needed"
-        )
+        raise file.error(f"the file holds {', '.join(others)}: the acceleration is needed")
     return motions
 
 
-def _trace(
-    path: Path,
-    lines: list[str],
-    span: range,
-    series: Field,
-    index: int,
-    units: str | None,
-    dt_s: float | None,
-    allow_partial: bool,
-) -> GroundMotion:
+def _trace(file: RecordFile, span: range, series: Field, index: int) -> GroundMotion:
     here = range(series.line - 1, series.line)
-    points = find_field(path, lines, here, _POINTS, "number of points")
-    npts = sample_count(path, points.text, points.line, "number of points")
-    factor = agreed_unit_in_g(
-        path, find_field(path, lines, here, _UNIT, "unit of acceleration"), units
-    )
+    npts = file.count(file.find(here, _POINTS, "number of points"), "number of points")
+    factor = file.unit_in_g(file.find(here, _UNIT, "unit of acceleration"))
     header = range(span.start, series.line - 1)
-    dt = agreed_dt(path, *_interval(path, lines, header), dt_s)
-    _check_duration(path, lines, here, npts, dt)
-    per_line, width = _layout(path, series)
-    end = next((at for at in span if at >= series.line and _END.match(lines[at])), span.stop)
-    data = without_blank_end(lines[series.line : end])
-    values = fixed_width_numbers(path, data, series.line + 1, width, per_line, "acceleration")
-    remarks = other_count(path, npts, values.size, series.line, allow_partial=allow_partial)
+    dt = file.agreed_dt(*_interval(file, header))
+    _check_duration(file, here, npts, dt)
+    ends = (at for at in span if at >= series.line and _END.match(file.lines[at]))
+    data = file.data(series.line, next(ends, span.stop))
+    values = file.fixed_width(data, series.line + 1, _layout(file, series), "acceleration")
+    remarks = file.remarks(npts, values.size, series.line)
 
-    channel = optional_field(lines, header, _CHANNEL)
-    direction = channel.text if channel else ""
-    seed = optional_field(lines, header, _SCNL)
-    component = seed.text if seed else direction
-    station = optional_field(lines, header, _STATION)
-    start = optional_field(lines, header, _START)
-    event = optional_field(lines, header, _EVENT)
-    name = station.text if station else ""
-    azimuth, vertical = azimuth_deg(direction), is_vertical_name(direction)
-    record = optional_field(lines, header, _RECORD)
-    return GroundMotion(
+    direction = file.words(header, _CHANNEL)
+    component = file.words(header, _SCNL) or direction
+    vertical = is_vertical_name(direction)
+    record = file.words(header, _RECORD)
+    return file.motion(
         values * factor,
         dt,
-        station=name,
-        event=event.text if event else "",
+        station=file.words(header, _STATION),
+        event=file.words(header, _EVENT),
         component=component,
-        orientation_deg=azimuth if direction else azimuth_deg(component),
+        orientation_deg=azimuth_deg(direction or component),
         is_vertical=vertical if vertical is not None else is_vertical_name(component),
-        recording=_without(record.text, component)
-        if record
-        else f"{event.text if event else ''} {name}".strip(),
-        source_file=path.name,
+        recording=_without(record, component) if record else None,
         trace_index=index,
-        file_format=FORMAT,
         remarks=remarks,
-        is_partial=bool(remarks),
-        is_corrected=not lines[span.start].strip().lower().startswith("uncorrected"),
-        start_time=first_sample_time(start.text) if start else None,
+        is_corrected=not file.lines[span.start].strip().lower().startswith("uncorrected"),
+        start=file.words(header, _START),
     )
 
 
-def _interval(path: Path, lines: list[str], header: range) -> tuple[float, int]:
+def _interval(file: RecordFile, header: range) -> tuple[float, int]:
     """Sampling interval [s] and its line."""
-    reals = find_field(path, lines, header, _REALS, "line 'Real-header values follow'")
-    per_line, width = _layout(path, reals)
+    reals = file.find(header, _REALS, "line 'Real-header values follow'")
+    per_line, width = _layout(file, reals)
     row, place = divmod(DT_MS_VALUE - 1, per_line)
     at = reals.line + row
     what = f"real-header value {DT_MS_VALUE}, the sampling interval in ms"
     if at >= header.stop:
-        raise MotionFileError(
-            path, f"the header ends before {what}: export the record again", line=reals.line
-        )
-    shown = lines[at][place * width : (place + 1) * width].strip()
-    milliseconds = finite_number(path, shown, at + 1, what)
+        raise file.error(f"the header ends before {what}: export the record again", reals.line)
+    shown = file.lines[at][place * width : (place + 1) * width].strip()
+    milliseconds = finite_number(file.path, shown, at + 1, what)
     if milliseconds <= 0.0:
-        raise MotionFileError(
-            path, f"{what} is {shown}, which means unknown: the record cannot be used", line=at + 1
+        raise file.error(
+            f"{what} is {shown}, which means unknown: the record cannot be used", at + 1
         )
     return milliseconds / 1000.0, at + 1
 
 
-def _check_duration(path: Path, lines: list[str], here: range, npts: int, dt: float) -> None:
-    field = optional_field(lines, here, _SECONDS)
+def _check_duration(file: RecordFile, here: range, npts: int, dt: float) -> None:
+    field = file.optional(here, _SECONDS)
     if field is None:
         return
-    seconds = finite_number(path, field.text, field.line, "approximate duration")
+    seconds = finite_number(file.path, field.text, field.line, "approximate duration")
     if abs(seconds - npts * dt) > DURATION_S + DURATION_SHARE * seconds:
-        raise MotionFileError(
-            path,
+        raise file.error(
             f"{npts} points at dt = {dt:g} s last {npts * dt:g} s, but the header says approx "
             f"{field.text} s: correct the header",
-            line=field.line,
+            field.line,
         )
 
 
-def _layout(path: Path, field: Field) -> tuple[int, int]:
+def _layout(file: RecordFile, field: Field) -> tuple[int, int]:
     layout = field_layout(field.text)
     if layout is None:
-        raise MotionFileError(path, "the line names no format such as (8F10.3)", line=field.line)
+        raise file.error("the line names no format such as (8F10.3)", field.line)
     return layout
 
 

@@ -13,31 +13,11 @@ they say. Channels of one file may differ in length. A block ends with ``/&``.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
-from rbfrag.errors import MotionFileError
-from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.clock import first_sample_time
-from rbfrag.motions.text.file import (
-    field_layout,
-    fixed_width_numbers,
-    sample_count,
-    without_blank_end,
-)
-from rbfrag.motions.text.header import (
-    Field,
-    agreed_dt,
-    agreed_unit_in_g,
-    blocks,
-    find_field,
-    missing_channels,
-    optional_field,
-    other_count,
-    positive_number,
-)
+from rbfrag.motions.text.file import field_layout
+from rbfrag.motions.text.record_file import Field, RecordFile
 
 FORMAT = "CSMIP/CDMG V2"
 
@@ -64,98 +44,59 @@ def recognises(head: str) -> bool:
     return bool(_BLOCK.match(head)) and bool(_KIND.search(head))
 
 
-def read(
-    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
-) -> list[GroundMotion]:
-    """Return the channels of a V2 file in their order, with one recording id.
-
-    Args:
-        path: for labels and messages.
-        text: the file's text.
-        units: unit that the caller states; refused when the file states another.
-        dt_s: sampling interval that the caller states [s]; likewise.
-        allow_partial: True to read a file whose header states another number of samples than
-            follow; the motion is then marked as partial.
-
-    Raises:
-        MotionFileError: a header or value that cannot be used, with its line.
-    """
-    lines = text.split("\n")
-    spans = blocks(path, lines, _BLOCK)
-    remarks = missing_channels(lines, spans[0], len(spans))
-    channels = [
-        _channel(path, lines, span, index, units, dt_s, allow_partial)
-        for index, span in enumerate(spans)
-    ]
+def read(file: RecordFile) -> list[GroundMotion]:
+    """Return the channels of a V2 file in their order, with one recording id."""
+    spans = file.blocks(_BLOCK)
+    remarks = file.missing_channels(spans[0], len(spans))
+    channels = [_channel(file, span, index) for index, span in enumerate(spans)]
     return [replace(channel, remarks=(*remarks, *channel.remarks)) for channel in channels]
 
 
-def _channel(
-    path: Path,
-    lines: list[str],
-    span: range,
-    index: int,
-    units: str | None,
-    dt_s: float | None,
-    allow_partial: bool,
-) -> GroundMotion:
-    points = find_field(
-        path, lines, span, _POINTS, f"line 'points of accel data' in channel {index}"
-    )
-    npts = sample_count(path, points.text, points.line, "number of points")
+def _channel(file: RecordFile, span: range, index: int) -> GroundMotion:
+    points = file.find(span, _POINTS, f"line 'points of accel data' in channel {index}")
+    npts = file.count(points, "number of points")
     here = range(points.line - 1, points.line)
-    interval = find_field(path, lines, here, _INTERVAL, "sampling interval")
-    dt = agreed_dt(path, positive_number(path, interval, "dt"), points.line, dt_s)
-    factor = agreed_unit_in_g(
-        path, find_field(path, lines, here, _UNIT, "unit of acceleration"), units
-    )
-    per_line, width = field_layout(lines[points.line - 1], LAYOUT) or LAYOUT
-    if not allow_partial and not any(lines[at].startswith(END) for at in span):
-        raise MotionFileError(
-            path,
+    dt = file.dt(file.find(here, _INTERVAL, "sampling interval"))
+    factor = file.unit_in_g(file.find(here, _UNIT, "unit of acceleration"))
+    layout = field_layout(file.lines[points.line - 1]) or LAYOUT
+    if not file.allow_partial and not any(file.lines[at].startswith(END) for at in span):
+        raise file.error(
             f"channel {index} does not end with a line {END}: the file is truncated; export the "
             "record again",
-            line=span.stop,
+            span.stop,
         )
-    end = next((at for at in span if at >= points.line and _SERIES_END.match(lines[at])), span.stop)
-    data = without_blank_end(lines[points.line : end])
-    values = fixed_width_numbers(path, data, points.line + 1, width, per_line, "acceleration")
-    remarks = other_count(
-        path, npts, values.size, points.line, f"channel {index}", allow_partial=allow_partial
-    )
+    ends = (at for at in span if at >= points.line and _SERIES_END.match(file.lines[at]))
+    data = file.data(points.line, next(ends, span.stop))
+    values = file.fixed_width(data, points.line + 1, layout, "acceleration")
+    remarks = file.remarks(npts, values.size, points.line, f"channel {index}")
 
     header = range(span.start, points.line - 1)
-    channel = find_field(path, lines, header, _CHANNEL, f"line 'Chan' in channel {index}")
-    station = optional_field(lines, header, _STATION)
-    start = optional_field(lines, header, _START)
-    return GroundMotion(
+    channel = file.find(header, _CHANNEL, f"line 'Chan' in channel {index}")
+    return file.motion(
         values * factor,
         dt,
-        station=_station(lines, station),
-        event=_event(lines, channel, header.stop),
+        station=_station(file, file.optional(header, _STATION)),
+        event=_event(file, channel, header.stop),
         component=channel.text,
-        orientation_deg=azimuth_deg(channel.text),
-        is_vertical=is_vertical_name(channel.text),
-        recording=find_field(path, lines, header, _RECORD, "name of the record").text,
-        source_file=path.name,
+        recording=file.find(header, _RECORD, "name of the record").text,
         trace_index=index,
-        file_format=FORMAT,
         remarks=remarks,
-        is_partial=bool(remarks),
         is_corrected=True,
-        start_time=first_sample_time(start.text) if start else None,
+        start=file.words(header, _START),
     )
 
 
-def _station(lines: Sequence[str], number: Field | None) -> str:
+def _station(file: RecordFile, number: Field | None) -> str:
     """Number and name; the name stands at the left of the line after the number."""
     if number is None:
         return ""
-    name = _WIDE_GAP.split(lines[number.line].strip())[0] if number.line < len(lines) else ""
+    name = (
+        _WIDE_GAP.split(file.lines[number.line].strip())[0] if number.line < len(file.lines) else ""
+    )
     return f"{number.text} {name}".strip() if not _CHANNEL.match(name) else number.text
 
 
-def _event(lines: Sequence[str], channel: Field, stop: int) -> str:
+def _event(file: RecordFile, channel: Field, stop: int) -> str:
     """The line after the channel, unless it gives no more than the time of the record."""
-    line = lines[channel.line].strip() if channel.line < stop else ""
+    line = file.lines[channel.line].strip() if channel.line < stop else ""
     return "" if line.lower().startswith("rcrd of") else " ".join(line.split())

@@ -15,20 +15,21 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import MotionFileError
-from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.column_header import event_station_component, stated_unit
-from rbfrag.motions.text.dt_index import INDEX, indexed_interval
-from rbfrag.motions.text.file import finite_number
+from rbfrag.motions.text.file import finite_number, read_text
+from rbfrag.motions.text.record_file import Field, FloatArray, RecordFile, positive_number
 from rbfrag.motions.text.times import sampling_interval
 from rbfrag.motions.units import unit_in_g
 
 FORMAT = "delimited text"
 
 COMMENT = "#"
+
+INDEX = "dt_index.txt"
+"""Beside lists of bare accelerations (FEMA P-695): lines of a file's name and its dt."""
 
 LONGEST_HEADER_LINE = 500
 """Characters of a header line that are looked at."""
@@ -54,45 +55,27 @@ def recognises(head: str) -> bool:
     return all(map(_is_numeric, rows[: 1 if width <= 2 else 2]))
 
 
-def read(
-    path: Path,
-    text: str,
-    *,
-    units: str | None,
-    dt_s: float | None,
-    allow_partial: bool = False,  # noqa: ARG001
-) -> list[GroundMotion]:
-    """Return the one motion of a delimited text file.
-
-    Args:
-        path: for labels and messages.
-        text: the file's text.
-        units: unit of acceleration that the caller states; refused when the file states another.
-        dt_s: sampling interval that the caller states [s]; needed where there is neither a time
-            column nor an index beside the file, refused where it contradicts one.
-        allow_partial: makes no difference: such files state no number of samples.
-
-    Raises:
-        MotionFileError: a header or value that cannot be used, with its line.
-    """
-    lines = text.split("\n")
+def read(file: RecordFile) -> list[GroundMotion]:
+    """Return the one motion of a delimited text file; such files state no number of samples."""
+    lines = file.lines
     start = _first_data_line(lines)
     header = [
         (number, line[:LONGEST_HEADER_LINE])
         for number, line in enumerate(lines[:start], 1)
         if line.strip()
     ]
-    rows = _rows(path, lines, start)
-    unit = stated_unit(path, header, units)
+    rows = _rows(file, start)
+    unit = stated_unit(file.path, header, file.units)
     if len(rows[0][1]) == 1:
-        samples = _numbers(path, rows, 0, "acceleration")
-        _refuse_gaps(path, rows)
-        dt, remark = _interval_of_list(path, dt_s)
+        samples = _numbers(file, rows, 0, "acceleration")
+        _refuse_gaps(file, rows)
+        dt, remark = _interval_of_list(file)
     else:
-        times = _numbers(path, rows, 0, "time")
-        samples = _numbers(path, rows, 1, "acceleration")
+        times = _numbers(file, rows, 0, "time")
+        samples = _numbers(file, rows, 1, "acceleration")
         tokens = [fields[0].strip() for _, fields in rows]
-        dt = sampling_interval(path, tokens, times, [number for number, _ in rows], dt_s)
+        numbers = [number for number, _ in rows]
+        dt = sampling_interval(file.path, tokens, times, numbers, file.dt_s)
         first_s = float(times[0])
         remark = f"times in the file start at {first_s:g} s; here they start at 0"
         if first_s == 0.0:
@@ -100,18 +83,15 @@ def read(
     event, station, component = event_station_component(header)
     factor = unit_in_g(unit)
     return [
-        GroundMotion(
+        file.motion(
             samples * factor if factor != 1.0 else samples,
             dt,
             station=station,
             event=event,
             component=component,
-            orientation_deg=azimuth_deg(component),
-            is_vertical=is_vertical_name(component),
             recording=f"{event} {station}" if event and station else "",
-            source_file=path.name,
-            file_format=FORMAT,
             remarks=(remark,) if remark else (),
+            is_partial=False,
         )
     ]
 
@@ -152,85 +132,103 @@ def _first_data_line(lines: list[str]) -> int:
     return len(lines)
 
 
-def _rows(path: Path, lines: list[str], start: int) -> list[tuple[int, list[str]]]:
+def _rows(file: RecordFile, start: int) -> list[tuple[int, list[str]]]:
     """Line number and fields of every row, all of one width."""
+    lines = file.lines
     numbered = [(n, line) for n, line in enumerate(lines[start:], start + 1) if line.strip()]
     if not numbered:
-        raise MotionFileError(path, "no values follow the header: export the record again")
+        raise file.error("no values follow the header: export the record again")
     first, top = numbered[0]
     mark = _mark(top)
     if _has_decimal_commas(top) or (mark == ";" and "," in top):
-        raise MotionFileError(
-            path,
+        raise file.error(
             f"{top.strip()!r} has decimal commas: write decimal points, as in 0.005",
-            line=first,
+            first,
         )
     rows = [(number, line.split(mark)) for number, line in numbered]
     fields = rows[0][1]
     width = len(fields)
     if width > 2:
-        raise MotionFileError(
-            path,
+        raise file.error(
             f"{width} columns: keep two, the time and one component's acceleration, or one with "
             "the acceleration alone",
-            line=first,
+            first,
         )
     for number, fields in rows:
         if len(fields) != width:
-            raise MotionFileError(
-                path,
+            raise file.error(
                 f"{lines[number - 1].strip()[:60]!r} has not {width} columns as the rows above: "
                 "repair the line or export the record again",
-                line=number,
+                number,
             )
     return rows
 
 
 def _numbers(
-    path: Path, rows: list[tuple[int, list[str]]], column: int, what: str
-) -> NDArray[np.float64]:
+    file: RecordFile, rows: list[tuple[int, list[str]]], column: int, what: str
+) -> FloatArray:
     tokens = [fields[column] for _, fields in rows]
     try:
         numbers = np.array(tokens, dtype=np.float64)
     except ValueError:
         numbers = np.array([np.nan])
     # float() also reads 'nan', 'inf', '1_000' and digits of other scripts
-    plain = all(token.isascii() and "_" not in token for token in tokens)
-    if not plain or not np.isfinite(numbers).all():
+    numbers_only = all(token.isascii() and "_" not in token for token in tokens)
+    if not numbers_only or not np.isfinite(numbers).all():
         return np.array(
-            [finite_number(path, fields[column].strip(), n, what) for n, fields in rows]
+            [finite_number(file.path, fields[column].strip(), n, what) for n, fields in rows]
         )
     return numbers
 
 
-def _interval_of_list(path: Path, dt_s: float | None) -> tuple[float, str]:
+def _interval_of_list(file: RecordFile) -> tuple[float, str]:
     """Sampling interval of a list of accelerations, and a sentence on where it comes from."""
-    indexed = indexed_interval(path)
+    path, dt_s = file.path, file.dt_s
+    indexed = _indexed_interval(path)
     if indexed is None and dt_s is None:
-        raise MotionFileError(
-            path,
+        raise file.error(
             "the file holds one column and states no sampling interval: give it in seconds, "
             f"as in  --dt 0.005, or in a file {INDEX} beside it, as in  {path.name} 0.005",
         )
     if indexed is None:
         assert dt_s is not None
         return dt_s, f"the file states no dt; {dt_s:g} s is what was stated when it was read"
-    if dt_s is not None and dt_s != indexed.dt_s:
-        raise MotionFileError(
-            path,
-            f"{indexed.source} beside the file says dt = {indexed.dt_s:g} s, not {dt_s:g}: "
+    if dt_s is not None and dt_s != indexed[0]:
+        raise file.error(
+            f"{indexed[1]} beside the file says dt = {indexed[0]:g} s, not {dt_s:g}: "
             "leave --dt out, or correct one of them",
         )
-    return indexed.dt_s, f"the file states no dt; {indexed.dt_s:g} s is from {indexed.source}"
+    return indexed[0], f"the file states no dt; {indexed[0]:g} s is from {indexed[1]}"
 
 
-def _refuse_gaps(path: Path, rows: list[tuple[int, list[str]]]) -> None:
+def _refuse_gaps(file: RecordFile, rows: list[tuple[int, list[str]]]) -> None:
     # without times an empty line may be a missing sample
     for (above, _), (number, _) in pairwise(rows):
         if number != above + 1:
-            raise MotionFileError(
-                path,
+            raise file.error(
                 "an empty line among the accelerations may be a missing sample: remove it, or "
                 "add a time column",
-                line=above + 1,
+                above + 1,
             )
+
+
+def _indexed_interval(path: Path) -> tuple[float, str] | None:
+    """The dt [s] that the index beside a file gives it, and where it does so, or None."""
+    index = path.parent / INDEX
+    if not index.is_file():
+        return None
+    found: tuple[float, str] | None = None
+    for number, line in enumerate(read_text(index).split("\n"), 1):
+        fields = line.split()
+        if len(fields) != 2 or fields[0] != path.name:
+            continue
+        dt = positive_number(index, Field(fields[1], number), "dt")
+        if found is not None and found[0] != dt:
+            raise MotionFileError(
+                index,
+                f"{path.name} has dt = {dt:g} s here, but {found[0]:g} s in {found[1]}: "
+                "keep one line",
+                line=number,
+            )
+        found = found or (dt, f"{INDEX}, line {number}")
+    return found

@@ -13,14 +13,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 
-from rbfrag.errors import InputError, MotionFileError
-from rbfrag.motions.direction import azimuth_deg, is_vertical_name
+from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.file import finite_number, free_numbers, sample_count
-from rbfrag.motions.text.header import other_count
-from rbfrag.motions.units import acceleration_unit, unit_in_g
+from rbfrag.motions.text.file import finite_number
+from rbfrag.motions.text.record_file import Field, RecordFile
+from rbfrag.motions.units import unit_in_g
 
 FORMAT = "PEER AT2"
 
@@ -45,52 +43,32 @@ def recognises(head: str) -> bool:
     return any(_NAMED.search(line) or _TRAILING.match(line) for line in lines)
 
 
-def read(
-    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
-) -> list[GroundMotion]:
-    """Return the one motion of an AT2 file.
-
-    Args:
-        path: for labels and messages.
-        text: the file's text.
-        units: unit that the caller states; refused when the file states another.
-        dt_s: sampling interval that the caller states [s]; likewise.
-        allow_partial: True to read a file whose header states another number of samples than
-            follow; the motion is then marked as partial.
-
-    Raises:
-        MotionFileError: a header or value that cannot be used, with its line.
-    """
-    lines = text.split("\n")
+def read(file: RecordFile) -> list[GroundMotion]:
+    """Return the one motion of an AT2 file."""
+    lines = file.lines
     at, npts_text, dt_text = _sampling(lines)
     number = at + 1
-    npts = sample_count(path, npts_text, number, "NPTS")
-    dt = finite_number(path, dt_text, number, "DT")
+    npts = file.count(Field(npts_text, number), "NPTS")
+    dt = finite_number(file.path, dt_text, number, "DT")
     if dt <= 0.0:
-        raise MotionFileError(path, f"DT = {dt_text} s must be positive", line=number)
-    if dt_s is not None and dt_s != dt:
-        raise MotionFileError(
-            path, f"the header says DT = {dt_text} s, not {dt_s:g}: leave --dt out", line=number
+        raise file.error(f"DT = {dt_text} s must be positive", number)
+    if file.dt_s is not None and file.dt_s != dt:
+        raise file.error(
+            f"the header says DT = {dt_text} s, not {file.dt_s:g}: leave --dt out", number
         )
-    factor = unit_in_g(_unit(path, lines[:at], units))
-    values = free_numbers(path, lines[at + 1 :], at + 2, "acceleration")
-    remarks = other_count(path, npts, values.size, number, allow_partial=allow_partial)
+    factor = _unit_in_g(file, lines[:at])
+    values = file.free_numbers(lines[at + 1 :], at + 2, "acceleration")
     event, station, component = _names(lines[1] if at >= 2 else "")
     return [
-        GroundMotion(
+        file.motion(
             values * factor if factor != 1.0 else values,
             dt,
             station=station,
             event=event,
             component=component,
-            orientation_deg=azimuth_deg(component),
-            is_vertical=is_vertical_name(component),
             # an event alone would join records of all its stations
             recording=f"{event} {station}" if event and station else "",
-            source_file=path.name,
-            file_format=FORMAT,
-            remarks=remarks,
-            is_partial=bool(remarks),
+            remarks=file.remarks(npts, values.size, number),
         )
     ]
 
@@ -125,32 +103,18 @@ def _sampling(lines: list[str]) -> tuple[int, str, str]:
     raise AssertionError("read() is called for recognised text only")
 
 
-def _unit(path: Path, header: list[str], stated: str | None) -> str:
+def _unit_in_g(file: RecordFile, header: list[str]) -> float:
     for number, line in enumerate(header, 1):
         quantity = _QUANTITY.search(line)
         if quantity and quantity[1].upper() != "ACCELERATION":
-            raise MotionFileError(
-                path,
-                f"this is a {quantity[1].lower()} record: the acceleration (.AT2) is needed",
-                line=number,
+            raise file.error(
+                f"this is a {quantity[1].lower()} record: the acceleration (.AT2) is needed", number
             )
-        found = _UNIT.search(line)
-        if not found:
-            continue
-        try:
-            unit = acceleration_unit(found[1])
-        except InputError as error:
-            raise MotionFileError(path, str(error), line=number) from None
-        if stated is not None and acceleration_unit(stated) != unit:
-            raise MotionFileError(
-                path, f"the header says {found[1]}, not {stated}: leave --units out", line=number
-            )
-        return unit
-    if stated is None:
-        raise MotionFileError(
-            path, "the header states no unit of acceleration: give it with --units g"
-        )
-    return acceleration_unit(stated)
+        if found := _UNIT.search(line):
+            return file.unit_in_g(Field(found[1], number))
+    if file.units is None:
+        raise file.error("the header states no unit of acceleration: give it with --units g")
+    return unit_in_g(file.units)
 
 
 def _names(line: str) -> tuple[str, str, str]:

@@ -20,16 +20,14 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rbfrag.errors import InputError, MotionFileError
+from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.clock import FIRST_YEAR
-from rbfrag.motions.text.file import table_numbers, without_blank_end
-from rbfrag.motions.text.header import Field, agreed_dt, agreed_unit_in_g, other_count
+from rbfrag.motions.text.record_file import Field, RecordFile
+from rbfrag.motions.text.times import FIRST_YEAR
 
 FORMAT = "rbfrag CSV"
 
@@ -71,28 +69,13 @@ def recognises(head: str) -> bool:
     return head.startswith(FIRST_LINE)
 
 
-def read(
-    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
-) -> list[GroundMotion]:
-    """Return the motions of a file as they were written, bit for bit.
-
-    Args:
-        path: for labels and messages.
-        text: the file's text.
-        units: unit that the caller states; refused unless it is g.
-        dt_s: sampling interval that the caller states [s]; refused when the file has another.
-        allow_partial: True to read a file whose header states another number of samples than
-            follow; the motion is then marked as partial.
-
-    Raises:
-        MotionFileError: a header or value that cannot be used, with its line, or samples that
-            are not those that were written.
-    """
-    agreed_unit_in_g(path, Field("g", 1), units)
-    lines = text.split("\n")
+def read(file: RecordFile) -> list[GroundMotion]:
+    """Return the motions of a file as they were written, bit for bit."""
+    file.unit_in_g(Field("g", 1))
+    lines = file.lines
     starts = [at for at, line in enumerate(lines) if line.startswith(FIRST_LINE)]
     return [
-        _motion(path, lines, range(start, end), index, dt_s, allow_partial)
+        _motion(file, range(start, end), index)
         for index, (start, end) in enumerate(zip(starts, [*starts[1:], len(lines)], strict=True))
     ]
 
@@ -130,59 +113,52 @@ def _labels(motion: GroundMotion) -> dict[str, object]:
     }
 
 
-def _motion(
-    path: Path, lines: list[str], span: range, index: int, dt_s: float | None, allow_partial: bool
-) -> GroundMotion:
+def _motion(file: RecordFile, span: range, index: int) -> GroundMotion:
+    lines = file.lines
     first = next((at for at in span if lines[at].strip() == COLUMNS), None)
     if first is None:
-        raise MotionFileError(
-            path, f"no line {COLUMNS!r} follows: export the motion again", line=span.start + 1
-        )
-    found = _header(path, lines, range(span.start + 1, first))
+        raise file.error(f"no line {COLUMNS!r} follows: export the motion again", span.start + 1)
+    found = _header(file, range(span.start + 1, first))
     missing = [name for name in ("dt_s", "npts") if name not in found]
     if missing:
-        raise MotionFileError(
-            path, f"the header has no {missing[0]!r}: export the motion again", line=first + 1
-        )
-    dt = agreed_dt(path, found["dt_s"], first + 1, dt_s)
-    rows = [line.replace(",", " ", 1) for line in without_blank_end(lines[first + 1 : span.stop])]
-    table = table_numbers(path, rows, first + 2, 2, "value")
+        raise file.error(f"the header has no {missing[0]!r}: export the motion again", first + 1)
+    dt = file.agreed_dt(found["dt_s"], first + 1)
+    rows = [line.replace(",", " ", 1) for line in file.data(first + 1, span.stop)]
+    table = file.table(rows, first + 2, 2, "value")
     times, samples = table[:, 0], table[:, 1]
-    remarks = other_count(path, found["npts"], samples.size, first + 1, allow_partial=allow_partial)
+    remarks = file.remarks(found["npts"], samples.size, first + 1)
     with np.errstate(over="ignore"):
         late = np.flatnonzero(~(np.abs(times - dt * np.arange(times.size)) <= TIME_SHARE * dt))
     if late.size:
         at = int(late[0])
-        raise MotionFileError(
-            path,
+        raise file.error(
             f"time {times[at]:g} s is not {at} intervals of {dt:g} s: repair the line or export "
             "the motion again",
-            line=first + 2 + at,
+            first + 2 + at,
         )
     labels = {name: found[name] for name in _LABELS if name in found}
     labels["remarks"] = (*map(str, found.get("remarks", ())), *remarks)
     motion = GroundMotion(
         samples,
         dt,
-        source_file=path.name,
+        source_file=file.path.name,
         trace_index=index,
         file_format=FORMAT,
         **{**labels, "is_partial": bool(labels.get("is_partial") or remarks)},
     )
     if not remarks and found.get("samples_sha256", motion.sha256) != motion.sha256:
-        raise MotionFileError(
-            path,
+        raise file.error(
             "the samples are not those that were written (their sha256 differs): export the "
             "motion again, or remove the line samples_sha256 if they were changed on purpose",
-            line=first + 1,
+            first + 1,
         )
     return motion
 
 
-def _header(path: Path, lines: list[str], span: range) -> dict[str, Any]:
+def _header(file: RecordFile, span: range) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for at in span:
-        name, colon, written = lines[at].removeprefix("#").partition(":")
+        name, colon, written = file.lines[at].removeprefix("#").partition(":")
         name = name.strip()
         if not colon or name not in _KINDS:
             continue
@@ -192,10 +168,8 @@ def _header(path: Path, lines: list[str], span: range) -> dict[str, Any]:
             value = None
         usable = _usable(name, value)
         if usable is None:
-            raise MotionFileError(
-                path,
-                f"{name} {written.strip()[:40]!r} cannot be used: export the motion again",
-                line=at + 1,
+            raise file.error(
+                f"{name} {written.strip()[:40]!r} cannot be used: export the motion again", at + 1
             )
         found[name] = usable
     return found

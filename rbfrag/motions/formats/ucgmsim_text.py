@@ -7,18 +7,9 @@ line. Observed records are in g and simulated ones often in cm/s², and no file 
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
-from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.file import free_numbers, sample_count
-from rbfrag.motions.text.header import (
-    Field,
-    agreed_dt,
-    other_count,
-    positive_number,
-    stated_unit_in_g,
-)
+from rbfrag.motions.text.record_file import Field, RecordFile
 
 FORMAT = "GeoNet text (.000/.090/.ver)"
 
@@ -36,42 +27,25 @@ def recognises(head: str) -> bool:
     return bool(_HEAD.match(head))
 
 
-def read(
-    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
-) -> list[GroundMotion]:
+def read(file: RecordFile) -> list[GroundMotion]:
     """Return the one motion of a file.
 
-    Args:
-        path: for labels and messages; its stem, which the three components share, is the
-            recording id, as the file names no event.
-        text: the file's text.
-        units: unit of acceleration, which the file does not state.
-        dt_s: sampling interval that the caller states [s]; refused when the file has another.
-        allow_partial: True to read a file whose header states another number of samples than
-            follow; the motion is then marked as partial.
-
-    Raises:
-        MotionFileError: no unit is stated, or a header or value cannot be used.
+    The stem of its name, which the three components share, is the recording id: the file names
+    no event.
     """
-    head = _HEAD.match(text)
+    head = _HEAD.match(file.text)
     assert head is not None, "read() is called for recognised text only"
-    npts = sample_count(path, head["npts"], 2, "number of points")
-    dt = agreed_dt(path, positive_number(path, Field(head["dt"], 2), "dt"), 2, dt_s)
-    factor = stated_unit_in_g(path, units)
-    values = free_numbers(path, text.split("\n")[2:], 3, "acceleration")
-    remarks = other_count(path, npts, values.size, 2, allow_partial=allow_partial)
+    npts = file.count(Field(head["npts"], 2), "number of points")
+    dt = file.dt(Field(head["dt"], 2))
+    factor = file.stated_unit_in_g()
+    values = file.free_numbers(file.lines[2:], 3, "acceleration")
     return [
-        GroundMotion(
+        file.motion(
             values * factor,
             dt,
             station=head["station"],
             component=head["component"],
-            orientation_deg=azimuth_deg(head["component"]),
-            is_vertical=is_vertical_name(head["component"]),
-            recording=path.stem,
-            source_file=path.name,
-            file_format=FORMAT,
-            remarks=remarks,
-            is_partial=bool(remarks),
+            recording=file.path.stem,
+            remarks=file.remarks(npts, values.size, 2),
         )
     ]

@@ -8,27 +8,10 @@ fields of 10 characters with one-digit exponents, and touch: ``-1.9234E+0-3.1562
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
-from rbfrag.errors import MotionFileError
-from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.file import (
-    MOST_DIGITS,
-    fixed_width_numbers,
-    holds_integers,
-    sample_count,
-    without_blank_end,
-)
-from rbfrag.motions.text.header import (
-    Field,
-    agreed_dt,
-    agreed_unit_in_g,
-    find_field,
-    optional_field,
-    other_count,
-    positive_number,
-)
+from rbfrag.motions.text.file import MOST_DIGITS, holds_integers
+from rbfrag.motions.text.record_file import Field, RecordFile
 
 FORMAT = "USGS SMC"
 
@@ -37,7 +20,8 @@ UNIT = "cm/s2"
 
 INTEGER_LINES, INTEGERS, INTEGER_WIDTH = 6, 8, 10
 REAL_LINES, REALS, REAL_WIDTH = 10, 5, 15
-PER_LINE, WIDTH = 8, 10
+LAYOUT = (8, 10)
+"""Samples a line, and characters a sample."""
 COMMENTS_VALUE, NPTS_VALUE, RATE_VALUE = 16, 17, 2
 """Places in the headers, from 1."""
 
@@ -55,29 +39,13 @@ def recognises(head: str) -> bool:
     return bool(_HEAD.match(head))
 
 
-def read(
-    path: Path, text: str, *, units: str | None, dt_s: float | None, allow_partial: bool = False
-) -> list[GroundMotion]:
-    """Return the one motion of a file.
-
-    Args:
-        path: for labels and messages.
-        text: the file's text.
-        units: unit that the caller states; refused unless it is cm/s2.
-        dt_s: sampling interval that the caller states [s]; refused when the file has another.
-        allow_partial: True to read a file whose header states another number of samples than
-            follow; the motion is then marked as partial.
-
-    Raises:
-        MotionFileError: a header or value that cannot be used, with its line.
-    """
-    lines = text.split("\n")
-    kind = _HEAD.match(text)
+def read(file: RecordFile) -> list[GroundMotion]:
+    """Return the one motion of a file."""
+    lines = file.lines
+    kind = _HEAD.match(file.text)
     if kind and kind[1] != "ACCELEROGRAM":
-        raise MotionFileError(
-            path, f"this is a record of {kind[1].lower()}: the acceleration is needed", line=1
-        )
-    factor = agreed_unit_in_g(path, Field(UNIT, 1), units)
+        raise file.error(f"this is a record of {kind[1].lower()}: the acceleration is needed", 1)
+    factor = file.unit_in_g(Field(UNIT, 1))
     top = next(
         (
             at
@@ -87,45 +55,32 @@ def read(
         None,
     )
     if top is None:
-        raise MotionFileError(path, "the file has no integer header: export it again", line=1)
-    comments = _integer(path, lines, top, COMMENTS_VALUE)
-    stated = _value(path, lines, top, NPTS_VALUE, INTEGERS, INTEGER_WIDTH)
-    npts = sample_count(path, stated.text, stated.line, "number of samples")
-    rate = _value(path, lines, top + INTEGER_LINES, RATE_VALUE, REALS, REAL_WIDTH)
-    dt = agreed_dt(path, 1.0 / positive_number(path, rate, "samples per second"), rate.line, dt_s)
+        raise file.error("the file has no integer header: export it again", 1)
+    comments = _integer(file, top, COMMENTS_VALUE)
+    stated = _value(file, top, NPTS_VALUE, INTEGERS, INTEGER_WIDTH)
+    npts = file.count(stated, "number of samples")
+    rate = _value(file, top + INTEGER_LINES, RATE_VALUE, REALS, REAL_WIDTH)
+    dt = file.agreed_dt(1.0 / file.positive(rate, "samples per second"), rate.line)
     above = top + INTEGER_LINES + REAL_LINES
     first = above + comments
     for at in range(above, min(first, len(lines))):
         if not lines[at].startswith("|"):
-            raise MotionFileError(
-                path,
+            raise file.error(
                 f"the header says {comments} comment lines, but this is none: they begin with |",
-                line=at + 1,
+                at + 1,
             )
-    data = without_blank_end(lines[first:])
-    values = fixed_width_numbers(path, data, first + 1, WIDTH, PER_LINE, "acceleration")
-    remarks = other_count(path, npts, values.size, stated.line, allow_partial=allow_partial)
+    values = file.fixed_width(file.data(first), first + 1, LAYOUT, "acceleration")
+    remarks = file.remarks(npts, values.size, stated.line)
 
     header = range(top)
-    component = find_field(path, lines, header, _COMPONENT, "line 'component ='").text
-    station = optional_field(lines, header, _STATION)
-    event = optional_field(lines, header, _EVENT)
-    name = " ".join(station.text.split()) if station else ""
-    earthquake = " ".join(event.text.split()) if event else ""
     return [
-        GroundMotion(
+        file.motion(
             values * factor,
             dt,
-            station=name,
-            event=earthquake,
-            component=component,
-            orientation_deg=azimuth_deg(component),
-            is_vertical=is_vertical_name(component),
-            recording=f"{earthquake} {name}".strip(),
-            source_file=path.name,
-            file_format=FORMAT,
+            station=" ".join(file.words(header, _STATION).split()),
+            event=" ".join(file.words(header, _EVENT).split()),
+            component=file.find(header, _COMPONENT, "line 'component ='").text,
             remarks=remarks,
-            is_partial=bool(remarks),
             is_corrected=_is_corrected(lines[0]),
         )
     ]
@@ -137,20 +92,18 @@ def _is_corrected(kind: str) -> bool | None:
     return True if "CORRECTED" in kind else None
 
 
-def _value(path: Path, lines: list[str], top: int, place: int, per_line: int, width: int) -> Field:
+def _value(file: RecordFile, top: int, place: int, per_line: int, width: int) -> Field:
     row, column = divmod(place - 1, per_line)
     at = top + row
-    if at >= len(lines):
-        raise MotionFileError(
-            path, "the file ends within its header: export the record again", line=len(lines)
+    if at >= len(file.lines):
+        raise file.error(
+            "the file ends within its header: export the record again", len(file.lines)
         )
-    return Field(lines[at][column * width : (column + 1) * width].strip(), at + 1)
+    return Field(file.lines[at][column * width : (column + 1) * width].strip(), at + 1)
 
 
-def _integer(path: Path, lines: list[str], top: int, place: int) -> int:
-    field = _value(path, lines, top, place, INTEGERS, INTEGER_WIDTH)
+def _integer(file: RecordFile, top: int, place: int) -> int:
+    field = _value(file, top, place, INTEGERS, INTEGER_WIDTH)
     if field.text.isascii() and field.text.isdigit() and len(field.text) < MOST_DIGITS:
         return int(field.text)
-    raise MotionFileError(
-        path, f"the number of comment lines {field.text!r} is no count", line=field.line
-    )
+    raise file.error(f"the number of comment lines {field.text!r} is no count", field.line)

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
-from rbfrag.errors import MotionFileError
-from rbfrag.motions.text.file import holds_integers, without_blank_end
+from rbfrag.motions.text.file import holds_integers
+from rbfrag.motions.text.record_file import RecordFile
 
 NUMERIC_LINES = 14
 
 _END = "/&"
 
 
-def data_lines(
-    path: Path, lines: Sequence[str], span: range, header_line: int
-) -> tuple[int, Sequence[str]]:
+def data_lines(file: RecordFile, span: range, header_line: int) -> tuple[int, Sequence[str]]:
     """Return the index of a block's first line of samples, and its lines of samples.
 
     Args:
-        path: for messages.
-        lines: the lines of the file.
+        file: the file.
         span: indices of the block's lines.
         header_line: 1-based line of the last header field that was found; the numeric header
             lies below it.
@@ -28,14 +24,14 @@ def data_lines(
     Raises:
         MotionFileError: the block ends before its samples.
     """
+    lines = file.lines
     stop = next((at for at in span if lines[at].startswith(_END)), span.stop)
     first = next((at for at in range(header_line, stop) if holds_integers(lines[at])), stop)
     first += NUMERIC_LINES
     if first >= stop:
-        raise MotionFileError(
-            path,
+        raise file.error(
             f"no samples follow the header: {NUMERIC_LINES} lines of numbers and then the samples "
             "were expected; the file is truncated, export the record again",
-            line=header_line,
+            header_line,
         )
-    return first, without_blank_end(lines[first:stop])
+    return first, file.data(first, stop)

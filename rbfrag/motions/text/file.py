@@ -1,4 +1,4 @@
-"""The text of a record's file, with troubles named by line."""
+"""The text of a record's file, its lines and single numbers."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import MotionFileError
 
@@ -99,104 +96,6 @@ def cut_number(text: str) -> str:
     return "" if whole else last
 
 
-def free_numbers(
-    path: Path, lines: Sequence[str], first_line: int, what: str
-) -> NDArray[np.float64]:
-    """Return blank-separated numbers; a bad one is named with its line.
-
-    Args:
-        path: for messages.
-        lines: the lines that hold the numbers.
-        first_line: 1-based number of the first of them in the file.
-        what: what the numbers are, for messages.
-    """
-    tokens = " ".join(lines).split()
-    try:
-        numbers = np.array(tokens, dtype=np.float64)
-    except ValueError:
-        numbers = np.array([np.nan])
-    # numpy also reads 'nan', 'inf' and '1_000', which no instrument writes
-    if not np.isfinite(numbers).all() or any("_" in token for token in tokens):
-        return np.array(
-            [
-                finite_number(path, token, number, what)
-                for number, line in enumerate(lines, first_line)
-                for token in line.split()
-            ]
-        )
-    return numbers
-
-
-def fixed_width_numbers(
-    path: Path, lines: Sequence[str], first_line: int, width: int, per_line: int, what: str
-) -> NDArray[np.float64]:
-    """Return numbers in columns of a fixed width, which may touch.
-
-    Args:
-        path: for messages.
-        lines: the lines that hold the numbers; only the last may hold fewer than the others.
-        first_line: 1-based number of the first of them in the file.
-        width: characters a field, the number at its right end.
-        per_line: fields a line.
-        what: what the numbers are, for messages.
-
-    Raises:
-        MotionFileError: a line of another length, or a field that is no finite number.
-    """
-    rows = [line.rstrip() for line in lines]
-    whole = width * per_line
-    for at, row in enumerate(rows):
-        # a character too many or too few would shift every field after it
-        if len(row) != whole and (at < len(rows) - 1 or len(row) % width or len(row) > whole):
-            raise MotionFileError(
-                path,
-                f"the line has {len(row)} characters, which are not {per_line} fields of {width}: "
-                "repair the line or export the record again",
-                line=first_line + at,
-            )
-    text = "".join(rows)
-    if not text:
-        return np.empty(0)
-    try:
-        numbers = np.frombuffer(text.encode("ascii"), dtype=f"S{width}").astype(np.float64)
-    except ValueError:
-        numbers = np.array([np.nan])
-    if not np.isfinite(numbers).all() or "_" in text:
-        # numpy knows fewer blanks than Python does: a field may be sound all the same
-        return np.array(
-            [
-                finite_number(path, row[start : start + width].strip(), first_line + at, what)
-                for at, row in enumerate(rows)
-                for start in range(0, len(row), width)
-            ]
-        )
-    return numbers
-
-
-def table_numbers(
-    path: Path, lines: Sequence[str], first_line: int, columns: int, what: str
-) -> NDArray[np.float64]:
-    """Return blank-separated columns of numbers, shape (rows, columns).
-
-    Args:
-        path: for messages.
-        lines: the rows.
-        first_line: 1-based number of the first of them in the file.
-        columns: columns that each row must have.
-        what: what the numbers are, for messages.
-    """
-    for number, line in enumerate(lines, first_line):
-        found = len(line.split())
-        if found != columns:
-            raise MotionFileError(
-                path,
-                f"the line has {found} values, not {columns} as the header says: repair the line "
-                "or export the record again",
-                line=number,
-            )
-    return free_numbers(path, lines, first_line, what).reshape(-1, columns)
-
-
 def holds_integers(line: str) -> bool:
     """Return whether a line holds integers and nothing else.
 
@@ -232,29 +131,6 @@ def field_layout(text: str, default: tuple[int, int] | None = None) -> tuple[int
     return (per_line, width) if per_line and width else default
 
 
-def sample_count(path: Path, text: str, line: int, what: str) -> int:
-    """Return a count of samples that a header states, or refuse it with its line.
-
-    Args:
-        path: for messages.
-        text: the count as the file has it.
-        line: 1-based line number.
-        what: the name of the count.
-
-    Raises:
-        MotionFileError: it is no whole number of at least 1.
-    """
-    digits = text.removesuffix(".")
-    # int() refuses thousands of digits in words of its own
-    if digits.isascii() and digits.isdigit() and len(digits) < MOST_DIGITS and int(digits) > 0:
-        return int(digits)
-    raise MotionFileError(path, f"{what} {_shown(text)} is not a count of samples", line=line)
-
-
-def _shown(text: str) -> str:
-    return repr(text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}…")
-
-
 def finite_number(path: Path, text: str, line: int, what: str) -> float:
     """Return one number of a file, or refuse it with its line.
 
@@ -271,9 +147,14 @@ def finite_number(path: Path, text: str, line: int, what: str) -> float:
         value = float(text)
         if math.isfinite(value):
             return value
-        raise MotionFileError(path, f"{what} {_shown(text)} is too large", line=line)
+        raise MotionFileError(path, f"{what} {shown(text)} is too large", line=line)
     raise MotionFileError(
         path,
-        f"{what} {_shown(text)} is not a finite number: repair the line or export the record again",
+        f"{what} {shown(text)} is not a finite number: repair the line or export the record again",
         line=line,
     )
+
+
+def shown(text: str) -> str:
+    """Return a text as messages quote it."""
+    return repr(text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}…")

@@ -1,0 +1,313 @@
+"""The methods that rbfrag's kernel is compared with: forward Euler, scipy's solve_ivp, CVODE.
+
+A general ODE solver is started at a lift-off and stopped at the impact (theta falls through zero)
+or where toppling is inevitable; the peak (theta' falls through zero) is recorded on the way.
+Rest between excursions is skipped by arithmetic, the motion after the record is decided in
+closed form: solvers are asked for nothing that rbfrag's own kernel does not do either.
+SUNDIALS CVODE, with Python callbacks, is the dissertation's method; scikit-sundae comes with the
+extra `bench` alone and is used where it is installed.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable
+from importlib.util import find_spec
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.bench.cases import Case
+from rbfrag.solver.integrator.compiled import kernel
+
+FloatArray = NDArray[np.float64]
+Solver = Literal["RK45", "DOP853", "LSODA"]
+Formula = Literal["Adams", "BDF"]
+
+STABLE, TOPPLED = "stable", "toppled"
+
+MOST_EXCURSIONS = 100_000
+
+GRACE = 1e-3
+"""Part of an interval after a start in which no impact is looked for: theta is zero there."""
+
+ATOL_PARTS = 1e-3
+"""Absolute tolerance over (relative tolerance x critical angle)."""
+
+CVODE_PACKAGE = "sksundae"
+CVODE_INSTALL = "scikit-sundae"
+
+MOST_STEPS = 1_000_000
+"""Of CVODE in one excursion."""
+
+
+class Answer(NamedTuple):
+    """Outcome and peak rotation [rad]; the peak is NaN unless the block stays."""
+
+    outcome: str
+    peak_rad: float
+
+
+def free_motion(
+    theta: float | np.longdouble,
+    rate: float | np.longdouble,
+    p: float | np.longdouble,
+    theta_c: float | np.longdouble,
+    peak: float | np.longdouble,
+) -> Answer:
+    """Decide by energy what becomes of a moving block once the ground is at rest.
+
+    Args:
+        theta: rotation at the end of the record [rad].
+        rate: rotation rate [rad/s].
+        p: frequency parameter [1/s].
+        theta_c: critical angle [rad].
+        peak: greatest rotation so far [rad].
+    """
+    x, v = theta_c - theta, rate / p
+    half = 2 * np.sin(np.abs(x) / 2)
+    topples = v > half if x > 0 else v > -half
+    if topples:
+        return Answer(TOPPLED, math.nan)
+    if v > 0:
+        top = theta_c - 2 * np.arcsin(np.sqrt((half - v) * (half + v)) / 2)
+        peak = max(peak, top)
+    return Answer(STABLE, float(peak))
+
+
+def euler(case: Case, parts: int) -> Answer:
+    """Run one case with `parts` Euler steps per sample interval."""
+    drive = case.drive
+    p, theta_c = math.sqrt(case.p2), math.atan(case.kr)
+    border = math.atan(min(float(drive.q.min()), 0.0))
+    fell, theta, rate, peak = _march(
+        drive.k_h, float(drive.interval_s[0]), case.kr, case.p2, theta_c, border, parts
+    )
+    if fell:
+        return Answer(TOPPLED, math.nan)
+    if theta <= 0.0 and rate <= 0.0:
+        return Answer(STABLE, peak)
+    return free_motion(theta, rate, p, theta_c, peak)
+
+
+@kernel
+def _march(
+    k_h: FloatArray,
+    dt: float,
+    kr: float,
+    p2: float,
+    theta_c: float,
+    border: float,
+    parts: int,
+) -> tuple[bool, float, float, float]:
+    theta = 0.0
+    rate = 0.0
+    peak = 0.0
+    h = dt / parts
+    for i in range(k_h.size - 1):
+        for j in range(parts):
+            k = k_h[i] + (k_h[i + 1] - k_h[i]) * j / parts
+            if theta <= 0.0 and rate <= 0.0 and k <= kr:
+                continue
+            x = theta_c - theta
+            slope = p2 * (k * math.cos(x) - math.sin(x))
+            theta += h * rate
+            rate += h * slope
+            if theta < 0.0 or (theta == 0.0 and rate <= 0.0):
+                theta = 0.0
+                rate = 0.0
+            elif theta > peak:
+                peak = theta
+            if rate > 0.0 and theta_c - theta < border:
+                return True, theta, rate, peak
+    return False, theta, rate, peak
+
+
+class Excursion(NamedTuple):
+    """How one excursion ended: at time [s], with (theta, theta'), peaks on the way."""
+
+    ended: str
+    time_s: float
+    theta: float
+    rate: float
+    peaks: tuple[float, ...]
+
+
+class Problem:
+    """One case as scalar Python functions, made as cheap as plain Python allows."""
+
+    def __init__(self, case: Case) -> None:
+        self.k: list[float] = case.drive.k_h.tolist()
+        self.dt = float(case.drive.interval_s[0])
+        self.end_s = self.dt * (len(self.k) - 1)
+        self.p2, self.kr, self.p = case.p2, case.kr, math.sqrt(case.p2)
+        self.theta_c = math.atan(case.kr)
+        # Below this angle to balance nothing in the record brings the block back.
+        self.border = self.theta_c - math.atan(min(float(case.drive.q.min()), 0.0))
+        self._lifts = np.flatnonzero(case.drive.k_h > case.kr)
+        k, inverse, last = self.k, 1.0 / self.dt, len(self.k) - 2
+        p2, theta_c, sin, cos = self.p2, self.theta_c, math.sin, math.cos
+
+        def acceleration(t: float, theta: float) -> float:
+            position = t * inverse
+            i = int(position)
+            if i > last:
+                i = last
+            a = k[i]
+            x = theta_c - theta
+            slope: float = p2 * ((a + (k[i + 1] - a) * (position - i)) * cos(x) - sin(x))
+            return slope
+
+        self.acceleration: Callable[[float, float], float] = acceleration
+
+    def next_lift(self, t: float) -> float | None:
+        """First time from t [s] on at which the threshold is exceeded."""
+        i = min(int(t / self.dt), len(self.k) - 2)
+        now = self.k[i] + (self.k[i + 1] - self.k[i]) * (t / self.dt - i)
+        if now > self.kr:
+            return t
+        later = self._lifts[np.searchsorted(self._lifts, i + 1) :]
+        if not later.size or t >= self.end_s:
+            return None
+        j = int(later[0])
+        low, high = self.k[j - 1], self.k[j]
+        return max(t, self.dt * (j - 1 + (self.kr - low) / (high - low)))
+
+
+def run_through(case: Case, excursion: Callable[[Problem, float], Excursion]) -> Answer:
+    """Run a case, one excursion after the other."""
+    problem = Problem(case)
+    t: float | None = problem.next_lift(0.0)
+    peak = 0.0
+    for _ in range(MOST_EXCURSIONS):
+        if t is None or t >= problem.end_s:
+            return Answer(STABLE, peak)
+        done = excursion(problem, t)
+        peak = max(peak, *done.peaks, 0.0)
+        if done.ended == "toppled":
+            return Answer(TOPPLED, math.nan)
+        if done.ended == "record":
+            if done.theta <= 0.0 and done.rate <= 0.0:
+                return Answer(STABLE, peak)
+            return free_motion(done.theta, done.rate, problem.p, problem.theta_c, peak)
+        if done.ended == "failed":
+            return Answer("failed", math.nan)
+        # an impact found where it started would be found again for ever
+        t = problem.next_lift(max(done.time_s, t + GRACE * problem.dt))
+    return Answer("failed", math.nan)
+
+
+def solve_ivp_run(case: Case, solver: Solver, rtol: float) -> Answer:
+    """Run one case."""
+    return run_through(case, lambda problem, t: _scipy_excursion(problem, t, solver, rtol))
+
+
+class _Event:
+    """An event function with the attributes that scipy reads."""
+
+    def __init__(self, problem: Problem, start: float, kind: str) -> None:
+        self.kind, self.border = kind, problem.border
+        self.grace_s = start + GRACE * problem.dt
+        self.terminal = kind != "peak"
+        self.direction = 1.0 if kind == "toppled" else -1.0
+
+    def __call__(self, t: float, y: FloatArray) -> float:
+        if self.kind == "peak":
+            return float(y[1])
+        if self.kind == "toppled":
+            return float(y[0]) - self.border
+        return float(y[0]) if t > self.grace_s else 1.0
+
+
+def _scipy_excursion(problem: Problem, start: float, solver: Solver, rtol: float) -> Excursion:
+    from scipy.integrate import solve_ivp
+
+    acceleration = problem.acceleration
+    absolute = ATOL_PARTS * rtol * problem.theta_c
+    events = [_Event(problem, start, kind) for kind in ("impact", "toppled", "peak")]
+    try:
+        solution = solve_ivp(
+            lambda t, y: (y[1], acceleration(t, y[0])),
+            (start, problem.end_s),
+            (0.0, 0.0),
+            method=solver,
+            rtol=rtol,
+            atol=[absolute, absolute * problem.p],
+            events=events,
+        )
+    except ValueError:  # its interpolant and its step disagree about the sign of an event
+        return Excursion("failed", start, 0.0, 0.0, ())
+    if solution.status < 0 or solution.t_events is None or solution.y_events is None:
+        return Excursion("failed", start, 0.0, 0.0, ())
+    ended = "record"
+    if solution.status == 1:
+        ended = "impact" if len(solution.t_events[0]) else "toppled"
+    return Excursion(
+        ended,
+        float(solution.t[-1]),
+        float(solution.y[0, -1]),
+        float(solution.y[1, -1]),
+        tuple(float(state[0]) for state in solution.y_events[2]),
+    )
+
+
+def cvode_is_installed() -> bool:
+    """Tell whether CVODE can be run here."""
+    return find_spec(CVODE_PACKAGE) is not None
+
+
+def cvode_run(case: Case, rtol: float, formula: Formula = "Adams") -> Answer:
+    """Run one case."""
+    cvode = importlib.import_module(f"{CVODE_PACKAGE}.cvode").CVODE
+    return run_through(case, lambda problem, t: _cvode_excursion(cvode, problem, t, rtol, formula))
+
+
+def _cvode_excursion(
+    cvode: Any, problem: Problem, start: float, rtol: float, formula: Formula
+) -> Excursion:
+    acceleration, border = problem.acceleration, problem.border
+    grace_s = start + GRACE * problem.dt
+
+    def slope(t: float, y: Any, yp: Any) -> None:
+        theta, rate = y.tolist()
+        yp[0] = rate
+        yp[1] = acceleration(t, theta)
+
+    def events(t: float, y: Any, g: Any) -> None:
+        theta, rate = y.tolist()
+        g[0] = theta if t > grace_s else 1.0
+        g[1] = theta - border
+        g[2] = rate
+
+    events.terminal = [True, True, False]  # type: ignore[attr-defined]
+    events.direction = [-1, 1, -1]  # type: ignore[attr-defined]
+    absolute = ATOL_PARTS * rtol * problem.theta_c
+    solver = cvode(
+        slope,
+        method=formula,
+        rtol=rtol,
+        atol=[absolute, absolute * problem.p],
+        eventsfn=events,
+        num_events=3,
+        max_num_steps=MOST_STEPS,
+    )
+    # A third time asks for output there alone: storing every step would slow CVODE down.
+    end = problem.end_s
+    solution = solver.solve([start, 0.5 * (start + end), end], [0.0, 0.0])
+    if solution.status < 0:
+        return Excursion("failed", start, 0.0, 0.0, ())
+    ended, peaks = "record", []
+    if solution.i_events is not None:
+        for which, state in zip(solution.i_events, solution.y_events, strict=True):
+            if which[2]:
+                peaks.append(float(state[0]))
+            if which[0]:
+                ended = "impact"
+            elif which[1]:
+                ended = "toppled"
+    return Excursion(
+        ended, float(solution.t[-1]), float(solution.y[-1, 0]), float(solution.y[-1, 1]),
+        tuple(peaks),
+    )  # fmt: skip

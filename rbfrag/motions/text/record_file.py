@@ -1,0 +1,411 @@
+"""One record's file as a reader sees it: its lines, and what the caller states of it.
+
+What every reader has to do is done here: fields are found by what they say, the header's unit,
+sampling interval and number of samples agreed with the caller's, samples read, labels put together.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError, MotionFileError
+from rbfrag.motions.direction import azimuth_deg, is_vertical_name
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.text.file import (
+    MOST_DIGITS,
+    finite_number,
+    shown,
+    without_blank_end,
+)
+from rbfrag.motions.text.times import first_sample_time
+from rbfrag.motions.units import acceleration_unit, unit_in_g
+
+FloatArray = NDArray[np.float64]
+
+TENTH_OF_G = re.compile(r"g\s*/\s*10", re.IGNORECASE)
+"""The unit of the uncorrected (volume 1) formats of the 1970s."""
+
+SAME_DT = 1e-9
+"""Intervals that differ by less were computed from different fields of one header; relative."""
+
+ROUNDING = 1e-9
+"""A computed number of samples is off by no more than this ratio."""
+
+MOST_SIGNIFICANT = 17
+
+LONGEST_LINE = 1000
+"""Characters of a header line that are looked at."""
+
+_CHANNELS = re.compile(r"\(\s*(\d{1,3})\s+chns\s+of", re.IGNORECASE | re.ASCII)
+
+
+@dataclass(frozen=True)
+class Field:
+    """A header field: its value as the file has it, and its line, from 1."""
+
+    text: str
+    line: int
+
+
+@dataclass(frozen=True)
+class RecordFile:
+    """A file that is being read. Every refusal is a MotionFileError that names the line.
+
+    Args:
+        path: for labels and messages.
+        text: the file's text.
+        file_format: name of the format, as motions keep it.
+        units: unit of acceleration that the caller states, or None.
+        dt_s: sampling interval that the caller states [s], or None.
+        allow_partial: True to read a file whose header states another number of samples than
+            follow; the motion is then marked as partial.
+    """
+
+    path: Path
+    text: str
+    file_format: str = ""
+    units: str | None = None
+    dt_s: float | None = None
+    allow_partial: bool = False
+
+    @cached_property
+    def lines(self) -> list[str]:
+        """The lines of the file."""
+        return self.text.split("\n")
+
+    def error(self, trouble: str, line: int | None = None) -> MotionFileError:
+        """Return the error that names this file, and its line from 1 where one is to blame."""
+        return MotionFileError(self.path, trouble, line=line)
+
+    # fields of the header
+
+    def optional(self, span: range, pattern: re.Pattern[str]) -> Field | None:
+        """Return the first match's group 1 among the lines of a span of indices, or None."""
+        for at in span:
+            if found := pattern.search(self.lines[at][:LONGEST_LINE]):
+                return Field(found[1].strip(), at + 1)
+        return None
+
+    def words(self, span: range, pattern: re.Pattern[str]) -> str:
+        """Return the first match's group 1 among the lines of a span; empty where there is none."""
+        found = self.optional(span, pattern)
+        return found.text if found else ""
+
+    def find(self, span: range, pattern: re.Pattern[str], what: str) -> Field:
+        """Return the first match's group 1 among the lines of a span, which must have it."""
+        found = self.optional(span, pattern)
+        if found is None:
+            raise self.error(
+                f"the header has no {what}: the file is truncated or its header damaged; export "
+                "the record again",
+                span.start + 1,
+            )
+        return found
+
+    def blocks(self, first: re.Pattern[str]) -> list[range]:
+        """Return the spans that begin with a line that `first` matches and end at the next."""
+        starts = [at for at, line in enumerate(self.lines) if first.match(line)]
+        if not starts:
+            raise self.error(
+                "the first line of the header is damaged: export the record again", line=1
+            )
+        ends = [*starts[1:], len(self.lines)]
+        return [range(start, end) for start, end in zip(starts, ends, strict=True)]
+
+    def missing_channels(self, span: range, found: int) -> tuple[str, ...]:
+        """Return a remark if the file holds fewer channels than its first block says.
+
+        Some agencies split a recording into one file a channel, so that this is no error.
+        """
+        stated = self.words(span, _CHANNELS)
+        if not stated or int(stated) <= found:
+            return ()
+        return (f"the header says {stated} channels, but the file holds {found}",)
+
+    # what header and caller must agree on
+
+    def positive(self, field: Field, what: str) -> float:
+        """Return a field's number, which must be above zero."""
+        return positive_number(self.path, field, what)
+
+    def count(self, field: Field, what: str) -> int:
+        """Return a whole number of at least 1 that a field states."""
+        digits = field.text.removesuffix(".")
+        # int() refuses thousands of digits in words of its own
+        if digits.isascii() and digits.isdigit() and len(digits) < MOST_DIGITS and int(digits) > 0:
+            return int(digits)
+        raise self.error(f"{what} {shown(field.text)} is not a count of samples", field.line)
+
+    def unit_in_g(self, field: Field) -> float:
+        """Return how many g the header's unit is; g/10 is known besides the usual units."""
+        unit: str | None = None
+        if not TENTH_OF_G.fullmatch(field.text):
+            try:
+                unit = acceleration_unit(field.text)
+            except InputError as error:
+                raise self.error(str(error), field.line) from None
+        if self.units is not None and acceleration_unit(self.units) != unit:
+            raise self.error(
+                f"the header says {field.text}, not {self.units}: leave --units out", field.line
+            )
+        return 0.1 if unit is None else unit_in_g(unit)
+
+    def stated_unit_in_g(self) -> float:
+        """Return how many g the caller's unit is, for formats that state none."""
+        if self.units is None:
+            raise self.error(
+                "files of this format state no unit of acceleration, and it is never guessed: give "
+                "it with --units g, m/s2, cm/s2 or mm/s2"
+            )
+        return unit_in_g(self.units)
+
+    def dt(self, field: Field, what: str = "dt") -> float:
+        """Return the sampling interval [s] that a field states."""
+        return self.agreed_dt(self.positive(field, what), field.line)
+
+    def agreed_dt(self, dt: float, line: int | None) -> float:
+        """Return the header's sampling interval [s]; refused where the caller states another."""
+        if not 0.0 < dt < math.inf:
+            raise self.error(f"the sampling interval of {dt:g} s must be positive and finite", line)
+        if self.dt_s is not None and not math.isclose(dt, self.dt_s, rel_tol=SAME_DT, abs_tol=0.0):
+            raise self.error(
+                f"the header says dt = {dt:g} s, not {self.dt_s:g}: leave --dt out", line
+            )
+        return dt
+
+    def dt_of_duration(self, duration: Field, npts: int) -> float:
+        """Return the shortest decimal dt [s] with which npts samples last the printed duration."""
+        seconds = self.positive(duration, "record length")
+        _, _, decimals = duration.text.partition(".")
+        half_digit = 0.5 * 10.0 ** -len(decimals.rstrip())
+        for digits in range(MOST_SIGNIFICANT):
+            dt = float(f"{seconds / npts:.{digits}e}")
+            if dt > 0.0 and abs(dt * npts - seconds) <= half_digit:
+                break
+        else:
+            dt = seconds / npts
+        return self.agreed_dt(dt, duration.line)
+
+    def remarks(self, stated: float, found: int, line: int, what: str = "") -> tuple[str, ...]:
+        """Return a remark if the header states another number of samples than follow, or refuse it.
+
+        Args:
+            stated: samples by the header; a product of duration and frequency may be rounded.
+            found: samples that follow. A file without any is refused in any case.
+            line: 1-based line that states the number.
+            what: whose samples, when the file holds several traces.
+        """
+        if found and abs(stated - found) <= ROUNDING * found:
+            return ()
+        says = f"the header{f' of {what}' if what else ''} says {stated:.12g} samples, but {found} "
+        if found and self.allow_partial:
+            return (
+                f"{says}follow: the record is partial, and which samples are missing is not told",
+            )
+        raise self.error(
+            f"{says}follow: the file is truncated or its header is wrong; export the record again, "
+            "or read what there is with --allow-partial",
+            line,
+        )
+
+    # samples
+
+    def data(self, start: int, stop: int | None = None) -> Sequence[str]:
+        """Return the lines of some indices without the blank ones at their end."""
+        return without_blank_end(self.lines[start:stop])
+
+    def free_numbers(self, rows: Sequence[str], first_line: int, what: str) -> FloatArray:
+        """Return blank-separated numbers of rows, of which the first is this line, from 1."""
+        tokens = " ".join(rows).split()
+        try:
+            numbers = np.array(tokens, dtype=np.float64)
+        except ValueError:
+            numbers = np.array([np.nan])
+        # numpy also reads 'nan', 'inf' and '1_000', which no instrument writes
+        if not np.isfinite(numbers).all() or any("_" in token for token in tokens):
+            return np.array(
+                [
+                    finite_number(self.path, token, number, what)
+                    for number, row in enumerate(rows, first_line)
+                    for token in row.split()
+                ]
+            )
+        return numbers
+
+    def table(self, rows: Sequence[str], first_line: int, columns: int, what: str) -> FloatArray:
+        """Return blank-separated columns of numbers, shape (rows, columns)."""
+        for number, row in enumerate(rows, first_line):
+            found = len(row.split())
+            if found != columns:
+                raise self.error(
+                    f"the line has {found} values, not {columns} as the header says: repair the "
+                    "line or export the record again",
+                    number,
+                )
+        return self.free_numbers(rows, first_line, what).reshape(-1, columns)
+
+    def fixed_width(
+        self, rows: Sequence[str], first_line: int, layout: tuple[int, int], what: str
+    ) -> FloatArray:
+        """Return numbers in columns of a fixed width, which may touch.
+
+        Args:
+            rows: the lines that hold them; only the last may hold fewer than the others.
+            first_line: 1-based line of the first.
+            layout: fields a line, and characters a field, the number at its right end.
+            what: what the numbers are, for messages.
+        """
+        per_line, width = layout
+        rows = [row.rstrip() for row in rows]
+        whole = width * per_line
+        for at, row in enumerate(rows):
+            # a character too many or too few would shift every field after it
+            if len(row) != whole and (at < len(rows) - 1 or len(row) % width or len(row) > whole):
+                raise self.error(
+                    f"the line has {len(row)} characters, which are not {per_line} fields of "
+                    f"{width}: repair the line or export the record again",
+                    first_line + at,
+                )
+        text = "".join(rows)
+        if not text:
+            return np.empty(0)
+        try:
+            numbers = np.frombuffer(text.encode("ascii"), dtype=f"S{width}").astype(np.float64)
+        except ValueError:
+            numbers = np.array([np.nan])
+        if not np.isfinite(numbers).all() or "_" in text:
+            # numpy knows fewer blanks than Python does: a field may be sound all the same
+            return np.array(
+                [
+                    finite_number(
+                        self.path, row[start : start + width].strip(), first_line + at, what
+                    )
+                    for at, row in enumerate(rows)
+                    for start in range(0, len(row), width)
+                ]
+            )
+        return numbers
+
+    def fixed_table(
+        self, rows: Sequence[str], first_line: int, layout: tuple[int, int], what: str
+    ) -> FloatArray:
+        """Return columns of a fixed width, shape (rows, fields a line)."""
+        numbers = self.fixed_width(rows, first_line, layout, what)
+        if numbers.size % layout[0]:
+            raise self.error(
+                f"the last row has not {layout[0]} columns: the file is truncated",
+                first_line - 1 + len(rows),
+            )
+        return numbers.reshape(-1, layout[0])
+
+    def refuse_other_times(
+        self, times_s: FloatArray, dt: float, decimals: int, first_line: int, per_line: int
+    ) -> None:
+        """Refuse printed times [s] that the sampling interval does not reproduce.
+
+        A missing or doubled row shows so.
+        """
+        expected = times_s[0] + dt * np.arange(times_s.size)
+        # the first time is rounded as well
+        off = np.flatnonzero(np.abs(times_s - expected) > (1.0 + 1e-6) * 10.0**-decimals)
+        if off.size:
+            at = int(off[0])
+            raise self.error(
+                f"time {times_s[at]:g} s stands where {expected[at]:g} s was expected with the "
+                f"header's dt of {dt:g} s: repair the line or export the record again",
+                first_line + at // per_line,
+            )
+
+    def motion(
+        self,
+        samples_g: FloatArray,
+        dt: float,
+        *,
+        component: str,
+        axis: str | None = None,
+        recording: str | None = None,
+        start: str = "",
+        remarks: tuple[str, ...] = (),
+        **labels: Any,
+    ) -> GroundMotion:
+        """Return a motion with the labels that all formats have.
+
+        Args:
+            samples_g: accelerations [g].
+            dt: sampling interval [s].
+            component: its name; direction and sense are what it says, or else what `axis` says.
+            axis: a name that says more of the direction.
+            recording: id that the components of a recording share; None for event and station.
+            start: text with the time of the first sample.
+            remarks: a motion with remarks is partial, unless `is_partial` says otherwise.
+            labels: other labels of :class:`GroundMotion`.
+        """
+        if recording is None:
+            recording = f"{labels.get('event', '')} {labels.get('station', '')}".strip()
+        name = component if axis is None else axis
+        time: datetime | None = first_sample_time(start) if start else None
+        return GroundMotion(
+            samples_g,
+            dt,
+            component=component,
+            recording=recording,
+            source_file=self.path.name,
+            file_format=self.file_format,
+            remarks=remarks,
+            **{
+                "orientation_deg": azimuth_deg(name),
+                "is_vertical": is_vertical_name(name),
+                "is_partial": bool(remarks),
+                "start_time": time,
+                **labels,
+            },
+        )
+
+
+def positive_number(path: Path, field: Field, what: str) -> float:
+    """Return a field's number, which must be above zero."""
+    value = finite_number(path, field.text, field.line, what)
+    if value <= 0.0:
+        raise MotionFileError(path, f"{what} {field.text} must be positive", line=field.line)
+    return value
+
+
+class NamedFields:
+    """Header lines ``name: value`` of a span, looked up by name; lines without a colon are not."""
+
+    def __init__(self, file: RecordFile, span: range) -> None:
+        self._file = file
+        self._fields: dict[str, Field] = {}
+        for at in span:
+            name, colon, value = file.lines[at][:LONGEST_LINE].partition(":")
+            if colon and name.strip():
+                self._fields.setdefault(name.strip(), Field(value.strip(), at + 1))
+
+    def __getitem__(self, name: str) -> Field:
+        """Return the field of this name, or else the first whose name begins so."""
+        found = self._find(name)
+        if found is None:
+            raise self._file.error(f"the header has no {name!r}: export the record again", line=1)
+        if not found.text:
+            raise self._file.error(f"the header's {name!r} is empty", found.line)
+        return found
+
+    def text(self, name: str) -> str:
+        """Return a field's text; empty where the header has none."""
+        found = self._find(name)
+        return found.text if found else ""
+
+    def _find(self, name: str) -> Field | None:
+        if name in self._fields:
+            return self._fields[name]
+        return next((field for key, field in self._fields.items() if key.startswith(name)), None)
