@@ -42,10 +42,9 @@ from rbfrag.db.models import save_model
 from rbfrag.db.outcome_maps import SAME_BLOCK
 from rbfrag.db.rows import ModelRow
 from rbfrag.db.stored_combination import stored_combination
+from rbfrag.fragility.fit.data import kr_over_pga_of_grid, read_source
 from rbfrag.fragility.fit.fitting import fit
-from rbfrag.fragility.fit.kind_fitting import fit_kind
 from rbfrag.fragility.fit.report import FitReport
-from rbfrag.fragility.fit.source import kr_over_pga_of_grid, read_source
 from rbfrag.solver.results import NUMERICS_VERSION, SEARCH_LIMIT
 from rbfrag.version import __version__
 
@@ -245,7 +244,7 @@ def add_kind_models(full: Path, made: Path) -> list[ModelRow]:
     rows = []
     for asked in KIND_MODELS:
         with opened_database(full, read_only=True) as engine, engine.connect() as connection:
-            row = fit_kind(connection, **asked).row
+            row = fit(connection, **asked).model.row
         with opened_database(made) as engine, engine.begin() as connection:
             rows.append(save_model(connection, row, replace=True))
         print(f"fitted {row.name}", file=sys.stderr, flush=True)

@@ -11,9 +11,9 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic
 
-from rbfrag.fragility.fit import straight_line
 from rbfrag.fragility.formulas import ABOVE_SPECTRUM, ABOVE_TWICE_PGV, LINE, NOT_LIFTED
 from rbfrag.fragility.functions import Functions, N
+from rbfrag.fragility.methods import wls as straight_line
 from rbfrag.fragility.model import FragilityModel
 
 NEGATIVE_SHARE_LIMIT = 0.025

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rbfrag.fragility.fit.source import kr_over_pga_of_grid, read_source
 
 from benchmarks import reference_set
 from benchmarks.all_outcomes import with_all_outcomes
@@ -15,7 +16,6 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.outcome_maps import outcome_maps
 from rbfrag.db.queries import combination_table
 from rbfrag.db.spectra import spectrum_values
-from rbfrag.fragility.fit.source import kr_over_pga_of_grid, read_source
 from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.toppling_run import respond
 from tests.synthetic import shaking, write_at2

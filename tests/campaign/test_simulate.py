@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rbfrag.fragility.fit.source import kr_over_pga_of_grid, read_source
 from sqlalchemy import select
 
 from rbfrag.campaign.add_motions import add_motions
@@ -24,7 +25,6 @@ from rbfrag.db.queries import combination_table, database_info
 from rbfrag.db.schema import combination, simulation
 from rbfrag.db.spectra import spectrum_values
 from rbfrag.errors import InputError
-from rbfrag.fragility.fit.source import kr_over_pga_of_grid, read_source
 from rbfrag.solver.toppling_run import respond
 from tests.synthetic import write_suite
 

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rbfrag.fragility.fit.kind_fitting import fit_kind
+from rbfrag.fragility.fit.model_check import check_models
 from sqlalchemy import Engine, select, update
 
 from rbfrag.campaign.progress import CampaignProgress
@@ -27,8 +29,6 @@ from rbfrag.db.queries import combination_table
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.exchange.database_tables import export_database
-from rbfrag.fragility.fit.kind_fitting import fit_kind
-from rbfrag.fragility.fit.model_check import check_models
 from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.critical import critical

@@ -14,11 +14,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.special import ndtr
-
-from rbfrag.db.engine import opened_database
-from rbfrag.db.rows import ModelRow
-from rbfrag.errors import FitError, InputError, ModelError, UnknownModelError
 from rbfrag.fragility.fit.kind_data import LEAST_DISPLACEMENT_M, KindData
 from rbfrag.fragility.fit.kind_fitting import (
     ARRAYS,
@@ -27,6 +22,11 @@ from rbfrag.fragility.fit.kind_fitting import (
     fit_kind_data,
     maximum_likelihood,
 )
+from scipy.special import ndtr
+
+from rbfrag.db.engine import opened_database
+from rbfrag.db.rows import ModelRow
+from rbfrag.errors import FitError, InputError, ModelError, UnknownModelError
 from rbfrag.fragility.kind_formulas import FORMULAS, METHODS, SINGLE
 from rbfrag.fragility.kind_model import KindModel
 from rbfrag.fragility.kind_prediction import dip_factor, predict_sliding, predict_slumping

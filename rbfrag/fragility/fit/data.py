@@ -300,6 +300,13 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
             "no critical values to fit: add motions with  rbfrag motions add  and run  rbfrag "
             f"simulate --kind {named}"
         )
+    of_outcomes = method.reads == "outcomes"
+    if of_outcomes and not np.isfinite(source.failed).any():
+        raise FitError(
+            f"method {method.name} fits what blocks did, and no outcomes are stored: run  rbfrag "
+            f"simulate --kind {named}  again, which adds those of the grid, or fit critical "
+            "values (--method wls or lognormal)"
+        )
     points = _READERS[method.block.names](source, method, term)
     own = points.combination
     keys = table.natural_key[own].astype(str)
@@ -311,7 +318,6 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
     found = points.found[chosen]
     values = {name: np.ascontiguousarray(v[chosen]) for name, v in points.values.items()}
     failed = np.ascontiguousarray(points.failed[chosen])
-    of_outcomes = method.reads == "outcomes"
     data = FitData(
         kind=named,
         values=values,
@@ -361,12 +367,6 @@ def _fingerprint(
 def _refuse_thin(data: FitData, method: Method, term: Term) -> None:
     of_outcomes = method.reads == "outcomes"
     tells = (np.isfinite(data.failed) & data.read).any(axis=1) if of_outcomes else data.found
-    if of_outcomes and not tells.any():
-        raise FitError(
-            f"method {method.name} fits what blocks did, and no outcomes are stored: run  rbfrag "
-            f"simulate --kind {data.kind}  again, which adds those of the grid, or fit critical "
-            "values (--method wls or lognormal)"
-        )
     n = int(tells.sum())
     if n < FEWEST_FOUND:
         raise FitError(

@@ -110,9 +110,7 @@ def test_the_jackknife_is_that_of_left_out_earthquakes(link):
     b = most_likely(data)
     steps = np.array([maximise(data.only(data.event != e), b)[0] - b for e in range(30)])
     expected = 29 / 30 * steps.T @ steps
-    assert np.diag(cr3(jackknife_steps(data, b))) == pytest.approx(
-        np.diag(expected), rel=0.15
-    )
+    assert np.diag(cr3(jackknife_steps(data, b))) == pytest.approx(np.diag(expected), rel=0.15)
 
 
 def test_a_published_logistic_regression():
