@@ -94,21 +94,16 @@ def within_motion(residual: FloatArray, group: NDArray[np.intp]) -> tuple[float,
     return within, float(np.std(mean[count > 1]))
 
 
-def slumping_scatter(data: FitData) -> tuple[float, float]:
-    """Return both scatters of ln(y/PGV) at failure, found values alone."""
-    v = data.values
-    y = v["ks"] * STANDARD_GRAVITY_M_S2 / np.sqrt(v["ps2"])
-    found = data.found
-    return within_motion(np.log(y / v["pgv_m_s"])[found], data.motion[found])
-
-
-def toppling_scatter(connection: Connection) -> tuple[float, float]:
-    """Return the same of toppling blocks of six sizes."""
-    table = combination_table(connection)
-    found = table.status == "found"
+def scatter(
+    connection: Connection, kind: str, rotation_deg: float | None = None
+) -> tuple[float, float]:
+    """Return both scatters of ln(y/PGV) at failure, found values alone; y = k g/p."""
+    table = combination_table(connection, kind=kind, rotation_deg=rotation_deg)
+    found = (table.status == "found") & (table.kr_over_pga < 1.0)
     names = [f"{m} {p}" for m, p in zip(table.motion_id.tolist(), table.polarity, strict=True)]
     group = np.unique(np.array(names)[found], return_inverse=True)[1]
-    return within_motion(np.log(table.y_m_s[found] / table.pgv_m_s[found]), group.astype(np.intp))
+    y = table.kr_over_pga * table.pga_g * STANDARD_GRAVITY_M_S2 / np.sqrt(table.p2)
+    return within_motion(np.log(y / table.pgv_m_s)[found], group.astype(np.intp))
 
 
 def main() -> None:
@@ -126,10 +121,11 @@ def main() -> None:
             for rotation in (None, 2.0)
             for term in ("pgv_pga", "pgv")
         }
+        slump_scatters = {r: scatter(c, "slumping", r) for r in (None, 2.0)}
     recovery, turned = slumps[None, "pgv_pga"].data, slumps[2.0, "pgv_pga"].data
     place = chosen.toppling or chosen.database
     with opened_database(place, read_only=True) as engine, engine.connect() as c:
-        topples = toppling_scatter(c)
+        topples = scatter(c, "toppling")
     rows = [
         scored("`sliding-pgv_pga`, held out", sliding.result.held_out, sliding.data),
         scored("`sliding-pgv`, held out", only_pgv.result.held_out, only_pgv.data),
@@ -151,8 +147,8 @@ def main() -> None:
         [name, f"{within:.2f}", f"{between:.2f}"]
         for name, (within, between) in (
             ("toppling, six sizes", topples),
-            ("slumping past recovery, 18 blocks", slumping_scatter(recovery)),
-            ("slumping by 2 degrees, 18 blocks", slumping_scatter(turned)),
+            ("slumping past recovery, 18 blocks", slump_scatters[None]),
+            ("slumping by 2 degrees, 18 blocks", slump_scatters[2.0]),
         )
     ]
     third = markdown(

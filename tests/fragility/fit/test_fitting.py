@@ -206,7 +206,7 @@ def test_no_mean_period_at_all_is_refused(draw):
 
 
 def test_unknown_names_are_refused(table):
-    with pytest.raises(InputError, match="unknown method 'ols': use one of .*wls"):
+    with pytest.raises(InputError, match=r"unknown method 'ols': use one of .*wls"):
         fit(table, term="pgv", method="ols")
     with pytest.raises(InputError, match="unknown intensity term"):
         fit(table, term="pgx")
