@@ -21,7 +21,7 @@ class Done(NamedTuple):
     """Whether the answer is proven, and the work it took; steps where they are counted."""
 
     certified: bool
-    flights: int
+    trajectories: int
     steps: int | None
 
 
@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     records = find_records(chosen.records)
     motions = records.motions[:: chosen.every]
     lines = [
-        "| work | p² | combinations | median | mean | 90 % | 99 % | certified | flights, mean "
+        "| work | p² | combinations | median | mean | 90 % | 99 % | certified | trajectories, mean "
         "| steps, median | steps, mean |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
@@ -57,13 +57,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
             ms = 1e3 * np.concatenate([seconds[p2] for p2 in sizes])
             middle, high, highest = np.quantile(ms, (0.5, 0.9, 0.99))
             all_done = [each for p2 in sizes for each in done[p2]]
-            flights = np.mean([each.flights for each in all_done])
+            trajectories = np.mean([each.trajectories for each in all_done])
             steps = [each.steps for each in all_done if each.steps is not None]
             counts = [f"{np.median(steps):,.0f}", f"{np.mean(steps):,.0f}"] if steps else ["", ""]
             lines.append(
                 f"| {name} | {label} | {ms.size} | {middle:.3g} ms | {ms.mean():.3g} ms "
                 f"| {high:.3g} ms | {highest:.3g} ms | {sum(each.certified for each in all_done)} "
-                f"| {flights:,.0f} | {' | '.join(counts)} |"
+                f"| {trajectories:,.0f} | {' | '.join(counts)} |"
             )
     about = f"{len(motions)} of {records.source}, both polarities, as the files have them."
     report("search-times", "\n".join([*lines, "", about]), write=chosen.write)

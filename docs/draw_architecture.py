@@ -1,18 +1,37 @@
 """Draw docs/figures/architecture.svg from the imports in rbfrag; --check only compares.
 
-Imports are read from the syntax trees, those in functions and under TYPE_CHECKING included.
+Imports are read from the syntax trees, those in functions and under TYPE_CHECKING included. The
+modules that one question loads are listed in docs/architecture.md by asking it.
 """
 
 from __future__ import annotations
 
 import ast
+import os
+import subprocess
 import sys
+import tempfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "rbfrag"
 FIGURE = ROOT / "docs" / "figures" / "architecture.svg"
+PAGE = ROOT / "docs" / "architecture.md"
+START, END = "<!-- loaded -->\n", "<!-- end -->\n"
+
+ASK = """
+import sys
+from rbfrag.cli.start import run
+sys.argv = ["rbfrag", "predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6"]
+try:
+    run()
+except SystemExit:
+    pass
+for name, module in sorted(sys.modules.items()):
+    if name.startswith("rbfrag.") and not module.__file__.endswith("__init__.py"):
+        print("loaded", name.replace(".", "/") + ".py")
+"""
 
 BESIDE = {"rbfrag", "errors", "files", "version", "migrations"}
 """What the figure leaves out: the public face, what everybody may import, the schema's steps."""
@@ -199,15 +218,42 @@ def _wrapped(words: Iterable[str], length: int) -> list[str]:
     return lines
 
 
+def loaded() -> list[str]:
+    """Return the files that the question of docs/architecture.md loads, packages' own aside."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    environment.pop("RBFRAG_DB", None)
+    # in an empty folder the shipped reference answers
+    with tempfile.TemporaryDirectory() as folder:
+        asked = subprocess.run(
+            [sys.executable, "-c", ASK],
+            cwd=folder,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    return [line.split()[1] for line in asked.stdout.splitlines() if line.startswith("loaded ")]
+
+
+def page() -> str:
+    """Return docs/architecture.md with the modules that are loaded today."""
+    before, rest = PAGE.read_text(encoding="utf-8").split(START)
+    after = rest.split(END, 1)[1]
+    names = loaded()
+    lines = "".join(f"- `{name}`\n" for name in names)
+    return f"{before}{START}\n{len(names)} modules:\n\n{lines}\n{END}{after}"
+
+
 def main(arguments: list[str]) -> int:
-    """Write the figure, or say whether it is up to date."""
-    if "--check" in arguments:
-        if FIGURE.exists() and FIGURE.read_text(encoding="utf-8") == drawn():
-            return 0
-        print(f"{FIGURE} is out of date: run python docs/draw_architecture.py", file=sys.stderr)
-        return 1
-    FIGURE.write_text(drawn(), encoding="utf-8")
-    return 0
+    """Write figure and list, or say whether they are up to date."""
+    status = 0
+    for path, text in ((FIGURE, drawn()), (PAGE, page())):
+        if "--check" not in arguments:
+            path.write_text(text, encoding="utf-8")
+        elif not path.exists() or path.read_text(encoding="utf-8") != text:
+            print(f"{path} is out of date: run python docs/draw_architecture.py", file=sys.stderr)
+            status = 1
+    return status
 
 
 if __name__ == "__main__":

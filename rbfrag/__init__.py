@@ -15,7 +15,6 @@ from rbfrag.version import __version__
 if TYPE_CHECKING:
     from rbfrag.campaign.add_motions import add_motions as add_motions
     from rbfrag.campaign.simulate import simulate as simulate
-    from rbfrag.campaign.simulate_kind import simulate_kind as simulate_kind
     from rbfrag.errors import DatabaseError as DatabaseError
     from rbfrag.errors import FitError as FitError
     from rbfrag.errors import InputError as InputError
@@ -78,7 +77,6 @@ _HOME = {
     "read_table": "rbfrag.exchange.database_tables",
     "respond": "rbfrag.solver.respond",
     "simulate": "rbfrag.campaign.simulate",
-    "simulate_kind": "rbfrag.campaign.simulate_kind",
     "sliding_displacements": "rbfrag.solver.models.sliding",
     "stability": "rbfrag.solver.stability.single",
     "stability_arrays": "rbfrag.solver.stability.arrays",

@@ -14,10 +14,10 @@ from rbfrag.bench.cases import Case
 from rbfrag.bench.methods import taylor_run
 from rbfrag.bench.timing import timed
 from rbfrag.campaign.executors.local import prepare
-from rbfrag.campaign.plan import Case as PlannedCase
-from rbfrag.campaign.worker import MotionWork, Task, run_work
+from rbfrag.campaign.worker import MotionWork, PlannedCase, Task, run_work
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
+from rbfrag.solver.kinds import model_of_kind
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES
 from rbfrag.solver.toppling_run import simulate
 
@@ -90,6 +90,7 @@ def workers(
     *,
     processes: Sequence[int] = (1, 2),
     combinations: Sequence[int] = (12, 24, 48, 96),
+    kind: str = "toppling",
 ) -> tuple[WorkersRow, ...]:
     """Time sets of critical searches, as a campaign hands them to its workers.
 
@@ -100,11 +101,11 @@ def workers(
     for number in processes:
         context = get_context("spawn")
         with ProcessPoolExecutor(number, mp_context=context, initializer=prepare) as pool:
-            warm = [_work(motions[i % len(motions)], i, 1) for i in range(4 * number)]
+            warm = [_work(motions[i % len(motions)], i, 1, kind) for i in range(4 * number)]
             list(pool.map(run_work, warm))
             for wanted in combinations:
                 chosen = range(max(1, wanted // each))
-                work = [_work(motions[i % len(motions)], i, each) for i in chosen]
+                work = [_work(motions[i % len(motions)], i, each, kind) for i in chosen]
                 started = time.perf_counter()
                 done = sum(len(answer.results) for answer in pool.map(run_work, work))
                 seconds = time.perf_counter() - started
@@ -112,10 +113,12 @@ def workers(
     return tuple(rows)
 
 
-def _work(motion: GroundMotion, number: int, cases: int) -> MotionWork:
+def _work(motion: GroundMotion, number: int, cases: int, kind: str) -> MotionWork:
     planned = [
-        PlannedCase(natural_key="", polarity=polarity, p2=p2)
-        for p2 in DEFAULT_P2
+        PlannedCase(
+            natural_key=f"{polarity} {case.p2}", polarity=polarity, vertical_id=None, case=case
+        )
+        for case in model_of_kind(kind).cases()
         for polarity in POLARITIES
     ]
     tasks = tuple(Task(case) for case in planned[:cases])

@@ -22,6 +22,12 @@ def machine() -> dict[str, str | int | float | None]:
     }
 
 
+def made_on() -> str:
+    """Return processor and compiler: where both are the same, so is every bit of a result."""
+    about = machine()
+    return f"{about['processor']}, numba {about['numba']}"
+
+
 def _processor() -> str:
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")

@@ -1,56 +1,65 @@
-"""Which critical searches a campaign is made of."""
+"""Which combinations a campaign is made of, and what of them is still to do."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
+import numpy as np
 from sqlalchemy import Connection
 
-from rbfrag.db.campaigns import combination_key
+from rbfrag.campaign.worker import PlannedCase, Task
+from rbfrag.db.campaigns import KnownCombination, combinations_with_points, known_combinations
+from rbfrag.db.keys import combination_key, response_key
 from rbfrag.db.motions import motion_rows
 from rbfrag.db.queries import Vertical
+from rbfrag.db.responses import known_responses
 from rbfrag.db.rows import MotionRow
+from rbfrag.db.spectra import SpectrumKey, spectrum_values
 from rbfrag.db.vertical_pairs import VerticalPair, vertical_pairs
 from rbfrag.errors import InputError
-from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION, POLARITIES, SEARCH_LIMIT, Polarity
-from rbfrag.solver.toppling_run import positive
+from rbfrag.solver.kind import Case
+from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.quantity import positive
+from rbfrag.solver.results import NUMERICS_VERSION, POLARITIES, SEARCH_LIMIT, Polarity
 
-SETTINGS = {"search_limit": SEARCH_LIMIT, "map": "full", "map_depth": MAP_DEPTH}
-"""What else decides an answer, as it goes into the natural key: how far down the search goes,
-that it maps every toppling and safe interval on the way, and how finely."""
+GRID_TOP = 0.99
+"""Largest k/PGA of blocks given by their number: the dissertation's first."""
+
+MOST_VALUES = 10_000
 
 
 @dataclass(frozen=True)
-class Case:
-    """One critical search of one motion.
+class Wanted:
+    """What is asked for beside the critical values and the outcome grid.
 
     Args:
-        natural_key: of the combination.
-        polarity: ``forward`` or ``reverse``.
-        p2: frequency parameter of the block [1/s²].
-        vertical_id: the vertical motion that goes with it, or None.
+        full_map: the map of the intervals that fail and that do not.
+        blocks: k/PGA of blocks to run for themselves, falling.
+        histories: k/PGA of blocks whose motion in time is to be kept, falling.
+        critical_history: keep that of each critical block.
     """
 
-    natural_key: str
-    polarity: Polarity
-    p2: float
-    vertical_id: int | None = None
+    full_map: bool = False
+    blocks: tuple[float, ...] = ()
+    histories: tuple[float, ...] = ()
+    critical_history: bool = False
 
 
 @dataclass(frozen=True)
 class MotionPlan:
-    """All searches of one horizontal motion, so that its samples travel once.
+    """All combinations of one horizontal motion, so that its samples travel once.
 
     Args:
         motion: the horizontal motion.
         vertical: the vertical motion of its recording, where some of the cases need it.
-        cases: the searches.
+        cases: the combinations.
     """
 
     motion: MotionRow
     vertical: VerticalPair | None
-    cases: tuple[Case, ...]
+    cases: tuple[PlannedCase, ...]
 
 
 @dataclass(frozen=True)
@@ -58,96 +67,70 @@ class CampaignPlan:
     """What a campaign is made of.
 
     Args:
+        kind: what the blocks do.
         motions: the longest records first, so that no worker is left with one at the end.
-        settings: what else decides an answer, as it went into the natural keys.
         without_vertical: horizontal motions that vertical shaking was asked for and have none.
         warnings: sentences about these.
     """
 
+    kind: str
     motions: tuple[MotionPlan, ...]
-    settings: Mapping[str, object]
     without_vertical: int
     warnings: tuple[str, ...]
 
     @property
-    def cases(self) -> list[Case]:
-        """All searches."""
+    def cases(self) -> list[PlannedCase]:
+        """All combinations."""
         return [case for plan in self.motions for case in plan.cases]
+
+
+@dataclass(frozen=True)
+class MotionTasks:
+    """What is to do on one horizontal motion.
+
+    Args:
+        plan: the motion.
+        tasks: what its combinations lack.
+        spectrum: p² [1/s²] at which its toppling spectrum is missing, by polarity.
+    """
+
+    plan: MotionPlan
+    tasks: tuple[Task, ...]
+    spectrum: dict[Polarity, tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class Todo:
+    """The work that is left.
+
+    Args:
+        motions: those with something left to do, in the order of the plan.
+        known: what is stored of each combination, by natural key.
+    """
+
+    motions: tuple[MotionTasks, ...]
+    known: dict[str, KnownCombination]
+
+    @property
+    def tasks(self) -> int:
+        """Number of combinations with something left to do."""
+        return sum(len(each.tasks) for each in self.motions)
 
 
 def plan_campaign(
     connection: Connection,
+    kind: str,
+    cases: Sequence[Case],
     *,
     suite: str | None,
-    p2: Sequence[float],
     vertical: Vertical = "without",
-    map_depth: float = MAP_DEPTH,
 ) -> CampaignPlan:
-    """Return every search: horizontal motions x vertical or not x polarity x p².
+    """Return every combination: horizontal motions x vertical or not x polarity x cases.
 
     Args:
         connection: the database.
-        suite: only the horizontal motions of this suite; their verticals need not be in it.
-        p2: frequency parameters [1/s²].
-        vertical: ``without`` vertical motion, ``with`` that of the same recording, or ``both``.
-        map_depth: width of k_r/PGA that the maps may leave undecided at a border.
-
-    Raises:
-        InputError: no such suite, no horizontal motion, none with a vertical one where it is
-            needed, a p² that is not positive or repeats.
-    """
-    sizes = _sizes(p2)
-    chosen = chosen_motions(connection, suite=suite, vertical=vertical)
-    settings = {**SETTINGS, "map_depth": positive(map_depth, "map_depth", "a width of k_r/PGA")}
-    plans = [
-        MotionPlan(
-            motion=row,
-            vertical=chosen.fitting.get(row.id),
-            cases=tuple(
-                _case(row, up, polarity, value, settings)
-                for up in excitations(vertical, chosen.fitting.get(row.id))
-                for value in sizes
-                for polarity in POLARITIES
-            ),
-        )
-        for row in chosen.rows
-    ]
-    return CampaignPlan(
-        motions=tuple(
-            sorted(
-                (plan for plan in plans if plan.cases), key=lambda p: (-p.motion.npts, p.motion.id)
-            )
-        ),
-        settings=settings,
-        without_vertical=chosen.without_vertical,
-        warnings=chosen.warnings,
-    )
-
-
-@dataclass(frozen=True)
-class ChosenMotions:
-    """The horizontal motions of a campaign.
-
-    Args:
-        rows: the motions.
-        fitting: the vertical motion that goes with each, by row id, where there is one.
-        without_vertical: how many were to have a vertical one and have none.
-        warnings: sentences about these.
-    """
-
-    rows: tuple[MotionRow, ...]
-    fitting: Mapping[int, VerticalPair]
-    without_vertical: int
-    warnings: tuple[str, ...]
-
-
-def chosen_motions(
-    connection: Connection, *, suite: str | None, vertical: Vertical
-) -> ChosenMotions:
-    """Return the horizontal motions of a campaign with their vertical ones.
-
-    Args:
-        connection: the database.
+        kind: what the blocks do.
+        cases: the blocks and what counts as failure, from the kind.
         suite: only the horizontal motions of this suite; their verticals need not be in it.
         vertical: ``without`` vertical motion, ``with`` that of the same recording, or ``both``.
 
@@ -178,22 +161,112 @@ def chosen_motions(
             f"{len(lacking)} of {len(rows)} horizontal motions have no vertical one that fits and "
             f"are {left}: {_first(lacking)}"
         )
-    return ChosenMotions(tuple(rows), fitting, len(lacking), tuple(warnings))
+    plans = [
+        MotionPlan(
+            motion=row,
+            vertical=fitting.get(row.id),
+            cases=tuple(
+                _planned(row, up, polarity, case)
+                for up in _verticals(vertical, fitting.get(row.id))
+                for polarity in POLARITIES
+                for case in cases
+            ),
+        )
+        for row in rows
+    ]
+    kept = sorted((p for p in plans if p.cases), key=lambda p: (-p.motion.npts, p.motion.id))
+    return CampaignPlan(kind, tuple(kept), len(lacking), tuple(warnings))
 
 
-def _sizes(p2: Sequence[float]) -> list[float]:
-    sizes = [positive(value, "p2", "1/s²") for value in p2]
-    repeated = sorted({value for value in sizes if sizes.count(value) > 1})
-    if repeated:
-        raise InputError(f"p2 = {repeated[0]:g} is in the list twice: name each value once")
-    if not sizes:
-        raise InputError("the list of p2 is empty: name at least one value in 1/s²")
-    return sizes
+def still_to_do(connection: Connection, plan: CampaignPlan, wanted: Wanted) -> Todo:
+    """Compare a plan with what is stored.
+
+    Args:
+        connection: the database.
+        plan: the campaign.
+        wanted: what it asks for beside critical values and outcome grids.
+    """
+    known = known_combinations(connection, (case.natural_key for case in plan.cases))
+    with_blocks = (
+        combinations_with_points(connection, known, wanted.blocks) if wanted.blocks else set()
+    )
+    histories = known_responses(
+        connection,
+        (
+            _history_key(motion, case, ratio)
+            for motion in plan.motions
+            for case in motion.cases
+            for ratio in _histories(known.get(case.natural_key), wanted)
+        ),
+    )
+    # X(p) is a measure of blocks that are described by p²
+    described = "p2" in model_of_kind(plan.kind).parameters
+    sizes = list(dict.fromkeys(c.case.p2 for c in plan.cases if c.case.p2 and described))
+    spectra = spectrum_values(connection, p2=sizes) if sizes else {}
+    motions = []
+    for motion in plan.motions:
+        tasks = [
+            _task(motion, case, known, with_blocks, histories, wanted) for case in motion.cases
+        ]
+        left = tuple(task for task in tasks if task is not None)
+        spectrum = missing_sizes(spectra, motion.motion.id, sizes)
+        if left or spectrum:
+            motions.append(MotionTasks(motion, left, spectrum))
+    return Todo(tuple(motions), known)
 
 
-def excitations(
-    vertical: Vertical, companion: VerticalPair | None
-) -> Iterable[VerticalPair | None]:
+def missing_sizes(
+    known: Container[SpectrumKey], motion_id: int, p2: Sequence[float]
+) -> dict[Polarity, tuple[float, ...]]:
+    """Return the p² [1/s²] at which X(p) of a motion is not stored, by polarity.
+
+    Args:
+        known: what is stored.
+        motion_id: the motion.
+        p2: frequency parameters asked for [1/s²].
+    """
+    missing: dict[Polarity, tuple[float, ...]] = {}
+    for polarity in POLARITIES:
+        sizes = tuple(each for each in map(float, p2) if (motion_id, polarity, each) not in known)
+        if sizes:
+            missing[polarity] = sizes
+    return missing
+
+
+def strengths_of(number: int) -> tuple[float, ...]:
+    """Return strengths that do not depend on any outcome: equal steps of ln(k/PGA).
+
+    Args:
+        number: how many values, from 0.99 down to the search limit 0.01; at least 2.
+
+    Raises:
+        InputError: fewer than 2, or absurdly many.
+    """
+    if not 2 <= number <= MOST_VALUES:
+        raise InputError(f"--grid: the number of values must be 2 to {MOST_VALUES}, not {number}")
+    values = np.geomspace(GRID_TOP, SEARCH_LIMIT, number)
+    values[[0, -1]] = GRID_TOP, SEARCH_LIMIT
+    return tuple(values.tolist())
+
+
+def checked_ratios(values: Sequence[float], what: str) -> tuple[float, ...]:
+    """Return k/PGA values as they are stored, falling, each once.
+
+    Args:
+        values: as the user gave them.
+        what: the option, for the message.
+
+    Raises:
+        InputError: a value that is not positive and finite, or one that repeats.
+    """
+    ratios = sorted((positive(value, what, "k_r/PGA") for value in values), reverse=True)
+    for one, next_one in pairwise(ratios):
+        if one == next_one:
+            raise InputError(f"{what}: {one:g} is in the list twice: name each value once")
+    return tuple(ratios)
+
+
+def _verticals(vertical: Vertical, companion: VerticalPair | None) -> Iterable[VerticalPair | None]:
     """Yield the vertical motions that a horizontal one is shaken with, None for without."""
     if vertical != "with":
         yield None
@@ -201,28 +274,82 @@ def excitations(
         yield companion
 
 
-def _case(
-    row: MotionRow,
-    up: VerticalPair | None,
-    polarity: Polarity,
-    p2: float,
-    settings: Mapping[str, object],
-) -> Case:
+def _planned(
+    row: MotionRow, up: VerticalPair | None, polarity: Polarity, case: Case
+) -> PlannedCase:
     key = combination_key(
         motion_sha256=row.sha256,
         dt_s=row.dt_s,
         vertical_sha256=None if up is None else up.vertical_sha256,
         polarity=polarity,
-        kind="toppling",
-        p2=p2,
-        settings=settings,
+        kind=case.kind,
+        p2=case.p2,
+        settings=case.settings,
         numerics_version=NUMERICS_VERSION,
+        block=case.block,
     )
-    return Case(
-        natural_key=key,
-        polarity=polarity,
-        p2=p2,
-        vertical_id=None if up is None else up.vertical_id,
+    return PlannedCase(key, polarity, None if up is None else up.vertical_id, case)
+
+
+def _task(
+    motion: MotionPlan,
+    planned: PlannedCase,
+    known: Mapping[str, KnownCombination],
+    with_blocks: set[str],
+    histories: set[str],
+    wanted: Wanted,
+) -> Task | None:
+    there = known.get(planned.natural_key)
+    moves = motion.motion.pga_g > 0.0  # without motion k/PGA says nothing
+    critical = None if there is None else there.kr_over_pga
+    lacks_grid = there is None or (
+        not there.gridded and there.status != "outside_model" and _has_grid(motion, planned)
+    )
+    task = Task(
+        planned=planned,
+        search=there is None,
+        grid=moves and lacks_grid,
+        full_map=wanted.full_map
+        and (there is None or (not there.mapped and there.status in ("found", "below_limit"))),
+        blocks=wanted.blocks if moves and planned.natural_key not in with_blocks else (),
+        histories=tuple(
+            ratio
+            for ratio in wanted.histories
+            if moves and _history_key(motion, planned, ratio) not in histories
+        ),
+        critical_history=wanted.critical_history
+        and (
+            there is None
+            or (critical is not None and _history_key(motion, planned, critical) not in histories)
+        ),
+        critical_k_over_pga=critical,
+    )
+    return task if task.asks else None
+
+
+def _has_grid(motion: MotionPlan, planned: PlannedCase) -> bool:
+    return len(model_of_kind(planned.case.kind).grid(planned.case, motion.motion)) > 0
+
+
+def _histories(there: KnownCombination | None, wanted: Wanted) -> Iterable[float]:
+    yield from wanted.histories
+    if wanted.critical_history and there is not None and there.kr_over_pga is not None:
+        yield there.kr_over_pga
+
+
+def _history_key(motion: MotionPlan, planned: PlannedCase, k_over_pga: float) -> str:
+    row = motion.motion
+    up = motion.vertical if planned.vertical_id is not None else None
+    assert planned.case.p2 is not None  # other kinds keep no histories
+    return response_key(
+        motion_sha256=row.sha256,
+        dt_s=row.dt_s,
+        vertical_sha256=None if up is None else up.vertical_sha256,
+        polarity=planned.polarity,
+        kind=planned.case.kind,
+        p2=planned.case.p2,
+        kr=k_over_pga * row.pga_g,
+        numerics_version=NUMERICS_VERSION,
     )
 
 

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import random
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
-from rbfrag.campaign.compare_results import SingleRun, deviations, differences
-from rbfrag.campaign.grid import run_grid
-from rbfrag.campaign.made_on import made_on
-from rbfrag.campaign.recompute_kind import recompute_kind
+from rbfrag.campaign.compare_results import ComputedAgain, deviations, differences, ends_of
+from rbfrag.campaign.machine import made_on
 from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
 from rbfrag.db.motions import load_motion
 from rbfrag.db.stored_combination import (
@@ -20,12 +16,10 @@ from rbfrag.db.stored_combination import (
     keys_with_samples,
     stored_combination,
 )
-from rbfrag.errors import InputError, RbfragError
-from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.excitation import excitation
-from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION, CriticalResult
-from rbfrag.solver.search.critical import critical
-from rbfrag.solver.toppling_run import respond
+from rbfrag.errors import RbfragError
+from rbfrag.solver.kind import Case
+from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION
 
 
 @dataclass(frozen=True)
@@ -73,12 +67,12 @@ def resimulate(connection: Connection, *, sample: int, seed: int = 0) -> Resimul
         except RbfragError as error:
             findings.append(_finding(stored, f"cannot be computed again: {error}"))
             continue
-        off = list(differences(stored, *again))
+        off = list(differences(stored, again))
         if not off:
             exact += 1
             continue
         if stored.campaign_settings.get("made_on") != here:
-            off = list(deviations(stored, *again))
+            off = list(deviations(stored, again))
             within_error += not off
         findings += (_finding(stored, problem) for problem in off)
     return Resimulation(
@@ -95,47 +89,38 @@ def _finding(stored: StoredCombination, problem: str) -> Finding:
     return Finding("combination", str(stored.id), problem, COMPUTE_AGAIN)
 
 
-def _compute(
-    connection: Connection, stored: StoredCombination
-) -> tuple[CriticalResult, dict[float, SingleRun]]:
+def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain:
     values = stored.values
-    if values["kind"] != "toppling":
-        again = recompute_kind(connection, stored)
-        searched = set(again.points.kr_over_pga.tolist())
-        if extra := [k for k in stored.points.kr_over_pga.tolist() if k not in searched]:
-            raise InputError(f"it holds a simulation at k/PGA {extra[0]!r} that no search makes")
-        return again, {}
+    kind = model_of_kind(str(values["kind"]))
+    case = Case(kind.kind, values["p2"], stored.block, stored.settings)
+    polarity = values["polarity"]
     motion = load_motion(connection, stored.motion_id)
     vertical = None
     if stored.vertical_motion_id is not None:
         vertical = load_motion(connection, stored.vertical_motion_id)
-    result = critical(
+    (found,) = kind.run_cases(
         motion,
-        p2=values["p2"],
-        vertical=vertical,
-        polarity=values["polarity"],
-        linear=values["linear"],
-        search_limit=values["search_limit"],
+        vertical,
+        polarity,
+        [case],
+        search=values["status"] != "not_searched",
+        grid=bool((stored.grid >= 0).any()),
         full_map=stored.intervals.k_lo.size > 0,
-        map_depth=stored.settings.get("map_depth", MAP_DEPTH),
+        map_depth=stored.campaign_settings.get("map_depth") or MAP_DEPTH,
     )
-    searched = set(result.points.kr_over_pga.tolist())
-    others = [k for k in stored.points.kr_over_pga.tolist() if k not in searched]
-    return result, dict(_runs(stored, motion, vertical, others))
+    ends = ends_of(found.grid)
+    if found.critical is not None:
+        ends = {**ends_of(found.critical.points), **ends}
+    others = tuple(k for k in stored.points.kr_over_pga.tolist() if k not in ends)
+    if others:
+        ends |= ends_of(kind.run_blocks(motion, vertical, polarity, case, others))
 
+    def error(k_over_pga: float) -> float:
+        if "store_responses" not in kind.campaign_options:
+            return 0.0
+        alone = kind.history(motion, vertical, polarity, case, k_over_pga)
+        if not alone.peak_theta_rad or alone.peak_theta_n is None:
+            return 0.0
+        return alone.error_estimate * alone.peak_theta_n / alone.peak_theta_rad
 
-def _runs(
-    stored: StoredCombination,
-    motion: GroundMotion,
-    vertical: GroundMotion | None,
-    strengths: list[float],
-) -> Iterator[tuple[float, SingleRun]]:
-    """Yield the runs that were asked for beside the search, by k_r/PGA."""
-    values = stored.values
-    polarity, p2 = values["polarity"], values["p2"]
-    grid = run_grid(excitation(motion, vertical, polarity), p2, strengths)
-    for k, theta_n, outcome in zip(strengths, grid.theta_n.tolist(), grid.outcome, strict=True):
-        kr = k * stored.pga_g
-        alone = respond(motion, p2=p2, kr=kr, vertical=vertical, polarity=polarity)
-        error = alone.error_estimate / math.atan(kr)
-        yield k, SingleRun(outcome, None if math.isnan(theta_n) else theta_n, error)
+    return ComputedAgain(found.critical, ends, error)

@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from sqlalchemy import Engine
 
 from rbfrag.campaign.executors.choice import CLUSTER, check_workers, executor
-from rbfrag.campaign.grid import checked_ratios, grid_of
-from rbfrag.campaign.made_on import made_on
-from rbfrag.campaign.plan import CampaignPlan, plan_campaign
-from rbfrag.campaign.progress import CampaignProgress
-from rbfrag.campaign.todo import MotionTasks, Todo, Wanted, still_to_do
-from rbfrag.campaign.worker import MotionResults, MotionWork, run_work
+from rbfrag.campaign.machine import made_on
+from rbfrag.campaign.plan import (
+    CampaignPlan,
+    MotionTasks,
+    Todo,
+    Wanted,
+    checked_ratios,
+    plan_campaign,
+    still_to_do,
+    strengths_of,
+)
+from rbfrag.campaign.worker import MotionResults, MotionWork, TaskResult, run_work
 from rbfrag.db.campaigns import (
     CombinationRecord,
     KnownCombination,
+    add_grids,
+    add_maps,
     finish_campaign,
     insert_combinations,
     insert_points,
@@ -30,8 +39,46 @@ from rbfrag.db.motions import load_motion
 from rbfrag.db.queries import Vertical
 from rbfrag.db.responses import insert_responses
 from rbfrag.db.spectra import store_spectrum
-from rbfrag.errors import WorkFailedError
-from rbfrag.solver.results import DEFAULT_P2, MAP_DEPTH, NUMERICS_VERSION
+from rbfrag.errors import InputError, WorkFailedError
+from rbfrag.solver.kind import Case
+from rbfrag.solver.kinds import models
+from rbfrag.solver.quantity import positive
+from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION, CriticalResult
+
+SAME_VALUE = 1e-9
+"""Relative difference up to which a search that is repeated on another processor is the same."""
+
+OPTIONS = {
+    "p2": "--p2",
+    "rotations_deg": "--rotation",
+    "displacements_m": "--displacement",
+    "family": "family",
+    "grid": "--grid",
+    "store_responses": "--store-responses",
+    "full_map": "--map",
+}
+"""What may be asked of a kind, as the command line calls it."""
+
+
+@dataclass(frozen=True)
+class CampaignProgress:
+    """How far a campaign is, in combinations."""
+
+    done: int
+    total: int
+    resumed: int
+    seconds: float
+
+    @property
+    def rate_per_s(self) -> float:
+        """Combinations finished per second by this run."""
+        made = self.done - self.resumed
+        return made / self.seconds if self.seconds > 0.0 else 0.0
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Estimated time left [s]; None before anything is finished."""
+        return (self.total - self.done) / self.rate_per_s if self.rate_per_s else None
 
 
 @dataclass(frozen=True)
@@ -39,15 +86,17 @@ class CampaignSummary:
     """What a finished campaign reports.
 
     Args:
-        combinations: critical searches asked for (motions x vertical x polarity x p²).
+        kind: what the blocks do.
+        combinations: those asked for (motions x vertical x polarity x cases of the kind).
         found: of these, with a critical value above the limit.
-        below_limit: nothing topples down to the search limit (censored).
-        no_motion: no block down to the limit ever lifts.
+        below_limit: nothing fails down to the search limit, or to where the model ends (censored).
+        no_motion: no block down to the limit ever moves.
         outside_model: the motion is outside the model.
+        not_searched: of a kind without a search; outcomes of its grid are all there is.
         certified: with a proven answer.
-        reentrant: with a safe island below the critical value.
+        reentrant: with a stronger failure below which a block is spared, as far as was looked at.
         runs: simulations made by this run.
-        grid_runs: of these, runs of the requested grid.
+        grid_runs: of these, runs of blocks asked for by `grid`.
         responses: histories that this run stored.
         without_vertical: horizontal motions that vertical shaking was asked for and have none.
         seconds: wall time of this run.
@@ -55,11 +104,13 @@ class CampaignSummary:
         warnings: what a reader of the results should know.
     """
 
+    kind: str
     combinations: int
     found: int
     below_limit: int
     no_motion: int
     outside_model: int
+    not_searched: int
     certified: int
     reentrant: int
     runs: int
@@ -78,38 +129,49 @@ class CampaignSummary:
 def simulate(
     db: str | os.PathLike[str] | None = None,
     *,
+    kind: str = "toppling",
     suite: str | None = None,
-    p2: Sequence[float] = DEFAULT_P2,
+    p2: Sequence[float] | None = None,
+    rotations_deg: Sequence[float | None] | None = None,
+    displacements_m: Sequence[float] | None = None,
+    family: Sequence[Any] | None = None,
     vertical: Vertical = "without",
-    grid: int | Sequence[float] = (),
-    store_responses: Sequence[float | Literal["critical"]] = (),
+    grid: int | Sequence[float] | None = None,
+    store_responses: Sequence[float | Literal["critical"]] | None = None,
+    full_map: bool = False,
+    map_depth: float = MAP_DEPTH,
     jobs: int | None = None,
     scheduler: str | None = None,
-    map_depth: float = MAP_DEPTH,
     on_progress: Callable[[CampaignProgress], None] | None = None,
 ) -> CampaignSummary:
-    """Find the critical block of every motion x vertical x polarity x p² and store it.
+    """Store critical values and outcomes of every motion x vertical x polarity x block.
 
-    The toppling spectrum of each motion at these p² is stored with it.
-
-    The toppling spectrum of every motion at these p² is stored with them. What is stored already
-    is not computed again, and each combination is stored with all that belongs to it in one
-    transaction: a run that was interrupted or killed is resumed by the
-    same call. The database is the same whatever does the work.
+    Of each combination the critical value with its certificate is stored, and the outcomes of
+    the blocks of a grid that does not depend on them: what fits read. For blocks described by
+    p² the toppling spectrum of each motion goes with them. What is stored already is not computed
+    again, and each motion is stored in one transaction: a run that was interrupted or killed is
+    resumed by the same call. The database is the same whatever does the work.
 
     Args:
         db: the database (path, URL, or None for the default).
+        kind: what the blocks do; an option of another kind is refused.
         suite: only the motions of this suite.
-        p2: frequency parameters [1/s²].
+        p2: toppling: frequency parameters p² [1/s²]; None for 30, 10, 3, 1, 0.3 and 0.1.
+        rotations_deg: slumping: rotations that count as failure [deg], None among them for
+            failure past recovery; None for 2 and past recovery.
+        displacements_m: sliding: displacements on a level plane [m]; None for 0.01, 0.05, 0.15
+            and 0.3.
+        family: slumping: the blocks; None for `rbfrag.solver.models.slumping.FAMILY`.
         vertical: ``without`` vertical motion, ``with`` that of the same recording, or ``both``.
-        grid: run blocks for themselves too, and store their peak rotation: at these k_r/PGA, or
-            at that many from 0.99 down to 0.01, equally spaced in the logarithm.
-        store_responses: keep the motion in time of blocks of these k_r/PGA; ``critical`` stands
-            for the critical block of each combination.
+        grid: toppling: run more blocks for themselves: at these k_r/PGA, or at that many from
+            0.99 down to 0.01, equally spaced in the logarithm.
+        store_responses: toppling: keep the motion in time of blocks of these k_r/PGA;
+            ``critical`` stands for the critical block of each combination.
+        full_map: map the intervals of k_r/PGA that fail and that do not, down to the limit.
+        map_depth: width of k_r/PGA that the maps may leave undecided at a border; a map that is
+            stored stays as it is.
         jobs: worker processes; None for one per processor, 1 for none (in this process).
         scheduler: address of a Dask scheduler whose workers take the place of local ones.
-        map_depth: width of k_r/PGA that the maps may leave undecided at a border; the critical
-            value does not depend on it. Another depth makes other combinations.
         on_progress: called after each motion.
 
     Raises:
@@ -118,33 +180,52 @@ def simulate(
         WorkFailedError: a worker died; what was finished is stored.
     """
     check_workers(jobs, scheduler)
-    wanted = _wanted(grid, store_responses)
+    blocks = {"p2": p2, "rotations_deg": rotations_deg, "displacements_m": displacements_m,
+              "family": family}  # fmt: skip
+    described = {name: value for name, value in blocks.items() if value is not None}
+    extras = {"grid": grid, "store_responses": store_responses, "full_map": full_map or None}
+    cases = _cases(kind, described, [name for name, given in extras.items() if given is not None])
+    wanted = _wanted(grid, store_responses, full_map)
+    depth = positive(map_depth, "map_depth", "a width of k_r/PGA")
     started = time.perf_counter()
     with opened_database(db) as engine:
         with engine.connect() as connection:
-            plan = plan_campaign(
-                connection, suite=suite, p2=p2, vertical=vertical, map_depth=map_depth
-            )
+            plan = plan_campaign(connection, kind, cases, suite=suite, vertical=vertical)
             todo = still_to_do(connection, plan, wanted)
         with executor(run_work, jobs, scheduler if todo.motions else None) as execute:
             settings = {
+                "kind": kind,
                 "suite": suite,
-                "p2": list(map(float, p2)),
                 "vertical": vertical,
-                "grid": list(wanted.grid),
-                "store_responses": list(map(str, store_responses)),
+                **{name: list(value) for name, value in described.items() if name != "family"},
+                "grid": list(wanted.blocks),
+                "store_responses": list(map(str, store_responses or ())),
+                "map_depth": depth if full_map else None,
                 "made_on": made_on() if scheduler is None else CLUSTER,
-                **plan.settings,
             }
             with engine.begin() as connection:
                 campaign_id = start_campaign(connection, settings)
             run = _Run(engine, campaign_id, plan, todo, started, on_progress)
             run.tell()
-            for done in execute(_work(engine, todo, map_depth), len(todo.motions)):
+            for done in execute(_work(engine, todo, depth), len(todo.motions)):
                 run.take(done)
             with engine.begin() as connection:
                 finish_campaign(connection, campaign_id)
     return run.summary()
+
+
+def _cases(kind: str, described: dict[str, Any], extras: Sequence[str]) -> tuple[Case, ...]:
+    """Ask the kind for its combinations; it refuses the options of others."""
+    known = {name: model for name, model in models().items() if model.campaign}
+    if kind not in known:
+        raise InputError(f"--kind {kind}: campaigns are of {', '.join(sorted(known))}")
+    for name in [*described, *extras]:
+        if name not in known[kind].campaign_options:
+            owners = [each for each, model in known.items() if name in model.campaign_options]
+            raise InputError(
+                f"{OPTIONS[name]} goes with --kind {' or '.join(owners)}, not with {kind}"
+            )
+    return known[kind].cases(**described)
 
 
 class _Run:
@@ -176,18 +257,32 @@ class _Run:
                 f"a worker computes with numerics version {done.numerics_version}, this rbfrag "
                 f"with {NUMERICS_VERSION}: install the same version on all machines"
             )
-        _store(self._engine, self._campaign_id, self._plan.settings, done)
+        for result in done.results:
+            self._compare(result)
+        _store(self._engine, self._campaign_id, done)
         for result in done.results:
             self._done += 1
             self._runs += result.runs
-            self._grid_runs += result.grid_runs
+            self._grid_runs += 0 if result.blocks is None else len(result.blocks.outcome)
             self._responses += len(result.responses)
-            if result.search is not None:
-                found = result.search
-                self._known[result.case.natural_key] = KnownCombination(
-                    0, found.status, found.kr_over_pga, found.certified, bool(found.reentrant)
-                )
+            if result.task.search or result.task.full_map:
+                key = result.task.planned.natural_key
+                self._known[key] = _as_known(result.critical)
         self.tell()
+
+    def _compare(self, result: TaskResult) -> None:
+        """Refuse a repeated search that contradicts what is stored."""
+        before = self._known.get(result.task.planned.natural_key)
+        now = result.critical
+        if before is None or now is None:
+            return
+        then, again = before.kr_over_pga or 0.0, now.kr_over_pga or 0.0
+        if before.status != now.status or not math.isclose(then, again, rel_tol=SAME_VALUE):
+            raise WorkFailedError(
+                f"combination {before.id} is stored with status {before.status} and the critical "
+                f"value {before.kr_over_pga!r}, the search repeated for its map gives {now.status} "
+                f"and {now.kr_over_pga!r}: look at the database with  rbfrag db check"
+            )
 
     def tell(self) -> None:
         """Report progress."""
@@ -201,11 +296,13 @@ class _Run:
         known = self._known.values()
         status = [each.status for each in known]
         return CampaignSummary(
+            kind=self._plan.kind,
             combinations=self._total,
             found=status.count("found"),
             below_limit=status.count("below_limit"),
             no_motion=status.count("no_motion"),
             outside_model=status.count("outside_model"),
+            not_searched=status.count("not_searched"),
             certified=sum(each.certified for each in known),
             reentrant=sum(bool(each.reentrant) for each in known),
             runs=self._runs,
@@ -221,14 +318,25 @@ class _Run:
         return time.perf_counter() - self._started
 
 
+def _as_known(found: CriticalResult | None) -> KnownCombination:
+    if found is None:
+        return KnownCombination(0, "not_searched", None, False, None)
+    return KnownCombination(0, found.status, found.kr_over_pga, found.certified, found.reentrant)
+
+
 def _wanted(
-    grid: int | Sequence[float], store_responses: Sequence[float | Literal["critical"]]
+    grid: int | Sequence[float] | None,
+    store_responses: Sequence[float | Literal["critical"]] | None,
+    full_map: bool,
 ) -> Wanted:
-    histories = [value for value in store_responses if value != "critical"]
+    asked = store_responses or ()
+    histories = [value for value in asked if value != "critical"]
+    blocks = strengths_of(grid) if isinstance(grid, int) else checked_ratios(grid or (), "--grid")
     return Wanted(
-        grid=grid_of(grid) if isinstance(grid, int) else checked_ratios(grid, "--grid"),
+        full_map=full_map,
+        blocks=blocks,
         histories=checked_ratios(histories, "--store-responses"),
-        critical_history="critical" in store_responses,
+        critical_history="critical" in asked,
     )
 
 
@@ -238,7 +346,9 @@ def _work(engine: Engine, todo: Todo, map_depth: float) -> Iterator[MotionWork]:
 
 
 def _with_samples(engine: Engine, each: MotionTasks, map_depth: float) -> MotionWork:
-    up = next((t.case.vertical_id for t in each.tasks if t.case.vertical_id is not None), None)
+    verticals = (task.planned.vertical_id for task in each.tasks)
+    up = next((vertical_id for vertical_id in verticals if vertical_id is not None), None)
+    # the connection is given back before the work is: a reader would hold up the writer
     with engine.connect() as connection:
         return MotionWork(
             motion_id=each.plan.motion.id,
@@ -250,28 +360,36 @@ def _with_samples(engine: Engine, each: MotionTasks, map_depth: float) -> Motion
         )
 
 
-def _store(
-    engine: Engine, campaign_id: int, settings: Mapping[str, object], done: MotionResults
-) -> None:
+def _store(engine: Engine, campaign_id: int, done: MotionResults) -> None:
+    new: list[TaskResult] = []
+    stored: list[TaskResult] = []
+    for each in done.results:
+        (new if each.task.search else stored).append(each)
     records = [
         CombinationRecord(
-            natural_key=each.case.natural_key,
+            natural_key=each.task.planned.natural_key,
             motion_id=done.motion_id,
-            vertical_motion_id=each.case.vertical_id,
-            result=each.search,
-            settings=settings,
+            vertical_motion_id=each.task.planned.vertical_id,
+            result=each.critical,
+            grid=each.grid,
+            polarity=each.task.planned.polarity,
+            p2=each.task.planned.case.p2,
+            settings=each.task.planned.case.settings,
+            kind=each.task.planned.case.kind,
             numerics_version=done.numerics_version,
+            block=each.task.planned.case.block,
         )
-        for each in done.results
-        if each.search is not None
+        for each in new
     ]
-    points = {
-        each.case.natural_key: each.blocks for each in done.results if each.blocks is not None
-    }
+    grids = {r.task.planned.natural_key: r.grid for r in stored if r.grid is not None}
+    maps = {r.task.planned.natural_key: r.critical for r in stored if r.critical is not None}
+    blocks = {r.task.planned.natural_key: r.blocks for r in done.results if r.blocks is not None}
     responses = [record for each in done.results for record in each.responses]
     with engine.begin() as connection:
         insert_combinations(connection, campaign_id, records)
-        insert_points(connection, points)
+        add_grids(connection, grids)
+        add_maps(connection, maps)
+        insert_points(connection, blocks)
         insert_responses(connection, responses)
         for part in done.spectrum:
             store_spectrum(

@@ -2,22 +2,41 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from rbfrag.campaign.grid import run_grid
-from rbfrag.campaign.open_blocks import open_blocks
-from rbfrag.campaign.plan import Case
-from rbfrag.campaign.spectra import SpectrumPart, spectrum_parts
 from rbfrag.db.keys import response_key
 from rbfrag.db.responses import ResponseRecord
-from rbfrag.fragility.fit.source import kr_over_pga_of_grid
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.polarity import Polarity
-from rbfrag.solver.excitation import kept_excitation
-from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION, CriticalResult, SearchPoints
-from rbfrag.solver.search.critical import critical
-from rbfrag.solver.toppling_run import respond
+from rbfrag.motions.toppling_spectrum import toppling_spectrum
+from rbfrag.solver.kind import Case
+from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.results import (
+    MAP_DEPTH,
+    NUMERICS_VERSION,
+    CriticalResult,
+    FloatArray,
+    Polarity,
+    SearchPoints,
+)
+
+
+@dataclass(frozen=True)
+class PlannedCase:
+    """One case under one motion: a combination.
+
+    Args:
+        natural_key: of the combination.
+        polarity: ``forward`` or ``reverse``.
+        vertical_id: the vertical motion that goes with it, or None.
+        case: the block and what counts as failure.
+    """
+
+    natural_key: str
+    polarity: Polarity
+    vertical_id: int | None
+    case: Case
 
 
 @dataclass(frozen=True)
@@ -25,20 +44,36 @@ class Task:
     """What is still to do for one combination.
 
     Args:
-        case: the combination.
-        search: make the critical search; False when its answer is stored.
-        grid: k_r/PGA of blocks to run for themselves, falling.
-        histories: k_r/PGA of blocks whose motion in time is to be kept.
+        planned: the combination.
+        search: look for the critical value; False when it is stored.
+        grid: run the outcome grid of the kind; False when it is stored.
+        full_map: map what fails and what does not; the search is repeated for it.
+        blocks: k/PGA of blocks to run for themselves, falling.
+        histories: k/PGA of blocks whose motion in time is to be kept.
         critical_history: keep that of the critical block too.
-        critical_kr_over_pga: the critical value, where it is stored already.
+        critical_k_over_pga: the critical value, where it is stored already.
     """
 
-    case: Case
+    planned: PlannedCase
     search: bool = True
-    grid: tuple[float, ...] = ()
+    grid: bool = True
+    full_map: bool = False
+    blocks: tuple[float, ...] = ()
     histories: tuple[float, ...] = ()
     critical_history: bool = False
-    critical_kr_over_pga: float | None = None
+    critical_k_over_pga: float | None = None
+
+    @property
+    def asks(self) -> bool:
+        """Whether there is anything to do."""
+        return bool(
+            self.search
+            or self.grid
+            or self.full_map
+            or self.blocks
+            or self.histories
+            or self.critical_history
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,27 +81,25 @@ class TaskResult:
     """What a task gave; None and () where nothing was asked for.
 
     Args:
-        case: the combination.
-        search: its search.
-        blocks: blocks run for themselves: of the requested grid, and those that the map left open.
-        grid_runs: how many of them were requested.
+        task: the task.
+        critical: the search; None also where the kind has none.
+        grid: outcomes of its grid.
+        blocks: blocks run for themselves.
         responses: histories.
     """
 
-    case: Case
-    search: CriticalResult | None
+    task: Task
+    critical: CriticalResult | None
+    grid: SearchPoints | None
     blocks: SearchPoints | None
-    grid_runs: int
     responses: tuple[ResponseRecord, ...]
 
     @property
     def runs(self) -> int:
         """How many simulations were made."""
-        return (
-            (0 if self.search is None else self.search.n_runs)
-            + (0 if self.blocks is None else len(self.blocks.outcome))
-            + len(self.responses)
-        )
+        made = 0 if self.critical is None else self.critical.n_runs
+        made += sum(len(some.outcome) for some in (self.grid, self.blocks) if some is not None)
+        return made + len(self.responses)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +112,7 @@ class MotionWork:
         vertical: the vertical one of its recording, if a task needs it.
         tasks: what to do.
         spectrum: p² [1/s²] at which to compute its toppling spectrum, by polarity.
-        map_depth: width of k_r/PGA that the maps may leave undecided at a border.
+        map_depth: width of k/PGA that maps may leave undecided at a border.
     """
 
     motion_id: int
@@ -88,6 +121,21 @@ class MotionWork:
     tasks: tuple[Task, ...]
     spectrum: Mapping[Polarity, Sequence[float]]
     map_depth: float = MAP_DEPTH
+
+
+@dataclass(frozen=True, eq=False)
+class SpectrumPart:
+    """X(p) of one motion and polarity.
+
+    Args:
+        polarity: ``forward`` or ``reverse``.
+        p2: frequency parameters [1/s²].
+        x_m_s: X(p) at each of them [m/s].
+    """
+
+    polarity: Polarity
+    p2: tuple[float, ...]
+    x_m_s: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,56 +150,75 @@ class MotionResults:
 
 def run_work(work: MotionWork) -> MotionResults:
     """Do everything that is asked of one motion."""
-    results = tuple(_run_task(work, task) for task in work.tasks)
-    spectrum = spectrum_parts(work.motion, work.spectrum)
+    # together: cases of one excitation share what the kind derives from it
+    groups: defaultdict[tuple[object, ...], list[Task]] = defaultdict(list)
+    for task in work.tasks:
+        one = task.planned
+        parts = (task.search or task.full_map, task.grid, task.full_map)
+        groups[(one.case.kind, one.polarity, one.vertical_id, *parts)].append(task)
+    done: dict[str, TaskResult] = {}
+    for tasks in groups.values():
+        for result in _run_group(work, tasks):
+            done[result.task.planned.natural_key] = result
+    spectrum = tuple(
+        SpectrumPart(polarity, tuple(p2), toppling_spectrum(work.motion, list(p2), polarity))
+        for polarity, p2 in work.spectrum.items()
+    )
+    results = tuple(done[task.planned.natural_key] for task in work.tasks)
     return MotionResults(work.motion_id, results, spectrum, NUMERICS_VERSION)
 
 
-def _run_task(work: MotionWork, task: Task) -> TaskResult:
-    case = task.case
-    vertical = None if case.vertical_id is None else work.vertical
-    search = None
-    critical_kr_over_pga = task.critical_kr_over_pga
-    if task.search:
-        search = critical(
+def _run_group(work: MotionWork, tasks: list[Task]) -> list[TaskResult]:
+    """Run tasks that ask for the same under the same excitation."""
+    first = tasks[0]
+    kind = model_of_kind(first.planned.case.kind)
+    vertical = None if first.planned.vertical_id is None else work.vertical
+    polarity = first.planned.polarity
+    search = first.search or first.full_map
+    answers: list[tuple[CriticalResult | None, SearchPoints | None]] = [(None, None)] * len(tasks)
+    if search or first.grid:
+        found = kind.run_cases(
             work.motion,
-            p2=case.p2,
-            polarity=case.polarity,
-            vertical=vertical,
-            full_map=True,
+            vertical,
+            polarity,
+            [task.planned.case for task in tasks],
+            search=search,
+            grid=first.grid,
+            full_map=first.full_map,
             map_depth=work.map_depth,
         )
-        critical_kr_over_pga = search.kr_over_pga
-    strengths = set(task.grid)
-    if search is not None:
-        blocks = kr_over_pga_of_grid(case.p2, work.motion.pgv_m_s, work.motion.pga_g)
-        strengths.update(open_blocks(search, blocks))
-    alone = None
-    if strengths:
-        drive = kept_excitation(work.motion, vertical, case.polarity)
-        alone = run_grid(drive, case.p2, sorted(strengths, reverse=True))
-    wanted = list(task.histories)
-    if task.critical_history and critical_kr_over_pga is not None:
-        wanted.append(critical_kr_over_pga)
-    responses = tuple(_history(work, case, vertical, ratio) for ratio in dict.fromkeys(wanted))
-    return TaskResult(case, search, alone, len(task.grid), responses)
+        answers = [(each.critical, each.grid) for each in found]
+    results = []
+    for task, (critical, grid) in zip(tasks, answers, strict=True):
+        blocks = None
+        if task.blocks:
+            case = task.planned.case
+            blocks = kind.run_blocks(work.motion, vertical, polarity, case, task.blocks)
+        ratios = list(task.histories)
+        value = task.critical_k_over_pga if critical is None else critical.kr_over_pga
+        if task.critical_history and value is not None:
+            ratios.append(value)
+        histories = (_history(work, task.planned, vertical, k) for k in dict.fromkeys(ratios))
+        results.append(TaskResult(task, critical, grid, blocks, tuple(histories)))
+    return results
 
 
 def _history(
-    work: MotionWork, case: Case, vertical: GroundMotion | None, kr_over_pga: float
+    work: MotionWork, planned: PlannedCase, vertical: GroundMotion | None, k_over_pga: float
 ) -> ResponseRecord:
-    motion = work.motion
+    motion, case = work.motion, planned.case
     assert motion.dt_s is not None  # the database holds no other motions
-    kr = kr_over_pga * motion.pga_g
-    response = respond(
-        motion, p2=case.p2, kr=kr, vertical=vertical, polarity=case.polarity, history=True
+    assert case.p2 is not None
+    kr = k_over_pga * motion.pga_g
+    response = model_of_kind(case.kind).history(
+        motion, vertical, planned.polarity, case, k_over_pga
     )
     key = response_key(
         motion_sha256=motion.sha256,
         dt_s=motion.dt_s,
         vertical_sha256=None if vertical is None else vertical.sha256,
-        polarity=case.polarity,
-        kind=response.kind,
+        polarity=planned.polarity,
+        kind=case.kind,
         p2=case.p2,
         kr=kr,
         numerics_version=NUMERICS_VERSION,
@@ -159,8 +226,8 @@ def _history(
     return ResponseRecord(
         natural_key=key,
         motion_id=work.motion_id,
-        vertical_motion_id=case.vertical_id,
-        polarity=case.polarity,
+        vertical_motion_id=planned.vertical_id,
+        polarity=planned.polarity,
         p2=case.p2,
         kr=kr,
         response=response,

@@ -313,6 +313,8 @@ def add_maps(connection: Connection, results: Mapping[str, CriticalResult]) -> N
             "island_width": _number(result.island_width),
             "kr_over_pga_resolved": _number(result.kr_over_pga_resolved),
             "reentrant": result.reentrant,
+            "n_runs": int(result.n_runs),
+            "warnings": json.dumps(list(result.warnings)),
         }
         update_rows(connection, combination, combination.c.id == known[key].id, values)
 

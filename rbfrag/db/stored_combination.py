@@ -30,6 +30,7 @@ class StoredCombination:
         campaign_settings: what the campaign that made it was asked for, and on which machine.
         points: its simulations, by falling k_r/PGA.
         intervals: its map; empty where none is stored.
+        grid: number in the kind's outcome grid of each simulation, -1 for those beside it.
     """
 
     id: int
@@ -42,6 +43,7 @@ class StoredCombination:
     campaign_settings: Mapping[str, Any]
     points: SearchPoints
     intervals: OutcomeIntervals
+    grid: NDArray[np.int64]
 
 
 def keys_with_samples(connection: Connection, *, numerics_version: str) -> list[str]:
@@ -87,6 +89,7 @@ def stored_combination(connection: Connection, natural_key: str) -> StoredCombin
             simulation.c.theta_n,
             simulation.c.outcome,
             simulation.c.displacement_m,
+            simulation.c.grid,
         )
         .where(simulation.c.combination_id == row["id"])
         .order_by(simulation.c.kr_over_pga.desc())
@@ -117,6 +120,9 @@ def stored_combination(connection: Connection, natural_key: str) -> StoredCombin
             k_lo=_floats([low for low, _, _ in intervals]),
             k_hi=_floats([high for _, high, _ in intervals]),
             outcome=tuple(outcome for _, _, outcome in intervals),
+        ),
+        grid=np.array(
+            [-1 if point.grid is None else point.grid for point in points], dtype=np.int64
         ),
     )
 

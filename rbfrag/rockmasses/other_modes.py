@@ -13,8 +13,8 @@ from rbfrag.fragility.kind_arrays import KindAnswers, kind_answers
 from rbfrag.fragility.kind_model import find_kind_model
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.quantity import positive
+from rbfrag.solver.stability.arrays import slumping_p2
 from rbfrag.solver.stability.modes import SLIDE, SLUMP, STABLE, ModeName
-from rbfrag.solver.stability.slumping_frequency import slumping_p2
 
 
 def other_modes(

@@ -143,8 +143,8 @@ def critical(
         linear: the linear model.
         full_map: map all outcomes.
     """
+    from rbfrag.solver.reports import critical_as_dict
     from rbfrag.solver.search.critical import critical as search
-    from rbfrag.solver.search.report import as_dict
 
     result = search(
         _motion(body, trace, units, dt_s),
@@ -153,7 +153,7 @@ def critical(
         linear=linear,
         full_map=full_map,
     )
-    return json_text(as_dict(result, full_map=full_map))
+    return json_text(critical_as_dict(result, full_map=full_map))
 
 
 def hazard(

@@ -219,11 +219,56 @@ class Kind:
         polarity: Polarity,
         cases: Sequence[Case],
         *,
+        search: bool = True,
+        grid: bool = True,
         full_map: bool = False,
         map_depth: float = MAP_DEPTH,
     ) -> list[CaseResult]:
-        """Return critical value and outcome grid of every case under one motion."""
+        """Return critical value and outcome grid of every case under one motion.
+
+        Args:
+            motion: horizontal ground motion.
+            vertical: vertical motion of the same recording, upward positive.
+            polarity: ``forward`` or ``reverse``.
+            cases: the cases.
+            search: look for the critical values; False where they are known.
+            grid: run the outcome grids; False where they are known.
+            full_map: map what fails and what does not, too.
+            map_depth: width of k/PGA that a map may leave undecided at a border.
+        """
         raise NotImplementedError
+
+    def run_blocks(
+        self,
+        motion: GroundMotion,
+        vertical: GroundMotion | None,
+        polarity: Polarity,
+        case: Case,
+        k_over_pga: Sequence[float],
+    ) -> SearchPoints:
+        """Run blocks of stated strengths k/PGA, falling: those of the campaign option `grid`.
+
+        Raises:
+            InputError: the kind knows no such blocks.
+        """
+        raise InputError(
+            f"no block of k/PGA {k_over_pga[0]!r} belongs to a campaign of {self.kind}"
+        )
+
+    def history(
+        self,
+        motion: GroundMotion,
+        vertical: GroundMotion | None,
+        polarity: Polarity,
+        case: Case,
+        k_over_pga: float,
+    ) -> Response:
+        """Return the motion in time of one block: the campaign option `store_responses`.
+
+        Raises:
+            InputError: the kind keeps none.
+        """
+        raise InputError(f"campaigns of {self.kind} keep no histories")
 
     def refuse_foreign(self, given: Iterable[str], own: Sequence[str]) -> None:
         """Refuse an option that is not among the kind's own."""

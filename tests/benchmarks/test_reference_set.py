@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rbfrag.fragility.fit.source import kr_over_pga_of_grid, read_source
+from sqlalchemy import select
 
 from benchmarks import reference_set
-from benchmarks.all_outcomes import with_all_outcomes
+from rbfrag.db import schema
 from rbfrag.db.engine import opened_database
-from rbfrag.db.outcome_maps import outcome_maps
-from rbfrag.db.queries import combination_table
+from rbfrag.db.queries import combination_table, outcome_grid
 from rbfrag.db.spectra import spectrum_values
 from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.toppling_run import respond
@@ -65,64 +64,44 @@ def test_it_needs_no_journal_and_holds_no_samples(built: Path) -> None:
     ).fetchall()
     others = raw.execute("SELECT kind, count(*) FROM combination GROUP BY kind").fetchall()
     curves = raw.execute("SELECT count(displacement_m) FROM simulation").fetchone()
+    maps = raw.execute("SELECT count(*) FROM outcome_interval").fetchone()
     raw.close()
     assert dict(others) == {"sliding": 4, "toppling": 36}
     assert curves == (4 * 23,)
-    assert settings == [('{"map":"decided","map_depth":0.001,"search_limit":0.01}',)]
+    assert maps == (0,)
+    assert settings == [('{"search_limit":0.01}',)]
 
 
-def test_the_maps_still_tell_what_a_block_does(built: Path) -> None:
+def test_every_outcome_of_the_grid_is_in_it(built: Path) -> None:
     with (
         opened_database(built / "out" / "reference.db", read_only=True) as engine,
         engine.connect() as connection,
     ):
         table = combination_table(connection, vertical="without")
-        k = np.geomspace(0.012, 1.1, 60)
-        told = outcome_maps(connection, table.combination_id).outcomes(k)
         both = combination_table(connection, vertical="both")
         assert len(spectrum_values(connection)) == 2 * 2 * 6
+        grid = outcome_grid(connection, table.combination_id)
     assert (table.p2.size, both.p2.size) == (24, 36)
-    assert np.isfinite(told).mean() > 0.9
-    motions = {m.sha256: m for f in built.glob("records/*.AT2") for m in read_motions(f)}
-    by_pga = {m.pga_g: m for m in motions.values()}
-    for i in range(0, 24, 5):
-        motion = by_pga[table.pga_g[i]]
-        for value, topples in zip(k, told[i], strict=True):
-            run = respond(
-                motion, p2=table.p2[i], kr=value * motion.pga_g, polarity=table.polarity[i]
-            )
-            assert np.isnan(topples) or (run.outcome == "toppled") == bool(topples)
-
-
-def test_no_outcome_that_fits_look_at_is_missing(built: Path) -> None:
-    with (
-        opened_database(built / "out" / "reference.db", read_only=True) as engine,
-        engine.connect() as connection,
-    ):
-        for vertical in ("without", "with"):
-            source = read_source(connection, vertical=vertical)
-            table = source.table
-            blocks = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
-            assert np.isfinite(source.topples)[blocks >= 0.01].all()
-
-
-def test_blocks_below_the_search_limit_are_simulated(built: Path) -> None:
-    with (
-        opened_database(built / "out" / "reference.db", read_only=True) as engine,
-        engine.connect() as connection,
-    ):
-        shipped = read_source(connection)
-    every = with_all_outcomes(shipped, built / "reference-full.db")
-    table, decided = shipped.table, np.isfinite(shipped.topples)
-    assert 0.5 < decided.mean() < 1.0
-    assert np.isfinite(every.topples).all()
-    np.testing.assert_array_equal(every.topples[decided], shipped.topples[decided])
+    assert grid.outcome.shape == (24, 35)
+    assert np.isfinite(grid.outcome).all()
+    assert (grid.k_over_pga < 0.01).any()
     motions = {m.pga_g: m for f in built.glob("records/*.AT2") for m in read_motions(f)}
-    k = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
-    for i, j in np.argwhere(~decided)[::7]:
+    for i in range(0, 24, 5):
         motion = motions[table.pga_g[i]]
-        run = respond(motion, p2=table.p2[i], kr=k[i, j] * motion.pga_g, polarity=table.polarity[i])
-        assert (run.outcome == "toppled") == bool(every.topples[i, j])
+        for k, fails in zip(grid.k_over_pga[i], grid.outcome[i], strict=True):
+            run = respond(motion, p2=table.p2[i], kr=k * motion.pga_g, polarity=table.polarity[i])
+            assert (run.outcome == "toppled") == bool(fails)
+
+
+def test_its_combinations_are_those_of_a_campaign(built: Path) -> None:
+    """Keys and values are the same, so that a merge of both changes nothing."""
+    rows = []
+    for file in (built / "out" / "reference.db", built / "reference-full.db"):
+        with opened_database(file, read_only=True) as engine, engine.connect() as connection:
+            table = schema.combination
+            query = select(table.c.natural_key, table.c.kr_over_pga, table.c.digest)
+            rows.append(set(connection.execute(query).all()))
+    assert rows[0] < rows[1]
 
 
 def test_the_page_says_where_it_comes_from(built: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from sqlalchemy import select, update
 
-from rbfrag.campaign.grid import grid_of
+from rbfrag.campaign.plan import strengths_of
 from rbfrag.campaign.resimulate import resimulate
 from rbfrag.campaign.simulate import simulate
 from rbfrag.db import schema
@@ -69,7 +69,7 @@ class TestVertical:
         for row in rows:
             motion, up = motions[row["motion_id"]], motions[row["vertical_motion_id"]]
             assert (motion.station, up.component) == (up.station, "UP")
-            told = critical(motion, p2=3.0, vertical=up, polarity=row["polarity"], full_map=True)
+            told = critical(motion, p2=3.0, vertical=up, polarity=row["polarity"])
             assert row["kr_over_pga"] == told.kr_over_pga
             short = "450 samples" in row["warnings"]
             assert short == (up.npts == 450)
@@ -114,14 +114,14 @@ class TestVertical:
 
 class TestGrid:
     def test_its_values(self) -> None:
-        grid = grid_of(23)
+        grid = strengths_of(23)
         assert (len(grid), grid[0], grid[-1]) == (23, 0.99, 0.01)
         ratios = np.diff(np.log(grid))
         np.testing.assert_allclose(ratios, ratios[0], rtol=1e-10)
 
     @pytest.mark.parametrize(
         ("grid", "message"),
-        [(1, "2 to"), ([0.5, 0.5], "twice"), ([-1.0], "positive"), ([float("nan")], "positive")],
+        [(1, "2 to"), ([0.5, 0.5], "twice"), ([-1.0], "above zero"), ([float("nan")], "finite")],
     )
     def test_what_is_refused(self, three_component_database: Path, grid: Any, message: str) -> None:
         with pytest.raises(InputError, match=message):
@@ -135,7 +135,7 @@ class TestGrid:
             table = combination_table(connection)
             motion = load_motion(connection, int(table.motion_id[0]))
             points = simulation_points(connection, int(table.combination_id[0]))
-        for k in grid_of(7):
+        for k in strengths_of(7):
             run = respond(motion, p2=3.0, kr=k * motion.pga_g, polarity=table.polarity[0])
             i = points.kr_over_pga.tolist().index(k)
             assert points.outcome[i] == run.outcome

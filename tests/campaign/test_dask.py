@@ -15,8 +15,7 @@ from typing import Any
 import pytest
 
 from rbfrag.campaign.executors import dask as dask_executor
-from rbfrag.campaign.progress import CampaignProgress
-from rbfrag.campaign.simulate import simulate
+from rbfrag.campaign.simulate import CampaignProgress, simulate
 from rbfrag.db.engine import opened_database
 from rbfrag.db.queries import database_info
 from rbfrag.errors import InputError, MissingExtraError, WorkFailedError

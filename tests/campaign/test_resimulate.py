@@ -143,7 +143,7 @@ def test_what_fails_is_a_finding(database: Path, monkeypatch: pytest.MonkeyPatch
     def refuse(*arguments: Any, **options: Any) -> None:
         raise RbfragError("no")
 
-    monkeypatch.setattr(rbfrag.campaign.resimulate, "critical", refuse)
+    monkeypatch.setattr(rbfrag.campaign.resimulate, "load_motion", refuse)
     findings = _again(database, sample=1).findings
     assert [finding.problem for finding in findings] == ["cannot be computed again: no"]
 

@@ -11,20 +11,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rbfrag.fragility.fit.source import kr_over_pga_of_grid, read_source
-from sqlalchemy import select
+from sqlalchemy import delete, func, select, update
 
 from rbfrag.campaign.add_motions import add_motions
-from rbfrag.campaign.progress import CampaignProgress
-from rbfrag.campaign.simulate import simulate
+from rbfrag.campaign.simulate import CampaignProgress, simulate
 from rbfrag.db.content import content_digest
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
 from rbfrag.db.outcome_maps import outcome_maps
-from rbfrag.db.queries import combination_table, database_info
-from rbfrag.db.schema import combination, simulation
+from rbfrag.db.queries import combination_table, database_info, outcome_grid
+from rbfrag.db.schema import combination, outcome_interval, simulation
 from rbfrag.db.spectra import spectrum_values
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, WorkFailedError
+from rbfrag.solver.kind import Case
+from rbfrag.solver.kinds import model_of_kind
 from rbfrag.solver.toppling_run import respond
 from tests.synthetic import write_suite
 
@@ -64,7 +64,7 @@ def test_one_and_two_workers_give_equal_databases(database: Path) -> None:
 
 
 def test_the_stored_maps_tell_what_every_block_does(database: Path) -> None:
-    simulate(database, p2=P2, jobs=1)
+    simulate(database, p2=P2, full_map=True, jobs=1)
     k = np.geomspace(0.012, 1.1, 40)
     with opened_database(database, read_only=True) as engine, engine.connect() as connection:
         table = combination_table(connection)
@@ -83,28 +83,55 @@ def test_the_stored_maps_tell_what_every_block_does(database: Path) -> None:
             assert (run.outcome == "toppled") == bool(toppling)
 
 
-def test_what_a_coarse_map_leaves_open_is_run(database: Path) -> None:
-    simulate(database, p2=(10.0, 0.1, 0.005), map_depth=0.03, jobs=1)
+def test_every_block_of_the_grid_is_simulated(database: Path) -> None:
+    simulate(database, p2=(10.0, 0.1, 0.005), jobs=1)
     with opened_database(database, read_only=True) as engine, engine.connect() as connection:
-        source = read_source(connection)
-        table = source.table
-        below = simulation.c.kr_over_pga < combination.c.kr_over_pga
-        runs = select(simulation.c.outcome).join(combination).where(below)
-        assert len(connection.execute(runs).all()) > 5
+        table = combination_table(connection)
         motions = {int(i): load_motion(connection, int(i)) for i in set(table.motion_id)}
-    blocks = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
-    assert (blocks < 0.01).any()
-    assert np.isfinite(source.topples).all()
+        stored = outcome_grid(connection, table.combination_id)
+        assert connection.scalar(select(func.count()).select_from(outcome_interval)) == 0
+    model = model_of_kind("toppling")
+    assert stored.outcome.shape == (table.p2.size, 35)
+    assert (stored.k_over_pga < 0.01).any()
     for i in range(0, table.p2.size, 3):
         motion = motions[int(table.motion_id[i])]
-        for k in range(blocks.shape[1]):
-            run = respond(
-                motion,
-                p2=table.p2[i],
-                kr=blocks[i, k] * motion.pga_g,
-                polarity=table.polarity[i],
-            )
-            assert (run.outcome == "toppled") == bool(source.topples[i, k])
+        strengths = model.grid(Case("toppling", table.p2[i]), motion)
+        np.testing.assert_array_equal(stored.k_over_pga[i], strengths)
+        for k, failed, theta_n in zip(strengths, stored.outcome[i], stored.theta_n[i], strict=True):
+            run = respond(motion, p2=table.p2[i], kr=k * motion.pga_g, polarity=table.polarity[i])
+            assert (run.outcome == "toppled") == bool(failed)
+            np.testing.assert_equal(theta_n, np.nan if failed else run.peak_theta_n)
+
+
+def test_what_a_stored_combination_lacks_is_added(database: Path) -> None:
+    """The grid alone where the search is stored, the map alone where both are."""
+    at_once, without = _copy(database, "b.db"), _copy(database, "c.db")
+    simulate(at_once, p2=P2, full_map=True, jobs=1)
+    first = simulate(without, p2=P2, jobs=1)
+    with opened_database(without) as engine, engine.begin() as connection:
+        whole = content_digest(connection)
+        connection.execute(delete(simulation).where(simulation.c.grid.is_not(None)))
+        assert content_digest(connection) != whole
+    again = simulate(without, p2=P2, jobs=1)
+    assert (again.resumed, again.found) == (0, first.found)
+    assert again.runs == 35 * again.combinations
+    with opened_database(without, read_only=True) as engine, engine.connect() as connection:
+        assert content_digest(connection) == whole
+    mapped = simulate(without, p2=P2, full_map=True, jobs=2)
+    assert (mapped.resumed, mapped.found) == (first.no_motion, first.found)
+    assert simulate(without, p2=P2, full_map=True, jobs=1).runs == 0
+    assert _digest(without) == _digest(at_once)
+
+
+def test_a_search_that_contradicts_what_is_stored_is_refused(database: Path) -> None:
+    simulate(database, p2=P2, jobs=1)
+    column = combination.c.kr_over_pga
+    with opened_database(database) as engine, engine.begin() as connection:
+        connection.execute(
+            update(combination).where(column.is_not(None)).values(kr_over_pga=0.9 * column)
+        )
+    with pytest.raises(WorkFailedError, match="the search repeated for its map gives found"):
+        simulate(database, p2=P2, full_map=True, jobs=1)
 
 
 def test_progress_is_told_after_each_motion(database: Path) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 from sqlalchemy import delete
 
 from rbfrag.campaign.add_motions import add_motions
+from rbfrag.campaign.plan import missing_sizes
 from rbfrag.campaign.simulate import simulate
-from rbfrag.campaign.spectra import missing_sizes
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
 from rbfrag.db.schema import toppling_spectrum as table

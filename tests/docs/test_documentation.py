@@ -115,6 +115,22 @@ def test_local_links_lead_somewhere(page: Path) -> None:
             assert (page.parent / target).exists(), target
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_named_files_and_modules_exist(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    for name in re.findall(r"(?<![\w./-])((?:rbfrag|tests|benchmarks)/[\w./-]*\w)", text):
+        assert (ROOT / name).exists() or (page.parent / name).exists(), name
+    for name in re.findall(r"`((?:rbfrag|benchmarks)(?:\.\w+)+)", text):
+        first, *rest = name.split(".")
+        place = ROOT / first
+        if first == "rbfrag" and rest[0] in (*rbfrag.__all__, "__all__"):
+            continue
+        # as far as folders go, then a module; what follows is a name in it
+        while rest and (place / rest[0]).is_dir():
+            place /= rest.pop(0)
+        assert not rest or (place / f"{rest[0]}.py").exists(), name
+
+
 def test_every_quality_flag_is_explained() -> None:
     absurd = GroundMotion(np.full(50, 50.0), 0.5)
     codes = {flag.code for motion in (absurd, absurd.scaled(0.0)) for flag in quality_flags(motion)}

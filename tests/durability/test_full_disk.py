@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.durability import campaign, digest, environment, stored
-from rbfrag.campaign.progress import CampaignProgress
-from rbfrag.campaign.simulate import simulate
+from rbfrag.campaign.simulate import CampaignProgress, simulate
 from rbfrag.errors import DatabaseFailedError
 from tests.durability.conftest import P2
 

@@ -7,8 +7,7 @@ import shutil
 from pathlib import Path
 
 from benchmarks.durability import digest
-from rbfrag.campaign.progress import CampaignProgress
-from rbfrag.campaign.simulate import simulate
+from rbfrag.campaign.simulate import CampaignProgress, simulate
 from rbfrag.db.check.database import check_database
 from rbfrag.db.content import table_rows_by_natural_key
 from rbfrag.db.engine import opened_database

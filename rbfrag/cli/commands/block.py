@@ -62,9 +62,8 @@ def block(
 
     Angles in degrees, lengths in m, accelerations in g, p2 in 1/s2.
     """
-    from rbfrag.solver.block.described import described
-    from rbfrag.solver.stability.report import as_dict
-    from rbfrag.solver.stability.single import stability
+    from rbfrag.solver.block.file import described
+    from rbfrag.solver.stability.single import stability, stability_as_dict
 
     shape, conditions = described(
         {"alpha1": alpha1, "alpha3": alpha3, "r3": r3},
@@ -86,7 +85,7 @@ def block(
         from rbfrag.plots.block import plot_block
 
         plot_block(shape, found, plot)
-    answer = as_dict(shape, found)
+    answer = stability_as_dict(shape, found)
     if json:
         print_json(answer)
         return

@@ -122,8 +122,8 @@ def critical(
     that brings the block of --block down.
     """
     from rbfrag.solver.critical import critical as search
+    from rbfrag.solver.reports import critical_as_dict
     from rbfrag.solver.results import MAP_DEPTH
-    from rbfrag.solver.search.report import as_dict
 
     given = {
         "--p2": p2 is not None,
@@ -160,7 +160,7 @@ def critical(
         from rbfrag.plots.islands import plot_islands
 
         plot_islands(ground, result, plot, vertical=upward, title=ground.label)
-    answer = as_dict(result, remarks=remarks, full_map=full_map)
+    answer = critical_as_dict(result, remarks=remarks, full_map=full_map)
     if json:
         print_json(answer)
         return
@@ -245,10 +245,12 @@ def _slides(
     """Print the strengths that slide stated distances, and how far blocks of any strength slide."""
     from rbfrag.solver.critical import critical as search
     from rbfrag.solver.models.sliding import KY_OVER_PGA, THRESHOLDS_M, sliding_displacements
-    from rbfrag.solver.search.report import as_dict
+    from rbfrag.solver.reports import critical_as_dict
 
     found = [
-        as_dict(search(ground, kind=kind, displacement_m=d, vertical=upward, polarity=polarity))
+        critical_as_dict(
+            search(ground, kind=kind, displacement_m=d, vertical=upward, polarity=polarity)
+        )
         for d in distances or THRESHOLDS_M
     ]
     curve = sliding_displacements(ground, vertical=upward, polarity=polarity)

@@ -114,8 +114,8 @@ def respond(
     The block is --p2 and --kr (toppling), --ky (sliding), or its geometry, from which the failure
     mode and with it the model follow.
     """
+    from rbfrag.solver.reports import response_as_dict, write_history
     from rbfrag.solver.respond import respond as run
-    from rbfrag.solver.response_report import as_dict, write_history
 
     shape, planes, p2, kr = _block(
         {"p2": p2, "kr": kr, "ky": ky},
@@ -163,7 +163,7 @@ def respond(
             response, shape, animate, beta_deg=planes["beta_deg"], exaggerate=exaggerate,
             back_fracture=planes.get("back_fracture", True), title=ground.label,
         )  # fmt: skip
-    answer = as_dict(response)
+    answer = response_as_dict(response)
     if json:
         print_json(answer)
         return
@@ -193,7 +193,7 @@ def _block(
             f"{by_number[0]} does not go with {by_shape[0]}: the block is described once"
         )
     if by_shape:
-        from rbfrag.solver.block.described import described
+        from rbfrag.solver.block.file import described
 
         block, conditions = described(
             angles, fractures, planes, no_back, file_option="--block", path=file

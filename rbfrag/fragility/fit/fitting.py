@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
+from os import PathLike
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -41,7 +42,7 @@ class Fitted:
 
 
 def fit(
-    source: Connection | CombinationTable | FitSource,
+    source: str | PathLike[str] | Connection | CombinationTable | FitSource,
     *,
     kind: str = "toppling",
     term: str,
@@ -57,8 +58,8 @@ def fit(
     """Fit a fragility model; nothing is stored.
 
     Args:
-        source: a connection to the database, or the data themselves (critical values alone
-            carry ``wls`` and ``lognormal``).
+        source: the database (a path, URL or connection), or the data themselves (critical values
+            alone carry ``wls`` and ``lognormal``).
         kind: what the blocks do: any kind that campaigns store.
         term: intensity term: ``pgv``, ``pga_tm``, ``pgd_tm``, ``pgv_pga``, ``pgv_pga_tm`` or
             ``xp``.
@@ -91,18 +92,22 @@ def fit(
         raise InputError(f"seed = {seed}: give a whole number from 0 up")
     if name is not None and not name.strip():
         raise InputError("the name of the model is empty: give a name or leave it out")
+    asked: dict[str, Any] = {
+        "suite": suite,
+        "vertical": vertical,
+        "doubtful_pgd": doubtful_pgd,
+        "rotation_deg": rotation_deg,
+    }
     if isinstance(source, CombinationTable):
         source = FitSource.of_table(source)
+    elif isinstance(source, str | PathLike):
+        from rbfrag.db.engine import opened_database
+
+        # reading takes no lock, so that a campaign may go on meanwhile
+        with opened_database(source, read_only=True) as engine, engine.connect() as connection:
+            source = read_source(connection, chosen.block, kind=kind, **asked)
     elif not isinstance(source, FitSource):
-        source = read_source(
-            source,
-            chosen.block,
-            kind=kind,
-            rotation_deg=rotation_deg,
-            suite=suite,
-            vertical=vertical,
-            doubtful_pgd=doubtful_pgd,
-        )
+        source = read_source(source, chosen.block, kind=kind, **asked)
     return fit_source(
         source,
         of_term,
@@ -111,12 +116,7 @@ def fit(
         name=name,
         seed=seed,
         estimate_m=estimate_m,
-        selection={
-            "suite": suite,
-            "vertical": vertical,
-            "doubtful_pgd": doubtful_pgd,
-            "rotation_deg": rotation_deg,
-        },
+        selection=asked,
     ).report
 
 

@@ -60,7 +60,7 @@ def block_of(values: Mapping[str, Any]) -> tuple[Block, Stability]:
     Raises:
         InputError: a block that is described in no way, or in two.
     """
-    from rbfrag.solver.block.described import described
+    from rbfrag.solver.block.file import described
     from rbfrag.solver.stability.single import stability
 
     block, conditions = described(
@@ -74,9 +74,9 @@ def block_of(values: Mapping[str, Any]) -> tuple[Block, Stability]:
 
 def block_answer(query: bytes) -> dict[str, Any]:
     """Return the answer to the query of a URL."""
-    from rbfrag.solver.stability.report import as_dict
+    from rbfrag.solver.stability.single import stability_as_dict
 
-    return as_dict(*block_of(read_query(query, PARAMETERS)))
+    return stability_as_dict(*block_of(read_query(query, PARAMETERS)))
 
 
 _NUMBERS = by_name((replace(P2, required=False), replace(KR, required=False)))
@@ -90,7 +90,7 @@ DRAWING = {**_NUMBERS, **_SHAPE}
 def drawing_answer(query: bytes) -> dict[str, Any]:
     """Return the answer to the query of a URL."""
     from rbfrag.plots.block import block_lines
-    from rbfrag.solver.block.rectangle import level_rectangle, rectangle_r3_m
+    from rbfrag.solver.stability.single import level_rectangle, rectangle_r3_m
 
     values = read_query(query, DRAWING)
     numbers = [name for name in _NUMBERS if name in values]

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from rbfrag.errors import InputError
-from rbfrag.solver.block.elementwise import SCALAR
-from rbfrag.solver.block.parallelogram import (
+from rbfrag.solver.block.formulas import (
+    SCALAR,
     cot_gamma,
     frequency_parameter,
     shape_factor,
+    tan_deg,
     tangents_from_spacings,
 )
 from rbfrag.solver.block.polygon import Point
 from rbfrag.solver.block.polygon_contacts import polygon_contacts
-from rbfrag.solver.block.tangent import tan_deg
 from rbfrag.solver.quantity import angle, positive
 
 

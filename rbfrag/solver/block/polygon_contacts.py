@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rbfrag.errors import InputError
-from rbfrag.solver.block.elementwise import SCALAR
+from rbfrag.solver.block.formulas import SCALAR, cot_deg
 from rbfrag.solver.block.polygon import (
     Point,
     PolygonProperties,
@@ -16,7 +16,6 @@ from rbfrag.solver.block.polygon import (
     extent_m,
     polygon_properties,
 )
-from rbfrag.solver.block.tangent import cot_deg
 from rbfrag.solver.quantity import angle
 
 CONTACT_TOLERANCE = 1e-3

@@ -9,11 +9,53 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.integrator.remaining_drive import linear_drive
+from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.integrator.spans import COLUMNS, LENGTHS, SPAN_PH, fill_spans
 from rbfrag.solver.integrator.taylor import PH_MAX
 
 FloatArray = NDArray[np.float64]
+
+
+@kernel
+def linear_drive(
+    interval_s: FloatArray, k_h: FloatArray, p: float, still: FloatArray
+) -> tuple[float, int]:
+    """Fill what of the drive is still to come; return its maximum and the node after it.
+
+    `still` at a node is G(t) = p integral_t^inf k_h(s) exp(-p (s - t)) ds, by G' = p (G - k_h)
+    from the end backwards. In the linear model without vertical motion a block topples from
+    (theta, theta') if theta'/p + G > theta_c - theta; the maximum of G, which may lie inside
+    an interval where G = k_h, is the largest critical angle over all fresh starts.
+    """
+    g = 0.0
+    greatest = 0.0
+    where = 0
+    h = -1.0
+    decay = 0.0
+    still[k_h.size - 1] = 0.0
+    for i in range(interval_s.size - 1, -1, -1):
+        if interval_s[i] != h:
+            h = interval_s[i]
+            decay = math.exp(-p * h)
+        if h > 0.0:
+            slope = (k_h[i + 1] - k_h[i]) / h
+            rest = g - k_h[i + 1] - slope / p  # times exp(-p (t_end - t))
+            # G turns where slope + p rest exp(-p (t_end - t)) = 0
+            if slope > 0.0 and rest < 0.0:
+                faded = -slope / (p * rest)
+                if decay < faded <= 1.0:
+                    turn = k_h[i + 1] + slope * math.log(faded) / p
+                    if turn > greatest:
+                        greatest = turn
+                        where = i + 1
+            g = k_h[i] + slope / p + rest * decay
+        still[i] = g
+        if g > greatest:
+            greatest = g
+            where = i
+    return greatest, where
+
+
 IntArray = NDArray[np.int64]
 
 SPAN_LEVELS = 3
@@ -31,7 +73,7 @@ class Ground(NamedTuple):
         q: k_h/(1 + k_v) at the nodes, shape (n,).
         tail_min_q: least q from each node on, rest after the record included, shape (n,).
         block_max_q: greatest q of each block of nodes.
-        still: what of the drive is to come (`rbfrag.solver.integrator.remaining_drive`), shape
+        still: what of the drive is to come (`rbfrag.solver.integrator.block_excitation`), shape
             (n,).
         still_max: greatest of it.
         still_node: node after that.

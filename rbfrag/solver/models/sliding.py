@@ -258,6 +258,8 @@ class Sliding(MechanismKind):
         polarity: Polarity,
         cases: Sequence[Case],
         *,
+        search: bool = True,
+        grid: bool = True,
         full_map: bool = False,
         map_depth: float = MAP_DEPTH,
     ) -> list[CaseResult]:
@@ -265,7 +267,9 @@ class Sliding(MechanismKind):
         drive = excitation(motion, vertical, polarity)
         thrown = drive.jump_node < drive.w.size
         strengths = () if thrown else tuple(self.grid(cases[0], motion).tolist())
-        grid = SlidingBlocks(drive, slide_m).points(strengths)
+        blocks = SlidingBlocks(drive, slide_m).points(strengths) if grid else None
+        if not search:
+            return [CaseResult(None, blocks) for _ in cases]
         results = []
         for case in cases:
             settings: dict[str, Any] = dict(case.settings)
@@ -279,7 +283,7 @@ class Sliding(MechanismKind):
                 tolerance=settings["tolerance"],
                 warnings=drive.warnings,
             )
-            results.append(CaseResult(found, grid))
+            results.append(CaseResult(found, blocks))
         return results
 
 

@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -52,7 +52,15 @@ from rbfrag.solver.kind import (
 )
 from rbfrag.solver.mechanism import ShakenMechanism, shaken_mechanism
 from rbfrag.solver.quantity import positive
-from rbfrag.solver.results import MAP_DEPTH, SEARCH_LIMIT, FloatArray, Outcome, Polarity
+from rbfrag.solver.results import (
+    MAP_DEPTH,
+    SEARCH_LIMIT,
+    CriticalResult,
+    FloatArray,
+    Outcome,
+    Polarity,
+    no_intervals,
+)
 from rbfrag.solver.search.scale import (
     BRACKET,
     SCAN_RATIO,
@@ -219,7 +227,7 @@ class Slumping(ScaledKind):
     yield_name = "ks"
     parameters = ("ks", "ps2")
     campaign = True
-    campaign_options = ("rotations_deg", "family")
+    campaign_options = ("rotations_deg", "family", "full_map")
     one_phase = True
 
     def mechanism(self, site: BlockOnPlanes) -> Mechanism:
@@ -233,7 +241,7 @@ class Slumping(ScaledKind):
             InputError: no rotation, one that repeats or that a block of the family cannot reach; a
                 block that does not slump.
         """
-        self.refuse_foreign(asked, self.campaign_options)
+        self.refuse_foreign(asked, ("rotations_deg", "family"))
         family: Sequence[BlockClass] = asked.get("family", FAMILY)
         rotations = [
             None if value is None else positive(value, "--rotation", "degrees")
@@ -253,7 +261,7 @@ class Slumping(ScaledKind):
                 self.kind,
                 self._shaken(each).p2,
                 each.as_dict(),
-                {**settings, "rotation_deg": rotation, "map": "seen"},
+                {**settings, "rotation_deg": rotation},
             )
             for each in family
             for rotation in rotations
@@ -270,12 +278,14 @@ class Slumping(ScaledKind):
         polarity: Polarity,
         cases: Sequence[Case],
         *,
+        search: bool = True,
+        grid: bool = True,
         full_map: bool = False,
         map_depth: float = MAP_DEPTH,
     ) -> list[CaseResult]:
         """Return critical scale and outcome grid of every case under one motion.
 
-        Cases of one block share their runs. What the search saw is there with or without a map.
+        Cases of one block share their runs. The map is what the search saw; it costs nothing.
 
         Raises:
             InputError: a stored block is none of this rbfrag's.
@@ -288,25 +298,30 @@ class Slumping(ScaledKind):
         for block, numbers in together.items():
             settings: dict[str, Any] = dict(cases[numbers[0]].settings)
             rotations: list[Any] = [cases[i].settings["rotation_deg"] for i in numbers]
-            found = critical_scales(
-                motion,
-                block.block,
-                kind=self.kind,
-                rotations_deg=rotations,
-                beta_deg=block.beta_deg,
-                phi_deg=block.phi_deg,
-                vertical=vertical,
-                polarity=polarity,
-                **{name: settings[name] for name in ("search_limit", "scan_ratio", "bracket")},
-            )
+            found: Sequence[CriticalResult | None] = [None] * len(numbers)
+            if search:
+                found = critical_scales(
+                    motion,
+                    block.block,
+                    kind=self.kind,
+                    rotations_deg=rotations,
+                    beta_deg=block.beta_deg,
+                    phi_deg=block.phi_deg,
+                    vertical=vertical,
+                    polarity=polarity,
+                    **{name: settings[name] for name in ("search_limit", "scan_ratio", "bracket")},
+                )
             shaken = self._shaken(block)
-            ratios = self.grid(cases[numbers[0]], motion)
+            ratios = self.grid(cases[numbers[0]], motion)[: None if grid else 0]
             scales = [shaken.yield_g / (k * drive.pga_g) for k in ratios.tolist()]
             courses = [follow(shaken.mechanism, drive.scaled(scale)) for scale in scales]
             for i, rotation, result in zip(numbers, rotations, found, strict=True):
                 fails = rotation_rad(rotation, shaken)
                 runs = [judged(*each, fails) for each in zip(courses, scales, strict=True)]
-                results[i] = CaseResult(result, grid_points(ratios, runs, critical_rad(shaken)))
+                if result is not None and not full_map:
+                    result = replace(result, intervals=no_intervals())
+                blocks = grid_points(ratios, runs, critical_rad(shaken)) if grid else None
+                results[i] = CaseResult(result, blocks)
         return [results[i] for i in range(len(cases))]
 
     def _shaken(self, each: BlockClass) -> ShakenMechanism:

@@ -59,7 +59,7 @@ class Toppling(Kind):
     search_needs = "p2"
     search_options = ("p2", "linear", "full_map", "map_depth", "block", *PLANES)
     campaign = True
-    campaign_options = ("p2",)
+    campaign_options = ("p2", "grid", "store_responses", "full_map")
 
     def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
         """Return what the block does."""
@@ -112,7 +112,7 @@ class Toppling(Kind):
         Raises:
             InputError: a p² that is not positive or repeats.
         """
-        self.refuse_foreign(asked, self.campaign_options)
+        self.refuse_foreign(asked, ("p2",))
         sizes = [positive(value, "p2", "1/s²") for value in asked.get("p2", DEFAULT_P2)]
         each_once(sizes, "p2")
         settings = {"search_limit": SEARCH_LIMIT}
@@ -134,6 +134,8 @@ class Toppling(Kind):
         polarity: Polarity,
         cases: Sequence[Case],
         *,
+        search: bool = True,
+        grid: bool = True,
         full_map: bool = False,
         map_depth: float = MAP_DEPTH,
     ) -> list[CaseResult]:
@@ -143,18 +145,49 @@ class Toppling(Kind):
         for case in cases:
             assert case.p2 is not None
             settings: dict[str, Any] = dict(case.settings)
-            found = self.critical(
-                motion,
-                p2=case.p2,
-                vertical=vertical,
-                polarity=polarity,
-                search_limit=settings["search_limit"],
-                full_map=full_map,
-                map_depth=map_depth,
-            )
-            grid = run_blocks_at(drive, case.p2, self.grid(case, motion))
-            results.append(CaseResult(found, grid))
+            found = blocks = None
+            if search:
+                found = self.critical(
+                    motion,
+                    p2=case.p2,
+                    vertical=vertical,
+                    polarity=polarity,
+                    search_limit=settings["search_limit"],
+                    full_map=full_map,
+                    map_depth=map_depth,
+                )
+            if grid:
+                blocks = run_blocks_at(drive, case.p2, self.grid(case, motion))
+            results.append(CaseResult(found, blocks))
         return results
+
+    def run_blocks(
+        self,
+        motion: GroundMotion,
+        vertical: GroundMotion | None,
+        polarity: Polarity,
+        case: Case,
+        k_over_pga: Sequence[float],
+    ) -> SearchPoints:
+        """Run blocks of stated k_r/PGA."""
+        assert case.p2 is not None
+        drive = kept_excitation(motion, vertical, polarity)
+        return run_blocks_at(drive, case.p2, np.array(k_over_pga, dtype=np.float64))
+
+    def history(
+        self,
+        motion: GroundMotion,
+        vertical: GroundMotion | None,
+        polarity: Polarity,
+        case: Case,
+        k_over_pga: float,
+    ) -> Response:
+        """Return the motion in time of the block of that k_r/PGA."""
+        assert case.p2 is not None
+        kr = k_over_pga * motion.pga_g
+        return respond(
+            motion, p2=case.p2, kr=kr, vertical=vertical, polarity=polarity, history=True
+        )
 
 
 def run_blocks_at(drive: Excitation, p2: float, kr_over_pga: FloatArray) -> SearchPoints:

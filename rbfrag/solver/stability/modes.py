@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 from typing import Any, Literal
 
-from rbfrag.solver.block.elementwise import Elementwise, N
+from rbfrag.solver.block.formulas import Elementwise, N
 
 ModeName = Literal["slide", "topple", "slump", "confined_topple"]
 StateName = Literal["stable", "unstable", "locked"]

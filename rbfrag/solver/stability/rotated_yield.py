@@ -11,10 +11,9 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, overload
 
 from rbfrag.errors import InputError
-from rbfrag.solver.block.elementwise import SCALAR, Elementwise, array_elementwise
+from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise, tan_deg
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.block.polygon import Point
-from rbfrag.solver.block.tangent import tan_deg
 from rbfrag.solver.quantity import angle, friction_angle, number, vertical_g
 from rbfrag.solver.stability.modes import (
     confined_topple,

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.block.elementwise import SCALAR
+from rbfrag.solver.block.formulas import SCALAR, tan_deg
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.block.tangent import tan_deg
 from rbfrag.solver.quantity import angle, friction_angle, not_negative, positive, vertical_g
-from rbfrag.solver.stability.margins import Margin, Surroundings, degrees_of, margins
+from rbfrag.solver.stability.margins import (
+    Finding,
+    Margin,
+    Surroundings,
+    degrees_of,
+    margins,
+    warnings_about,
+)
 from rbfrag.solver.stability.modes import (
     CONFINED_TOPPLE,
     MODES,
@@ -31,7 +38,6 @@ from rbfrag.solver.stability.modes import (
     wedges,
     yield_coefficient,
 )
-from rbfrag.solver.stability.remarks import Finding, warnings_about
 
 
 @dataclass(frozen=True)
@@ -277,3 +283,81 @@ def _cohesion(mu1: float, tb: float, weight: float, bond: float, ky: float) -> C
         phi_equivalent_deg=degrees_of(equivalent),
         ky_equivalent=yield_coefficient(equivalent, 1.0, tb, weight, SCALAR),
     )
+
+
+def rectangle_r3_m(p2: float) -> float:
+    """Return the distance from centroid to toe of a rectangle, r3 = 3g/(4p²) [m].
+
+    Args:
+        p2: frequency parameter p² [1/s²], above 0.
+
+    Raises:
+        InputError: p2 is not above 0.
+    """
+    return 0.75 * STANDARD_GRAVITY_M_S2 / positive(p2, "p2", "1/s²")
+
+
+def level_rectangle(p2: float, kr: float) -> tuple[Block, Stability]:
+    """Return a rectangle that stands free on level ground, rough enough to topple.
+
+    Args:
+        p2: its frequency parameter p² [1/s²], above 0.
+        kr: its yield acceleration coefficient k_r = tan(critical angle), above 0.
+
+    Raises:
+        InputError: a value that is not above 0.
+    """
+    slender_deg = math.degrees(math.atan(positive(kr, "kr", "")))
+    block = Block.from_angles(-slender_deg, slender_deg, rectangle_r3_m(p2))
+    rough_deg = 0.5 * (slender_deg + 90.0)
+    return block, stability(block, beta_deg=0.0, phi_deg=rough_deg, back_fracture=False)
+
+
+def stability_as_dict(block: Block, found: Stability) -> dict[str, Any]:
+    """Return the answer with the keys of the JSON contract.
+
+    A yield acceleration that no number expresses is None; the state says why.
+
+    Args:
+        block: the block.
+        found: its stability.
+    """
+    answer: dict[str, Any] = {
+        "mode": found.mode,
+        "state": found.state,
+        "p2": block.p2,
+        "kr": _finite(found.kr),
+        "ky": _finite(found.ky),
+        "ks": _finite(found.ks),
+        "kct": _finite(found.kct),
+        "yield_acceleration": _finite(found.yield_acceleration),
+        "alpha1_deg": block.alpha1_deg,
+        "alpha3_deg": block.alpha3_deg,
+        "gamma_deg": block.gamma_deg,
+        "r1_m": block.r1_m,
+        "r2_m": block.r2_m,
+        "r3_m": block.r3_m,
+        "s1_m": block.s1_m,
+        "s2_m": block.s2_m,
+        "area_m2": block.area_m2,
+        "shape_factor": block.shape_factor,
+        "delta_deg": found.delta_deg,
+        "margins": [
+            {"variable": m.variable, "change_deg": m.change_deg, "mode": m.mode}
+            for m in found.margins
+        ],
+        "cohesion": None,
+        "warnings": list(found.warnings),
+    }
+    if found.cohesion is not None:
+        answer["cohesion"] = {
+            "ratio": found.cohesion.ratio,
+            "ky": _finite(found.cohesion.ky),
+            "phi_equivalent_deg": found.cohesion.phi_equivalent_deg,
+            "ky_equivalent": _finite(found.cohesion.ky_equivalent),
+        }
+    return answer
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.integrator.remaining_drive import linear_drive
+from rbfrag.solver.integrator.block_excitation import linear_drive
 from rbfrag.solver.integrator.single_run import STABLE, TOPPLED
 from rbfrag.solver.results import CriticalResult
 from rbfrag.solver.search.certified import MAP_DEPTH, certified_map, keeps_order

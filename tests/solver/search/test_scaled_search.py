@@ -18,9 +18,9 @@ from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.one_freedom.follow import follow
 from rbfrag.solver.mechanism import shaken_mechanism
 from rbfrag.solver.models.sliding import sliding_displacements
+from rbfrag.solver.reports import critical_as_dict
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import CriticalResult, Outcome
-from rbfrag.solver.search.report import as_dict
 from rbfrag.solver.search.scale import Found, first_motion
 from tests.synthetic import shaking as samples
 
@@ -129,7 +129,7 @@ def test_a_record_that_drives_only_uphill_never_moves_the_block() -> None:
     assert found.certified
     still = search(GroundMotion(np.zeros(20), 0.01), slump())
     assert still.status == "no_motion"
-    assert as_dict(still)["scale_limit"] is None
+    assert critical_as_dict(still)["scale_limit"] is None
 
 
 def test_what_was_seen_is_told_as_intervals_and_points() -> None:
@@ -143,7 +143,7 @@ def test_what_was_seen_is_told_as_intervals_and_points() -> None:
     assert seen.k_hi[seen.outcome.index("topples")] == found.kr_over_pga
     assert found.kr_over_pga in found.points.kr_over_pga
     assert not found.certified
-    assert "not proven" in as_dict(found)["warnings"][-1]
+    assert "not proven" in critical_as_dict(found)["warnings"][-1]
 
 
 @settings(max_examples=10, deadline=None)

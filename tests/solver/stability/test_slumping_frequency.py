@@ -8,7 +8,7 @@ import pytest
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.mechanism import shaken_mechanism
 from rbfrag.solver.models.slumping import FAMILY
-from rbfrag.solver.stability.slumping_frequency import slumping_p2
+from rbfrag.solver.stability.arrays import slumping_p2
 
 
 def test_it_is_that_of_the_mechanism() -> None:

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.solver.block.arrays import REASONS, BlockArray
-from rbfrag.solver.block.chunks import CHUNK
+from rbfrag.solver.block.arrays import CHUNK, REASONS, BlockArray
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.arrays import stability_arrays
 from rbfrag.solver.stability.single import stability

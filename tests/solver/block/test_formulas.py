@@ -8,8 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from rbfrag.solver.block.elementwise import SCALAR, array_elementwise
-from rbfrag.solver.block.tangent import cot_deg, tan_deg
+from rbfrag.solver.block.formulas import SCALAR, array_elementwise, cot_deg, tan_deg
 
 PI = Fraction("3.14159265358979323846264338327950288419716939937510582097494459")
 

@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rbfrag.fragility.fit.kind_fitting import fit_kind
-from rbfrag.fragility.fit.model_check import check_models
+from rbfrag.fragility.fit.check import check_models
+from rbfrag.fragility.fit.fitting import fit
 from sqlalchemy import Engine, select, update
 
-from rbfrag.campaign.progress import CampaignProgress
 from rbfrag.campaign.resimulate import resimulate
-from rbfrag.campaign.simulate import simulate
-from rbfrag.campaign.simulate_kind import KindSummary, simulate_kind
+from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
 from rbfrag.db import schema
 from rbfrag.db.check.database import check_database
 from rbfrag.db.content import table_rows_by_natural_key
@@ -54,9 +52,9 @@ def database(tmp_path: Path) -> Path:
     return tmp_path / "k.db"
 
 
-def slump(place: str | Path, **more: Any) -> KindSummary:
+def slump(place: str | Path, **more: Any) -> CampaignSummary:
     options: dict[str, Any] = {"family": TWO, "jobs": 1, "rotations_deg": (1.0, None), **more}
-    return simulate_kind(place, kind="slumping", **options)
+    return simulate(place, kind="slumping", **options)
 
 
 def rows(engine: Engine, kind: str) -> list[Any]:
@@ -114,7 +112,7 @@ def test_slumps_are_stored_as_the_search_finds_them(place: str) -> None:
 
 def test_slides_are_stored_with_their_displacements(place: str) -> None:
     fill(place)
-    summary = simulate_kind(place, kind="sliding", displacements_m=(0.01, 0.1), jobs=1)
+    summary = simulate(place, kind="sliding", displacements_m=(0.01, 0.1), jobs=1)
     assert summary.combinations == 2 * 2 * 3
     engine = open_database(place)
     try:
@@ -145,7 +143,7 @@ def test_one_and_two_workers_give_equal_databases(
     other = copy_of(database, "other.db")
     for place, jobs in ((database, 1), (other, 2)):
         slump(place, jobs=jobs)
-        simulate_kind(place, kind="sliding", jobs=jobs)
+        simulate(place, kind="sliding", jobs=jobs)
     assert digest_of(database) == digest_of(other)
 
 
@@ -179,7 +177,7 @@ def test_toppling_rows_do_not_notice(database: Path) -> None:
     simulate(database, p2=(10.0, 1.0), jobs=1)
     before = toppling()
     slump(database)
-    simulate_kind(database, kind="sliding", jobs=1)
+    simulate(database, kind="sliding", jobs=1)
     assert toppling() == before
     assert simulate(database, p2=(10.0, 1.0), jobs=1).runs == 0
 
@@ -205,14 +203,14 @@ def test_tables_of_one_rotation_hold_each_block_once(database: Path) -> None:
 
 def test_a_sample_is_computed_again_bit_for_bit(database: Path) -> None:
     slump(database)
-    simulate_kind(database, kind="sliding", jobs=1)
+    simulate(database, kind="sliding", jobs=1)
     with opened_database(database, read_only=True) as engine, engine.connect() as connection:
         answer = resimulate(connection, sample=12, seed=2)
     assert (answer.sampled, answer.exact, answer.findings) == (12, 12, ())
 
 
 def test_damage_is_found(database: Path) -> None:
-    simulate_kind(database, kind="sliding", jobs=1)
+    simulate(database, kind="sliding", jobs=1)
     table = schema.simulation
     with opened_database(database) as engine:
         with engine.begin() as connection:
@@ -233,9 +231,9 @@ def test_what_two_databases_found_is_merged_and_exported(
     other = tmp_path / "other.db"
     other.write_bytes(database.read_bytes())
     slump(database)
-    simulate_kind(other, kind="sliding", jobs=1)
+    simulate(other, kind="sliding", jobs=1)
     slump(both)
-    simulate_kind(both, kind="sliding", jobs=1)
+    simulate(both, kind="sliding", jobs=1)
     merge_databases(other, db=database)
     assert digest_of(database) == digest_of(both)
     export_database(tmp_path / "out", db=database, format="csv", tables=["combination"])
@@ -251,28 +249,28 @@ def test_what_two_databases_found_is_merged_and_exported(
         ({"kind": "slumping", "rotations_deg": (2.0, 2.0)}, "2 is in the list twice"),
         ({"kind": "slumping", "rotations_deg": (25.0,)}, "lies on its back edge"),
         ({"kind": "sliding", "displacements_m": (0.0,)}, "above zero"),
-        ({"kind": "confined_toppling"}, "toppling, slumping or sliding"),
+        ({"kind": "confined_toppling"}, "campaigns are of sliding, slumping, toppling"),
         ({"kind": "sliding", "jobs": 0}, "at least 1"),
     ],
 )
 def test_what_cannot_be_run_is_refused(database: Path, options: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        simulate_kind(database, **options)
+        simulate(database, **options)
 
 
 def test_models_are_fitted_stored_and_asked(tmp_path: Path) -> None:
     place = tmp_path / "m.db"
     fill(place, 5)
     slump(place, rotations_deg=(1.0,))
-    simulate_kind(place, kind="sliding", jobs=1)
+    simulate(place, kind="sliding", jobs=1)
     with opened_database(place) as engine:
         for kind, rotation_deg in (("sliding", None), ("slumping", 1.0)):
             for term in ("pgv_pga", "pgv"):
                 with engine.connect() as connection:
-                    fitted = fit_kind(connection, kind=kind, term=term, rotation_deg=rotation_deg)
+                    fitted = fit(connection, kind=kind, term=term, rotation_deg=rotation_deg)
                 with engine.begin() as connection:
-                    row = save_model(connection, fitted.row)
-                assert row.coefficients == fitted.row.coefficients
+                    row = save_model(connection, fitted.model.row)
+                assert row.coefficients == fitted.coefficients
                 assert row.is_default == (term == "pgv_pga")
         with engine.connect() as connection:
             checks = check_models(connection, model_rows(connection))

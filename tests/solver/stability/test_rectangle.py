@@ -5,7 +5,7 @@ import math
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.solver.block.rectangle import level_rectangle, rectangle_r3_m
+from rbfrag.solver.stability.single import level_rectangle, rectangle_r3_m
 
 BLOCKS = [(0.1, 0.02), (3.0, 0.1), (30.0, 1.5), (12.0, 5.0)]
 

@@ -1,0 +1,143 @@
+"""Formulas of block shape, written once for single numbers and for arrays (eqs. 3.1-3.15).
+
+Only the functions of :class:`Elementwise`, the four operations and comparisons are used, and all of
+them round correctly, so that single numbers and arrays give the same bits. No numpy is loaded until
+an array is asked for. The libraries' tangents differ in the last bit between processors; a block on
+a boundary between two modes must not change mode for that, so the tangent is made here. All of a
+parallelogram follows from the tangents of its angles, t1 = tan α1 and t3 = tan α3, and from half
+its thickness, h = S1/2 = r1 cos α1 = r3 cos α3.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+N = TypeVar("N", float, "NDArray[np.float64]")
+"""A number or an array of numbers."""
+
+
+@dataclass(frozen=True)
+class Elementwise(Generic[N]):
+    """The functions that the formulas need, for one kind of number.
+
+    Args:
+        sqrt: square root.
+        where: ``where(condition, a, b)`` is a where the condition holds, else b.
+    """
+
+    sqrt: Callable[[N], N]
+    where: Callable[[Any, Any, Any], Any]
+
+
+def _choose(condition: bool, yes: float, no: float) -> float:
+    return yes if condition else no
+
+
+SCALAR: Elementwise[float] = Elementwise(sqrt=math.sqrt, where=_choose)
+"""The functions for single numbers."""
+
+
+@cache
+def array_elementwise() -> Elementwise[Any]:
+    """Return the functions for numpy arrays."""
+    import numpy as np
+
+    return Elementwise(sqrt=np.sqrt, where=np.where)
+
+
+_RADIAN = math.pi / 180.0
+
+# Ninth convergent of Lambert's continued fraction, tan y = y/(1 - y²/(3 - y²/(5 - ...))), as
+# polynomials in y²; at 45° it is 9e-19 off.
+_NUMERATOR = (1.0, -990.0, 135135.0, -4729725.0, 34459425.0)
+_DENOMINATOR = (45.0, -13860.0, 945945.0, -16216200.0, 34459425.0)
+
+
+def tan_deg(angle_deg: N, functions: Elementwise[N]) -> N:
+    """Return the tangent of an angle between -90 and 90 degrees, both excluded.
+
+    Args:
+        angle_deg: angle [deg], scalar or array; NaN gives NaN.
+        functions: the functions for this kind of number.
+    """
+    where = functions.where
+    steep = abs(angle_deg) > 45.0
+    # the complement is exact for these angles
+    rest = where(steep, where(angle_deg < 0.0, -90.0, 90.0) - angle_deg, angle_deg)
+    above, below = _tangent_parts(rest)
+    result: N = where(steep, below, above) / where(steep, above, below)
+    return result
+
+
+def cot_deg(angle_deg: N, functions: Elementwise[N]) -> N:
+    """Return the cotangent of an angle between 0 and 180 degrees, both excluded.
+
+    Args:
+        angle_deg: angle [deg], scalar or array; NaN gives NaN.
+        functions: the functions for this kind of number.
+    """
+    where = functions.where
+    steep = abs(angle_deg - 90.0) <= 45.0
+    # complement and supplement are exact for these angles
+    flat = where(angle_deg > 90.0, angle_deg - 180.0, angle_deg)
+    above, below = _tangent_parts(where(steep, 90.0 - angle_deg, flat))
+    result: N = where(steep, above, below) / where(steep, below, above)
+    return result
+
+
+def _tangent_parts(angle_deg: N) -> tuple[N, N]:
+    """Return two numbers whose quotient is the tangent of an angle up to 45 degrees."""
+    y = angle_deg * _RADIAN
+    z = y * y
+    return y * _polynomial(_NUMERATOR, z), _polynomial(_DENOMINATOR, z)
+
+
+def _polynomial(coefficients: tuple[float, ...], z: N) -> N:
+    total = z * coefficients[0] + coefficients[1]
+    for coefficient in coefficients[2:]:
+        total = total * z + coefficient
+    return total
+
+
+def cot_gamma(tan_alpha1: N, tan_alpha3: N) -> N:
+    """Return cot γ = (t1 + t3)/2 (eq. 3.12)."""
+    return (tan_alpha1 + tan_alpha3) * 0.5
+
+
+def tangents_from_spacings(
+    s1_m: N, s2_m: N, gamma_deg: N, functions: Elementwise[N]
+) -> tuple[N, N]:
+    """Return (t1, t3) of the block that two fracture sets cut out (eq. 3.15).
+
+    tan α = cot γ ∓ (S2/S1)/sin γ, with 1/sin γ = √(1 + cot² γ).
+
+    Args:
+        s1_m: spacing of the base fractures [m].
+        s2_m: spacing of the back fractures [m].
+        gamma_deg: dip of the back less dip of the base [deg].
+        functions: the functions for this kind of number.
+    """
+    cot = cot_deg(gamma_deg, functions)
+    half_base = s2_m / s1_m * functions.sqrt(cot * cot + 1.0)
+    return cot - half_base, cot + half_base
+
+
+def shape_factor(tan_alpha1: N, tan_alpha3: N) -> N:
+    """Return F_s = m r3²/I_toe = 1/(7/6 + (cos α3/cos α1)²/6)."""
+    ratio = (tan_alpha1 * tan_alpha1 + 1.0) / (tan_alpha3 * tan_alpha3 + 1.0)
+    return 6.0 / (ratio + 7.0)
+
+
+def frequency_parameter(factor: N, r3_m: N) -> N:
+    """Return p² = F_s g/r3 [1/s²] (eq. 4.27) for a distance toe-centroid r3 [m]."""
+    return factor * STANDARD_GRAVITY_M_S2 / r3_m

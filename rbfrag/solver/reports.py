@@ -1,0 +1,218 @@
+"""Answers of the solver as scripts read them: dictionaries of plain values, a CSV of a history."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from rbfrag.errors import InputError
+from rbfrag.files import written_whole
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.results import CriticalResult, Response, ResponseHistory
+
+HISTORY_COLUMNS = (
+    "time_s",
+    "theta_rad",
+    "theta_over_critical",
+    "theta_dot_rad_s",
+    "k_h_g",
+    "k_v_g",
+)
+
+
+def response_as_dict(response: Response) -> dict[str, Any]:
+    """Return the answer with the keys of the JSON contract."""
+    return {
+        "kind": response.kind,
+        "outcome": response.outcome.value,
+        "peak_theta_n": response.peak_theta_n,
+        "peak_theta_rad": response.peak_theta_rad,
+        "critical_angle_deg": response.critical_angle_deg,
+        "started_s": response.started_s,
+        "toppled_s": response.toppled_s,
+        "error_estimate": response.error_estimate,
+        "steps": response.steps,
+        "samples_moved": response.samples_moved,
+        "samples_total": response.samples_total,
+        "final_theta_rad": response.final_theta_rad,
+        "displacement_m": response.displacement_m,
+        "peak_displacement_m": response.peak_displacement_m,
+        "centroid_displacement_m": response.centroid_displacement_m,
+        "stopped_s": response.stopped_s,
+        "mode_changes": [
+            {"time_s": change.time_s, "motion": change.motion} for change in response.mode_changes
+        ],
+        "warnings": list(response.warnings),
+    }
+
+
+MOTION_COLUMNS = (
+    *HISTORY_COLUMNS,
+    "displacement_m",
+    "velocity_m_s",
+    "centroid_x_m",
+    "centroid_y_m",
+    "strength_g",
+)
+"""Columns for the models in which the block is displaced; empty where one does not apply."""
+
+
+def write_history(response: Response, path: str | os.PathLike[str]) -> None:
+    """Write the motion of the block in time as CSV, whole or not at all.
+
+    Args:
+        response: a response that was asked for with its history.
+        path: the file to write; units are in its column names.
+
+    Raises:
+        InputError: the response holds no history, or the file cannot be written.
+    """
+    history = response.history
+    if history is None:
+        raise InputError("this response holds no history: ask for it with history=True")
+    with (
+        written_whole(Path(path)) as partial,
+        partial.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = csv.writer(file)
+        writer.writerow(HISTORY_COLUMNS if history.displacement_m is None else MOTION_COLUMNS)
+        writer.writerows(_rows(response, history))
+
+
+def _rows(response: Response, history: ResponseHistory) -> Iterator[tuple[float | str, ...]]:
+    columns: list[list[float] | list[str]] = [
+        history.time_s.tolist(),
+        history.theta_rad.tolist(),
+        _over_critical(response, history),
+        history.theta_dot_rad_s.tolist(),
+        history.k_h.tolist(),
+        history.k_v.tolist(),
+    ]
+    if history.displacement_m is not None:
+        centroid = history.centroid_m
+        columns += [
+            values.tolist() if values is not None else [""] * history.time_s.size
+            for values in (
+                history.displacement_m,
+                history.velocity_m_s,
+                None if centroid is None else centroid[:, 0],
+                None if centroid is None else centroid[:, 1],
+                history.strength_g,
+            )
+        ]
+    return zip(*columns, strict=True)
+
+
+def _over_critical(response: Response, history: ResponseHistory) -> list[float] | list[str]:
+    if response.critical_angle_deg is None:
+        return [""] * history.time_s.size
+    ratio: list[float] = (history.theta_rad / math.radians(response.critical_angle_deg)).tolist()
+    return ratio
+
+
+NOT_PROVEN = (
+    "the scale is the smallest that was seen to fail: the scales between those that were looked "
+    "at (5 % apart) are not proven safe"
+)
+
+
+def critical_as_dict(
+    result: CriticalResult, *, remarks: Sequence[str] = (), full_map: bool = False
+) -> dict[str, Any]:
+    """Return the answer with the keys of the JSON contract.
+
+    Args:
+        result: the answer, of any kind.
+        remarks: warnings about the motion, which go before those of the answer.
+        full_map: put the map of outcomes in.
+    """
+    if "scale" in result.of_kind:
+        answer = _scaled(result)
+    elif "displacement_m" in result.of_kind:
+        answer = _sliding(result)
+    else:
+        answer = _strength(result)
+    answer |= {"polarity": result.polarity, "pga_g": result.pga_g}
+    answer["warnings"] = [*remarks, *result.warnings]
+    if result.of_kind.get("scale") is not None:
+        answer["warnings"].append(NOT_PROVEN)
+    if full_map:
+        answer["map"] = map_rows(result)
+    return answer
+
+
+def map_rows(result: CriticalResult) -> list[dict[str, Any]]:
+    """Return the map of outcomes, one row per interval of k_r/PGA, rising."""
+    found = result.intervals
+    return [
+        {"k_lo": low, "k_hi": high, "outcome": outcome}
+        for low, high, outcome in zip(
+            found.k_lo.tolist(), found.k_hi.tolist(), found.outcome, strict=True
+        )
+    ]
+
+
+def _strength(result: CriticalResult) -> dict[str, Any]:
+    return {
+        "kr_over_pga": result.kr_over_pga,
+        "lower": result.lower,
+        "upper": result.upper,
+        "kr": result.kr,
+        "y_m_s": result.y_m_s,
+        "status": result.status,
+        "search_limit": result.search_limit,
+        "certified": result.certified,
+        "k_up_over_pga": result.k_up_over_pga,
+        "undecided": result.undecided,
+        "island_width": result.island_width,
+        "kr_over_pga_resolved": result.kr_over_pga_resolved,
+        "reentrant": result.reentrant,
+        "n_runs": result.n_runs,
+        "p2": result.p2,
+    }
+
+
+def _sliding(result: CriticalResult) -> dict[str, Any]:
+    return {
+        "kind": result.kind,
+        "displacement_m": result.of_kind["displacement_m"],
+        "ky_over_pga": result.kr_over_pga,
+        "lower": result.lower,
+        "upper": result.upper,
+        "ky": result.kr,
+        "status": result.status,
+        "search_limit": result.search_limit,
+        "certified": result.certified,
+        "n_runs": result.n_runs,
+    }
+
+
+def _scaled(result: CriticalResult) -> dict[str, Any]:
+    its = result.of_kind
+    scale, limit, leaves_g = its["scale"], its["scale_limit"], its["leaves_g"]
+    y_m_s = None
+    if scale is not None:
+        y_m_s = its["yield_g"] / scale * STANDARD_GRAVITY_M_S2 / math.sqrt(result.p2)
+    return {
+        "kind": result.kind,
+        "rotation_deg": its["rotation_deg"],
+        "scale": scale,
+        "lower": its["lower_scale"],
+        "upper": scale,
+        "status": result.status,
+        "starts_scale": its["starts_scale"],
+        "scale_limit": limit if math.isfinite(limit) else None,
+        "certified": result.certified,
+        "reentrant": result.reentrant,
+        "n_runs": result.n_runs,
+        "k_over_pga": result.kr_over_pga,
+        "pga_at_failure_g": None if scale is None else scale * result.pga_g,
+        "y_m_s": y_m_s,
+        its["yield_name"]: its["yield_g"],
+        "ps2": result.p2,
+        "leaves_g": leaves_g if math.isfinite(leaves_g) else None,
+    }
