@@ -17,7 +17,7 @@ from rbfrag.bench.timing import timed
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.integrator.batch import run_blocks
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
-from rbfrag.solver.integrator.vectorised import run_in_lanes
+from rbfrag.solver.integrator.vectorised import run_batch
 
 READINGS = 5
 
@@ -77,7 +77,7 @@ def compare(drive: Excitation, p2: float, kr: np.ndarray) -> tuple[float, float,
         lambda: run_blocks(
             *arrays, drive.jump_node, kr, p, False, ORDER, PH_MAX, whole[0], real[0]
         ),
-        lambda: run_in_lanes(*arrays, drive.jump_node, kr, p, PH_MAX, whole[1], real[1]),
+        lambda: run_batch(*arrays, drive.jump_node, kr, p, PH_MAX, whole[1], real[1]),
     ]
     least = [np.inf, np.inf]
     for way in ways:

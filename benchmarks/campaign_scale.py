@@ -23,8 +23,7 @@ from rbfrag.bench.cases import RECORDS_VARIABLE
 from rbfrag.bench.tables import markdown
 from rbfrag.campaign.add_motions import add_motions
 from rbfrag.db.engine import opened_database
-from rbfrag.db.motions import motion_rows
-from rbfrag.db.suites import add_to_suite
+from rbfrag.db.motions import add_to_suite, motion_rows
 
 RECORDS = (50, 100, 265)
 """Numbers of records at which the memory is looked at."""

@@ -19,7 +19,7 @@ from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.integrator.single_run import TOPPLED
 from rbfrag.solver.results import DEFAULT_P2
 from rbfrag.solver.toppling_run import runner
-from tests.solver.fresh_excursions import fails
+from tests.solver.excursions_from_rest import fails
 
 PAGE = ROOT / "docs" / "theory" / "toppling-spectrum.md"
 
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def bounds(records: Records, p2: Sequence[float]) -> list[list[str]]:
-    """Compare X with the greatest k_r of a failing fresh excursion, linear and non-linear."""
+    """Compare X with the greatest k_r of a failing excursion from rest, linear and non-linear."""
     wrong, linear, strengths, apart = 0, 0, [], []
     for done, motion in enumerate(records.motions):
         print(f"bounds: {done}/{len(records.motions)} motions", file=sys.stderr)
@@ -138,7 +138,7 @@ def bound_k(x_m_s: float, p2: float) -> float:
 
 
 def non_linear_bound(drive: Excitation, p2: float, guess: float) -> float:
-    """Bisect for the greatest k_r of the non-linear model with a failing fresh excursion."""
+    """Bisect for the greatest k_r of the non-linear model with a failing excursion from rest."""
     low, high = guess, guess
     step = 0.002
     while low > 0.0 and not fails(drive, p2, False, low):

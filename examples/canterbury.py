@@ -18,7 +18,7 @@ import pandas as pd
 
 import rbfrag
 from rbfrag.rockmasses.file import read_rock_mass
-from rbfrag.rockmasses.table import toppling_blocks
+from rbfrag.rockmasses.report import toppling_blocks
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.batch import simulate_many
 from rbfrag.solver.integrator.single_run import TOPPLED

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.integrator.block_excitation import ground_of
+from rbfrag.solver.integrator.block_excitation import block_excitation
 from rbfrag.solver.integrator.single_run import STABLE, TOPPLED
 from rbfrag.solver.search.certified import MARGIN, keeps_order
 from rbfrag.solver.search.envelopes import ALL_SAFE, ALL_TOPPLE, decide
@@ -65,7 +65,7 @@ def verdict_on(drive: Excitation, p2: float, low: float, high: float) -> bool | 
     n = drive.q.size
     check = not keeps_order(drive, False)
     starts = no_starts(n)
-    ground = ground_of(drive, p2=p2, linear=False)
+    g = block_excitation(drive, p2=p2, linear=False)
     begin(starts, low, low * (1.0 - MARGIN), high * (1.0 + MARGIN), check, 0, n)
-    what, *_ = decide(ground, low, high, MARGIN, check, starts, 0)
+    what, *_ = decide(g, low, high, MARGIN, check, starts, 0)
     return {ALL_SAFE: False, ALL_TOPPLE: True}.get(what)

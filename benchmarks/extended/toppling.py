@@ -3,7 +3,7 @@
 It shares nothing with rbfrag.solver but the arrays of the excitation, which both take as
 exact. Every step computes sine and cosine of the angle anew; the Taylor series goes on until
 its terms are below 1e-34; roots are isolated by bounds of the polynomial on each part of a
-step, so that no touch and no peak is stepped over; the start of motion, the re-seat and the
+step, so that no touch and no peak is stepped over; the start of motion, the impact and the
 state after the record are closed-form or bisected to the last digit.
 """
 

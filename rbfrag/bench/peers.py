@@ -136,7 +136,7 @@ class Excursion(NamedTuple):
 
 
 class Problem:
-    """One case as scalar Python functions, made as cheap as plain Python allows."""
+    """One case as scalar Python functions, made as cheap as Python allows."""
 
     def __init__(self, case: Case) -> None:
         self.k: list[float] = case.drive.k_h.tolist()

@@ -47,12 +47,12 @@ def reference(case: Case) -> Answer:
                 break
             i = max(i + 1, int(later[0]) - 1)
             continue
-        at, fresh = rest, False
+        at, from_rest = rest, False
         da, dw = k[i + 1] - k[i], w[i + 1] - w[i]
         g0, slope = k[i] - w[i] * kr, da - dw * kr
         if not moving:
-            fresh = bool(g0 <= 0)
-            at = -g0 / slope if fresh else rest
+            from_rest = bool(g0 <= 0)
+            at = -g0 / slope if from_rest else rest
             moving, theta, rate = True, rest, rest
         while moving and at < 1 and h > 0:
             left = h * (1 - at)
@@ -60,9 +60,9 @@ def reference(case: Case) -> Answer:
             part = (1 - at) / pieces
             u = _coefficients(
                 theta_c - theta, rate * h * part, (p * h * part) ** 2,
-                k[i] + da * at, da * part, w[i] + dw * at, dw * part, fresh,
+                k[i] + da * at, da * part, w[i] + dw * at, dw * part, from_rest,
             )  # fmt: skip
-            fresh = False
+            from_rest = False
             path = [theta, *(u[j] / (j + 1) for j in range(len(u)))]
             landing = _first_root(path)
             for turn in _roots(u):
@@ -78,9 +78,9 @@ def reference(case: Case) -> Answer:
             now = g0 + slope * at
             theta = rate = rest
             if now <= 0:
-                fresh = bool(slope > 0 and g0 + slope > 0)
-                moving = fresh
-                at = max(at, -g0 / slope) if fresh else at
+                from_rest = bool(slope > 0 and g0 + slope > 0)
+                moving = from_rest
+                at = max(at, -g0 / slope) if from_rest else at
         i += 1
         if moving and rate > 0 and theta_c - theta < border[i]:
             return Answer(TOPPLED, math.nan)
@@ -90,7 +90,7 @@ def reference(case: Case) -> Answer:
 
 
 def _coefficients(
-    phi: Real, u0: Real, big_p: Real, a: Real, da: Real, w: Real, dw: Real, fresh: bool
+    phi: Real, u0: Real, big_p: Real, a: Real, da: Real, w: Real, dw: Real, from_rest: bool
 ) -> list[Real]:
     """Taylor coefficients of h theta' over one step."""
     u, s, c = [u0], [np.sin(phi)], [np.cos(phi)]
@@ -98,7 +98,7 @@ def _coefficients(
         drive = a * c[n] - w * s[n]
         if n:
             drive += da * c[n - 1] - dw * s[n - 1]
-        elif fresh:
+        elif from_rest:
             drive = Real(0)  # a = w k_r is where the motion starts
         u.append(big_p * drive / (n + 1))
         s.append(-sum((u[j] * c[n - j] for j in range(n + 1)), Real(0)) / (n + 1))

@@ -61,7 +61,7 @@ class WorkersRow:
 def record_length(
     motion: GroundMotion, *, p2: float = 3.0, times: Sequence[int] = (1, 2, 4, 8, 16)
 ) -> tuple[LengthRow, ...]:
-    """Time one run, of a block that stays, under a record padded or repeated."""
+    """Time one run, of a block that stays, under a record with zeros before it, or repeated."""
     kr = 0.5 * motion.pga_g
     samples = motion.acceleration_g
     taylor_run(Case(motion, "forward", excitation(motion), p2, kr))  # compiles

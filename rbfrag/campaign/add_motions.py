@@ -16,7 +16,7 @@ from rbfrag.db.motions import add_motion, motion_row, same_source
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.vertical_pairs import recordings_of_mixed_dt
 from rbfrag.errors import InputError, MotionFileError
-from rbfrag.motions.companions import upward
+from rbfrag.motions.direction import upward
 from rbfrag.motions.formats.delimited_text import INDEX
 from rbfrag.motions.metadata import read_metadata
 from rbfrag.motions.processing import (

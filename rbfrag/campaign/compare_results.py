@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from rbfrag.db.check.compare_maps import BORDER_ERROR, Interval, contradictions
+from rbfrag.db.check.maps import BORDER_ERROR, Interval, contradictions
 from rbfrag.db.stored_combination import StoredCombination
 from rbfrag.solver.results import CriticalResult, OutcomeIntervals, SearchPoints
 

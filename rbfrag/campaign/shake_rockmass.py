@@ -13,8 +13,14 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
 from rbfrag.rockmasses.joint_sets import Realisations
-from rbfrag.rockmasses.response import CHUNK, ShakenMass, plan_shaking
-from rbfrag.rockmasses.shaking import BlockFates, FailureLimits, run_blocks
+from rbfrag.rockmasses.shaking import (
+    CHUNK,
+    BlockOutcomes,
+    FailureLimits,
+    ShakenMass,
+    plan_shaking,
+    run_blocks,
+)
 
 WORTH_A_PROCESS = 500
 """Blocks below which a worker process takes longer to start than to work."""
@@ -65,7 +71,7 @@ def shake(
         on_progress: called at the beginning and after each piece of work.
 
     Raises:
-        InputError: as for :func:`rbfrag.rockmasses.response.plan_shaking`; `jobs` below 1;
+        InputError: as for :func:`rbfrag.rockmasses.shaking.plan_shaking`; `jobs` below 1;
             a block that cannot be run.
         WorkFailedError: a worker died.
     """
@@ -80,7 +86,7 @@ def shake(
         workers = 1
     started = time.perf_counter()
 
-    def told(answers: Iterator[BlockFates]) -> Iterator[BlockFates]:
+    def told(answers: Iterator[BlockOutcomes]) -> Iterator[BlockOutcomes]:
         done = 0
         if on_progress is not None and total:
             on_progress(ShakingProgress(0, total, 0.0))

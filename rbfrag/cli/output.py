@@ -1,10 +1,12 @@
-"""What commands print: JSON for scripts, tables for people."""
+"""What commands print: JSON for scripts, tables for people, and how far a long command is."""
 
 from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Protocol
 
 
 def print_json(document: object) -> None:
@@ -42,6 +44,18 @@ def print_warnings(warnings: Iterable[str]) -> None:
         print(f"warning: {warning}", file=sys.stderr)
 
 
+def check_files(*, table: str | None = None, plot: str | None = None) -> None:
+    """Refuse a table or a figure that cannot be written, before long work."""
+    if table is not None:
+        from rbfrag.exchange.block_table import table_path
+
+        table_path(table)
+    if plot is not None:
+        from rbfrag.plots.canvas import plot_path
+
+        plot_path(plot)
+
+
 def cell(value: object) -> str:
     """Return a value as people read it: six digits, a dash for nothing."""
     if value is None:
@@ -63,3 +77,76 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+SECONDS_BETWEEN_LINES = 5.0
+"""Pause between two lines where they are not rewritten in place [s]."""
+
+
+class Progress(Protocol):
+    """What a line tells of."""
+
+    @property
+    def done(self) -> int:
+        """Things done."""
+
+    @property
+    def total(self) -> int:
+        """Things to do."""
+
+    @property
+    def rate_per_s(self) -> float:
+        """Things done per second; 0 while that is not known."""
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Estimated time left [s]."""
+
+
+class ProgressLine:
+    """A line on standard error: rewritten on a terminal, now and then elsewhere.
+
+    Args:
+        command: the command that is under way.
+        things: what is counted.
+    """
+
+    def __init__(self, command: str, things: str) -> None:
+        self._command = command
+        self._things = things
+        self._terminal = sys.stderr.isatty()
+        self._last = -SECONDS_BETWEEN_LINES
+        self._shown = False
+
+    def __enter__(self) -> ProgressLine:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._terminal and self._shown:
+            print(file=sys.stderr)
+
+    def show(self, progress: Progress, remark: str = "") -> None:
+        """Show how far the command is.
+
+        Args:
+            progress: what to tell.
+            remark: something more about what is done, in brackets.
+        """
+        now = time.monotonic()
+        finished = progress.done == progress.total
+        if not self._terminal and now - self._last < SECONDS_BETWEEN_LINES and not finished:
+            return
+        self._last = now
+        left = progress.seconds_left
+        text = f"{self._command}: {progress.done}/{progress.total} {self._things}"
+        if remark:
+            text += f" ({remark})"
+        if progress.rate_per_s:
+            text += f", {progress.rate_per_s:.1f} per second"
+        if left is not None and not finished:
+            text += f", {int(left) // 60}:{int(left) % 60:02d} left"
+        if self._terminal:
+            print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+            self._shown = True
+        else:
+            print(text, file=sys.stderr, flush=True)

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, bindparam, exists, select
 
-from rbfrag.db.clock import utc_now
-from rbfrag.db.insert import insert_row, insert_rows, update_rows
+from rbfrag.db.insert import insert_row, insert_rows, update_rows, utc_now
 from rbfrag.db.keys import canonical_json, combination_key
 from rbfrag.db.schema import campaign, combination, outcome_interval, simulation
 from rbfrag.errors import InputError

@@ -11,7 +11,7 @@ from typing import Any
 
 from sqlalchemy import Boolean, Column, Double, Integer, LargeBinary
 
-from rbfrag.db.revision import SCHEMA_REVISION
+from rbfrag.db.location import SCHEMA_REVISION
 from rbfrag.db.schema import metadata
 
 _POLARITY = "forward: positive samples drive toppling out of the slope; reverse: negative ones do"

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, and_, select
 
+from rbfrag.db.motions import require_suite
 from rbfrag.db.queries import Vertical
 from rbfrag.db.schema import combination, earthquake, motion, recording, simulation, suite_motion
-from rbfrag.db.suites import require_suite
 from rbfrag.solver.results import NUMERICS_VERSION
 
 

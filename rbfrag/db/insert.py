@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from functools import cache
 from typing import Any
 
@@ -149,3 +150,18 @@ def _value_type(column_type: Any) -> ValueType:
     if isinstance(column_type, Integer):
         return "integer"
     return "bytes" if isinstance(column_type, LargeBinary) else "text"
+
+
+def utc_now() -> str:
+    """Return the current UTC time in ISO 8601, to the second."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+def storable(text: str) -> str:
+    r"""Return text without what databases refuse, changed visibly.
+
+    File names may hold bytes that are no text, and damaged headers hold NUL; both become
+    ``\x..`` instead of failing the insert.
+    """
+    visible = text.replace("\x00", "\\x00")
+    return visible.encode("utf-8", "backslashreplace").decode("utf-8")

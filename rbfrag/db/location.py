@@ -1,4 +1,8 @@
-"""Where the database is, without loading SQLAlchemy."""
+"""Where the database is and which schema this rbfrag works with, without loading SQLAlchemy.
+
+The schema is named apart from the migrations, so that `rbfrag predict` can check a database
+without loading Alembic; a test proves that both agree.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +10,25 @@ import os
 from os import PathLike
 from pathlib import Path
 
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, SchemaVersionError
 
 DEFAULT_NAME = "rbfrag.db"
 """File name of the database in the current folder when nothing else is said."""
+
+REFERENCE = Path(__file__).parents[1] / "reference" / "reference.db"
+"""The database that is shipped with rbfrag, read-only and without samples, if there is one."""
+
+REVISIONS = ("0001", "0002", "0003", "0004")
+"""Every schema revision this rbfrag knows, oldest first."""
+
+SCHEMA_REVISION = REVISIONS[-1]
+"""The revision that this rbfrag works with."""
+
+VERSION_TABLE = "rbfrag_revision"
+"""Alembic's version table; its own name, so that a PostgreSQL schema may be shared."""
+
+APPLICATION_ID = 0x72626672
+"""SQLite's application_id of an rbfrag database: the letters "rbfr"."""
 
 
 def locate(db: str | PathLike[str] | None) -> Path | str:
@@ -50,10 +69,29 @@ def locate(db: str | PathLike[str] | None) -> Path | str:
     return Path(name)
 
 
-REFERENCE = Path(__file__).parents[1] / "reference" / "reference.db"
-"""The database that is shipped with rbfrag, read-only and without samples, if there is one."""
-
-
 def reference_file() -> Path | None:
     """Return the shipped reference database, or None where none is shipped."""
     return REFERENCE if REFERENCE.is_file() else None
+
+
+def check_revision(found: str, where: str) -> None:
+    """Refuse a database whose schema this rbfrag does not work with.
+
+    Args:
+        found: the revision stored in the database.
+        where: the database as the user names it, for the message.
+
+    Raises:
+        SchemaVersionError: the schema is older or newer.
+    """
+    if found == SCHEMA_REVISION:
+        return
+    if found in REVISIONS:
+        raise SchemaVersionError(
+            f"{where}: the database has schema {found}, this rbfrag needs {SCHEMA_REVISION}: "
+            f"run  rbfrag db upgrade --db {where}"
+        )
+    raise SchemaVersionError(
+        f"{where}: the database has schema {found}, newer than {SCHEMA_REVISION} of this rbfrag: "
+        "install a newer rbfrag"
+    )

@@ -1,22 +1,131 @@
-"""The fast way to a fitted model: straight from the SQLite file.
+"""A fitted model as a row: encoded, decoded, and read straight from an SQLite file.
 
-`rbfrag predict` loads nothing heavier than `sqlite3` for it.
+Standard library only: `rbfrag predict` loads nothing heavier than `sqlite3` for its model. Both
+readers, the one over SQLAlchemy and the one here, decode alike and so agree to the bit: JSON writes
+the shortest text that reads back as the same double.
 """
 
 from __future__ import annotations
 
+import json
+import math
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
-from rbfrag.db.model_record import COLUMNS, decode_model, unknown_model
 from rbfrag.db.rows import ModelRow
 from rbfrag.db.sqlite_file import check_sqlite_database, connect_sqlite, sqlite_error_in_words
-from rbfrag.errors import UnknownModelError
+from rbfrag.errors import DatabaseError, InputError, UnknownModelError
+
+COLUMNS = (
+    "name",
+    "term",
+    "method",
+    "coefficients",
+    "covariance",
+    "domain",
+    "data_fingerprint",
+    "diagnostics",
+    "is_default",
+    "created",
+    "kind",
+)
+"""The columns that make a model, in the order of :func:`decode_model`."""
 
 _SELECT = f"SELECT {', '.join(COLUMNS)} FROM fragility_model"
+
+
+def encode_model(row: ModelRow) -> dict[str, Any]:
+    """Return a model as values by column.
+
+    Raises:
+        InputError: an empty name, a covariance of another size than the coefficients, a number
+            that is not finite, a diagnostic that JSON has no word for.
+    """
+    if not row.name.strip():
+        raise InputError("the name of a model must not be empty")
+    if not row.name.isprintable():
+        raise InputError(f"the name of a model must be printable text, not {row.name!r}")
+    n = len(row.coefficients)
+    if len(row.covariance) != n or any(len(line) != n for line in row.covariance):
+        raise InputError(f"model {row.name}: the covariance is not {n} by {n}")
+    numbers = [*row.coefficients.values(), *(v for line in row.covariance for v in line)]
+    numbers += [bound for pair in row.domain.values() for bound in pair]
+    for number in numbers:
+        if not math.isfinite(number):
+            raise InputError(f"model {row.name} holds {number}: such a fit cannot be stored")
+    try:
+        diagnostics = json.dumps(dict(row.diagnostics), allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f"model {row.name}: its diagnostics cannot be stored as JSON: {error}"
+        ) from error
+    return {
+        "name": row.name,
+        "term": row.term,
+        "method": row.method,
+        "coefficients": json.dumps({k: float(v) for k, v in row.coefficients.items()}),
+        "covariance": json.dumps([[float(v) for v in line] for line in row.covariance]),
+        "domain": json.dumps({k: [float(v) for v in pair] for k, pair in row.domain.items()}),
+        "data_fingerprint": row.data_fingerprint,
+        "diagnostics": diagnostics,
+        "is_default": bool(row.is_default),
+        "created": row.created,
+        "kind": row.kind,
+    }
+
+
+def decode_model(values: Sequence[Any]) -> ModelRow:
+    """Return the model of one row, its values in the order of :data:`COLUMNS`.
+
+    Raises:
+        DatabaseError: the row does not read as a model.
+    """
+    by_name: Mapping[str, Any] = dict(zip(COLUMNS, values, strict=True))
+    try:
+        return ModelRow(
+            name=by_name["name"],
+            term=by_name["term"],
+            method=by_name["method"],
+            coefficients={k: float(v) for k, v in json.loads(by_name["coefficients"]).items()},
+            covariance=tuple(
+                tuple(float(v) for v in line) for line in json.loads(by_name["covariance"])
+            ),
+            domain={
+                k: (float(low), float(high))
+                for k, (low, high) in json.loads(by_name["domain"]).items()
+            },
+            data_fingerprint=by_name["data_fingerprint"],
+            diagnostics=json.loads(by_name["diagnostics"]),
+            is_default=bool(by_name["is_default"]),
+            created=by_name["created"],
+            kind=by_name["kind"],
+        )
+    except (ValueError, TypeError, AttributeError) as error:
+        raise DatabaseError(
+            f"model {by_name['name']} is damaged in the database ({error}): fit it again"
+        ) from error
+
+
+def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
+    """Return the sentence for a model that is not there.
+
+    Args:
+        name: the name asked for; None for the default.
+        known: names of the models there are.
+        where: the database as the user names it.
+    """
+    if not known:
+        return f"{where} holds no model yet: make one with  rbfrag fit --term pgv --method wls"
+    if name is None:
+        return (
+            f"{where} has no default model: choose one of {', '.join(known)} with --model, or "
+            "with  rbfrag models default NAME"
+        )
+    return f"there is no model {name!r} in {where}; it holds: {', '.join(known)}"
 
 
 def read_model(

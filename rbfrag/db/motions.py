@@ -1,4 +1,4 @@
-"""Writing and reading accelerograms."""
+"""Writing and reading accelerograms, with their earthquakes and suites."""
 
 from __future__ import annotations
 
@@ -23,13 +23,10 @@ from sqlalchemy import (
 )
 
 from rbfrag.db import schema
-from rbfrag.db.clock import utc_now
-from rbfrag.db.earthquakes import earthquake_id_for
-from rbfrag.db.insert import insert_if_new, update_rows
+from rbfrag.db.insert import insert_if_new, storable, update_rows, utc_now
 from rbfrag.db.keys import canonical_json
 from rbfrag.db.rows import EarthquakeInfo, MotionRow
-from rbfrag.db.stored_text import storable
-from rbfrag.db.suites import add_to_suite, require_suite, suite_names
+from rbfrag.db.schema import earthquake, suite, suite_motion
 from rbfrag.errors import DatabaseError, InputError
 from rbfrag.motions.ground_motion import GroundMotion
 
@@ -416,3 +413,74 @@ def _row_of(connection: Connection, query: Select[Any], motion_id: int) -> RowMa
             f"there is no motion {motion_id} in the database: rbfrag motions list  shows the ids"
         )
     return row
+
+
+def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording: str) -> int:
+    """Return the row id of an earthquake, made when new.
+
+    A guessed event never becomes a stated one of the same id: both stand side by side. What
+    is said first about an event stays (sources give one event several names and
+    magnitudes); what was not known is filled in.
+
+    Args:
+        connection: inside the caller's transaction.
+        info: the earthquake. Without an event_id nothing is known, and the recording
+            stands for an event of its own.
+        recording: name of the recording.
+
+    Raises:
+        InputError: a magnitude that no earthquake has.
+    """
+    if info.magnitude is not None and not -5.0 < info.magnitude < 11.0:
+        raise InputError(
+            f"event {info.event_id}: {info.magnitude} is no magnitude of an earthquake"
+        )
+    event_id = storable(info.event_id) or f"unknown event of {recording}"
+    guessed = info.guessed or not info.event_id
+    known = {
+        "name": storable(info.name),
+        "magnitude": info.magnitude,
+        "time": None if info.time is None else storable(info.time),
+    }
+    insert_if_new(connection, earthquake, {"event_id": event_id, "guessed": guessed, **known})
+    row = connection.execute(
+        select(earthquake).where(
+            earthquake.c.event_id == event_id, earthquake.c.guessed.is_(guessed)
+        )
+    ).one()
+    missing = {key: value for key, value in known.items() if value and not row._mapping[key]}
+    if missing:
+        update_rows(connection, earthquake, earthquake.c.id == row.id, missing)
+    return int(row.id)
+
+
+def add_to_suite(connection: Connection, name: str, motion_id: int) -> None:
+    """Put a motion into a suite, made when new; a motion that is in it stays in it.
+
+    Raises:
+        InputError: the name is empty.
+    """
+    if not name.strip():
+        raise InputError("the name of a suite must not be empty")
+    name = storable(name)
+    insert_if_new(connection, suite, {"name": name})
+    suite_id = connection.execute(select(suite.c.id).where(suite.c.name == name)).scalar_one()
+    insert_if_new(connection, suite_motion, {"suite_id": suite_id, "motion_id": motion_id})
+
+
+def suite_names(connection: Connection) -> list[str]:
+    """Return the names of all suites, sorted."""
+    return sorted(connection.scalars(select(suite.c.name)))
+
+
+def require_suite(connection: Connection, name: str) -> int:
+    """Return the row id of a suite.
+
+    Raises:
+        InputError: there is no such suite; the message lists those there are.
+    """
+    suite_id = connection.scalar(select(suite.c.id).where(suite.c.name == storable(name)))
+    if suite_id is None:
+        known = ", ".join(suite_names(connection)) or "none"
+        raise InputError(f"there is no suite {name!r}; the database holds: {known}")
+    return int(suite_id)

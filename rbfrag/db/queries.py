@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sqlalchemy import Connection, RowMapping, Select, and_, case, func, select
 
-from rbfrag.db.revision import SCHEMA_REVISION
+from rbfrag.db.location import SCHEMA_REVISION
+from rbfrag.db.motions import require_suite
 from rbfrag.db.rows import CombinationTable
 from rbfrag.db.schema import (
     combination,
@@ -23,7 +24,6 @@ from rbfrag.db.schema import (
     simulation,
     suite_motion,
 )
-from rbfrag.db.suites import require_suite
 from rbfrag.errors import InputError
 from rbfrag.motions.quality import PGD_IN_DOUBT
 from rbfrag.solver.results import NUMERICS_VERSION, SearchPoints
@@ -277,3 +277,19 @@ def _combination_query() -> Select[Any]:
         .join(recording)
         .join(earthquake)
     )
+
+
+def stored_blocks(connection: Connection, combination_id: ArrayLike) -> list[str]:
+    """Return the blocks of some combinations as JSON text; empty for toppling.
+
+    Args:
+        connection: the database.
+        combination_id: row ids, shape (n,).
+    """
+    wanted = np.asarray(combination_id, dtype=np.int64).tolist()
+    if not wanted:
+        return []
+    column = combination.c
+    query = select(column.id, column.block).where(column.id.between(min(wanted), max(wanted)))
+    found = {row_id: block or "" for row_id, block in connection.execute(query)}
+    return [found[row_id] for row_id in wanted]

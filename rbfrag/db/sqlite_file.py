@@ -9,7 +9,7 @@ import sqlite3
 import stat
 from pathlib import Path
 
-from rbfrag.db.revision import APPLICATION_ID, VERSION_TABLE, check_revision
+from rbfrag.db.location import APPLICATION_ID, VERSION_TABLE, check_revision
 from rbfrag.errors import (
     DatabaseBusyError,
     DatabaseError,

@@ -14,8 +14,7 @@ from rbfrag.db.motions import load_motion, motion_row, motion_rows
 from rbfrag.db.rows import MotionRow
 from rbfrag.db.schema import motion, recording
 from rbfrag.errors import InputError
-from rbfrag.motions.companions import lead_in_of, why_not_together
-from rbfrag.motions.direction import is_downward_name
+from rbfrag.motions.direction import is_downward_name, lead_in_of, why_not_together
 from rbfrag.motions.ground_motion import GroundMotion
 
 

@@ -121,11 +121,6 @@ def parquet_parts(
 ) -> tuple[list[str], Parts]:
     """Return the names of the columns of a Parquet file, and its parts.
 
-    Args:
-        origin: the file.
-        numeric: columns that hold numbers.
-        stack: closes the file at the end.
-
     Raises:
         InputError: not a Parquet file, or a column of numbers holds none.
         MissingExtraError: pyarrow is not installed.
@@ -158,12 +153,6 @@ def parquet_parts(
 
 def numbers(origin: Path, column: str, cells: Any, first_line: int) -> NDArray[np.float64]:
     """Return the numbers of some cells; NaN where one is empty.
-
-    Args:
-        origin: the file, for messages.
-        column: name of the column.
-        cells: an array of numbers, or texts.
-        first_line: line of the first of them.
 
     Raises:
         InputError: a text is no number; the message names its line.
@@ -250,11 +239,7 @@ def parquet_writer(
     numeric: Sequence[str],
     stack: ExitStack,
 ) -> Write:
-    """Return a function that writes parts as Parquet, where NaN is null; as :func:`csv_writer`.
-
-    Raises:
-        MissingExtraError: pyarrow is not installed.
-    """
+    """Return a function that writes parts as Parquet, where NaN is null; as :func:`csv_writer`."""
     arrow, parquet = pyarrow()
     open_file: list[Any] = []
 

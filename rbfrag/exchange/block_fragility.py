@@ -95,9 +95,6 @@ def class_function(
         levels: number of levels of a discrete function.
         model: as in :func:`rbfrag.predict`.
         db: as in :func:`rbfrag.predict`.
-
-    Raises:
-        InputError: no block, or as for :func:`block_functions`.
     """
     if p2.size == 0:
         raise InputError(f"class {name!r} has no stable toppling block: it has no fragility")

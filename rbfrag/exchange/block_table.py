@@ -53,10 +53,6 @@ def write_block_table(columns: Mapping[str, NDArray[Any]], path: str | os.PathLi
     Args:
         columns: arrays of one length by column name, units in the names.
         path: file to write, ``.csv`` or ``.parquet``; an existing file is replaced.
-
-    Raises:
-        InputError: as for :func:`table_path`, or the disk refuses.
-        MissingExtraError: a Parquet file without pyarrow.
     """
     target = table_path(path)
     with written_whole(target, "table") as partial:

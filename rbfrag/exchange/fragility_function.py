@@ -35,15 +35,7 @@ class IntensityType:
 
 
 def openquake_type(imt: str, where: str) -> IntensityType:
-    """Return the meaning of an OpenQuake intensity measure type: PGA [g], PGV [cm/s], SA(T) [g].
-
-    Args:
-        imt: the name in the file.
-        where: file and place, for messages.
-
-    Raises:
-        InputError: another measure.
-    """
+    """Return the meaning of an OpenQuake intensity measure type: PGA [g], PGV [cm/s], SA(T) [g]."""
     name = imt.strip()
     if name.upper() == "PGA":
         return IntensityType("pga_g", 1.0)
@@ -162,11 +154,7 @@ def lognormal_function(
     where: str,
     no_damage_limit: float | None = None,
 ) -> FragilityFunction:
-    """Return a checked lognormal function.
-
-    Raises:
-        InputError: median or standard deviation are not above zero.
-    """
+    """Return a checked lognormal function."""
     for value, what in ((median, "median"), (beta, "standard deviation of the logarithm")):
         if not (np.isfinite(value) and value > 0.0):
             raise InputError(f"{where}: the {what} is {value:g}: it must be above zero")

@@ -44,9 +44,6 @@ def hazard_curves_in(
         source: what messages call it.
         imt: as for :func:`read_hazard_curves`.
         site: as for :func:`read_hazard_curves`.
-
-    Raises:
-        InputError: as for :func:`read_hazard_curves`.
     """
     if is_openquake_curve(text):
         curves = openquake_curves(text, source)
@@ -95,9 +92,6 @@ def suited_curves(
         curves: curves of a file, one or more measures.
         with_mean_period: whether the mean period is known.
         converted_period_s: period of the spectral acceleration to be converted, or None.
-
-    Raises:
-        InputError: several measures, and none of them is called for.
     """
     measures = list(dict.fromkeys((curve.measure, curve.period_s) for curve in curves))
     if len(measures) == 1:
@@ -130,13 +124,6 @@ def nshm_curves(text: str, source: str) -> list[HazardCurve]:
 
     Each measure holds ``xs``, the natural logarithms of acceleration in g (or of velocity in
     cm/s for the peak ground velocity), and ``ys``, annual rates of exceedance.
-
-    Args:
-        text: content of the file.
-        source: its path, for messages.
-
-    Raises:
-        InputError: not such a file, with the element in question.
     """
     try:
         document = json.loads(text)
@@ -196,10 +183,6 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     The first line holds kind, investigation_time [years] and imt; the columns are lon, lat,
     depth and ``poe-LEVEL``, levels in g (PGA, SA) or cm/s (PGV), values probabilities of
     exceedance in the investigation time: λ = -ln(1 - poe)/time.
-
-    Args:
-        text: content of the file.
-        source: its path, for messages.
 
     Raises:
         InputError: a header or a row that does not say what it should, with its line.
@@ -303,10 +286,6 @@ def table_curves(text: str, source: str) -> list[HazardCurve]:
     The header says what the numbers are: levels ``pga_g``, ``pga_m_s2``, ``pgv_m_s``,
     ``pgv_cm_s`` or ``sa(0.5)_g``; and ``annual_rate`` [1/a] or ``poe_50_years``, the
     probability of exceedance in 50 years.
-
-    Args:
-        text: content of the file.
-        source: its path, for messages.
 
     Raises:
         InputError: a header or a row that cannot be used, with its line.

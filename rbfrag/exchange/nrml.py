@@ -42,9 +42,6 @@ def read_nrml(path: str | os.PathLike[str]) -> list[FragilityFunction]:
     ``mean`` and ``stddev`` of a continuous function are those of the lognormal variable itself:
     β = sqrt(ln(1 + (sd/mean)²)), median = mean/sqrt(1 + (sd/mean)²).
 
-    Args:
-        path: NRML file.
-
     Raises:
         InputError: not such a file, a limit state without its function, or numbers that make
             none; the message names line or element.

@@ -61,9 +61,6 @@ def pelicun_text(functions: Sequence[FragilityFunction]) -> str:
 
     Args:
         functions: functions of PGA or PGV, one limit state for each asset.
-
-    Raises:
-        InputError: nothing to write, a name twice, or another measure.
     """
     if not functions:
         raise InputError("there is no fragility function to write")
@@ -94,9 +91,6 @@ def pelicun_text(functions: Sequence[FragilityFunction]) -> str:
 
 def read_pelicun(path: str | os.PathLike[str]) -> PelicunTable:
     """Return the functions of peak ground acceleration and velocity of a table.
-
-    Args:
-        path: CSV file.
 
     Raises:
         InputError: not such a table, or a row whose numbers make no function, with its line.

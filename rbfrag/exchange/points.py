@@ -68,9 +68,6 @@ def write_points(
         columns: arrays of one length by name, ``lon`` and ``lat`` [deg] among them.
         about: members of the collection itself, such as the model that answered.
         target: file to write, whole or not at all.
-
-    Raises:
-        InputError: the disk refuses.
     """
     names = [name for name in columns if name not in ("lon", "lat")]
     size = len(columns["lon"])
@@ -123,10 +120,6 @@ def write_geopackage(columns: Mapping[str, NDArray[Any]], layer: str, target: Pa
         columns: arrays of one length by name, ``lon`` and ``lat`` [deg] among them.
         layer: name of the layer.
         target: file to write; an existing file is replaced at the end, not before.
-
-    Raises:
-        InputError: the disk refuses.
-        MissingExtraError: pyogrio is not installed.
     """
     raw = pyogrio()
     names = [name for name in columns if name not in ("lon", "lat")]

@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 
 from rbfrag.db.location import DEFAULT_NAME, REFERENCE, locate, reference_file
-from rbfrag.db.model_record import unknown_model
+from rbfrag.db.model_file import unknown_model
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.fragility.measures import TERMS, terms_from

@@ -148,11 +148,7 @@ def failure_rate(curve: HazardCurve, fragility: Fragility) -> FailureRate:
 
 
 def probability_in(years: float, annual_rate: FloatArray) -> FloatArray:
-    """Return the probability of at least one failure in T years, 1 - exp(-λT) (Poisson).
-
-    Raises:
-        InputError: years are not above zero.
-    """
+    """Return the probability of at least one failure in T years, 1 - exp(-λT) (Poisson)."""
     if not np.isfinite(years) or years <= 0.0:
         raise InputError(f"years = {years:g}: give a period above 0 years")
     result: FloatArray = -np.expm1(-annual_rate * years)

@@ -1,13 +1,22 @@
-"""Published ratios: what a horizontal component means, and PGV out of a spectral acceleration."""
+"""Published ratios: what a horizontal component means, and PGV out of a spectral acceleration.
+
+The models are fitted on single components. Ratios of components are medians of Beyer, K. & Bommer,
+J. J. (2006): Relationships between median values and between aleatory variabilities for different
+definitions of the horizontal component of motion. Bulletin of the Seismological Society of
+America 96(4A), 1512-1522, table 2 (PGA and PGV).
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -42,17 +51,8 @@ COMPONENTS: Mapping[str, Component] = {
 
 
 def component(name: str) -> Component:
-    """Return the definition of that name.
-
-    Raises:
-        InputError: there is none.
-    """
-    try:
-        return COMPONENTS[name]
-    except KeyError:
-        raise InputError(
-            f"component {name!r} is not known: use one of {', '.join(COMPONENTS)}"
-        ) from None
+    """Return the definition of that name."""
+    return _named(COMPONENTS, name, "component")
 
 
 @dataclass(frozen=True)
@@ -93,14 +93,11 @@ CONVERSIONS: Mapping[str, VelocityConversion] = {
 
 
 def velocity_conversion(name: str) -> VelocityConversion:
-    """Return the conversion of that name.
+    """Return the conversion of that name."""
+    return _named(CONVERSIONS, name, "conversion")
 
-    Raises:
-        InputError: there is none.
-    """
-    try:
-        return CONVERSIONS[name]
-    except KeyError:
-        raise InputError(
-            f"conversion {name!r} is not known: use one of {', '.join(CONVERSIONS)}"
-        ) from None
+
+def _named(known: Mapping[str, T], name: str, what: str) -> T:
+    if name not in known:
+        raise InputError(f"{what} {name!r} is not known: use one of {', '.join(known)}")
+    return known[name]

@@ -92,11 +92,6 @@ def site_probability(
         model: as in :func:`rbfrag.predict`.
         level: confidence level.
         db: as in :func:`rbfrag.predict`.
-
-    Raises:
-        InputError: a value that cannot be used.
-        UnknownModelError: no model of that name.
-        DatabaseError: the database cannot be read.
     """
     n = pgv_m_s.size
     chosen = find_model(model, ("p2", "kr", "pgv_m_s", "pga_g"), db)

@@ -9,9 +9,8 @@ from __future__ import annotations
 from alembic import context
 from sqlalchemy import Connection
 
-from rbfrag.db.engine import unchecked_engine
-from rbfrag.db.location import locate
-from rbfrag.db.revision import VERSION_TABLE
+from rbfrag.db.connect import unchecked_engine
+from rbfrag.db.location import VERSION_TABLE, locate
 from rbfrag.db.schema import metadata
 
 

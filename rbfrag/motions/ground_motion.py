@@ -1,4 +1,4 @@
-"""One accelerogram, as every room of the house passes it on."""
+"""One accelerogram, the input of everything else."""
 
 from __future__ import annotations
 

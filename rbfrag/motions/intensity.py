@@ -129,8 +129,8 @@ def mean_period(acceleration_g: FloatArray, dt_s: float) -> float | None:
         The mean period, or None where the record has no power in the band.
     """
     scaled, _ = _scaled(acceleration_g)
-    padded = _ceil(1.0 / TM_FREQUENCY_STEP_HZ / dt_s)
-    nfft = max(float(scaled.size), padded)
+    fine_enough = _ceil(1.0 / TM_FREQUENCY_STEP_HZ / dt_s)
+    nfft = max(float(scaled.size), fine_enough)
     window_s = nfft * dt_s
     if not math.isfinite(window_s):
         return None

@@ -49,7 +49,7 @@ READERS: tuple[ModuleType, ...] = (
     ucgmsim_text,
     delimited_text,
 )
-"""One module a format, asked in this order; plain text, which has no mark of its own, last."""
+"""One module a format, asked in this order; text without a mark of its own last."""
 
 HEAD_CHARACTERS = 4096
 
@@ -95,7 +95,7 @@ def motions_in(
 
     Raises:
         MotionFileError: as for :func:`read_motions`.
-        InputError: likewise.
+        InputError: an unknown unit, or a dt that is not positive.
     """
     _check_stated(units, dt_s)
     # readers look for an index beside a file, and beside this one there is nothing

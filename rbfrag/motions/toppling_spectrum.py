@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity, driving_acceleration_g
+from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]
@@ -54,7 +55,7 @@ def toppling_spectrum(
 ) -> FloatArray | float:
     """Return the toppling spectrum X(p) of a motion [m/s], for blocks of any size.
 
-    The largest toppling velocity k_r g/p that any fresh excursion topples, in the linear
+    The largest toppling velocity k_r g/p that any excursion from rest topples, in the linear
     model without vertical motion; within 1 % that of the non-linear model. Towards p² = 0 it
     is the largest difference between the ground's final velocity and an earlier one, for
     small blocks g·max(a)/p; it is never above 2 PGV.
@@ -114,14 +115,14 @@ def _greatest_velocities(a: FloatArray, h: FloatArray, p: FloatArray) -> FloatAr
     if not h.size:
         return greatest
     equal = bool((h == h[0]).all())
-    still, excess = np.zeros(a.size), np.empty(a.size)
+    remaining, excess = np.zeros(a.size), np.empty(a.size)
     diagonals = np.ones((2, h.size), order="F")
     # one row a value of p, and one column an interval unless all are of one length
     for i, (each, weights) in enumerate(zip(p.tolist(), _rows(h, p, equal), strict=True)):
-        _fill_still_to_come(still, a, weights, diagonals)
-        np.multiply(still, each, out=excess)
+        _fill_remaining(remaining, a, weights, diagonals)
+        np.multiply(remaining, each, out=excess)
         excess -= a  # H' = p H − a
-        greatest[i] = _greatest(a, h, each, still, excess)
+        greatest[i] = _greatest(a, h, each, remaining, excess)
     return greatest
 
 
@@ -132,15 +133,15 @@ def _rows(h: FloatArray, p: FloatArray, equal: bool) -> Iterator[tuple[FloatArra
         yield from (_weights(h, each) for each in p)
 
 
-def _fill_still_to_come(
-    still: FloatArray, a: FloatArray, weights: tuple[FloatArray, ...], diagonals: FloatArray
+def _fill_remaining(
+    remaining: FloatArray, a: FloatArray, weights: tuple[FloatArray, ...], diagonals: FloatArray
 ) -> None:
     """Fill H [g·s] at every node, by H_i = exp(−p h) H_{i+1} + what the interval adds.
 
     These are the equations of a matrix with two diagonals, solved from the last row upwards.
 
     Args:
-        still: filled, shape (n,); its last value is zero and stays.
+        remaining: filled, shape (n,); its last value is zero and stays.
         a: acceleration [g], shape (n,).
         weights: of :func:`_weights`, shapes (n - 1,) or (1,).
         diagonals: the matrix in LAPACK's form, shape (2, n - 1); the second row is one.
@@ -149,7 +150,7 @@ def _fill_still_to_come(
     from scipy.linalg.lapack import dtbtrs
 
     decay, near, far = weights
-    added = still[:-1]
+    added = remaining[:-1]
     np.multiply(a[:-1], near, out=added)
     added += far * a[1:]
     np.negative(decay[:-1] if decay.size > 1 else decay, out=diagonals[0, 1:])
@@ -157,22 +158,22 @@ def _fill_still_to_come(
 
 
 def _greatest(
-    a: FloatArray, h: FloatArray, p: float, still: FloatArray, excess: FloatArray
+    a: FloatArray, h: FloatArray, p: float, remaining: FloatArray, excess: FloatArray
 ) -> float:
-    greatest = max(float(still.max()), 0.0)
+    greatest = max(float(remaining.max()), 0.0)
     # where a does not rise, the signs can only differ by rounding
     signs = excess > 0.0
     turning = np.flatnonzero(signs[:-1] > signs[1:])
     # H bends down where it has a maximum: it stays below both tangents
     reach = np.minimum(
-        still[turning] + excess[turning] * h[turning],
-        still[turning + 1] - excess[turning + 1] * h[turning],
+        remaining[turning] + excess[turning] * h[turning],
+        remaining[turning + 1] - excess[turning + 1] * h[turning],
     )
     turning = turning[(reach > greatest) & (a[turning] < a[turning + 1])]
     if not turning.size:
         return greatest
     inside = _turning_values(
-        a[turning], a[turning + 1], h[turning], still[turning + 1], excess[turning + 1], p
+        a[turning], a[turning + 1], h[turning], remaining[turning + 1], excess[turning + 1], p
     )
     return max(greatest, float(inside.max()))
 
@@ -215,3 +216,31 @@ def _weights(h: FloatArray, p: FloatArray | float) -> tuple[FloatArray, FloatArr
         near = np.where(z > SERIES_BELOW, (1.0 - mean) / large, near)
         far = np.where(z > SERIES_BELOW, (mean - np.exp(-large)) / large, far)
     return decay, h * near, h * far
+
+
+def spectrum_as_dict(
+    motion: str, ground: GroundMotion, p2: Sequence[float], polarity: Polarity
+) -> dict[str, Any]:
+    """Return the answer under the keys of the JSON contract.
+
+    Args:
+        motion: the motion as the caller names it.
+        ground: the motion itself.
+        p2: frequency parameters [1/s²].
+        polarity: forward or reverse.
+
+    Raises:
+        InputError: a p² that cannot be used.
+    """
+    return {
+        "motion": motion,
+        "name": ground.label,
+        "polarity": polarity,
+        "pgv_m_s": ground.pgv_m_s,
+        "p2": list(p2),
+        "x_m_s": toppling_spectrum(ground, p2, polarity).tolist(),
+        "warnings": [
+            *ground.remarks,
+            *(flag.sentence for flag in quality_flags(ground)),
+        ],
+    }

@@ -44,12 +44,7 @@ class BlockLines:
 
 
 def block_lines(block: Block, found: Stability) -> BlockLines:
-    """Return what a drawing of the block consists of.
-
-    Args:
-        block: the block.
-        found: its stability.
-    """
+    """Return what a drawing of the block consists of."""
     beta = math.radians(found.beta_deg)
     cosine, sine = math.cos(beta), math.sin(beta)
 
@@ -118,10 +113,6 @@ def plot_block(
         found: its stability.
         path: file to write: .png, .pdf or .svg.
         title: title of the figure; mode and yield if empty.
-
-    Raises:
-        InputError: a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     figure = new_figure(7.4, 4.8)

@@ -35,9 +35,6 @@ def plot_calibration(
         scores: held-out scores by name of the model, for the legend.
         data: what the outcomes are, for the title.
 
-    Returns:
-        The path.
-
     Raises:
         InputError: no model or too many, or a path that cannot be written.
         MissingExtraError: matplotlib is not installed.

@@ -30,9 +30,6 @@ def new_figure(width_in: float = 7.0, height_in: float = 5.0) -> Figure:
     Args:
         width_in: width [inch].
         height_in: height [inch].
-
-    Raises:
-        MissingExtraError: matplotlib is not installed.
     """
     try:
         from matplotlib.figure import Figure
@@ -56,9 +53,6 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
     Args:
         figure: the figure.
         path: file to write, which is returned; an existing file is replaced.
-
-    Raises:
-        InputError: as for :func:`plot_path`, or the disk refuses.
     """
     target = plot_path(path)
     with written_whole(target, "plot file") as partial, partial.open("wb") as stream:

@@ -48,9 +48,6 @@ def plot_chart(
         path: file to write: .png, .pdf or .svg.
         held: what is held; None for the middle of the fitted ranges.
 
-    Returns:
-        The path.
-
     Raises:
         InputError: a model of another term, or a path that cannot be written.
         MissingExtraError: matplotlib is not installed.

@@ -92,9 +92,6 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
         path: file to write: .png, .pdf or .svg.
         data: what the data are, for the title.
 
-    Returns:
-        The path.
-
     Raises:
         InputError: no critical value of a motion with a mean period, or a path that cannot
             be written.
@@ -224,13 +221,6 @@ def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
     Args:
         pairs: critical values of the same motion, polarity and p².
         path: file to write: .png, .pdf or .svg.
-
-    Returns:
-        The path.
-
-    Raises:
-        InputError: no pair, or a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     if not pairs.ln_ratio.size:

@@ -56,9 +56,6 @@ def plot_curve(
         beside: other fragilities of the same measure to be drawn for comparison, by name:
             probabilities at levels of it.
 
-    Returns:
-        The path.
-
     Raises:
         InputError: a value that cannot be used, a measure that is missing, or a path that
             cannot be written.

@@ -59,9 +59,6 @@ def film(
         exaggerate: factor on displacement and rotation; 1 is true scale.
         title: name of the motion.
 
-    Returns:
-        The path.
-
     Raises:
         InputError: no history, a factor that is not positive, an unknown suffix, a folder that
             cannot be written, an .mp4 without ffmpeg.

@@ -25,13 +25,6 @@ def plot_contribution(curve: HazardCurve, found: HazardAnswer, path: str | PathL
         curve: the hazard curve.
         found: the answer; its first block is drawn.
         path: file to write: .png, .pdf or .svg.
-
-    Returns:
-        The path.
-
-    Raises:
-        InputError: a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     figure = new_figure(6.4, 6.4)

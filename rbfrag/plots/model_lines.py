@@ -200,9 +200,6 @@ def failure_line(
     Returns:
         y, shape (n,); NaN where even the weakest block is less likely to fail, which is where
         a model of no bound runs below zero.
-
-    Raises:
-        InputError: a model of another term.
     """
     held = held_measures(model) if held is None else held
 

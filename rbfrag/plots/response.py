@@ -10,10 +10,11 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.plots.canvas import new_figure, save_figure
-from rbfrag.solver.results import Outcome, Response, ResponseHistory
+from rbfrag.solver.results import FloatArray, Outcome, Response, ResponseHistory
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 GROUND = "#7f7f7f"
 STRENGTH = "#c44e52"
@@ -65,26 +66,11 @@ def plot_response(
     remaining = theta_c - history.theta_rad
     # tan runs away beyond 90 degrees past balance, where strength means nothing any more
     strength = remaining if linear else np.tan(np.clip(remaining, -1.4, 1.4))
-    drive = history.k_h / (1.0 + history.k_v)
-
-    figure = new_figure(width_in=7.5, height_in=5.6)
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.25, 1.0])
-    upper.plot(history.time_s, drive, color=GROUND, lw=0.7, label="ground: $k_h/(1+k_v)$")
-    upper.plot(
-        history.time_s, strength, color=STRENGTH, lw=1.3,
-        label=r"block: $k_r(\theta)=\tan(\theta_c-\theta)$" if not linear
-        else r"block: $\theta_c-\theta$ (linear)",
-    )  # fmt: skip
-    top = 1.15 * max(float(np.abs(drive).max()), kr)
-    upper.set_ylim(-top, top)
-    upper.axhline(0.0, color="black", lw=0.5)
-    upper.set_ylabel("acceleration [g]")
-    upper.legend(loc="upper right", fontsize=8, ncols=2, framealpha=0.9)
-
+    label = r"$\theta_c-\theta$ (linear)" if linear else r"$k_r(\theta)=\tan(\theta_c-\theta)$"
+    figure, upper, lower = _panels(history, strength, f"block: {label}", kr)
     lower.plot(history.time_s, ratio, color=BLOCK, lw=1.3)
     lower.axhline(1.0, color=STRENGTH, lw=0.8, ls="--")
     lower.set_ylabel(r"rotation $\theta/\theta_c$")
-    lower.set_xlabel("time [s]")
     seen = ratio if response.toppled_s is None else ratio[history.time_s <= response.toppled_s]
     tallest = min(max(1.0, float(seen.max(initial=0.0))), TALLEST_SHOWN)
     lower.set_ylim(-0.05 * tallest, 1.15 * tallest)
@@ -101,16 +87,35 @@ def plot_response(
             ha="right", va="top", fontsize=8,
         )  # fmt: skip
     lower.set_xlim(*_window(history.time_s, ratio, response))
-    for axes in (upper, lower):
-        axes.grid(visible=True, lw=0.3, alpha=0.6)
-    polarity = ", reversed" if reverse else ""
-    figure.suptitle(f"{title}{polarity}\n{_verdict(response, p2, kr)}", fontsize=10)
+    figure.suptitle(_title(title, reverse, _verdict(response, p2, kr)), fontsize=10)
     save_figure(figure, path)
 
 
-def _window(
-    time_s: NDArray[np.float64], ratio: NDArray[np.float64], response: Response
-) -> tuple[float, float]:
+def _panels(
+    history: ResponseHistory, strength: FloatArray, label: str, least_top: float
+) -> tuple[Figure, Axes, Axes]:
+    """Draw acceleration against strength; return the figure, its upper and its empty lower part."""
+    figure = new_figure(width_in=7.5, height_in=5.6)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.25, 1.0])
+    drive = history.k_h / (1.0 + history.k_v)
+    upper.plot(history.time_s, drive, color=GROUND, lw=0.7, label="ground: $k_h/(1+k_v)$")
+    upper.plot(history.time_s, strength, color=STRENGTH, lw=1.3, label=label)
+    top = 1.15 * max(float(np.abs(drive).max()), least_top)
+    upper.set_ylim(-top, 1.25 * top)
+    upper.axhline(0.0, color="black", lw=0.5)
+    upper.set_ylabel("acceleration [g]")
+    upper.legend(loc="upper right", fontsize=8, ncols=2, framealpha=0.9)
+    lower.set_xlabel("time [s]")
+    for axes in (upper, lower):
+        axes.grid(visible=True, lw=0.3, alpha=0.6)
+    return figure, upper, lower
+
+
+def _title(name: str, reverse: bool, verdict: str) -> str:
+    return f"{name}{', reversed' if reverse else ''}\n{verdict}"
+
+
+def _window(time_s: FloatArray, ratio: FloatArray, response: Response) -> tuple[float, float]:
     """Show the whole motion of the block with a little rest on both sides."""
     if response.started_s is None:
         return float(time_s[0]), float(max(time_s[-1], time_s[0] + 1e-3))
@@ -163,27 +168,15 @@ def plot_motion(
     history = response.history
     if history is None or history.displacement_m is None or history.strength_g is None:
         raise InputError("this response holds no displacements in time: ask for its history")
-    drive = history.k_h / (1.0 + history.k_v)
-
-    figure = new_figure(width_in=7.5, height_in=5.6)
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.25, 1.0])
-    upper.plot(history.time_s, drive, color=GROUND, lw=0.7, label="ground: $k_h/(1+k_v)$")
-    upper.plot(
-        history.time_s, history.strength_g, color=STRENGTH, lw=1.3, label="strength of the block"
+    figure, _, lower = _panels(
+        history, history.strength_g, "strength of the block", float(history.strength_g[0])
     )
-    top = 1.15 * max(float(np.abs(drive).max()), float(history.strength_g[0]))
-    upper.set_ylim(-top, 1.25 * top)
-    upper.axhline(0.0, color="black", lw=0.5)
-    upper.set_ylabel("acceleration [g]")
-    upper.legend(loc="upper right", fontsize=8, ncols=2, framealpha=0.9)
-
     largest = float(np.abs(history.displacement_m).max())
     factor, unit = (
         (1000.0, "mm") if largest < 0.01 else (100.0, "cm") if largest < 1.0 else (1.0, "m")
     )
     lower.plot(history.time_s, factor * history.displacement_m, color=BLOCK, lw=1.4)
     lower.set_ylabel(f"displacement [{unit}]", color=BLOCK)
-    lower.set_xlabel("time [s]")
     least = float(history.displacement_m.min())
     lower.set_ylim(*_around(factor * float(history.displacement_m.max()), factor * least))
     if response.peak_theta_rad is not None or np.any(history.theta_rad):
@@ -192,10 +185,7 @@ def plot_motion(
         right.set_ylabel("rotation [deg]", color=ROTATION)
         right.set_ylim(*_around(float(np.degrees(history.theta_rad).max()), 0.0))
     lower.set_xlim(*_motion_window(history, response))
-    for axes in (upper, lower):
-        axes.grid(visible=True, lw=0.3, alpha=0.6)
-    polarity = ", reversed" if reverse else ""
-    figure.suptitle(f"{title}{polarity}\n{_motion_verdict(response)}", fontsize=10)
+    figure.suptitle(_title(title, reverse, _motion_verdict(response)), fontsize=10)
     save_figure(figure, path)
 
 

@@ -27,7 +27,7 @@ from rbfrag.rockmasses.counts import (
 )
 from rbfrag.rockmasses.failures import ModeFailures, ScaleFailures, failures
 from rbfrag.rockmasses.joint_sets import Realisations
-from rbfrag.rockmasses.response import ShakenMass
+from rbfrag.rockmasses.shaking import ShakenMass
 from rbfrag.solver.stability.modes import ModeName
 
 if TYPE_CHECKING:
@@ -48,10 +48,6 @@ def plot_rockmass(made: Realisations, path: str | PathLike[str], *, title: str =
         made: the realisations.
         path: file to write: .png, .pdf or .svg.
         title: title of the figure; a count of the blocks if empty.
-
-    Raises:
-        InputError: a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     counts = mode_counts(made)
@@ -152,7 +148,7 @@ def plot_failures(
     the scale nearest to that. With one scale there is that alone.
 
     Args:
-        shaken: the fates of the blocks.
+        shaken: the outcomes of the blocks.
         path: file to write: .png, .pdf or .svg.
         level: confidence level of the bands.
         title: title of the figure; the motion and the number of blocks if empty.
@@ -272,8 +268,8 @@ def _part(each: ModeFailures, part: str) -> int:
     if part == "open":
         return each.open
     if part == "still":
-        return each.fates["at_rest"] + each.fates["locked"]
-    return each.fates[part]
+        return each.outcomes["at_rest"] + each.outcomes["locked"]
+    return each.outcomes[part]
 
 
 def _shaken_title(shaken: ShakenMass) -> str:

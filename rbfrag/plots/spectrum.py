@@ -55,9 +55,6 @@ def plot_spectrum(
         p2: the figure spans at least these frequency parameters [1/s²].
         names: names of the motions in the legend; their labels if empty.
 
-    Returns:
-        The path.
-
     Raises:
         InputError: no motion or too many, nothing to draw, a path that cannot be written.
         MissingExtraError: matplotlib is not installed.

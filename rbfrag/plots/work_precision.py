@@ -60,10 +60,6 @@ def plot_work_precision(
         points: measured methods; those of a family in the order of their settings.
         path: .png, .pdf or .svg.
         title: written above.
-
-    Raises:
-        InputError: an unknown suffix, a folder that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     figure = new_figure(width_in=8.0, height_in=5.4)
     axes = figure.subplots()

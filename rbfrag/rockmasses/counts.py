@@ -65,11 +65,7 @@ class Crossing:
 
 
 def mode_counts(made: Realisations) -> dict[ModeName, ModeCount]:
-    """Return the blocks of all modes, in the order of the mode codes.
-
-    Args:
-        made: the realisations.
-    """
+    """Return the blocks of all modes, in the order of the mode codes."""
     found = made.stability
     counts: dict[ModeName, ModeCount] = {}
     for code, mode in enumerate(MODES):
@@ -119,9 +115,6 @@ def crossings(made: Realisations) -> list[Crossing]:
     A crossing lies between two ranges of PGA in which one mode and then the other leads by more
     than three standard errors of the difference; closer races are chance. Its own standard error
     is that of the difference of the counts, over the slope of the difference.
-
-    Args:
-        made: the realisations.
     """
     yields = {mode: sorted_yields(made, mode) for mode in MODES}
     found = [

@@ -1,9 +1,10 @@
-"""What one recorded motion does to blocks of a rock mass: every block is run in its own mode."""
+"""What one recorded motion does to the blocks of a rock mass, each run in its own mode."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,17 +12,20 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
+from rbfrag.motions.quality import quality_flags
+from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.kind import BlockOnPlanes, RunEnd, Runner
 from rbfrag.solver.kinds import model_of_mode
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import Outcome
-from rbfrag.solver.stability.modes import CONFINED_TOPPLE, MODES, SLIDE, SLUMP
+from rbfrag.solver.stability import modes as mechanism
+from rbfrag.solver.stability.modes import CONFINED_TOPPLE, MODES, SLIDE, SLUMP, TOPPLE, ModeName
 
 FloatArray = NDArray[np.float64]
 
-FATES = (
+OUTCOMES = (
     "at_rest", "stays", "fails", "unstable", "locked",
     "undetermined", "contact_lost", "indeterminate", "jump",
 )  # fmt: skip
@@ -38,7 +42,7 @@ NO_BLOCK = -1
 """Code of a realisation that is no block."""
 
 OPEN = ("undetermined", "contact_lost", "indeterminate", "jump")
-"""Fates that leave open whether the block fails."""
+"""Outcomes that leave open whether the block fails."""
 
 DISPLACEMENT_M = 0.05
 """Displacement beyond which a slide counts as failed when nothing else is said [m].
@@ -56,9 +60,6 @@ class FailureLimits:
         displacement_m: a sliding block fails where it slides further than this [m].
         rotation_deg: a block that slumps, or topples against its back plane, fails where it turns
             by more than this [deg]; None where only one past recovery has failed.
-
-    Raises:
-        InputError: a limit that is not above zero.
     """
 
     displacement_m: float = DISPLACEMENT_M
@@ -69,29 +70,24 @@ class FailureLimits:
         if self.rotation_deg is not None:
             positive(self.rotation_deg, "rotation", "degrees")
 
-    def code(self, mode_code: int, fate: RunEnd) -> int:
-        """Return the code in :data:`FATES` of a block that was run.
-
-        Args:
-            mode_code: its mode.
-            fate: the end of its run.
-        """
-        if fate.outcome is Outcome.TOPPLED:
+    def code(self, mode_code: int, end: RunEnd) -> int:
+        """Return the code in :data:`OUTCOMES` of a block that was run."""
+        if end.outcome is Outcome.TOPPLED:
             return FAILS
         peak = limit = None
         if mode_code == SLIDE:
-            peak, limit = fate.peak_displacement_m, self.displacement_m
+            peak, limit = end.peak_displacement_m, self.displacement_m
         elif mode_code in (SLUMP, CONFINED_TOPPLE) and self.rotation_deg is not None:
-            peak, limit = fate.peak_rad, math.radians(self.rotation_deg)
+            peak, limit = end.peak_rad, math.radians(self.rotation_deg)
         if peak is not None and limit is not None:
             # What has happened before a model ends has happened.
-            if peak - fate.error > limit:
+            if peak - end.error > limit:
                 return FAILS
-            if peak + fate.error > limit:
+            if peak + end.error > limit:
                 return UNDETERMINED
-        if fate.outcome is Outcome.STABLE:
-            return STAYS if fate.moved else AT_REST
-        return FATES.index(fate.outcome.value)
+        if end.outcome is Outcome.STABLE:
+            return STAYS if end.moved else AT_REST
+        return OUTCOMES.index(end.outcome.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,13 +119,8 @@ class BlocksToRun:
     Args:
         place: places of the blocks among the realisations.
         mode_code: their modes.
-        yield_g: their yield accelerations [g].
-        s1_m: thickness normal to the base [m].
-        s2_m: thickness normal to the back [m].
-        gamma_deg: dip of the back less dip of the base [deg].
-        beta_deg: dip of the base [deg].
-        phi_deg: friction angle of the base [deg].
-        phi_back_deg: friction angle of the back [deg].
+        numbers: ``yield_g`` [g], ``s1_m`` and ``s2_m`` [m], ``gamma_deg``, ``beta_deg``,
+            ``phi_deg`` and ``phi_back_deg``, as :class:`Realisations` has them.
         back_fracture: whether there is a plane behind them.
         moves: at which scale which of them moves.
         shaking: the motion.
@@ -138,13 +129,7 @@ class BlocksToRun:
 
     place: NDArray[np.intp]
     mode_code: NDArray[np.int8]
-    yield_g: FloatArray
-    s1_m: FloatArray
-    s2_m: FloatArray
-    gamma_deg: FloatArray
-    beta_deg: FloatArray
-    phi_deg: FloatArray
-    phi_back_deg: FloatArray
+    numbers: Mapping[str, FloatArray]
     back_fracture: bool
     moves: NDArray[np.bool_]
     shaking: Shaking
@@ -152,12 +137,12 @@ class BlocksToRun:
 
 
 @dataclass(frozen=True, eq=False)
-class BlockFates:
+class BlockOutcomes:
     """What became of them, shapes (m, k).
 
     Args:
         place: as asked.
-        code: places in :data:`FATES`; ``at_rest`` where a block was not run.
+        code: places in :data:`OUTCOMES`; ``at_rest`` where a block was not run.
         displacement_m: greatest displacement along the base; NaN where there is none to tell.
         rotation_rad: greatest rotation; NaN likewise.
         about: sentences on what a model takes for granted, and how many of the blocks each is
@@ -173,15 +158,8 @@ class BlockFates:
     runs: int
 
 
-def run_blocks(work: BlocksToRun) -> BlockFates:
-    """Run blocks, one after another, each at the scales at which it moves.
-
-    Args:
-        work: the blocks.
-
-    Raises:
-        InputError: a block that cannot be run; it is numbered.
-    """
+def run_blocks(work: BlocksToRun) -> BlockOutcomes:
+    """Run blocks, one after another, each at the scales at which it moves."""
     drives = work.shaking.drives()
     code = np.full(work.moves.shape, AT_REST, dtype=np.int8)
     displacement_m = np.where(work.mode_code == MODES.index("topple"), np.nan, 0.0)
@@ -193,16 +171,16 @@ def run_blocks(work: BlocksToRun) -> BlockFates:
         mode_code = int(work.mode_code[j])
         try:
             run = _runner(work, j)
-            fates = [(i, run(drive)) for i, drive in enumerate(drives) if work.moves[i, j]]
+            outcomes = [(i, run(drive)) for i, drive in enumerate(drives) if work.moves[i, j]]
         except InputError as error:
             raise InputError(f"block {int(work.place[j]) + 1}: {error}") from None
-        for i, fate in fates:
-            code[i, j] = work.limits.code(mode_code, fate)
-            displacement_m[i, j] = _or_nan(fate.peak_displacement_m)
-            rotation_rad[i, j] = _or_nan(fate.peak_rad)
-        for sentence in fates[0][1].about_block if fates else ():
+        for i, end in outcomes:
+            code[i, j] = work.limits.code(mode_code, end)
+            displacement_m[i, j] = _or_nan(end.peak_displacement_m)
+            rotation_rad[i, j] = _or_nan(end.peak_rad)
+        for sentence in outcomes[0][1].about_block if outcomes else ():
             about[mode_code, sentence] = about.get((mode_code, sentence), 0) + 1
-    return BlockFates(
+    return BlockOutcomes(
         place=work.place,
         code=code,
         displacement_m=displacement_m,
@@ -214,16 +192,15 @@ def run_blocks(work: BlocksToRun) -> BlockFates:
 
 def _runner(work: BlocksToRun, j: int) -> Runner:
     """Return the runner of the model that the block's mode calls for."""
+    one = {name: float(values[j]) for name, values in work.numbers.items()}
     site = BlockOnPlanes(
-        block=Block.from_fractures(
-            float(work.s1_m[j]), float(work.s2_m[j]), float(work.gamma_deg[j])
-        ),
-        beta_rad=math.radians(work.beta_deg[j]),
-        phi_rad=math.radians(work.phi_deg[j]),
-        phi_back_rad=math.radians(work.phi_back_deg[j]),
+        block=Block.from_fractures(one["s1_m"], one["s2_m"], one["gamma_deg"]),
+        beta_rad=math.radians(one["beta_deg"]),
+        phi_rad=math.radians(one["phi_deg"]),
+        phi_back_rad=math.radians(one["phi_back_deg"]),
         back_fracture=work.back_fracture,
         cohesive=False,
-        yield_g=float(work.yield_g[j]),
+        yield_g=one["yield_g"],
         settings={},
     )
     return model_of_mode(MODES[work.mode_code[j]]).runner(site)
@@ -231,3 +208,181 @@ def _runner(work: BlocksToRun, j: int) -> Runner:
 
 def _or_nan(value: float | None) -> float:
     return math.nan if value is None else value
+
+
+_NUMBERS = ("s1_m", "s2_m", "gamma_deg", "beta_deg", "phi_deg", "phi_back_deg")
+
+CHUNK = 250
+"""Blocks handed out at a time: a second or less of work."""
+
+MOST_OUTCOMES = 50_000_000
+"""Realisations times scales that are kept in memory at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShakingPlan:
+    """What is known of the blocks without running any, and which ones have to be run.
+
+    Args:
+        made: the realisations.
+        shaking: the motion and its scales.
+        limits: what counts as failure.
+        code: places in :data:`OUTCOMES`, -1 for no block, shape (scales, n); ``at_rest`` where a
+            block is still to be run.
+        moves: which block moves, and is to be run, at which scale, shape (scales, n).
+        pga_g: PGA at each scale [g].
+        warnings: sentences about the motion.
+    """
+
+    made: Realisations
+    shaking: Shaking
+    limits: FailureLimits
+    code: NDArray[np.int8]
+    moves: NDArray[np.bool_]
+    pga_g: FloatArray
+    warnings: tuple[str, ...]
+
+    @property
+    def places(self) -> NDArray[np.intp]:
+        """Places of the blocks that are to be run at any scale."""
+        return np.flatnonzero(self.moves.any(axis=0))
+
+    def work(self, chunk: int = CHUNK) -> Iterator[BlocksToRun]:
+        """Yield the blocks that are to be run, some at a time."""
+        made, places = self.made, self.places
+        for start in range(0, places.size, chunk):
+            at = places[start : start + chunk]
+            numbers = {name: getattr(made, name)[at] for name in _NUMBERS}
+            yield BlocksToRun(
+                place=at,
+                mode_code=made.stability.mode_code[at],
+                numbers={**numbers, "yield_g": made.stability.yield_acceleration[at]},
+                back_fracture=made.rock_mass.back_fracture,
+                moves=self.moves[:, at],
+                shaking=self.shaking,
+                limits=self.limits,
+            )
+
+    def gathered(self, answers: Iterable[BlockOutcomes]) -> ShakenMass:
+        """Return the outcomes of all blocks; the order of the answers does not matter.
+
+        Args:
+            answers: to all of :meth:`work`.
+        """
+        code = self.code.copy()
+        still = (self.code == AT_REST) | (self.code == LOCKED)
+        mode_code = self.made.stability.mode_code
+        displacement_m = np.where(still & (mode_code != TOPPLE), 0.0, np.nan)
+        rotation_rad = np.where(still & (mode_code != SLIDE), 0.0, np.nan)
+        about: dict[tuple[int, str], int] = {}
+        runs = 0
+        for answer in answers:
+            code[:, answer.place] = np.where(
+                self.moves[:, answer.place], answer.code, code[:, answer.place]
+            )
+            displacement_m[:, answer.place] = answer.displacement_m
+            rotation_rad[:, answer.place] = answer.rotation_rad
+            runs += answer.runs
+            for key, count in answer.about.items():
+                about[key] = about.get(key, 0) + count
+        known = {each.name: getattr(self, each.name) for each in fields(self)}
+        return ShakenMass(
+            **{**known, "code": code},
+            displacement_m=displacement_m,
+            rotation_rad=rotation_rad,
+            runs=runs,
+            about={(MODES[mode], text): count for (mode, text), count in sorted(about.items())},
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ShakenMass(ShakingPlan):
+    """What became of the realisations of a rock mass; arrays have shape (scales, n).
+
+    Args:
+        displacement_m: greatest displacement along the base, of the block or, where it turns, of
+            its contact on the base; NaN where there is none to tell.
+        rotation_rad: greatest rotation; NaN for sliding, and where there is none to tell.
+        runs: number of simulations.
+        about: how many blocks of a mode a sentence is about.
+    """
+
+    displacement_m: FloatArray
+    rotation_rad: FloatArray
+    runs: int
+    about: Mapping[tuple[ModeName, str], int]
+
+
+def plan_shaking(
+    made: Realisations,
+    motion: GroundMotion,
+    *,
+    scales: Sequence[float] = (1.0,),
+    vertical: GroundMotion | None = None,
+    polarity: Polarity = "forward",
+    limits: FailureLimits | None = None,
+) -> ShakingPlan:
+    """Find the blocks that a motion moves, which are those that have to be run.
+
+    A block stays at rest where k_h never exceeds (1 + k_v) times its yield; that is seen at the
+    samples, because k_h/(1 + k_v) is monotone between them.
+
+    Args:
+        made: blocks of a rock mass.
+        motion: horizontal ground motion.
+        scales: factors on the motion; each is taken once, in rising order.
+        vertical: vertical motion of the same recording, upward positive; scaled likewise.
+        polarity: ``forward`` or ``reverse``.
+        limits: what counts as failure; None for the usual.
+
+    Raises:
+        InputError: a scale that is not above zero, none at all or too many for the realisations,
+            components that do not go together, or a rock mass that states a vertical acceleration.
+    """
+    if np.any(made.kv != 0.0):
+        raise InputError(
+            "block.kv does not belong in a rock mass that is to be shaken: the vertical "
+            "acceleration comes with the motion; leave the key out"
+        )
+    wrong = [scale for scale in scales if not (math.isfinite(scale) and scale > 0.0)]
+    if wrong or not len(scales):
+        said = f"scale {wrong[0]:g}" if wrong else "no scale"
+        raise InputError(f"{said}: give factors on the motion above 0, such as 0.5,1,2")
+    shaking = Shaking(motion, tuple(sorted(set(map(float, scales)))), vertical, polarity)
+    if made.n * len(shaking.scales) > MOST_OUTCOMES:
+        raise InputError(
+            f"{made.n} realisations at {len(shaking.scales)} scales are more than {MOST_OUTCOMES} "
+            "blocks to keep: ask for fewer of either"
+        )
+    found = made.stability
+    k = found.yield_acceleration
+    stable = made.is_block & (found.state_code == mechanism.STABLE) & (k > 0.0) & np.isfinite(k)
+    locked = made.is_block & (found.state_code == mechanism.LOCKED)
+    drives = shaking.drives()
+    code = np.full((len(drives), made.n), AT_REST, dtype=np.int8)
+    moves = np.zeros(code.shape, dtype=np.bool_)
+    for i, drive in enumerate(drives):
+        moves[i] = stable & (k < drive.max_q)
+        code[i, made.is_block & ~stable] = UNSTABLE
+        code[i, locked] = LOCKED
+        if drive.jump_node < drive.w.size:
+            code[i, (stable & ~moves[i]) | locked] = OUTCOMES.index("jump")
+        code[i, ~made.is_block] = NO_BLOCK
+    return ShakingPlan(
+        made=made,
+        shaking=shaking,
+        limits=FailureLimits() if limits is None else limits,
+        code=code,
+        moves=moves,
+        pga_g=np.array([drive.pga_g for drive in drives]),
+        warnings=_about_motion(motion, vertical, drives[0].warnings),
+    )
+
+
+def _about_motion(
+    motion: GroundMotion, vertical: GroundMotion | None, together: tuple[str, ...]
+) -> tuple[str, ...]:
+    said = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion)), *together]
+    if vertical is not None:
+        said += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
+    return tuple(said)

@@ -15,6 +15,16 @@ from rbfrag.service.settings import Settings
 
 MULTIPART = "multipart/form-data"
 
+FILE_FORM = {
+    "schema": {
+        "type": "object",
+        "properties": {"file": {"type": "string", "format": "binary"}},
+        "required": ["file"],
+        "additionalProperties": False,
+    }
+}
+"""A form of one file, as OpenAPI describes it."""
+
 
 class Bodies:
     """Reads bodies, a bounded number at a time.

@@ -101,11 +101,7 @@ def read_query(query: bytes, known: Mapping[str, Parameter]) -> dict[str, Any]:
 
 
 def _pairs(query: str) -> list[tuple[str, str]]:
-    """Return names and values.
-
-    Raises:
-        ValueError: not UTF-8, or too many.
-    """
+    """Return names and values."""
     if query.count("&") >= MOST_PARAMETERS:
         raise ValueError
     if "%" in query or "+" in query:

@@ -67,11 +67,7 @@ class ServeOptions:
     jobs: int = 2
 
     def settings(self) -> Settings:
-        """Return the settings of the application.
-
-        Raises:
-            InputError: what was told cannot be done.
-        """
+        """Return the settings of the application."""
         token = read_token(self.token_file)
         check_reach(self.host, token)
         if self.workers < 1:
@@ -106,11 +102,7 @@ class ServeOptions:
 
 
 def serve() -> None:
-    """Answer requests until the process is told to stop, as the environment says.
-
-    Raises:
-        InputError: the environment does not say how.
-    """
+    """Answer requests until the process is told to stop, as the environment says."""
     told = _options()
     settings = told.settings()
     import uvicorn
@@ -153,9 +145,6 @@ def listener(host: str, port: int) -> socket.socket:
     Args:
         host: address to listen at.
         port: port to listen at; 0 for any that is free.
-
-    Raises:
-        InputError: nobody can listen there, or somebody does.
     """
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]

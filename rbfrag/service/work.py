@@ -113,7 +113,7 @@ def spectrum(
         polarity: forward, reverse or both.
     """
     from rbfrag.motions.polarity import POLARITIES
-    from rbfrag.motions.spectrum_report import as_dict
+    from rbfrag.motions.toppling_spectrum import spectrum_as_dict as as_dict
 
     ground = _motion(body, trace, units, dt_s)
     asked = [each for each in POLARITIES if polarity in (each, "both")]

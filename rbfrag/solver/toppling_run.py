@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Literal
 
 import numpy as np
 
@@ -14,8 +13,6 @@ from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.integrator.single_run import TOPPLED, Run, run_toppling
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
 from rbfrag.solver.results import FloatArray, Outcome, Polarity, Response, ResponseHistory
-
-Kind = Literal["toppling"]
 
 OUTCOMES = (Outcome.STABLE, Outcome.TOPPLED, Outcome.UNDETERMINED, Outcome.JUMP)
 """Outcome of each kernel code."""
@@ -37,7 +34,7 @@ def respond(
     kr: float,
     vertical: GroundMotion | None = None,
     polarity: Polarity = "forward",
-    kind: Kind = "toppling",
+    kind: str = "toppling",
     linear: bool = False,
     history: bool = False,
 ) -> Response:
@@ -50,18 +47,16 @@ def respond(
             `linear` the critical angle itself [rad].
         vertical: vertical motion of the same recording, upward positive.
         polarity: ``forward`` (positive samples drive forward rotation) or ``reverse``.
-        kind: the response model; ``toppling``.
+        kind: name of the model, for the answer.
         linear: the linear model, for verification against closed forms only.
         history: keep the motion in time.
 
     Raises:
-        InputError: a value that is not a positive finite number, an unknown kind or
+        InputError: a value that is not a positive finite number, an unknown
             polarity, components that cannot be brought together.
 
     The model is eq. (4.2) of Gibson's dissertation with the vertical motion of (4.13).
     """
-    if kind != "toppling":
-        raise InputError(f"unknown kind {kind!r}: use 'toppling'")
     p2 = positive(p2, "p2", "1/s²")
     kr = positive(kr, "kr", "the rocking acceleration coefficient")
     drive = excitation(motion, vertical, polarity)
@@ -173,7 +168,7 @@ def _history(drive: Excitation, *, p2: float, kr: float, linear: bool) -> Respon
         w=np.concatenate([drive.w, np.ones(n_tail + 1)]),
         pga_g=drive.pga_g,
     )
-    # nodes, and at most a start, a peak and a re-seat twice in an interval
+    # nodes, and at most a start, a peak and an impact twice in an interval
     store = np.empty((4, 7 * longer.time_s.size + 8))
     run = Run(*_kernel_call(longer, kr, p, linear, ORDER, PH_MAX, store))
     store = store[:, : run.history_length]

@@ -11,7 +11,7 @@ from rbfrag.campaign.shake_rockmass import ShakingProgress, shake
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.rockmasses.file import read_rock_mass
-from rbfrag.rockmasses.response import CHUNK
+from rbfrag.rockmasses.shaking import CHUNK
 from tests.synthetic import shaking
 
 EXAMPLE = Path(__file__).resolve().parent.parent.parent / "docs" / "examples" / "rockmass.toml"

@@ -11,8 +11,7 @@ from rbfrag.exchange.block_table import read_columns
 from rbfrag.motions.recognise import read_motion
 from rbfrag.rockmasses.failures import failures
 from rbfrag.rockmasses.file import read_rock_mass
-from rbfrag.rockmasses.response import plan_shaking
-from rbfrag.rockmasses.shaking import FailureLimits, run_blocks
+from rbfrag.rockmasses.shaking import FailureLimits, plan_shaking, run_blocks
 from tests.cli.conftest import Refuses, Shell
 from tests.synthetic import shaking, write_at2
 
@@ -43,8 +42,8 @@ def test_shares_table_and_figure(shell: Shell, record: Path, tmp_path: Path) -> 
         polarity="reverse",
         limits=FailureLimits(0.02, 1.0),
     )
-    fates = plan.gathered(map(run_blocks, plan.work()))
-    for each, found in zip(told["scales"], failures(fates, 0.9), strict=True):
+    outcomes = plan.gathered(map(run_blocks, plan.work()))
+    for each, found in zip(told["scales"], failures(outcomes, 0.9), strict=True):
         assert set(each["modes"]) == {"slide", "slump"}
         for mode, counted in found.modes.items():
             assert each["modes"][mode]["fails"] == counted.fails

@@ -12,9 +12,8 @@ from sqlalchemy import Engine, Text, and_, delete, func, select, update
 from sqlalchemy.exc import IntegrityError
 
 from rbfrag.db import schema
-from rbfrag.db.check.database import check_database
+from rbfrag.db.check.database import ALTERED, check_database, check_digests
 from rbfrag.db.check.finding import Finding
-from rbfrag.db.check.numbers import ALTERED, check_digests
 from rbfrag.db.digest import NOT_DIGESTED
 from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import insert_row, insert_rows

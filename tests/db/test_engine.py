@@ -14,9 +14,10 @@ from typing import Any
 import pytest
 from sqlalchemy import Engine, func, select
 
-import rbfrag.db.create
-import rbfrag.db.revision
-from rbfrag.db.engine import database_label, database_url, open_database, opened_database
+import rbfrag.db.location
+import rbfrag.db.upgrade
+from rbfrag.db.connect import database_label
+from rbfrag.db.engine import database_url, open_database, opened_database
 from rbfrag.db.insert import insert_row
 from rbfrag.db.location import locate
 from rbfrag.db.schema import suite
@@ -104,13 +105,13 @@ class TestCreation:
     def test_an_interrupted_creation_leaves_nothing(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        real = rbfrag.db.create.migrate
+        real = rbfrag.db.upgrade.migrate
 
         def interrupted(engine: Engine) -> None:
             real(engine)
             raise KeyboardInterrupt
 
-        monkeypatch.setattr(rbfrag.db.create, "migrate", interrupted)
+        monkeypatch.setattr(rbfrag.db.upgrade, "migrate", interrupted)
         with pytest.raises(KeyboardInterrupt):
             open_database(tmp_path / "x.db", create=True)
         assert list(tmp_path.iterdir()) == []
@@ -118,7 +119,7 @@ class TestCreation:
     def test_a_killed_creation_leaves_no_database(self, tmp_path: Path) -> None:
         path = tmp_path / "x.db"
         code = (
-            "import os, signal, sys, rbfrag.db.create as create\n"
+            "import os, signal, sys, rbfrag.db.upgrade as create\n"
             "from rbfrag.db.engine import open_database\n"
             "real = create.migrate\n"
             "create.migrate = lambda e: (real(e), os.kill(os.getpid(), signal.SIGKILL))\n"
@@ -134,15 +135,15 @@ class TestCreation:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         path = tmp_path / "x.db"
-        real = rbfrag.db.create.migrate
+        real = rbfrag.db.upgrade.migrate
 
         def overtaken(engine: Engine) -> None:
-            monkeypatch.setattr(rbfrag.db.create, "migrate", real)
+            monkeypatch.setattr(rbfrag.db.upgrade, "migrate", real)
             with opened_database(path, create=True) as other, other.begin() as connection:
                 insert_row(connection, suite, {"name": "theirs"})
             real(engine)
 
-        monkeypatch.setattr(rbfrag.db.create, "migrate", overtaken)
+        monkeypatch.setattr(rbfrag.db.upgrade, "migrate", overtaken)
         with opened_database(path, create=True) as engine:
             assert _count(engine) == 1
         assert [file.name for file in tmp_path.iterdir()] == ["x.db"]
@@ -249,7 +250,7 @@ class TestRefusals:
             upgrade_database(sqlite_file)
 
     def test_older_schema(self, sqlite_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(rbfrag.db.revision, "REVISIONS", ("0000", "0001"))
+        monkeypatch.setattr(rbfrag.db.location, "REVISIONS", ("0000", "0001"))
         _mark(sqlite_file, "0000")
         with pytest.raises(SchemaVersionError, match=r"rbfrag db upgrade --db .*test\.db"):
             open_database(sqlite_file)

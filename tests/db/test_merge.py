@@ -14,8 +14,8 @@ from sqlalchemy import Engine, delete, func, select, true, update
 
 from rbfrag.db import schema
 from rbfrag.db.campaigns import start_campaign
-from rbfrag.db.check.compare_maps import contradictions
 from rbfrag.db.check.database import check_database
+from rbfrag.db.check.maps import contradictions
 from rbfrag.db.content import CONTENT_TABLES, content_digest, table_rows_by_natural_key
 from rbfrag.db.engine import open_database, opened_database
 from rbfrag.db.insert import insert_if_new, insert_row, update_rows

@@ -13,17 +13,20 @@ from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, Engine, create_engine, inspect, text
+from sqlalchemy import Connection, Engine, create_engine, func, inspect, select, text
 
 import rbfrag.db.upgrade
 import rbfrag.migrations
+from rbfrag.db.campaigns import start_campaign
+from rbfrag.db.check.database import check_database
+from rbfrag.db.connect import unchecked_engine
 from rbfrag.db.content import table_rows_by_natural_key
-from rbfrag.db.engine import open_database, unchecked_engine
+from rbfrag.db.engine import open_database
+from rbfrag.db.location import REVISIONS, SCHEMA_REVISION, VERSION_TABLE
 from rbfrag.db.models import load_model, save_model
 from rbfrag.db.motions import add_motion, load_motion, motion_rows
-from rbfrag.db.revision import REVISIONS, SCHEMA_REVISION, VERSION_TABLE
 from rbfrag.db.rows import EarthquakeInfo, ModelRow
-from rbfrag.db.schema import metadata
+from rbfrag.db.schema import combination, metadata, simulation
 from rbfrag.db.upgrade import migrate, upgrade_database
 from rbfrag.motions.ground_motion import GroundMotion
 
@@ -204,3 +207,41 @@ def test_results_of_the_second_schema_stay_as_they_are(
         assert load_model(connection).kind == "toppling"
     again.dispose()
     assert all(before)
+
+
+def test_maps_are_no_part_of_keys_any_more(
+    place: str, make_motion: Any, make_result: Any, store_result: Any
+) -> None:
+    open_database(place, create=True).dispose()
+    engine = unchecked_engine(Path(place) if "://" not in place else place, foreign_keys=False)
+    given = make_motion()
+    plain = {"search_limit": 0.01}
+    with engine.begin() as connection:
+        quake = EarthquakeInfo("E")
+        motion_id, _ = add_motion(connection, given, earthquake=quake, is_vertical=False)
+        campaign = start_campaign(connection, {})
+        for p2, widths in ((3.0, {0.3: 1e-3, 0.2: 1e-6}), (1.0, {0.1: 1e-3})):
+            for width, depth in widths.items():
+                result = make_result(given.pga_g, p2=p2, island_width=width)
+                settings = {**plain, "map": "full", "map_depth": depth}
+                store_result(connection, campaign, given, motion_id, result, settings=settings)
+        config = _config()
+        config.attributes["connection"] = connection
+        command.downgrade(config, "0003")
+    engine.dispose()
+    assert upgrade_database(place) == ("0003", SCHEMA_REVISION)
+    again = open_database(place)
+    with again.begin() as connection:
+        assert check_database(connection) == []
+        rows = connection.execute(select(combination).order_by(combination.c.p2)).all()
+        # of two maps of one search the finer one
+        assert [row.island_width for row in rows] == [0.1, 0.2]
+        assert {row.settings for row in rows} == {'{"search_limit":0.01}'}
+        assert len({row.combination_id for row in connection.execute(select(simulation))}) == 2
+        # a search without a map finds itself stored
+        again_key = store_result(
+            connection, campaign, given, motion_id, make_result(given.pga_g), settings=plain
+        )
+        assert again_key in {row.natural_key for row in rows}
+        assert connection.scalar(select(func.count()).select_from(combination)) == 2
+    again.dispose()

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.motions.companions import companion, upward
-from rbfrag.motions.direction import is_downward_name, is_vertical_name
+from rbfrag.motions.direction import companion, is_downward_name, is_vertical_name, upward
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.processing import processed
 from rbfrag.motions.text.times import first_sample_time

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from rbfrag.errors import InputError, MotionFileError
-from rbfrag.motions.companions import upward
+from rbfrag.motions.direction import upward
 from rbfrag.motions.export import export_motions
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.processing import processed

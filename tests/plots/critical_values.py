@@ -37,6 +37,7 @@ def critical_values(n: int = N) -> CombinationTable:
         pgd_m=0.1 * pgv,
         tm_s=tm,
         natural_key=np.arange(n).astype(str).astype(object),
+        block=np.full(n, None, dtype=object),
     )
 
 

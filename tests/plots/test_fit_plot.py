@@ -37,6 +37,7 @@ def table():
         pgd_m=0.1 * pgv,
         tm_s=np.full(N, 0.5),
         natural_key=np.arange(N).astype(str).astype(object),
+        block=np.full(N, None, dtype=object),
     )
 
 

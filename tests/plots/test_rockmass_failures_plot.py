@@ -11,8 +11,7 @@ from rbfrag.plots import rockmass as module
 from rbfrag.plots.rockmass import plot_failures
 from rbfrag.rockmasses.failures import failures
 from rbfrag.rockmasses.joint_sets import RockMass
-from rbfrag.rockmasses.response import plan_shaking
-from rbfrag.rockmasses.shaking import run_blocks
+from rbfrag.rockmasses.shaking import plan_shaking, run_blocks
 from tests.synthetic import shaking
 
 UNIFORM = {"distribution": "uniform"}

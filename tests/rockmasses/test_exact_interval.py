@@ -7,7 +7,7 @@ from scipy.stats import binom
 from statsmodels.stats.proportion import proportion_confint
 
 from rbfrag.errors import InputError
-from rbfrag.rockmasses.exact_interval import exact_interval
+from rbfrag.rockmasses.failures import exact_interval
 
 
 @pytest.mark.parametrize("count", [0, 1, 5, 19, 20])

@@ -14,9 +14,8 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import predict
 from rbfrag.rockmasses.counts import Crossing, crossings, mode_counts
 from rbfrag.rockmasses.joint_sets import Realisations, RockMass
-from rbfrag.rockmasses.report import as_dict
+from rbfrag.rockmasses.report import as_dict, block_columns
 from rbfrag.rockmasses.scenario import LOCKED, UNCOVERED, scenario
-from rbfrag.rockmasses.table import block_columns
 
 UNIFORM = {"distribution": "uniform"}
 WILD: dict[str, object] = {

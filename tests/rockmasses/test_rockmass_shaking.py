@@ -11,15 +11,15 @@ import pytest
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
-from rbfrag.rockmasses import response as rockmass_shaken
-from rbfrag.rockmasses.failures import failures
-from rbfrag.rockmasses.failures_table import fate_columns
+from rbfrag.rockmasses import shaking as rockmass_shaken
+from rbfrag.rockmasses.failures import failures, outcome_columns
 from rbfrag.rockmasses.joint_sets import Realisations, RockMass
-from rbfrag.rockmasses.response import ShakenMass, plan_shaking
 from rbfrag.rockmasses.shaking import (
-    FATES,
     OPEN,
+    OUTCOMES,
     FailureLimits,
+    ShakenMass,
+    plan_shaking,
     run_blocks,
 )
 from rbfrag.solver.block.geometry import Block
@@ -78,7 +78,7 @@ def test_sliding_blocks_by_hand() -> None:
     slid = factor * 0.5 * 0.4 * G * 0.2**2 * (0.4 / ky - 1.0)
     for limit, fate in ((slid * 1.001, "stays"), (slid * 0.999, "fails")):
         found = shake(made, pulse(0.4, 0.2), limits=FailureLimits(limit))
-        assert [FATES[code] for code in found.code[0]] == [fate] * 3
+        assert [OUTCOMES[code] for code in found.code[0]] == [fate] * 3
         assert found.displacement_m[0] == pytest.approx([slid] * 3, rel=1e-10)
         assert np.isnan(found.rotation_rad).all()
         (each,) = failures(found)
@@ -88,7 +88,7 @@ def test_sliding_blocks_by_hand() -> None:
         assert each.modes["slide"].displacement_m["max"] == pytest.approx(slid, rel=1e-10)
     # on the limit itself rounding decides, and that is said
     at_limit = shake(made, pulse(0.4, 0.2), limits=FailureLimits(float(found.displacement_m[0, 0])))
-    assert at_limit.code[0].tolist() == [FATES.index("undetermined")] * 3
+    assert at_limit.code[0].tolist() == [OUTCOMES.index("undetermined")] * 3
     assert failures(at_limit)[0].total.open == 3
 
 
@@ -98,7 +98,7 @@ def test_scales_are_factors_on_the_motion() -> None:
     assert found.shaking.scales == (0.4, 1.0, 2.0)
     assert found.pga_g.tolist() == pytest.approx([0.16, 0.4, 0.8])
     # k_y = 0.176 g is not passed at 0.16 g
-    assert found.code[0].tolist() == [FATES.index("at_rest")] * 3
+    assert found.code[0].tolist() == [OUTCOMES.index("at_rest")] * 3
     assert found.displacement_m[0].tolist() == [0.0] * 3
     assert found.runs == 6
     for i, scale in enumerate(found.shaking.scales):
@@ -133,7 +133,7 @@ def test_every_block_is_what_it_would_be_alone(four: ShakenMass) -> None:
             beta_deg=float(made.beta_deg[j]),
             phi_deg=float(made.phi_deg[j]),
         )
-        fate = FATES[four.code[1, j]]
+        fate = OUTCOMES[four.code[1, j]]
         outcomes.add((alone.kind, fate))
         if alone.kind == "sliding":
             assert alone.peak_displacement_m == pytest.approx(four.displacement_m[1, j], rel=1e-9)
@@ -158,13 +158,13 @@ def test_the_fates_are_a_partition(four: ShakenMass) -> None:
         assert each.total.count == made.n_blocks < made.n
         assert sum(found.count for found in each.modes.values()) == made.n_blocks
         for found in (*each.modes.values(), each.total):
-            assert sum(found.fates.values()) == found.count
-            assert found.open == sum(found.fates[name] for name in OPEN)
+            assert sum(found.outcomes.values()) == found.count
+            assert found.open == sum(found.outcomes[name] for name in OPEN)
             assert found.of_all.low <= found.of_all.value <= found.of_all.high
             assert found.of_all.value == found.fails / made.n_blocks
         unstable = made.is_block & (made.stability.state == "unstable")
-        assert each.total.fates["unstable"] == int(unstable.sum()) > 0
-        assert each.total.fates["locked"] == int((made.stability.state == "locked").sum()) > 0
+        assert each.total.outcomes["unstable"] == int(unstable.sum()) > 0
+        assert each.total.outcomes["locked"] == int((made.stability.state == "locked").sum()) > 0
         assert each.total.moved == int(four.moves[i].sum())
         assert set(four.code[i, ~made.is_block].tolist()) == {-1}
     assert four.runs == int(four.moves.sum())
@@ -185,7 +185,7 @@ def test_a_stated_rotation_is_failure_before_recovery_is_lost(four: ShakenMass) 
     slumps = four.made.is_block & (four.made.stability.mode == "slump")
     turned = four.rotation_rad[1] > math.radians(0.05)
     lax, now = four.code[1], strict.code[0]
-    fails = FATES.index("fails")
+    fails = OUTCOMES.index("fails")
     assert (now[slumps & turned] == fails).all()
     assert (lax[slumps & turned] != fails).any()
     # what a free topple or a slide does is judged as before
@@ -197,24 +197,24 @@ def test_thrown_off_by_the_vertical_motion() -> None:
     up = GroundMotion(np.array([0.0, 0.0, -2.0, 0.0]), 0.1)
     motion = GroundMotion(np.array([0.0, 0.9, 0.9, 0.0]), 0.1)
     thrown = shake(one_block(), motion, vertical=up)
-    assert thrown.code[0].tolist() == [FATES.index("jump")] * 3
+    assert thrown.code[0].tolist() == [OUTCOMES.index("jump")] * 3
     # the strength is not passed, and yet the block does not stay
     weak = shake(
         one_block(), replace(motion, acceleration_g=0.1 * motion.acceleration_g), vertical=up
     )
-    assert weak.code[0].tolist() == [FATES.index("jump")] * 3
+    assert weak.code[0].tolist() == [OUTCOMES.index("jump")] * 3
     assert weak.runs == 0
     assert failures(weak)[0].total.moved == 0
 
 
 def test_the_table_has_a_row_for_each_block_and_scale(four: ShakenMass) -> None:
-    columns = fate_columns(four)
+    columns = outcome_columns(four)
     n = four.made.n
     assert {values.shape for values in columns.values()} == {(2 * n,)}
     assert columns["block_id"].tolist() == [*range(1, n + 1)] * 2
     assert set(columns["scale"][:n]) == {0.5}
     named = columns["fate"].reshape(2, n)
-    assert all(named[1, j] == FATES[four.code[1, j]] for j in np.flatnonzero(four.made.is_block))
+    assert all(named[1, j] == OUTCOMES[four.code[1, j]] for j in np.flatnonzero(four.made.is_block))
     assert set(named[:, ~four.made.is_block].ravel()) == {""}
 
 
@@ -232,7 +232,7 @@ def test_refused(asked: dict[str, object], word: str) -> None:
 
 
 def test_more_than_the_memory_holds_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rockmass_shaken, "MOST_FATES", 5)
+    monkeypatch.setattr(rockmass_shaken, "MOST_OUTCOMES", 5)
     with pytest.raises(InputError, match="3 realisations at 2 scales are more than 5"):
         plan_shaking(one_block(), pulse(0.4, 0.2), scales=[1.0, 2.0])
 

@@ -134,7 +134,7 @@ def integrate(
             y, t, past = _to_event(motion, t, y, border, note)
             if past:
                 return ReferenceRun("toppled", None, moved, started)
-            if y is None and t < h:  # re-seated at t
+            if y is None and t < h:  # had an impact at t
                 now = g[0] + (g[1] - g[0]) * t / h
                 if now <= 0.0:
                     if g[1] <= 0.0:
@@ -152,7 +152,7 @@ def integrate(
 def _to_event(
     motion: _Interval, t: float, y: Vector, border: float, note: Callable[[float], None]
 ) -> tuple[Vector | None, float, bool]:
-    """Integrate to the next event: (state, None when re-seated; time; irrecoverable?)."""
+    """Integrate to the next event: (state, None when had an impact; time; irrecoverable?)."""
     for point_t, point_y in motion.steps(t, y, motion.h):
         turns = _turning_points(motion, t, y, point_t, point_y)
         for end_t, end_y in [*turns, (point_t, point_y)]:

@@ -26,7 +26,6 @@ def bench(
             help="Accelerogram file or folder to measure on. Default: the folder in "
             "RBFRAG_TEST_RECORDS, else the sample records of rbfrag[samples], else analytic "
             "pulses.",
-            show_default=False,
         ),
     ] = None,
     out: Annotated[
@@ -35,7 +34,6 @@ def bench(
             "--out",
             metavar="FOLDER",
             help="Folder for the tables as CSV and, with matplotlib, work-precision.svg.",
-            show_default=False,
         ),
     ] = None,
     json: options.Json = False,

@@ -7,53 +7,45 @@ from typing import Annotated
 import typer
 
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
-from rbfrag.cli.parameters import described_block, options
+from rbfrag.cli.parameters import options
 
 EXAMPLE = "Example:  rbfrag block --s1 1 --s2 0.6 --gamma 25 --beta 20 --phi 40"
 
 
 def block(
-    alpha1: described_block.Alpha1 = None,
-    alpha3: described_block.Alpha3 = None,
-    r3: described_block.R3 = None,
-    s1: described_block.S1 = None,
-    s2: described_block.S2 = None,
-    gamma: described_block.Gamma = None,
+    alpha1: options.Alpha1 = None,
+    alpha3: options.Alpha3 = None,
+    r3: options.R3 = None,
+    s1: options.S1 = None,
+    s2: options.S2 = None,
+    gamma: options.Gamma = None,
     polygon: Annotated[
         str | None,
         typer.Option(
             "--polygon",
             help="Block file (.toml or .csv); what it states may be given anew by options.",
-            show_default=False,
         ),
     ] = None,
-    beta: described_block.Beta = None,
-    phi: described_block.Phi = None,
-    phi_back: described_block.PhiBack = None,
+    beta: options.Beta = None,
+    phi: options.Phi = None,
+    phi_back: options.PhiBack = None,
     cohesion: Annotated[
-        float | None,
-        typer.Option(
-            "--cohesion", help="Cohesion of the base [Pa], with --density.", show_default=False
-        ),
+        float | None, typer.Option("--cohesion", help="Cohesion of the base [Pa], with --density.")
     ] = None,
     density: Annotated[
-        float | None,
-        typer.Option("--density", help="Density of the rock [kg/m3].", show_default=False),
+        float | None, typer.Option("--density", help="Density of the rock [kg/m3].")
     ] = None,
     kv: Annotated[
         float | None,
-        typer.Option(
-            "--kv", help="Vertical acceleration of the ground, up positive [g].", show_default=False
-        ),
+        typer.Option("--kv", help="Vertical acceleration of the ground, up positive [g]."),
     ] = None,
-    no_back: described_block.NoBack = False,
+    no_back: options.NoBack = False,
     plot: Annotated[
         str | None,
         typer.Option(
             "--plot",
             help="Draw the block on its planes with its contacts and the resultant at yield "
             "(.png, .pdf, .svg).",
-            show_default=False,
         ),
     ] = None,
     json: options.Json = False,

@@ -9,7 +9,7 @@ import typer
 from rbfrag.cli.output import print_json, print_pairs, print_table, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion, find_vertical
-from rbfrag.cli.parameters.number_list import number_list
+from rbfrag.cli.parameters.values import number_list
 from rbfrag.errors import InputError
 
 if TYPE_CHECKING:

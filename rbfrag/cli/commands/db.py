@@ -123,18 +123,15 @@ def export(
             "--out",
             metavar="DIR",
             help="Folder to make: a file for each table, and the data dictionary.",
-            show_default=False,
         ),
     ],
     db: options.Db = None,
     format: Annotated[str, typer.Option("--format", help="parquet or csv.")] = "parquet",
     tables: Annotated[
-        str | None,
-        typer.Option("--tables", help="Only these, with commas between.", show_default=False),
+        str | None, typer.Option("--tables", help="Only these, with commas between.")
     ] = None,
     arrays: Annotated[
-        bool,
-        typer.Option("--arrays", help="Include samples [g] and histories (Parquet only)."),
+        bool, typer.Option("--arrays", help="Include samples [g] and histories (Parquet only).")
     ] = False,
     json: options.Json = False,
 ) -> None:
@@ -157,7 +154,6 @@ def merge(
         typer.Argument(
             metavar="OTHER",
             help="Database to read: a path or an SQLAlchemy URL. It is not changed.",
-            show_default=False,
         ),
     ],
     db: options.Db = None,

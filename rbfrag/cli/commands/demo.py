@@ -13,6 +13,7 @@ EXAMPLE = "Example:  rbfrag demo"
 
 
 def demo(
+    context: typer.Context,
     folder: Annotated[
         str, typer.Option("--folder", help="Folder that the results are written to.")
     ] = ".",
@@ -47,16 +48,14 @@ def demo(
         ("plot", "fit", "--out", str(fit_png), *db),
         ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6", *db),
     ):
-        _run(arguments)
+        _run(context, arguments)
     print(f"\ndone in {time.perf_counter() - started:.0f} s; written:")
     for path in (database, response_png, fit_png):
         print(f"  {path}")
 
 
-def _run(arguments: tuple[str, ...]) -> None:
-    from rbfrag.cli.main import app
-
+def _run(context: typer.Context, arguments: tuple[str, ...]) -> None:
     print(f"\n$ rbfrag {shlex.join(arguments)}", flush=True)
-    status = app(arguments, standalone_mode=False)
+    status = context.find_root().command.main(list(arguments), "rbfrag", standalone_mode=False)
     if status:
         raise typer.Exit(int(status))

@@ -8,7 +8,7 @@ import typer
 
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import toppling_block
+from rbfrag.cli.parameters.block import toppling_blocks
 from rbfrag.errors import InputError
 
 app = typer.Typer(
@@ -25,7 +25,6 @@ Blocks = Annotated[
         metavar="FILE",
         help="Block table (.csv, .parquet) with block_id, p2_1_s2 [1/s²] and kr; one function a "
         "block.",
-        show_default=False,
     ),
 ]
 
@@ -35,7 +34,6 @@ RockMass = Annotated[
         "--rockmass",
         metavar="FILE",
         help="Rock mass file (.toml, .csv): one function, the mean over its toppling blocks.",
-        show_default=False,
     ),
 ]
 
@@ -49,7 +47,7 @@ Name = Annotated[
     str, typer.Option("--name", help="Identifier of the one block or of the rock mass.")
 ]
 
-Out = Annotated[str, typer.Option("--out", help="File to write.", show_default=False)]
+Out = Annotated[str, typer.Option("--out", help="File to write.")]
 
 
 @app.command("nrml", epilog="Example:  rbfrag export nrml --blocks blocks.csv --out blocks.xml")
@@ -123,46 +121,23 @@ def _functions(
     model: str | None,
     db: str | None,
 ) -> tuple[list[Any], tuple[str, ...], list[str]]:
-    import numpy as np
-
     from rbfrag.exchange.block_fragility import block_functions, class_function
 
     measures = {"PGV": "pgv_m_s", "PGA": "pga_g"}
     if imt.upper() not in measures:
         raise InputError(f"--imt {imt}: use PGV, or PGA with --tm")
-    warnings: list[str] = []
-    alone = p2 is not None or kr is not None or block is not None
-    if (blocks is not None) + (rockmass is not None) + alone > 1:
-        raise InputError(
-            "give one of --p2 with --kr, --block, --blocks and --rockmass, not several of them"
-        )
     measure = measures[imt.upper()]
-    if rockmass is not None:
-        from rbfrag.rockmasses.file import read_rock_mass
-        from rbfrag.rockmasses.table import toppling_blocks
-
-        p2s, krs, share = toppling_blocks(read_rock_mass(rockmass).realise(None, None))
+    table, is_class, remarks = toppling_blocks(p2, kr, block, blocks, rockmass, name=name)
+    p2s, krs = table["p2_1_s2"], table["kr"]
+    if is_class:
         mean, about = class_function(
             name, p2s, krs, measure, tm_s=tm, levels=levels, model=model, db=db
         )
-        warnings.append(
-            f"the function is the mean over {p2s.size} stable toppling blocks, "
-            f"{100.0 * share:.3g} % of the rock mass; the others have no part in it"
-        )
-        return [mean], about, warnings
-    if blocks is not None:
-        from rbfrag.exchange.block_table import waiting_blocks
-
-        table = waiting_blocks(blocks)
-        names, p2s, krs = table["block_id"].tolist(), table["p2_1_s2"], table["kr"]
-    else:
-        one_p2, one_kr, remarks = toppling_block(p2, kr, block)
-        names, p2s, krs = [name], np.array([one_p2]), np.array([one_kr])
-        warnings += remarks
+        return [mean], about, list(remarks)
     made, about = block_functions(
-        names, p2s, krs, measure, tm_s=tm, levels=levels, model=model, db=db
+        list(table["block_id"]), p2s, krs, measure, tm_s=tm, levels=levels, model=model, db=db
     )
-    return made, about, warnings
+    return made, about, list(remarks)
 
 
 def _sentence(about: tuple[str, ...], tm: float | None) -> str:

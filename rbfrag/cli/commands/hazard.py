@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from rbfrag.cli.output import print_json, print_pairs, print_table, print_warnings
+from rbfrag.cli.output import check_files, print_json, print_pairs, print_table, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import toppling_block
+from rbfrag.cli.parameters.block import toppling_blocks
 from rbfrag.errors import InputError
 
 EXAMPLE = "Example:  rbfrag hazard pgv-curve.csv --p2 3 --kr 0.1 --component rotd50 --years 50"
@@ -21,7 +21,6 @@ def hazard(
             metavar="CURVE",
             help="Hazard curve: OpenQuake CSV, USGS NSHM JSON, or CSV of two columns whose header "
             "names their units (pgv_m_s,annual_rate).",
-            show_default=False,
         ),
     ],
     p2: options.P2OrFile = None,
@@ -33,7 +32,6 @@ def hazard(
             "--blocks",
             metavar="FILE",
             help="Block table (.csv, .parquet) with p2_1_s2 [1/s²] and kr, one answer a row.",
-            show_default=False,
         ),
     ] = None,
     rockmass: Annotated[
@@ -43,7 +41,6 @@ def hazard(
             metavar="FILE",
             help="Rock mass file (.toml, .csv): the rate of a block drawn from its stable toppling "
             "blocks.",
-            show_default=False,
         ),
     ] = None,
     imt: Annotated[
@@ -77,8 +74,7 @@ def hazard(
     model: options.Model = None,
     level: options.Level = 0.95,
     out: Annotated[
-        str | None,
-        typer.Option("--out", help="Write one row a block and site (.csv, .parquet)."),
+        str | None, typer.Option("--out", help="Write one row a block and site (.csv, .parquet).")
     ] = None,
     plot: Annotated[
         str | None,
@@ -94,32 +90,28 @@ def hazard(
     The fragility is integrated over the hazard curve. A PGA curve needs --tm, a spectral
     acceleration --convert.
     """
-    from rbfrag.exchange.block_table import table_path, write_block_table
+    from rbfrag.exchange.block_table import write_block_table
     from rbfrag.exchange.hazard_curves import read_hazard_curves, suited_curves
     from rbfrag.hazards.answer import hazard as answer
     from rbfrag.hazards.conversions import velocity_conversion
     from rbfrag.hazards.report import as_dict
 
-    if out is not None:
-        table_path(out)
-    if plot is not None:
-        from rbfrag.plots.canvas import plot_path
-
-        plot_path(plot)
-    table, remarks = _blocks(p2, kr, block, blocks, rockmass)
+    check_files(table=out, plot=plot)
+    table, is_class, remarks = toppling_blocks(p2, kr, block, blocks, rockmass)
+    names = list(table["block_id"])
     curves = suited_curves(
         read_hazard_curves(curve, imt=imt, site=site),
         with_mean_period=tm is not None,
         converted_period_s=None if convert is None else velocity_conversion(convert).period_s,
     )
-    if plot is not None and (len(curves) > 1 or len(table["block_id"]) > 1):
+    if plot is not None and (len(curves) > 1 or len(names) > 1):
         raise InputError(
             "--plot draws one block at one site: choose them with --site, --p2 and --kr"
         )
     found = [
         answer(
             one, table["p2_1_s2"], table["kr"], tm_s=tm, convert=convert, component=component,
-            years=years, model=model, level=level, db=db, one_class=rockmass is not None,
+            years=years, model=model, level=level, db=db, one_class=is_class,
         )
         for one in curves
     ]  # fmt: skip
@@ -131,7 +123,7 @@ def hazard(
         from rbfrag.plots.hazard import plot_contribution
 
         plot_contribution(curves[0], found[0], plot)
-    document = as_dict(curves, table["block_id"], found, remarks)
+    document = as_dict(curves, names, found, remarks)
     if json:
         print_json(document)
         return
@@ -149,41 +141,6 @@ def hazard(
             print()
             print_table(["from", "to", "share_%"], _shares(found[0], curves[0]))
     print_warnings(warnings)
-
-
-def _blocks(
-    p2: float | None,
-    kr: float | None,
-    block: str | None,
-    blocks: str | None,
-    rockmass: str | None,
-) -> tuple[dict[str, Any], tuple[str, ...]]:
-    if rockmass is not None:
-        if blocks is not None or p2 is not None or kr is not None or block is not None:
-            raise InputError("--rockmass goes without --p2, --kr, --block and --blocks")
-        from rbfrag.rockmasses.file import read_rock_mass
-        from rbfrag.rockmasses.table import toppling_blocks
-
-        p2s, krs, share = toppling_blocks(read_rock_mass(rockmass).realise(None, None))
-        if krs.size == 0:
-            raise InputError(f"{rockmass}: no block of it topples: the rate has no model")
-        remark = (
-            f"the rate is that of a block drawn from {krs.size} stable toppling blocks, "
-            f"{100.0 * share:.3g} % of the rock mass; the others have no part in it"
-        )
-        return {"block_id": ["rock mass"], "p2_1_s2": p2s, "kr": krs}, (remark,)
-    if blocks is None:
-        from rbfrag.solver.quantity import positive
-
-        p2, kr, remarks = toppling_block(p2, kr, block)
-        sizes = [positive(p2, "p2", "1/s²")], [positive(kr, "kr", "g")]
-        return {"block_id": [None], "p2_1_s2": sizes[0], "kr": sizes[1]}, remarks
-    if p2 is not None or kr is not None or block is not None:
-        raise InputError("--blocks does not go with --p2, --kr or --block: the table has them")
-    from rbfrag.exchange.block_table import waiting_blocks
-
-    table = waiting_blocks(blocks)
-    return {**table, "block_id": table["block_id"].tolist()}, ()
 
 
 def _shares(found: Any, curve: Any) -> list[list[object]]:

@@ -16,7 +16,7 @@ app = typer.Typer(
     epilog="Example:  rbfrag models show wls-pgv",
 )
 
-Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the model.", show_default=False)]
+Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the model.")]
 
 
 @app.command("list", epilog="Example:  rbfrag models list --json")

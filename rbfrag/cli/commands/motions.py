@@ -31,12 +31,10 @@ app = typer.Typer(
 @app.command("add", epilog="Example:  rbfrag motions add records/ --metadata records/META.csv")
 def add(
     paths: Annotated[
-        list[str],
-        typer.Argument(metavar="PATHS...", help="Files, or folders to search.", show_default=False),
+        list[str], typer.Argument(metavar="PATHS...", help="Files, or folders to search.")
     ],
     suite: Annotated[
-        str | None,
-        typer.Option("--suite", help="Put the motions into this suite.", show_default=False),
+        str | None, typer.Option("--suite", help="Put the motions into this suite.")
     ] = None,
     metadata: Annotated[
         str | None,
@@ -46,7 +44,6 @@ def add(
             help="Table with the columns file, trace_index, event_id, units, is_vertical, "
             "companion_group, magnitude, processing (only file must be there). Files are named "
             "relative to the table's folder.",
-            show_default=False,
         ),
     ] = None,
     raw: Annotated[
@@ -192,19 +189,15 @@ def export(
         typer.Argument(
             metavar="MOTION...",
             help="Accelerograms: files, FILE#INDEX for one trace of several, or database ids.",
-            show_default=False,
         ),
     ],
-    out: Annotated[
-        str, typer.Option("--out", metavar="FILE", help="File to write.", show_default=False)
-    ],
+    out: Annotated[str, typer.Option("--out", metavar="FILE", help="File to write.")],
     file_format: Annotated[
         str | None,
         typer.Option(
             "--format",
             help="csv (several motions, every label) or at2 (one motion). Default: what FILE ends "
             "in.",
-            show_default=False,
         ),
     ] = None,
     allow_partial: options.AllowPartial = False,

@@ -17,9 +17,7 @@ app = typer.Typer(
     epilog="Example:  rbfrag plot fit --out fit.png",
 )
 
-Out = Annotated[
-    str, typer.Option("--out", help="File to write: .png, .pdf or .svg.", show_default=False)
-]
+Out = Annotated[str, typer.Option("--out", help="File to write: .png, .pdf or .svg.")]
 
 
 @app.command("fit", epilog="Example:  rbfrag plot fit --model wls-pgv --out fit.png")
@@ -110,7 +108,6 @@ def plot_curve(
             metavar="FILE",
             help="Fragilities of the same measure to compare with: NRML 0.4 or 0.5 (.xml), or a "
             "pelicun table (.csv).",
-            show_default=False,
         ),
     ] = None,
     db: options.Db = None,
@@ -209,8 +206,7 @@ def plot_spectrum(
     db: options.Db = None,
 ) -> None:
     """Draw the toppling spectra of motions over the size of the block, with PGV beside them."""
-    from rbfrag.cli.parameters.number_list import number_list
-    from rbfrag.cli.parameters.polarity import polarities
+    from rbfrag.cli.parameters.values import number_list, polarities
     from rbfrag.plots.canvas import plot_path
     from rbfrag.plots.spectrum import plot_spectrum as draw
 
@@ -259,21 +255,15 @@ def plot_response(
     epilog="Example:  rbfrag plot modes --phi 40 --beta 20 --rockmass mass.toml --out a.png",
 )
 def plot_modes(
-    phi: Annotated[
-        float,
-        typer.Option("--phi", help="Friction angle of the base [deg].", show_default=False),
-    ],
+    phi: Annotated[float, typer.Option("--phi", help="Friction angle of the base [deg].")],
     out: Out,
     beta: Annotated[
-        float,
-        typer.Option("--beta", help="Dip of the base for the yield accelerations [deg]."),
+        float, typer.Option("--beta", help="Dip of the base for the yield accelerations [deg].")
     ] = 0.0,
     phi_back: Annotated[
         float | None,
         typer.Option(
-            "--phi-back",
-            help="Friction angle of the back plane [deg]. Default: that of the base.",
-            show_default=False,
+            "--phi-back", help="Friction angle of the back plane [deg]. Default: that of the base."
         ),
     ] = None,
     no_back: Annotated[
@@ -286,21 +276,17 @@ def plot_modes(
             metavar="FILE",
             help="Show the blocks of a table (.csv, .parquet) with alpha1_deg and alpha3_deg, "
             "as  rbfrag rockmass --out  writes it.",
-            show_default=False,
         ),
     ] = None,
     rockmass: Annotated[
         str | None,
         typer.Option(
-            "--rockmass",
-            metavar="FILE",
-            help="Show the blocks of a rock mass file (.toml, .csv).",
-            show_default=False,
+            "--rockmass", metavar="FILE", help="Show the blocks of a rock mass file (.toml, .csv)."
         ),
     ] = None,
 ) -> None:
     """Draw failure modes and yield accelerations over the block angles alpha1 and alpha3."""
-    from rbfrag.cli.parameters.charted_blocks import charted_blocks
+    from rbfrag.cli.parameters.block import charted_blocks
     from rbfrag.plots.canvas import plot_path
     from rbfrag.plots.modes import plot_modes as draw
 

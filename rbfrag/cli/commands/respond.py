@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
-from rbfrag.cli.parameters import described_block, options
+from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion, find_vertical
 from rbfrag.errors import InputError
 
@@ -30,7 +30,6 @@ def respond(
             "--ky",
             help="Yield acceleration coefficient tan(phi - beta) [g] of a block that slides on a "
             "plane of dip --beta (default 0), whatever its shape.",
-            show_default=False,
         ),
     ] = None,
     block: Annotated[
@@ -40,26 +39,24 @@ def respond(
             metavar="FILE",
             help="Block file (.toml or .csv); its mode chooses the model. What it states about "
             "the planes may be given anew by options.",
-            show_default=False,
         ),
     ] = None,
-    alpha1: described_block.Alpha1 = None,
-    alpha3: described_block.Alpha3 = None,
-    r3: described_block.R3 = None,
-    s1: described_block.S1 = None,
-    s2: described_block.S2 = None,
-    gamma: described_block.Gamma = None,
-    beta: described_block.Beta = None,
-    phi: described_block.Phi = None,
-    phi_back: described_block.PhiBack = None,
-    no_back: described_block.NoBack = False,
+    alpha1: options.Alpha1 = None,
+    alpha3: options.Alpha3 = None,
+    r3: options.R3 = None,
+    s1: options.S1 = None,
+    s2: options.S2 = None,
+    gamma: options.Gamma = None,
+    beta: options.Beta = None,
+    phi: options.Phi = None,
+    phi_back: options.PhiBack = None,
+    no_back: options.NoBack = False,
     kind: Annotated[
         str | None,
         typer.Option(
             "--kind",
             help="Response model: toppling, sliding, slumping or confined_toppling. Default: that "
             "of the block's failure mode.",
-            show_default=False,
         ),
     ] = None,
     vertical: options.Vertical = None,
@@ -77,8 +74,7 @@ def respond(
         ),
     ] = False,
     csv: Annotated[
-        str | None,
-        typer.Option("--csv", help="Write the motion of the block in time.", show_default=False),
+        str | None, typer.Option("--csv", help="Write the motion of the block in time.")
     ] = None,
     plot: Annotated[
         str | None,
@@ -86,7 +82,6 @@ def respond(
             "--plot",
             help="Draw the acceleration against the strength that is left, and the motion of the "
             "block (.png, .pdf, .svg).",
-            show_default=False,
         ),
     ] = None,
     animate: Annotated[
@@ -95,7 +90,6 @@ def respond(
             "--animate",
             help="Film the block on its planes (.gif, .mp4 where ffmpeg is installed, .html); it "
             "must be given by its geometry.",
-            show_default=False,
         ),
     ] = None,
     exaggerate: Annotated[
@@ -229,7 +223,7 @@ def _draw(
     title: str,
     reverse: bool,
 ) -> None:
-    if response.kind != "toppling":
+    if response.history is not None and response.history.displacement_m is not None:
         from rbfrag.plots.response import plot_motion
 
         plot_motion(response, path, title=title, reverse=reverse)

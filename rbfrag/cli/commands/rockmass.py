@@ -2,14 +2,115 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rbfrag.cli.output import cell, print_json, print_pairs, print_table, print_warnings
+from rbfrag.cli.output import (
+    ProgressLine,
+    cell,
+    check_files,
+    print_json,
+    print_pairs,
+    print_table,
+    print_warnings,
+)
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.rockmass_shaking import print_failures, run_shaken
+from rbfrag.cli.parameters.motion import find_motion, find_vertical
+from rbfrag.cli.parameters.values import number_list
 from rbfrag.errors import InputError
+
+if TYPE_CHECKING:
+    from rbfrag.rockmasses.joint_sets import Realisations
+    from rbfrag.rockmasses.shaking import ShakenMass
+
+ALWAYS = ("at_rest", "stays", "unstable")
+"""Outcomes that have a column of their own even if there are none."""
+
+
+def run_shaken(
+    made: Realisations,
+    motion: str,
+    *,
+    vertical: str | None,
+    reverse: bool,
+    scales: str | None,
+    displacement: float | None,
+    rotation: float | None,
+    jobs: int | None,
+    db: str | None,
+    units: str | None,
+    dt: float | None,
+) -> tuple[ShakenMass, list[str]]:
+    """Run the blocks under the motion that the options name.
+
+    Returns:
+        Their outcomes, and sentences about the motion and about blocks.
+    """
+    from rbfrag.campaign.shake_rockmass import shake
+    from rbfrag.rockmasses.failures import failure_warnings
+    from rbfrag.rockmasses.shaking import DISPLACEMENT_M, FailureLimits
+
+    limits = FailureLimits(DISPLACEMENT_M if displacement is None else displacement, rotation)
+    factors = [1.0] if scales is None else number_list(scales, "--scales")
+    ground = find_motion(motion, db=db, units=units, dt_s=dt)
+    upward, remarks = find_vertical(vertical, ground, db=db, units=units, dt_s=dt)
+    with ProgressLine("rockmass", "blocks") as line:
+        found = shake(
+            made,
+            ground,
+            scales=factors,
+            vertical=upward,
+            polarity="reverse" if reverse else "forward",
+            limits=limits,
+            jobs=jobs,
+            on_progress=line.show,
+        )
+    return found, [*remarks, *failure_warnings(found)]
+
+
+def print_failures(document: dict[str, Any]) -> None:
+    """Print the failures that a motion causes, mode by mode and scale by scale."""
+    from rbfrag.rockmasses.shaking import OUTCOMES
+
+    print()
+    turned = document["rotation_limit_deg"]
+    print(
+        f"{document['motion']}, {document['polarity']}: {document['runs']} runs; a slide fails "
+        f"beyond {document['displacement_limit_m']:g} m, a block that turns "
+        + ("past recovery" if turned is None else f"beyond {turned:g} degrees or past recovery")
+    )
+    counts = [found for each in document["scales"] for found in each["modes"].values()]
+    outcomes = [
+        name
+        for name in OUTCOMES
+        if name != "fails" and (name in ALWAYS or any(found[name] for found in counts))
+    ]
+    rows = []
+    for each in document["scales"]:
+        for mode, found in [*each["modes"].items(), ("all", each["all"])]:
+            of_all, of_mode = found["fails_of_all"], found["fails_of_mode"]
+            rows.append(
+                [
+                    each["scale"],
+                    round(each["pga_g"], 4),
+                    mode,
+                    found["count"],
+                    found["fails"],
+                    _percent(of_mode["share"]),
+                    _percent(of_all["share"]),
+                    _percent(of_all["ci_low"]),
+                    _percent(of_all["ci_high"]),
+                    *(found[name] for name in outcomes),
+                ]
+            )
+    headers = ["scale", "pga_g", "mode", "count", "fails", "%_of_mode", "%_of_all"]
+    print_table([*headers, "ci_low_%", "ci_high_%", *outcomes], rows)
+
+
+def _percent(share: float) -> float:
+    return round(100.0 * share, 2)
+
 
 EXAMPLE = "Example:  rbfrag rockmass rockmass.toml --pgv 0.6 --out blocks.csv --plot counts.png"
 
@@ -20,7 +121,6 @@ def rockmass(
         typer.Argument(
             metavar="FILE",
             help="Rock mass file (.toml or .csv): dips [deg], spacings [m], friction [deg].",
-            show_default=False,
         ),
     ],
     n: Annotated[
@@ -38,7 +138,6 @@ def rockmass(
             metavar="MOTION",
             help="Run every block under this accelerogram, each in its own mode: a file, "
             "FILE#INDEX for one trace of several, or a database id.",
-            show_default=False,
         ),
     ] = None,
     vertical: options.Vertical = None,
@@ -49,7 +148,6 @@ def rockmass(
             "--scales",
             metavar="LIST",
             help="Factors on the motion, such as 0.5,1,1.5,2. Default: 1.",
-            show_default=False,
         ),
     ] = None,
     displacement: Annotated[
@@ -58,7 +156,6 @@ def rockmass(
             "--displacement",
             help="A slide fails beyond this displacement [m]. Default with --motion: 0.05. With "
             "--pgv, blocks that slide or slump are answered for where it is given.",
-            show_default=False,
         ),
     ] = None,
     rotation: Annotated[
@@ -67,7 +164,6 @@ def rockmass(
             "--rotation",
             help="A slump, or a topple against the back plane, fails beyond this rotation [deg]. "
             "Default: failure past recovery only.",
-            show_default=False,
         ),
     ] = None,
     jobs: Annotated[
@@ -75,7 +171,6 @@ def rockmass(
         typer.Option(
             "--jobs",
             help="Worker processes. Default: one per processor, where there is work for them.",
-            show_default=False,
         ),
     ] = None,
     pgv: options.Pgv = None,
@@ -110,23 +205,19 @@ def rockmass(
     mode. With a measure of the motion (--pgv ...), the probability of failure is averaged over
     the blocks of each mode for which there is a fragility model.
     """
-    from rbfrag.exchange.block_table import table_path, write_block_table
+    from rbfrag.exchange.block_table import write_block_table
     from rbfrag.rockmasses.counts import crossings, mode_counts
-    from rbfrag.rockmasses.exact_interval import checked_level
-    from rbfrag.rockmasses.failures import failures
-    from rbfrag.rockmasses.failures_report import failures_as_dict
-    from rbfrag.rockmasses.failures_table import fate_columns
+    from rbfrag.rockmasses.failures import (
+        checked_level,
+        failures,
+        failures_as_dict,
+        outcome_columns,
+    )
     from rbfrag.rockmasses.file import read_rock_mass
-    from rbfrag.rockmasses.report import as_dict
+    from rbfrag.rockmasses.report import as_dict, block_columns
     from rbfrag.rockmasses.scenario import scenario
-    from rbfrag.rockmasses.table import block_columns
 
-    if out is not None:
-        table_path(out)
-    if plot is not None:
-        from rbfrag.plots.canvas import plot_path
-
-        plot_path(plot)
+    check_files(table=out, plot=plot)
     measures = {"pgv_m_s": pgv, "pga_g": pga, "tm_s": tm, "pgd_m": pgd}
     shaken = any(value is not None for value in measures.values())
     _refuse_options_without_their_cause(
@@ -146,7 +237,7 @@ def rockmass(
         db=db,
     )
     made = read_rock_mass(file).realise(n, seed)
-    answer = fates = found = None
+    answer = outcomes = found = None
     about: list[str] = []
     if shaken:
         answer = scenario(
@@ -155,25 +246,25 @@ def rockmass(
         )  # fmt: skip
     if motion is not None:
         checked_level(level)
-        fates, about = run_shaken(
+        outcomes, about = run_shaken(
             made, motion, vertical=vertical, reverse=reverse, scales=scales,
             displacement=displacement, rotation=rotation, jobs=jobs, db=db, units=units, dt=dt,
         )  # fmt: skip
-        found = failures_as_dict(fates, failures(fates, level), level)
+        found = failures_as_dict(outcomes, failures(outcomes, level), level)
     document = as_dict(made, mode_counts(made), crossings(made), answer, found)
     document["warnings"] += about
     if out is not None:
-        columns = block_columns(made, answer) if fates is None else fate_columns(fates)
+        columns = block_columns(made, answer) if outcomes is None else outcome_columns(outcomes)
         write_block_table(columns, out)
     if plot is not None:
-        if fates is None:
+        if outcomes is None:
             from rbfrag.plots.rockmass import plot_rockmass
 
             plot_rockmass(made, plot)
         else:
             from rbfrag.plots.rockmass import plot_failures
 
-            plot_failures(fates, plot, level=level)
+            plot_failures(outcomes, plot, level=level)
     if json:
         print_json(document)
         return

@@ -19,8 +19,7 @@ EXAMPLE = "Example:  rbfrag serve --db rbfrag.db --port 8000"
 def serve(
     db: options.Db = None,
     host: Annotated[
-        str,
-        typer.Option("--host", help="Address to listen at; any but loopback needs a token."),
+        str, typer.Option("--host", help="Address to listen at; any but loopback needs a token.")
     ] = "127.0.0.1",
     port: Annotated[
         int, typer.Option("--port", help="Port to listen at; 0 for any that is free.")
@@ -32,7 +31,6 @@ def serve(
             "--token-file",
             metavar="FILE",
             help="File with the bearer token that requests must bring. Default: RBFRAG_TOKEN.",
-            show_default=False,
         ),
     ] = None,
     allow_origin: Annotated[
@@ -42,7 +40,6 @@ def serve(
             metavar="ORIGIN",
             help="Web page elsewhere whose scripts may read answers, such as "
             "https://maps.example.org; may be repeated.",
-            show_default=False,
         ),
     ] = None,
     allow_host: Annotated[
@@ -52,7 +49,6 @@ def serve(
             metavar="NAME",
             help="Name, beside localhost, that a service without a token may be asked by; may be "
             "repeated.",
-            show_default=False,
         ),
     ] = None,
     body_limit_mb: Annotated[

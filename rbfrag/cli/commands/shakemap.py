@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
-from rbfrag.cli.output import print_json, print_pairs, print_warnings
+from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import toppling_block
+from rbfrag.cli.parameters.block import toppling_blocks
 from rbfrag.errors import InputError
 
 EXAMPLE = "Example:  rbfrag shakemap grid.xml --p2 3 --kr 0.1 --out map.geojson --plot map.png"
@@ -17,19 +17,10 @@ SUFFIXES = (".geojson", ".json", ".csv", ".parquet", ".gpkg")
 
 
 def shakemap(
-    grid: Annotated[
-        str,
-        typer.Argument(
-            metavar="GRID.xml", help="ShakeMap grid, version 3 or 4.", show_default=False
-        ),
-    ],
+    grid: Annotated[str, typer.Argument(metavar="GRID.xml", help="ShakeMap grid, version 3 or 4.")],
     out: Annotated[
         str,
-        typer.Option(
-            "--out",
-            help="File to write: .geojson, .csv, .parquet or .gpkg (extra gis).",
-            show_default=False,
-        ),
+        typer.Option("--out", help="File to write: .geojson, .csv, .parquet or .gpkg (extra gis)."),
     ],
     p2: options.P2OrFile = None,
     kr: options.KrOrFile = None,
@@ -41,7 +32,6 @@ def shakemap(
             metavar="FILE",
             help="Blocks (.csv, .parquet, .geojson) with p2_1_s2 [1/s²] and kr: with lon and lat "
             "[deg] one answer a block, without them a class that stands at every node.",
-            show_default=False,
         ),
     ] = None,
     rockmass: Annotated[
@@ -50,7 +40,6 @@ def shakemap(
             "--rockmass",
             metavar="FILE",
             help="Rock mass file (.toml, .csv): its stable toppling blocks stand at every node.",
-            show_default=False,
         ),
     ] = None,
     n: Annotated[int, typer.Option("--n", help="Number of realisations of the rock mass.")] = 200,
@@ -60,7 +49,6 @@ def shakemap(
             "--uncertainty",
             metavar="FILE",
             help="uncertainty.xml of the same map: the answer is integrated over it.",
-            show_default=False,
         ),
     ] = None,
     component: Annotated[
@@ -72,8 +60,7 @@ def shakemap(
         ),
     ] = "larger",
     allow_partial: Annotated[
-        bool,
-        typer.Option("--allow-partial", help="Read a grid that has not its declared size."),
+        bool, typer.Option("--allow-partial", help="Read a grid that has not its declared size.")
     ] = False,
     plot: Annotated[
         str | None, typer.Option("--plot", help="Draw the map (.png, .pdf, .svg).")
@@ -95,12 +82,9 @@ def shakemap(
     from rbfrag.hazards.site_probability import site_probability
 
     target = output_path(out, SUFFIXES, "map")
-    if plot is not None:
-        from rbfrag.plots.canvas import plot_path
-
-        plot_path(plot)
+    check_files(plot=plot)
     meaning = component_named(component)
-    found_blocks, remarks = _blocks(p2, kr, block, blocks, rockmass, n)
+    found_blocks, _, remarks = toppling_blocks(p2, kr, block, blocks, rockmass, n=n)
     shaken = read_shakemap(grid, uncertainty=uncertainty, allow_partial=allow_partial)
     warnings = [*remarks, *shaken.warnings]
     own = "lon" in found_blocks
@@ -211,40 +195,6 @@ def shakemap(
         return
     print_pairs(document)
     print_warnings(warnings)
-
-
-def _blocks(
-    p2: float | None,
-    kr: float | None,
-    block: str | None,
-    blocks: str | None,
-    rockmass: str | None,
-    n: int,
-) -> tuple[dict[str, Any], list[str]]:
-    import numpy as np
-
-    alone = p2 is not None or kr is not None or block is not None
-    if (blocks is not None) + (rockmass is not None) + alone > 1:
-        raise InputError(
-            "give one of --p2 with --kr, --block, --blocks and --rockmass, not several of them"
-        )
-    if rockmass is not None:
-        from rbfrag.rockmasses.file import read_rock_mass
-        from rbfrag.rockmasses.table import toppling_blocks
-
-        p2s, krs, share = toppling_blocks(read_rock_mass(rockmass).realise(n, None))
-        if p2s.size == 0:
-            raise InputError(f"{rockmass}: none of {n} blocks topples: the map would be empty")
-        return {"p2_1_s2": p2s, "kr": krs}, [
-            f"the probability is the mean over {p2s.size} stable toppling blocks, "
-            f"{100.0 * share:.3g} % of the rock mass; the others have no part in it"
-        ]
-    if blocks is not None:
-        from rbfrag.exchange.block_table import waiting_blocks
-
-        return waiting_blocks(blocks), []
-    one_p2, one_kr, remarks = toppling_block(p2, kr, block)
-    return {"p2_1_s2": np.array([one_p2]), "kr": np.array([one_kr])}, list(remarks)
 
 
 def _write(columns: dict[str, Any], about: dict[str, Any], target: Any) -> None:

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
-from rbfrag.cli.output import print_json, print_pairs, print_warnings
+from rbfrag.cli.output import ProgressLine, print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.number_list import number_list
-from rbfrag.cli.progress_line import ProgressLine
+from rbfrag.cli.parameters.values import number_list
 
 if TYPE_CHECKING:
     from rbfrag.campaign.simulate import CampaignProgress

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rbfrag.cli.output import print_json, print_table, print_warnings
+from rbfrag.cli.output import check_files, print_json, print_table, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion
-from rbfrag.cli.parameters.number_list import number_list
-from rbfrag.cli.parameters.polarity import polarities as polarities_of
+from rbfrag.cli.parameters.values import number_list
+from rbfrag.cli.parameters.values import polarities as polarities_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,15 +27,12 @@ def spectrum(
     ] = "30,10,3,1,0.3,0.1",
     polarity: options.Polarity = "forward",
     csv: Annotated[
-        str | None,
-        typer.Option("--csv", help="Write the values (.csv or .parquet).", show_default=False),
+        str | None, typer.Option("--csv", help="Write the values (.csv or .parquet).")
     ] = None,
     plot: Annotated[
         str | None,
         typer.Option(
-            "--plot",
-            help="Draw the spectra over p², with PGV beside them (.png, .pdf, .svg).",
-            show_default=False,
+            "--plot", help="Draw the spectra over p², with PGV beside them (.png, .pdf, .svg)."
         ),
     ] = None,
     units: options.Units = None,
@@ -48,16 +45,11 @@ def spectrum(
     No block with a toppling velocity k_r g/p more than 2 % above X(p) topples. With --json, one
     motion in one polarity is an object, several are a list of such objects.
     """
-    from rbfrag.exchange.block_table import table_path, write_block_table
-    from rbfrag.motions.spectrum_report import as_dict
+    from rbfrag.exchange.block_table import write_block_table
+    from rbfrag.motions.toppling_spectrum import spectrum_as_dict as as_dict
 
     sizes, polarities = number_list(p2, "--p2"), polarities_of(polarity)
-    if csv is not None:
-        table_path(csv)
-    if plot is not None:
-        from rbfrag.plots.canvas import plot_path
-
-        plot_path(plot)
+    check_files(table=csv, plot=plot)
     found = [find_motion(text, db=db, units=units, dt_s=dt) for text in motions]
     answers = [
         as_dict(text, ground, sizes, each)

@@ -28,9 +28,6 @@ def find_motion(
         units: unit of a text file that does not state it.
         dt_s: sampling interval [s] of a text file without a time column.
         allow_partial: read a file whose header states another number of samples than follow.
-
-    Raises:
-        InputError: no such file, trace or id.
     """
     if _is_id(text):
         from rbfrag.db.engine import opened_database
@@ -91,7 +88,7 @@ def find_vertical(
     """
     if text is None:
         return None, []
-    from rbfrag.motions.companions import companion
+    from rbfrag.motions.direction import companion
 
     found = find_motion(text, db=db, units=units, dt_s=dt_s)
     warnings = []

@@ -17,7 +17,6 @@ Db = Annotated[
         metavar="URL",
         help="Database: a path or an SQLAlchemy URL. Default: RBFRAG_DB, else rbfrag.db in the "
         "current folder.",
-        show_default=False,
     ),
 ]
 
@@ -26,7 +25,6 @@ Motion = Annotated[
     typer.Argument(
         metavar="MOTION",
         help="Accelerogram: a file, FILE#INDEX for one trace of several, or a database id.",
-        show_default=False,
     ),
 ]
 
@@ -35,15 +33,13 @@ Motions = Annotated[
     typer.Argument(
         metavar="MOTION...",
         help="Accelerograms: files, FILE#INDEX for one trace of several, or database ids.",
-        show_default=False,
     ),
 ]
 
 Polarity = Annotated[
     str,
     typer.Option(
-        "--polarity",
-        help="forward: positive samples drive forward; reverse: negative ones; both.",
+        "--polarity", help="forward: positive samples drive forward; reverse: negative ones; both."
     ),
 ]
 
@@ -53,44 +49,29 @@ Vertical = Annotated[
         "--vertical",
         metavar="MOTION",
         help="Vertical accelerogram of the same recording, upward positive.",
-        show_default=False,
     ),
 ]
 
 Reverse = Annotated[
-    bool,
-    typer.Option("--reverse", help="Positive samples drive backward: k_h(t) = -a(t)."),
+    bool, typer.Option("--reverse", help="Positive samples drive backward: k_h(t) = -a(t).")
 ]
 
-P2 = Annotated[
-    float,
-    typer.Option("--p2", help="Frequency parameter p² of the block [1/s²].", show_default=False),
-]
+P2 = Annotated[float, typer.Option("--p2", help="Frequency parameter p² of the block [1/s²].")]
 
 Kr = Annotated[
     float,
-    typer.Option(
-        "--kr",
-        help="Rocking acceleration coefficient k_r = tan(critical angle) [g].",
-        show_default=False,
-    ),
+    typer.Option("--kr", help="Rocking acceleration coefficient k_r = tan(critical angle) [g]."),
 ]
 
 P2OrFile = Annotated[
     float | None,
-    typer.Option(
-        "--p2",
-        help="Frequency parameter p² of the block [1/s²], with --kr.",
-        show_default=False,
-    ),
+    typer.Option("--p2", help="Frequency parameter p² of the block [1/s²], with --kr."),
 ]
 
 KrOrFile = Annotated[
     float | None,
     typer.Option(
-        "--kr",
-        help="Rocking acceleration coefficient k_r = tan(critical angle) [g], with --p2.",
-        show_default=False,
+        "--kr", help="Rocking acceleration coefficient k_r = tan(critical angle) [g], with --p2."
     ),
 ]
 
@@ -101,7 +82,6 @@ BlockFile = Annotated[
         metavar="FILE",
         help="Block file (.toml or .csv) with beta_deg and phi_deg, instead of --p2 and --kr; "
         "refused unless the block topples.",
-        show_default=False,
     ),
 ]
 
@@ -119,16 +99,13 @@ Units = Annotated[
     typer.Option(
         "--units",
         help="Unit of acceleration of a text file that does not state it: g, m/s2, cm/s2 or mm/s2.",
-        show_default=False,
     ),
 ]
 
 Dt = Annotated[
     float | None,
     typer.Option(
-        "--dt",
-        help="Sampling interval [s] of a text file that holds accelerations only.",
-        show_default=False,
+        "--dt", help="Sampling interval [s] of a text file that holds accelerations only."
     ),
 ]
 
@@ -140,22 +117,13 @@ AllowPartial = Annotated[
     ),
 ]
 
-Suite = Annotated[
-    str | None,
-    typer.Option("--suite", help="Only the motions of this suite.", show_default=False),
-]
+Suite = Annotated[str | None, typer.Option("--suite", help="Only the motions of this suite.")]
 
-Pgv = Annotated[
-    float | None,
-    typer.Option("--pgv", help="Peak ground velocity [m/s].", show_default=False),
-]
+Pgv = Annotated[float | None, typer.Option("--pgv", help="Peak ground velocity [m/s].")]
 
-Pga = Annotated[
-    float | None,
-    typer.Option("--pga", help="Peak ground acceleration [g].", show_default=False),
-]
+Pga = Annotated[float | None, typer.Option("--pga", help="Peak ground acceleration [g].")]
 
-Tm = Annotated[float | None, typer.Option("--tm", help="Mean period [s].", show_default=False)]
+Tm = Annotated[float | None, typer.Option("--tm", help="Mean period [s].")]
 
 HeldP2 = Annotated[
     float | None,
@@ -163,7 +131,6 @@ HeldP2 = Annotated[
         "--p2",
         help="Frequency parameter p² [1/s²] of the blocks drawn. Default: the middle of the "
         "fitted range.",
-        show_default=False,
     ),
 ]
 
@@ -173,7 +140,6 @@ HeldPga = Annotated[
         "--pga",
         help="PGA [g] of the motions drawn. Default: in proportion to PGV, by the middle of the "
         "fitted range.",
-        show_default=False,
     ),
 ]
 
@@ -182,14 +148,10 @@ HeldTm = Annotated[
     typer.Option(
         "--tm",
         help="Mean period [s] of the motions drawn. Default: the middle of the fitted range.",
-        show_default=False,
     ),
 ]
 
-Pgd = Annotated[
-    float | None,
-    typer.Option("--pgd", help="Peak ground displacement [m].", show_default=False),
-]
+Pgd = Annotated[float | None, typer.Option("--pgd", help="Peak ground displacement [m].")]
 
 Model = Annotated[
     str | None,
@@ -197,8 +159,33 @@ Model = Annotated[
         "--model",
         help="Name of a stored model. Default: the database's default if the given "
         "measures suffice for it, else the best that they suffice for.",
-        show_default=False,
     ),
 ]
 
 Level = Annotated[float, typer.Option("--level", help="Confidence level of the interval.")]
+
+
+Alpha1 = Annotated[
+    float | None, typer.Option("--alpha1", help="Angle of the heel [deg], with --alpha3 and --r3.")
+]
+Alpha3 = Annotated[float | None, typer.Option("--alpha3", help="Angle of the toe [deg].")]
+R3 = Annotated[float | None, typer.Option("--r3", help="Distance from centroid to toe [m].")]
+S1 = Annotated[
+    float | None,
+    typer.Option("--s1", help="Spacing of the base fractures [m], with --s2 and --gamma."),
+]
+S2 = Annotated[float | None, typer.Option("--s2", help="Spacing of the back fractures [m].")]
+Gamma = Annotated[
+    float | None, typer.Option("--gamma", help="Dip of the back plane less dip of the base [deg].")
+]
+Beta = Annotated[
+    float | None, typer.Option("--beta", help="Dip of the base, out of the slope positive [deg].")
+]
+Phi = Annotated[float | None, typer.Option("--phi", help="Friction angle of the base [deg].")]
+PhiBack = Annotated[
+    float | None,
+    typer.Option(
+        "--phi-back", help="Friction angle of the back plane [deg]. Default: that of the base."
+    ),
+]
+NoBack = Annotated[bool, typer.Option("--no-back", help="There is no fracture behind the block.")]

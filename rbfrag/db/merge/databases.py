@@ -9,14 +9,15 @@ from pathlib import Path
 from sqlalchemy import Connection, text
 
 from rbfrag.db.check.database import check_database
-from rbfrag.db.engine import database_label, opened_database
+from rbfrag.db.connect import database_label
+from rbfrag.db.engine import opened_database
 from rbfrag.db.location import locate
 from rbfrag.db.merge.ledger import CONFLICTS_SHOWN, Ledger
-from rbfrag.db.merge.models import merge_models
 from rbfrag.db.merge.motions import merge_motions, merge_suites
 from rbfrag.db.merge.results import (
     merge_campaigns,
     merge_combinations,
+    merge_models,
     merge_responses,
     merge_spectra,
 )

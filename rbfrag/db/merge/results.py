@@ -1,4 +1,4 @@
-"""Bringing the results of another database in: campaigns, combinations, maps, runs, spectra."""
+"""Bringing in the results of another database: combinations, histories, spectra, models."""
 
 from __future__ import annotations
 
@@ -6,20 +6,25 @@ import json
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from sqlalchemy import Connection, RowMapping, Table, select
 
 from rbfrag.db.campaigns import GRID_MEETS_POINT, known_combinations
-from rbfrag.db.check.compare_maps import BORDER_ERROR, contradictions
+from rbfrag.db.check.maps import BORDER_ERROR, contradictions
 from rbfrag.db.digest import NOT_DIGESTED
 from rbfrag.db.insert import insert_if_new, insert_row, insert_rows, update_rows
 from rbfrag.db.keys import combination_key
 from rbfrag.db.merge.ledger import Ledger
 from rbfrag.db.merge.motions import MergedMotions
+from rbfrag.db.model_file import encode_model
+from rbfrag.db.models import model_rows
+from rbfrag.db.rows import ModelRow
 from rbfrag.db.schema import (
     campaign,
     combination,
+    fragility_model,
     motion,
     outcome_interval,
     response,
@@ -375,3 +380,41 @@ def merge_responses(
             ledger.conflict("response", name, "peak_theta_n", here, there)
         elif any(ours[c] != theirs[c] for c in ("time_s", "theta_rad", "theta_dot_rad_s")):
             ledger.within_error += 1
+
+
+def merge_models(source: Connection, target: Connection, ledger: Ledger) -> None:
+    """Bring models in; of two that differ under one name, the other's gets a number.
+
+    A model "m" that differs from the "m" here is stored as "m-2", or the first number that is
+    free. The defaults stay; a database without models of a kind takes the other's.
+
+    Args:
+        source: the other database.
+        target: the database that is merged into, inside the caller's transaction.
+        ledger: what was done.
+    """
+    ours = {row.name: row for row in model_rows(target)}
+    had = {row.kind for row in ours.values()}
+    for theirs in model_rows(source):
+        name, number = theirs.name, 1
+        while name in ours and not _same(ours[name], theirs):
+            number += 1
+            name = f"{theirs.name}-{number}"
+        if name in ours:
+            ledger.same["fragility_model"] += 1
+            continue
+        row = replace(theirs, name=name, is_default=theirs.is_default and theirs.kind not in had)
+        insert_row(target, fragility_model, encode_model(row))
+        ours[name] = row
+        ledger.added["fragility_model"] += 1
+        if name != theirs.name:
+            ledger.notes.append(
+                f"there is another model {theirs.name!r} here: theirs is stored as {name!r}"
+            )
+
+
+def _same(one: ModelRow, other: ModelRow) -> bool:
+    left, right = (
+        encode_model(replace(row, name="-", is_default=False, created="")) for row in (one, other)
+    )
+    return left == right

@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
-from rbfrag.motions.formats.volume_1 import data_lines
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.record_file import RecordFile
 
@@ -46,7 +45,7 @@ def _component(file: RecordFile, span: range, index: int) -> GroundMotion:
     unit = file.find(span, _UNIT, "unit of acceleration")
     factor = file.unit_in_g(unit)
     dt = file.dt_of_duration(duration, npts)
-    first, rows = data_lines(file, span, unit.line)
+    first, rows = file.volume_1_data(span, unit.line)
     values = file.fixed_width(rows, first + 1, LAYOUT, "acceleration")
     remarks = file.remarks(npts, values.size, points.line, f"component {index}")
     if remarks:

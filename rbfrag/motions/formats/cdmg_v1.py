@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from rbfrag.motions.formats.volume_1 import data_lines
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.record_file import RecordFile
 
@@ -43,12 +42,12 @@ def read(file: RecordFile) -> list[GroundMotion]:
     spans = file.blocks(_BLOCK)
     channels = [_channel(file, span) for span in spans]
     moving = [channel for channel in channels if channel.acceleration_g.any()]
-    still = [channel.component for channel in channels if not channel.acceleration_g.any()]
+    silent = [channel.component for channel in channels if not channel.acceleration_g.any()]
     if not moving:
         raise file.error("every sample of every channel is zero: this is no record")
     remarks = file.missing_channels(spans[0], len(spans))
-    if still:
-        remarks += (f"the channel {', '.join(still)} holds zeros only and is left out",)
+    if silent:
+        remarks += (f"the channel {', '.join(silent)} holds zeros only and is left out",)
     return [
         replace(channel, trace_index=index, remarks=(*remarks, *channel.remarks))
         for index, channel in enumerate(moving)
@@ -62,7 +61,7 @@ def _channel(file: RecordFile, span: range) -> GroundMotion:
     unit = file.find(span, _UNIT, "unit of acceleration")
     factor = file.unit_in_g(unit)
     dt = file.dt_of_duration(duration, npts)
-    first, rows = data_lines(file, span, unit.line)
+    first, rows = file.volume_1_data(span, unit.line)
     numbers = file.fixed_width(rows, first + 1, LAYOUT, "time or acceleration")
     times, values = numbers[0::2], numbers[1::2]
     remarks = file.remarks(npts, values.size, points.line)

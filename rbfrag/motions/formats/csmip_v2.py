@@ -5,8 +5,8 @@ Each block: 25 text lines, numeric headers, then a line such as ::
     7500 points of accel data equally spaced at  .010 sec, in cm/sec2. (8f10.6)
     3251 POINTS OF ACCEL DATA EQUALLY SPACED AT  .020 SEC.  (UNITS: CM/SEC/SEC)
 
-and the accelerations, 8 of width 10 a line, which may touch; then velocity and displacement
-likewise. Older files are upper case and may wrap a header line, so that lines are found by what
+and the accelerations, 8 of width 10 a line, which may touch; then velocity and displacement in the
+same way. Older files are upper case and may wrap a header line, so that lines are found by what
 they say. Channels of one file may differ in length. A block ends with ``/&``.
 """
 

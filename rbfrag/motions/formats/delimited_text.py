@@ -11,18 +11,18 @@ line with the names of the columns. The unit comes from there, or from the calle
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from rbfrag.errors import MotionFileError
+from rbfrag.errors import InputError, MotionFileError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.column_header import event_station_component, stated_unit
 from rbfrag.motions.text.file import finite_number, read_text
 from rbfrag.motions.text.record_file import Field, FloatArray, RecordFile, positive_number
 from rbfrag.motions.text.times import sampling_interval
-from rbfrag.motions.units import unit_in_g
+from rbfrag.motions.units import acceleration_unit, unit_in_g
 
 FORMAT = "delimited text"
 
@@ -38,6 +38,36 @@ _NUMBER_LIKE = re.compile(
     r"[+-]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[ed][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE
 )
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*[;\s]\s*[+-]?\d*,\d+\S*\s*")
+
+
+_ACCELERATION = re.compile(r"(?<![A-Za-z])(?:acc|a(?![A-Za-z]))", re.IGNORECASE)
+_OTHER_QUANTITY = re.compile(r"(?<![A-Za-z])(vel|displ?)[a-z]*", re.IGNORECASE)
+_TIME = re.compile(r"(?<![A-Za-z])(?:time|t)(?![A-Za-z])", re.IGNORECASE)
+
+_ACCELERATION_UNIT = re.compile(
+    r"(?<![A-Za-z])(?:acc[^,;\t()\[\]]*|a\s*)[(\[]\s*([^)\]]+?)\s*[)\]]", re.IGNORECASE
+)
+_ACCELERATION_SUFFIX = re.compile(
+    r"(?<![A-Za-z])acc[a-z]*(?:_|\s+in\s+)(g|gal|[cm]?m[_/]s(?:ec)?(?:\^|\*\*)?2)(?![A-Za-z0-9])",
+    re.IGNORECASE,
+)
+_UNITS_WORD = re.compile(
+    r"(?<![A-Za-z])units?\s*(?:of\s+acc[a-z]*\s*)?(?:[:=]|\bof\b|\bare\b|\bin\b)\s*([^\s,;()\[\]]+)",
+    re.IGNORECASE,
+)
+_TIME_UNIT = re.compile(
+    r"(?<![A-Za-z])(?:time[^,;\t()\[\]]*|t\s*)[(\[]\s*([^)\]]+?)\s*[)\]]", re.IGNORECASE
+)
+_SECONDS = frozenset({"s", "sec", "sec.", "secs", "second", "seconds"})
+
+_TITLE = re.compile(
+    r"#\s*(?:Time Series:\s*)?(?P<event>\S.*?\b(?:18|19|20)\d\d)\s+-\s+"
+    r"(?P<station>\S+)-(?P<component>[A-Za-z0-9]+)[\s,;]*",
+    re.IGNORECASE,
+)
+
+Header = Sequence[tuple[int, str]]
+"""Lines above the data with their 1-based numbers."""
 
 
 def recognises(head: str) -> bool:
@@ -65,7 +95,7 @@ def read(file: RecordFile) -> list[GroundMotion]:
         if line.strip()
     ]
     rows = _rows(file, start)
-    unit = stated_unit(file.path, header, file.units)
+    unit = _stated_unit(file, header)
     if len(rows[0][1]) == 1:
         samples = _numbers(file, rows, 0, "acceleration")
         _refuse_gaps(file, rows)
@@ -80,7 +110,7 @@ def read(file: RecordFile) -> list[GroundMotion]:
         remark = f"times in the file start at {first_s:g} s; here they start at 0"
         if first_s == 0.0:
             remark = ""
-    event, station, component = event_station_component(header)
+    event, station, component = _event_station_component(header)
     factor = unit_in_g(unit)
     return [
         file.motion(
@@ -232,3 +262,90 @@ def _indexed_interval(path: Path) -> tuple[float, str] | None:
             )
         found = found or (dt, f"{INDEX}, line {number}")
     return found
+
+
+def _stated_unit(file: RecordFile, header: Header) -> str:
+    """The standard name of the unit of acceleration, which is never guessed."""
+    units = file.units
+    _check_columns(file, header)
+    found: tuple[int, str, str] | None = None
+    unknown: tuple[int, str] | None = None
+    for number, spelling in _spellings(header):
+        try:
+            unit = acceleration_unit(spelling)
+        except InputError:
+            unknown = unknown or (number, spelling)
+            continue
+        if found is not None and found[2] != unit:
+            raise file.error(
+                f"the header says {spelling}, but {found[1]} on line {found[0]}: correct it",
+                number,
+            )
+        found = found or (number, spelling, unit)
+    if found is None and unknown is not None:
+        number, spelling = unknown
+        raise file.error(
+            f"the header gives the acceleration in {spelling!r}, which is no known unit: convert "
+            "the record to g, m/s2, cm/s2 or mm/s2",
+            number,
+        )
+    if found is None and units is None:
+        raise file.error(
+            "the file states no unit of acceleration, and it is never guessed: give it with "
+            "--units g, m/s2, cm/s2 or mm/s2",
+        )
+    if found is None:
+        assert units is not None
+        return acceleration_unit(units)
+    if units is not None and acceleration_unit(units) != found[2]:
+        raise file.error(
+            f"the header says {found[1]}, not {units}: leave --units out, or correct the header",
+            found[0],
+        )
+    return found[2]
+
+
+def _event_station_component(header: Header) -> tuple[str, str, str]:
+    """What a title ``# Northridge 1994 - VSP-360`` says; empty texts for other titles."""
+    match = _TITLE.fullmatch(header[0][1].rstrip()) if header else None
+    return (match["event"], match["station"], match["component"]) if match else ("", "", "")
+
+
+def _spellings(header: Header) -> Iterator[tuple[int, str]]:
+    for number, line in header:
+        names_columns = bool(_TIME.search(line))
+        for match in _ACCELERATION_UNIT.finditer(line):
+            # a title may well have brackets: "Accelerogram (corrected)"
+            if names_columns or _is_unit(match[1]):
+                yield number, match[1]
+        for match in _ACCELERATION_SUFFIX.finditer(line):
+            yield number, match[1].replace("_", "/")
+        for match in _UNITS_WORD.finditer(line):
+            yield number, match[1]
+
+
+def _is_unit(text: str) -> bool:
+    try:
+        acceleration_unit(text)
+    except InputError:
+        return False
+    return True
+
+
+def _check_columns(file: RecordFile, header: Header) -> None:
+    for number, line in header:
+        time = _TIME.search(line)
+        if not time:
+            continue
+        if (unit := _TIME_UNIT.search(line)) and unit[1].lower() not in _SECONDS:
+            raise file.error(
+                f"the times are in {unit[1]!r}: convert them to seconds",
+                number,
+            )
+        acceleration = _ACCELERATION.search(line)
+        other = _OTHER_QUANTITY.search(line)
+        if other and not acceleration:
+            raise file.error(f"the header names {other[0]!r}: an acceleration is needed", number)
+        # a title such as "Accelerations, time series" is no list of columns
+        if acceleration and acceleration.start() < time.start() and _TIME_UNIT.search(line):
+            raise file.error("the acceleration stands before the time: swap the columns", number)

@@ -24,6 +24,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.file import (
     MOST_DIGITS,
     finite_number,
+    holds_integers,
     shown,
     without_blank_end,
 )
@@ -40,6 +41,8 @@ SAME_DT = 1e-9
 
 ROUNDING = 1e-9
 """A computed number of samples is off by no more than this ratio."""
+
+VOLUME_1_NUMBERS = 14
 
 MOST_SIGNIFICANT = 17
 
@@ -223,6 +226,27 @@ class RecordFile:
     def data(self, start: int, stop: int | None = None) -> Sequence[str]:
         """Return the lines of some indices without the blank ones at their end."""
         return without_blank_end(self.lines[start:stop])
+
+    def volume_1_data(self, span: range, header_line: int) -> tuple[int, Sequence[str]]:
+        """Return the index of the first line of samples of a volume 1 block, and all these lines.
+
+        They stand below 7 lines of integers and 7 of reals, and end with a line ``/&``.
+
+        Args:
+            span: indices of the block's lines.
+            header_line: 1-based line of the last header field, above the numbers.
+        """
+        lines = self.lines
+        stop = next((at for at in span if lines[at].startswith("/&")), span.stop)
+        first = next((at for at in range(header_line, stop) if holds_integers(lines[at])), stop)
+        first += VOLUME_1_NUMBERS
+        if first >= stop:
+            raise self.error(
+                f"no samples follow the header: {VOLUME_1_NUMBERS} lines of numbers and then the "
+                "samples were expected; the file is truncated, export the record again",
+                header_line,
+            )
+        return first, self.data(first, stop)
 
     def free_numbers(self, rows: Sequence[str], first_line: int, what: str) -> FloatArray:
         """Return blank-separated numbers of rows, of which the first is this line, from 1."""

@@ -168,8 +168,8 @@ class _Column:
         finest = float(np.min(self.tolerance_s))
         if np.min(steps) < 0.0 or (np.min(steps) == 0.0 and finest > FINE * mean_s):
             return True
-        odd = np.abs(steps - self.usual_step_s) > 1.98 * self.tolerance_s[1:]
-        return bool(0.0 < np.mean(odd) < RARE)
+        off = np.abs(steps - self.usual_step_s) > 1.98 * self.tolerance_s[1:]
+        return bool(0.0 < np.mean(off) < RARE)
 
     def shortest_decimal(self) -> float | None:
         mean = float(self.times_s[-1] - self.times_s[0]) / (self.times_s.size - 1)
@@ -226,13 +226,13 @@ def _unequal(
     steps = np.diff(times_s)
     usual = float(np.median(steps))
     slack = tolerance[1:] + tolerance[:-1]
-    odd = np.flatnonzero((steps < 0.0) | (np.abs(steps - usual) > slack))
+    off = np.flatnonzero((steps < 0.0) | (np.abs(steps - usual) > slack))
     if usual <= 0.0:
-        odd = np.flatnonzero(steps <= 0.0)
-    if not odd.size:
+        off = np.flatnonzero(steps <= 0.0)
+    if not off.size:
         drift = times_s - times_s[0] - usual * np.arange(times_s.size)
-        odd = np.flatnonzero(np.abs(drift[1:]) > tolerance[1:])
-    at = int(odd[0]) + 1 if odd.size else 1
+        off = np.flatnonzero(np.abs(drift[1:]) > tolerance[1:])
+    at = int(off[0]) + 1 if off.size else 1
     step = float(steps[at - 1])
     if step <= 0.0:
         reason = f"time {tokens[at]} s follows {tokens[at - 1]} s: times must rise from row to row"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fastapi import APIRouter, Request, Response
 
 from rbfrag.service import work
-from rbfrag.service.body import MULTIPART, Bodies
+from rbfrag.service.body import FILE_FORM, MULTIPART, Bodies
 from rbfrag.service.documents import HazardAnswer
 from rbfrag.service.json_body import answer
 from rbfrag.service.operation import (
@@ -59,13 +59,7 @@ EXAMPLE = "pgv_m_s,annual_rate\n0.05,0.05\n0.1,0.02\n0.2,0.006\n0.5,0.0008\n1.0,
 
 
 def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
-    """Return the operation on `/v1/hazard`.
-
-    Args:
-        settings: the database.
-        bodies: reads what is sent.
-        pool: where the work is done.
-    """
+    """Return the operation on `/v1/hazard`."""
     routes = plain_router()
 
     @routes.post(
@@ -77,14 +71,7 @@ def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
             body={
                 "text/csv": {"schema": {"type": "string"}, "example": EXAMPLE},
                 "application/json": {"schema": {"type": "object"}},
-                MULTIPART: {
-                    "schema": {
-                        "type": "object",
-                        "properties": {"file": {"type": "string", "format": "binary"}},
-                        "required": ["file"],
-                        "additionalProperties": False,
-                    }
-                },
+                MULTIPART: FILE_FORM,
             },
             description="What `rbfrag hazard --json` prints for the curve that is sent: OpenQuake "
             "CSV, USGS NSHM JSON, or CSV of two columns whose header names their units.",

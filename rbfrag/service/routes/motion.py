@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request, Response
 
 from rbfrag.errors import InputError
 from rbfrag.service import work
-from rbfrag.service.body import MULTIPART, Bodies
+from rbfrag.service.body import FILE_FORM, MULTIPART, Bodies
 from rbfrag.service.documents import CriticalAnswer, SpectrumAnswer
 from rbfrag.service.json_body import answer
 from rbfrag.service.operation import P2, Parameter, by_name, operation, plain_router, read_query
@@ -77,25 +77,13 @@ ACCELEROGRAM = {
         "example": work.EXAMPLE,
     },
     "text/plain": {"schema": {"type": "string"}, "example": work.EXAMPLE},
-    MULTIPART: {
-        "schema": {
-            "type": "object",
-            "properties": {"file": {"type": "string", "format": "binary"}},
-            "required": ["file"],
-            "additionalProperties": False,
-        }
-    },
+    MULTIPART: FILE_FORM,
 }
 """An accelerogram in any format that rbfrag reads, as the body itself or as a form's one file."""
 
 
 def router(bodies: Bodies, pool: WorkerPool) -> APIRouter:
-    """Return the operations on accelerograms.
-
-    Args:
-        bodies: reads what is sent.
-        pool: where the work is done.
-    """
+    """Return the operations on accelerograms."""
     routes = plain_router()
 
     @routes.post(

@@ -83,13 +83,7 @@ _FORMS: dict[str, Literal["toml", "json", "csv"]] = {
 
 
 def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
-    """Return the operation on `/v1/rockmass`.
-
-    Args:
-        settings: database and limits.
-        bodies: reads what is sent.
-        pool: where the work is done.
-    """
+    """Return the operation on `/v1/rockmass`."""
     routes = plain_router()
 
     @routes.post(

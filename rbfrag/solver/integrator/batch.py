@@ -12,7 +12,7 @@ from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.integrator.single_run import run_toppling
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
-from rbfrag.solver.integrator.vectorised import run_in_lanes
+from rbfrag.solver.integrator.vectorised import run_batch
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -129,7 +129,7 @@ def simulate_many(drive: Excitation, *, p2: ArrayLike, kr: ArrayLike, linear: bo
     if linear:
         run_blocks(*arrays, drive.jump_node, flat_kr, p, True, ORDER, PH_MAX, whole, real)
     else:
-        run_in_lanes(*arrays, drive.jump_node, flat_kr, p, PH_MAX, whole, real)
+        run_batch(*arrays, drive.jump_node, flat_kr, p, PH_MAX, whole, real)
     theta_c = flat_kr if linear else np.arctan(flat_kr)
     return Runs(
         outcome=whole[0].reshape(shape),

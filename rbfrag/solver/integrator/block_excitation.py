@@ -18,21 +18,21 @@ FloatArray = NDArray[np.float64]
 
 @kernel
 def linear_drive(
-    interval_s: FloatArray, k_h: FloatArray, p: float, still: FloatArray
+    interval_s: FloatArray, k_h: FloatArray, p: float, remaining: FloatArray
 ) -> tuple[float, int]:
     """Fill what of the drive is still to come; return its maximum and the node after it.
 
-    `still` at a node is G(t) = p integral_t^inf k_h(s) exp(-p (s - t)) ds, by G' = p (G - k_h)
+    `remaining` at a node is G(t) = p integral_t^inf k_h(s) exp(-p (s - t)) ds, by G' = p (G - k_h)
     from the end backwards. In the linear model without vertical motion a block topples from
     (theta, theta') if theta'/p + G > theta_c - theta; the maximum of G, which may lie inside
-    an interval where G = k_h, is the largest critical angle over all fresh starts.
+    an interval where G = k_h, is the largest critical angle over all starts from rest.
     """
     g = 0.0
     greatest = 0.0
     where = 0
     h = -1.0
     decay = 0.0
-    still[k_h.size - 1] = 0.0
+    remaining[k_h.size - 1] = 0.0
     for i in range(interval_s.size - 1, -1, -1):
         if interval_s[i] != h:
             h = interval_s[i]
@@ -49,7 +49,7 @@ def linear_drive(
                         greatest = turn
                         where = i + 1
             g = k_h[i] + slope / p + rest * decay
-        still[i] = g
+        remaining[i] = g
         if g > greatest:
             greatest = g
             where = i
@@ -73,9 +73,9 @@ class Ground(NamedTuple):
         q: k_h/(1 + k_v) at the nodes, shape (n,).
         tail_min_q: least q from each node on, rest after the record included, shape (n,).
         block_max_q: greatest q of each block of nodes.
-        still: what of the drive is to come (`rbfrag.solver.integrator.block_excitation`), shape
+        remaining: what of the drive is to come (`rbfrag.solver.integrator.block_excitation`), shape
             (n,).
-        still_max: greatest of it.
+        remaining_max: greatest of it.
         still_node: node after that.
         spans: rows of `rbfrag.solver.integrator.spans`, of one length after the other.
         span_length: intervals of a span, by falling length, shape (levels,).
@@ -96,8 +96,8 @@ class Ground(NamedTuple):
     q: FloatArray
     tail_min_q: FloatArray
     block_max_q: FloatArray
-    still: FloatArray
-    still_max: float
+    remaining: FloatArray
+    remaining_max: float
     still_node: int
     spans: FloatArray
     span_length: IntArray
@@ -111,18 +111,20 @@ class Ground(NamedTuple):
     uc: FloatArray
 
 
-def ground_of(drive: Excitation, *, p2: float, linear: bool, span_ph: float = SPAN_PH) -> Ground:
+def block_excitation(
+    drive: Excitation, *, p2: float, linear: bool, span_ph: float = SPAN_PH
+) -> Ground:
     """Bring together what the kernels need.
 
     Args:
         drive: the excitation; 1 + k_v > 0 throughout.
         p2: frequency parameter p² [1/s²].
-        linear: the linear model, which is flown without spans.
+        linear: the linear model, which is integrated without spans.
         span_ph: greatest p·T of a span.
     """
     p = math.sqrt(p2)
-    still = np.empty(drive.q.size)
-    greatest, node = linear_drive(drive.interval_s, drive.k_h, p, still)
+    remaining = np.empty(drive.q.size)
+    greatest, node = linear_drive(drive.interval_s, drive.k_h, p, remaining)
     lengths: list[int] = []
     if not linear and drive.interval_s.size:
         usual_s = float(drive.time_s[-1] - drive.time_s[0]) / drive.interval_s.size
@@ -136,8 +138,8 @@ def ground_of(drive: Excitation, *, p2: float, linear: bool, span_ph: float = SP
         q=drive.q,
         tail_min_q=drive.tail_min_q,
         block_max_q=drive.block_max_q,
-        still=still,
-        still_max=greatest,
+        remaining=remaining,
+        remaining_max=greatest,
         still_node=node,
         spans=np.concatenate([np.empty((0, COLUMNS)), *tables]),
         span_length=np.array(lengths, dtype=np.int64),

@@ -47,7 +47,7 @@ def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
 def within(function: Callable[P, R]) -> Callable[P, R]:
     """Put the operations of a function into every kernel that calls it.
 
-    They are then compiled with that kernel, by its rules and in the lanes of its loops.
+    They are then compiled with that kernel, by its rules and vectorised in its loops.
     """
     return cast("Callable[P, R]", njit(inline="always", error_model="numpy")(function))
 

@@ -1,4 +1,4 @@
-"""What happens inside one step: peaks, dips below zero, the re-seat."""
+"""What happens inside one step: peaks, dips below zero, the impact."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def examine_step(
     """Find what happens inside one step.
 
     The step is cut at the turning points of theta into monotone stretches, so a peak and a
-    re-seat in one step, or a dip below zero between two positive ends, are all seen.
+    impact in one step, or a dip below zero between two positive ends, are all seen.
 
     Returns:
-        tau of the re-seat or -1; peak, -1 where theta has no maximum before the re-seat; tau
+        tau of the impact or -1; peak, -1 where theta has no maximum before the impact; tau
         of the peak; lowest minimum above zero, infinite where there is none.
     """
     v_start = u[1]

@@ -26,7 +26,7 @@ from rbfrag.solver.integrator.taylor import (
 
 FloatArray = NDArray[np.float64]
 
-RESEATED, TOPPLED, IN_AIR, STOPPED, ORDER_LOST = 0, 1, 2, 3, 4
+IMPACT, TOPPLED, IN_AIR, STOPPED, ORDER_LOST = 0, 1, 2, 3, 4
 
 ORDER = 8
 
@@ -111,7 +111,7 @@ def order_lost(
 
 
 @kernel
-def fly(
+def integrate_excursion(
     g: Ground,
     kr: float,
     i: int,
@@ -127,7 +127,7 @@ def fly(
     check: int,
     kr_other: float,
 ) -> tuple[int, int, float, float, float, float, float, int]:
-    """Fly a block from (i, tau) until it re-seats, topples, or the stop or the end is reached.
+    """Integrate an excursion from (i, tau) until the block impacts, topples or the stop comes.
 
     Args:
         interval_s: interval lengths [s], shape (n - 1,).
@@ -145,7 +145,7 @@ def fly(
         s: sin(theta_c - theta) at the start.
         c: cos(theta_c - theta) at the start.
         lifting: theta >= 0, theta' >= 0 and q >= kr at the start: until q next falls below
-            kr the rotation rate cannot become negative, so that no re-seat is looked for.
+            kr the rotation rate cannot become negative, so that no impact is looked for.
         stop_i: interval of the stop; n - 1 for none.
         stop_tau: fraction of it.
         touch: False continues below theta = 0 (a virtual motion).
@@ -262,7 +262,7 @@ def fly(
                         if x >= 0.0:
                             rate = min(value(u, ORDER, x) / ph, 0.0)
                             s, c = rest_state(kr, linear)
-                            return RESEATED, i, min(at + part * x, 1.0), 0.0, rate, s, c, steps
+                            return IMPACT, i, min(at + part * x, 1.0), 0.0, rate, s, c, steps
                 theta = theta_end
                 if linear:
                     s -= turned

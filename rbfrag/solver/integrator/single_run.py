@@ -5,7 +5,7 @@
 
 theta is the forward rotation about the toe; theta_c = atan(k_r). In the linear model, kept
 for verification against closed forms, sin is replaced by its argument, cos by 1, and
-theta_c = k_r. Events: lift-off (an upward crossing of the threshold), re-seat (theta back
+theta_c = k_r. Events: lift-off (an upward crossing of the threshold), impact (theta back
 to 0, without rebound; motion restarts at once if the threshold is exceeded), and the
 verdict "irrecoverable". After the last sample the ground is at rest and the verdict is
 closed-form, by energy.
@@ -156,12 +156,12 @@ def run_toppling(
     i = 0
     tau = 0.0  # position inside interval i
     moving = False
-    fresh = False  # starting at an upward crossing: no re-seat is possible in the first step
+    just_lifted = False  # starting at an upward crossing: no impact is possible in the first step
     theta = 0.0
     rate = 0.0  # theta'/p
     error = 0.0  # bound on |error of theta| + |error of theta'/p|
-    drift = 0.0  # closer bound on the error of theta alone, which times a re-seat
-    lost = False  # whether a re-seat may as well have been a fall: the error hid the difference
+    drift = 0.0  # closer bound on the error of theta alone, which times an impact
+    lost = False  # whether an impact may as well have been a fall: the error hid the difference
     hands_over = state.size > 0 and state[TO_THE_END] <= 0.0
     entered = -1  # interval at which a state was taken over
     if state.size > 0 and state[AT_INTERVAL] >= 0.0:
@@ -182,7 +182,7 @@ def run_toppling(
         moved = int(state[SAMPLES])
 
     while i < last:
-        if hands_over and moving and tau == 0.0 and not fresh and i > entered:
+        if hands_over and moving and tau == 0.0 and not just_lifted and i > entered:
             state[AT_INTERVAL] = i
             state[THETA] = theta
             state[RATE] = rate
@@ -213,11 +213,11 @@ def run_toppling(
                 else:
                     tau = -g0 / (g1 - g0)
                     moving = True
-                    fresh = True
-            elif g1 > 0.0:  # at rest inside the interval, after a re-seat
+                    just_lifted = True
+            elif g1 > 0.0:  # at rest inside the interval, after an impact
                 tau = min(max(tau, -g0 / (g1 - g0)), 1.0)
                 moving = True
-                fresh = True
+                just_lifted = True
             else:
                 i += 1
                 tau = 0.0
@@ -236,11 +236,11 @@ def run_toppling(
                 filled += 1
 
         left = interval_s[i] * (1.0 - tau)
-        reseat_at = -1.0
+        impact_at = -1.0
         if left <= 0.0:
             # a jump, or a start at the very end of the interval: what follows decides
             moving = theta != 0.0 or rate != 0.0
-            fresh = False
+            just_lifted = False
         else:
             if i != counted:
                 counted = i
@@ -289,11 +289,11 @@ def run_toppling(
                 error = error * _exponential(growth) + truncation + rounding
                 drift += ph * error + truncation + 2.0 * MACHINE_EPSILON * abs(theta_end)
 
-                if fresh:
-                    fresh = False
+                if just_lifted:
+                    just_lifted = False
                     if theta_end <= 0.0 or u_end <= 0.0:
                         theta_end = 0.0
-                        reseat_at = at + part
+                        impact_at = at + part
                 else:
                     u_start = u[0]
                     v_start = u[1]
@@ -325,12 +325,12 @@ def run_toppling(
                             history[3, filled] = -1.0
                             filled += 1
                         if x >= 0.0:
-                            reseat_at = at + part * x
+                            impact_at = at + part * x
                             rate = value(u, order, x) / ph
                         elif low <= drift:
                             # it may have touched after all, and lost the speed of the touch
                             error += math.sqrt(2.0 * max(g0, g1, 0.0) * c_rest * drift)
-                if reseat_at >= 0.0:
+                if impact_at >= 0.0:
                     break
                 theta = theta_end
                 rate = u_end / ph
@@ -351,10 +351,10 @@ def run_toppling(
                                 TOPPLED, math.nan, started_s, verdict_s, error, steps, moved, 0,
                             )  # fmt: skip
 
-        if reseat_at >= 0.0:
+        if impact_at >= 0.0:
             moving = False
-            stuck = reseat_at <= tau
-            tau = min(reseat_at, 1.0)
+            stuck = impact_at <= tau
+            tau = min(impact_at, 1.0)
             g = g0 + (g1 - g0) * tau
             impact = abs(rate)
             push = max(g * c_rest, 0.0)  # theta''/p² at theta = 0
@@ -382,7 +382,7 @@ def run_toppling(
                 # block at rest; a rising one starts it as an upward crossing does.
                 if g1 > g0:
                     moving = True
-                    fresh = True
+                    just_lifted = True
                     theta = 0.0
                     rate = 0.0
                     s[0] = s_rest

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.integrator.block_excitation import Ground, ground_of
+from rbfrag.solver.integrator.block_excitation import Ground, block_excitation
 from rbfrag.solver.results import MAP_DEPTH, RESOLUTION
 from rbfrag.solver.search.lower_bound import all_topple_below
 from rbfrag.solver.search.march import (
@@ -66,7 +66,7 @@ class CertifiedMap:
         point: a k_r of an undecided interval whose block topples, or NaN, shape (n,).
         reached: k_r down to which verdicts were given.
         complete: False when the step budget ended the search early.
-        runs: motions flown.
+        runs: motions integrated.
         steps: integration steps taken.
     """
 
@@ -107,18 +107,18 @@ def keeps_order(drive: Excitation, linear: bool) -> bool:
     return bool((highest * -drive.q).max() <= 1.0)
 
 
-def surely_topples_below(ground: Ground, drive: Excitation, bottom: float, top: float) -> float:
+def surely_topples_below(g: Ground, drive: Excitation, bottom: float, top: float) -> float:
     """Return a k_r below which every block topples, `bottom` where none is known.
 
     Args:
-        ground: the ground under the blocks.
+        g: the excitation of the blocks.
         drive: the excitation.
         bottom: least k_r of interest.
         top: greatest k_r of interest.
     """
-    if ground.linear or not keeps_order(drive, False):
+    if g.linear or not keeps_order(drive, False):
         return bottom
-    return float(all_topple_below(ground, bottom, top, MARGIN)[0])
+    return float(all_topple_below(g, bottom, top, MARGIN)[0])
 
 
 def certified_map(
@@ -142,10 +142,8 @@ def certified_map(
             as wide as RESOLUTION.
     """
     check = not keeps_order(drive, linear)
-    ground = ground_of(drive, p2=p2, linear=linear)
-    code, _, k_up, runs, steps = upper_bound(
-        ground, bottom, drive.max_q, MARGIN, 0.1 * DEPTH, check
-    )
+    g = block_excitation(drive, p2=p2, linear=linear)
+    code, _, k_up, runs, steps = upper_bound(g, bottom, drive.max_q, MARGIN, 0.1 * DEPTH, check)
     if code == AT_THE_TOP:
         k_up = drive.max_q
     if code == NOTHING_FAILS:
@@ -155,28 +153,28 @@ def certified_map(
     low, high, point = (np.empty(MAX_INTERVALS) for _ in range(3))
     verdict = np.empty(MAX_INTERVALS, dtype=np.int64)
     count, reached, made_runs, made_steps = march(
-        ground, k_up, bottom, MARGIN, DEPTH, 0.0, ORDERLESS_DEPTH, FIRST_STEP, check,
+        g, k_up, bottom, MARGIN, DEPTH, 0.0, ORDERLESS_DEPTH, FIRST_STEP, check,
         TO_BRACKET, 0.0, False, STEP_BUDGET, low, high, verdict, point,
     )  # fmt: skip
     runs += made_runs
     steps += made_steps
     if full and reached > bottom and made_steps < STEP_BUDGET:
         more, reached, made_runs, made_steps = march(
-            ground, reached, bottom, MARGIN, DEPTH, 0.0, ORDERLESS_DEPTH, FIRST_STEP, check,
+            g, reached, bottom, MARGIN, DEPTH, 0.0, ORDERLESS_DEPTH, FIRST_STEP, check,
             TO_ISLAND, RESOLUTION * drive.pga_g, True, MAP_STEPS,
             low[count:], high[count:], verdict[count:], point[count:],
         )  # fmt: skip
         count += more
         runs += made_runs
         steps += made_steps
-        floor = surely_topples_below(ground, drive, bottom, reached)
+        floor = surely_topples_below(g, drive, bottom, reached)
         if floor < reached:
             margin = MARGIN
             if map_depth >= 100.0 * MAP_MARGIN:
                 margin = MAP_MARGIN
-                ground = ground_of(drive, p2=p2, linear=linear, span_ph=MAP_SPAN_PH)
+                g = block_excitation(drive, p2=p2, linear=linear, span_ph=MAP_SPAN_PH)
             more, reached, made_runs, made_steps = march(
-                ground, reached, floor, margin, DEPTH, map_depth * drive.pga_g,
+                g, reached, floor, margin, DEPTH, map_depth * drive.pga_g,
                 ORDERLESS_DEPTH, FIRST_STEP, check, TO_BOTTOM, 0.0, True, MAP_STEPS,
                 low[count:], high[count:], verdict[count:], point[count:],
             )  # fmt: skip

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Excitation, kept_excitation, motion_remarks
-from rbfrag.solver.integrator.block_excitation import ground_of
+from rbfrag.solver.integrator.block_excitation import block_excitation
 from rbfrag.solver.integrator.single_run import TOPPLED, Run
 from rbfrag.solver.results import (
     MAP_DEPTH,
@@ -195,12 +195,12 @@ class _Search:
         resolution = RESOLUTION * pga
         lower = self.lower * pga
         if found.complete:
-            ground = ground_of(drive, p2=self.p2, linear=self.linear)
-            islands, made = islands_of_map(found, ground, lower, resolution)
+            g = block_excitation(drive, p2=self.p2, linear=self.linear)
+            islands, made = islands_of_map(found, g, lower, resolution)
         else:
-            ground = ground_of(drive, p2=self.p2, linear=self.linear, span_ph=MAP_SPAN_PH)
-            floor = surely_topples_below(ground, drive, bottom, lower)
-            islands, made = islands_by_blocks(ground, lower, floor, bottom, resolution)
+            g = block_excitation(drive, p2=self.p2, linear=self.linear, span_ph=MAP_SPAN_PH)
+            floor = surely_topples_below(g, drive, bottom, lower)
+            islands, made = islands_by_blocks(g, lower, floor, bottom, resolution)
         self.n_runs += made
         self.island_width = islands.width / pga
         self.resolved = None if islands.resolved is None else islands.resolved / pga

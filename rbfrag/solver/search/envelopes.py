@@ -2,10 +2,10 @@
 
 With q = k_h/(1 + k_v) and D = k_h sin(phi) + (1 + k_v) cos(phi) >= 0, the acceleration of the
 block grows with theta and falls with k_r. Hence a motion that is ahead of another in theta and
-theta' stays so until the other re-seats, and a smaller k_r only adds to its lead. A motion
+theta' stays so until the other impacts, and a smaller k_r only adds to its lead. A motion
 *ahead*, with the smallest k_r and the earliest start, and one *behind*, with the largest k_r
 and the latest start, enclose every block between. Rules A to E say how the enclosure is carried
-through re-seats and new starts.
+through impacts and new starts.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from rbfrag.solver.integrator.block_excitation import Ground
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.integrator.excursion import (
+    IMPACT,
     IN_AIR,
     ORDER,
     ORDER_LOST,
-    RESEATED,
     STOPPED,
     TOPPLED,
-    fly,
+    integrate_excursion,
     rest_state,
 )
 from rbfrag.solver.integrator.taylor import bracketed_root
@@ -49,16 +49,16 @@ def decide(
     """Decide whether all blocks with k_r in [k1, k2] topple, or none, if that can be told.
 
     Args:
-        g: the ground under a block.
+        g: the excitation of a block.
         k1: smallest k_r.
         k2: greatest k_r.
-        margin: the enclosing motions are flown with k1 (1 - margin) and k2 (1 + margin).
+        margin: the enclosing motions are integrated with k1 (1 - margin) and k2 (1 + margin).
         check: check D >= 0 on the way.
-        starts: fresh excursions of a k_r <= k1.
+        starts: excursions from rest of a k_r <= k1.
         at_rest: node at which all blocks are at rest, and from which on the excursions count.
 
     Returns:
-        Verdict, a k_r to split at (NaN for anywhere), flights, steps.
+        Verdict, a k_r to split at (NaN for anywhere), trajectories, steps.
     """
     interval_s = g.interval_s
     k_h = g.k_h
@@ -71,20 +71,20 @@ def decide(
     u = g.u
     n = q.size
     steps = 0
-    flights = 0
+    trajectories = 0
     ka = k1 * (1.0 - margin)
     kb = k2 * (1.0 + margin)
     sa0, ca0 = rest_state(ka, linear)
     sb0, cb0 = rest_state(kb, linear)
 
     rest, _ = last_rest(g, starts, at_rest, at_rest, at_rest)
-    ib = rest  # first and last re-seat
+    ib = rest  # first and last impact
     tb = 0.0
     ia = rest
     ta = 0.0
-    in_air = False  # the motion ahead is still in the air when the record ends
-    mixable = False  # the flight before this rest lets rule E be tried
-    # the motions at the first re-seat, for rule E
+    in_air = False  # the upper bounding trajectory is still off its base when the record ends
+    mixable = False  # the trajectory before this rest lets rule E be tried
+    # the motions at the first impact, for rule E
     ixb = 0
     txb = 0.0
     rate_b = 0.0
@@ -96,7 +96,7 @@ def decide(
     for _ in range(4 * n + 16):
         ie, te = next_start(k_h, w, q, block_max_q, k1, ib, tb)
         if ie >= n or not fails_after(g, starts, ie):
-            return ALL_SAFE, math.nan, flights, steps
+            return ALL_SAFE, math.nan, trajectories, steps
         code = APART
         il = 0
         tl = 0.0
@@ -113,7 +113,7 @@ def decide(
         else:
             mixed = False
             if mixable:
-                # rule E: carry the motion behind on below zero until it turns
+                # rule E: carry the lower bounding trajectory on below zero until it turns
                 i = ixb
                 tau = txb
                 theta = 0.0
@@ -123,7 +123,7 @@ def decide(
                 while i < n - 1 and q[i + 1] > kb:
                     il = i
                     tl = tau
-                    event, i, tau, theta, rate, s, c, made = fly(
+                    event, i, tau, theta, rate, s, c, made = integrate_excursion(
                         g,
                         kb,
                         i,
@@ -144,18 +144,18 @@ def decide(
                         mixed = True
                         left = 1.0 - tl
                         if p * interval_s[il] * left <= ph_max and u[0] < 0.0:
-                            # all have theta' >= 0 from where the motion behind turns
+                            # all have theta' >= 0 from where the lower trajectory turns
                             turn_at = bracketed_root(1, theta, u, ORDER, 0.0, 1.0)
                             tl = min(tl + turn_at * left + 1e-13, 1.0)
                         else:
                             il = i
                             tl = 0.0
                         break
-                flights += 1
+                trajectories += 1
                 mixable = False
             if mixed:
-                # ahead of those that have not re-seated since, and of those that have
-                event, _, _, theta, rate, s, c, made = fly(
+                # ahead of those that have had no impact since, and of those that have
+                event, _, _, theta, rate, s, c, made = integrate_excursion(
                     g,
                     ka,
                     ixb,
@@ -172,7 +172,7 @@ def decide(
                     0.0,
                 )
                 steps += made
-                event, ixa, txa, theta_a, rate_a, s_a, c_a, made = fly(
+                event, ixa, txa, theta_a, rate_a, s_a, c_a, made = integrate_excursion(
                     g,
                     ka,
                     ixb,
@@ -190,7 +190,7 @@ def decide(
                 )
                 steps += made
                 if event != STOPPED:
-                    return SPLIT, math.nan, flights, steps
+                    return SPLIT, math.nan, trajectories, steps
                 if theta > theta_a:
                     theta_a = theta
                     s_a = s
@@ -200,7 +200,7 @@ def decide(
                 rest_from = 2 * n if in_air else (ia + 1 if ta > 0.0 else ia)
                 rest, failing = last_rest(g, starts, ib, rest_from, -1)
                 if failing < 0:
-                    return ALL_SAFE, math.nan, flights, steps
+                    return ALL_SAFE, math.nan, trajectories, steps
                 if rest > ib:
                     ib = rest
                     ia = rest
@@ -208,8 +208,8 @@ def decide(
                     ta = 0.0
                     in_air = False
                     continue
-                # rule F: what starts in this stretch is behind the motion ahead from e
-                event, i, tau, _, _, _, _, made = fly(
+                # rule F: what starts in this stretch is below the upper trajectory from e
+                event, i, tau, _, _, _, _, made = integrate_excursion(
                     g,
                     ka,
                     ie,
@@ -226,13 +226,13 @@ def decide(
                     kb,
                 )
                 steps += made
-                flights += 1
+                trajectories += 1
                 if event == ORDER_LOST:
-                    return NO_ORDER, math.nan, flights, steps
+                    return NO_ORDER, math.nan, trajectories, steps
                 if event == TOPPLED:
                     if k1 < peak < k2:
-                        return SPLIT, peak, flights, steps
-                    return SPLIT, math.nan, flights, steps
+                        return SPLIT, peak, trajectories, steps
+                    return SPLIT, math.nan, trajectories, steps
                 in_air = in_air or event == IN_AIR
                 node = ie + 1
                 while node < n and q[node] > k1:
@@ -247,17 +247,17 @@ def decide(
                     ta = 0.0
                 continue
 
-        # flight of the motion behind
+        # lower bounding trajectory
         floor = restart_floor(q, k1, k2, il)
         mixable = False
         in_air = False
         if code == TURNED_BACK:
-            event = RESEATED
+            event = IMPACT
             ixb = il
             txb = tl
             rate_b = 0.0
         else:
-            event, ixb, txb, _, rate_b, _, _, made = fly(
+            event, ixb, txb, _, rate_b, _, _, made = integrate_excursion(
                 g,
                 kb,
                 il,
@@ -274,14 +274,14 @@ def decide(
                 0.0,
             )
             steps += made
-            flights += 1
+            trajectories += 1
             if event == ORDER_LOST:
-                return NO_ORDER, math.nan, flights, steps
+                return NO_ORDER, math.nan, trajectories, steps
             if event == TOPPLED:
-                return ALL_TOPPLE, math.nan, flights, steps
+                return ALL_TOPPLE, math.nan, trajectories, steps
         check_ahead = 1 if check else 0
         if event == IN_AIR:
-            event, _, _, _, _, _, _, made = fly(
+            event, _, _, _, _, _, _, made = integrate_excursion(
                 g,
                 ka,
                 ixa,
@@ -298,12 +298,12 @@ def decide(
                 kb,
             )
             steps += made
-            flights += 1
+            trajectories += 1
             if event == ORDER_LOST:
-                return NO_ORDER, math.nan, flights, steps
-            return (ALL_SAFE if event == IN_AIR else SPLIT), math.nan, flights, steps
-        # the motion behind has re-seated; bring the motion ahead there
-        event, ixa, txa, theta_a, rate_a, s_a, c_a, made = fly(
+                return NO_ORDER, math.nan, trajectories, steps
+            return (ALL_SAFE if event == IN_AIR else SPLIT), math.nan, trajectories, steps
+        # the lower bounding trajectory has ended in an impact; bring the upper one there
+        event, ixa, txa, theta_a, rate_a, s_a, c_a, made = integrate_excursion(
             g,
             ka,
             ixa,
@@ -320,17 +320,17 @@ def decide(
             kb,
         )
         steps += made
-        flights += 1
+        trajectories += 1
         if event == ORDER_LOST:
-            return NO_ORDER, math.nan, flights, steps
-        if event == IN_AIR:  # the first re-seat is at the end of the record
-            return ALL_SAFE, math.nan, flights, steps
+            return NO_ORDER, math.nan, trajectories, steps
+        if event == IN_AIR:  # the first impact is at the end of the record
+            return ALL_SAFE, math.nan, trajectories, steps
         if event != STOPPED:
-            return SPLIT, math.nan, flights, steps
+            return SPLIT, math.nan, trajectories, steps
         at = k_h[ixb] + (k_h[ixb + 1] - k_h[ixb]) * txb
         at /= w[ixb] + (w[ixb + 1] - w[ixb]) * txb
         lifting = rate_a >= 0.0 and at >= k1
-        event, ia, ta, _, _, _, _, made = fly(
+        event, ia, ta, _, _, _, _, made = integrate_excursion(
             g,
             ka,
             ixa,
@@ -348,9 +348,9 @@ def decide(
         )
         steps += made
         if event == ORDER_LOST:
-            return NO_ORDER, math.nan, flights, steps
+            return NO_ORDER, math.nan, trajectories, steps
         if event == TOPPLED:
-            return SPLIT, math.nan, flights, steps
+            return SPLIT, math.nan, trajectories, steps
         in_air = event == IN_AIR
         ib = ixb
         tb = txb
@@ -363,4 +363,4 @@ def decide(
             if ia < floor:
                 ia = floor
                 ta = 0.0
-    return SPLIT, math.nan, flights, steps
+    return SPLIT, math.nan, trajectories, steps

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rbfrag.solver.integrator.block_excitation import Ground
 from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.excursion import RESEATED, TOPPLED, fly, rest_state
+from rbfrag.solver.integrator.excursion import IMPACT, TOPPLED, integrate_excursion, rest_state
 from rbfrag.solver.search.renewal import Starts, fails_after, no_starts
 from rbfrag.solver.search.rises import next_start
 
@@ -36,15 +36,15 @@ def linear_distance(
     """
     time_s = g.time_s
     interval_s = g.interval_s
-    still = g.still
+    remaining = g.remaining
     p = g.p
     linear = g.linear
     x = s if linear else math.atan2(s, c)
     end_s = time_s[i]
-    to_come = still[i]
+    to_come = remaining[i]
     if tau > 0.0:
         end_s += tau * interval_s[i]
-        to_come += (still[i + 1] - to_come) * tau
+        to_come += (remaining[i + 1] - to_come) * tau
     start_s = time_s[start_i]
     if start_tau > 0.0:
         start_s += start_tau * interval_s[start_i]
@@ -65,10 +65,10 @@ def follow(
     """Follow a block at rest at a node; return its distance from toppling and the steps taken.
 
     Args:
-        g: the ground under a block.
+        g: the excitation of a block.
         kr: rocking acceleration coefficient.
         node: node of rest.
-        starts: fresh excursions of a k_r <= kr: where none is left that fails, no more is flown.
+        starts: excursions from rest of a k_r <= kr: where none is left that fails, the run ends.
         use: False to do without them.
     """
     k_h = g.k_h
@@ -86,7 +86,7 @@ def follow(
         i, tau = next_start(k_h, w, q, block_max_q, kr, i, tau)
         if i >= n or (use and not fails_after(g, starts, i)):
             break
-        event, at, fraction, _, rate, s, c, made = fly(
+        event, at, fraction, _, rate, s, c, made = integrate_excursion(
             g,
             kr,
             i,
@@ -107,7 +107,7 @@ def follow(
         if event == TOPPLED:
             return distance, steps
         best = max(best, distance)
-        if event != RESEATED:
+        if event != IMPACT:
             break
         i = at
         tau = fraction
@@ -119,7 +119,7 @@ def first_turn(g: Ground, kr: FloatArray, first: int, topples: bool) -> int:
     """Return the number of the first block from `first` on that does not do as said.
 
     Args:
-        g: the ground under a block.
+        g: the excitation of a block.
         kr: rocking acceleration coefficients of blocks at rest when the record begins, shape (m,).
         first: number of the first block to look at.
         topples: what is said.

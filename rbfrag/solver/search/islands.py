@@ -78,7 +78,7 @@ def outcome_intervals(
 
 
 def islands_of_map(
-    found: CertifiedMap, ground: Ground, lower: float, resolution: float
+    found: CertifiedMap, g: Ground, lower: float, resolution: float
 ) -> tuple[Islands, int]:
     """Read the islands off a full map.
 
@@ -88,7 +88,7 @@ def islands_of_map(
 
     Args:
         found: the map, in k_r.
-        ground: the ground under the blocks.
+        g: the excitation of the blocks.
         lower: greatest k_r that topples.
         resolution: width of k_r below which islands are ignored.
 
@@ -112,7 +112,7 @@ def islands_of_map(
             if gap_top is None:
                 gap_top = high
             if width is None:
-                _, floor, runs, _ = border(ground, high, -1.0, bottom, BORDER, 0, unknown, False)
+                _, floor, runs, _ = border(g, high, -1.0, bottom, BORDER, 0, unknown, False)
                 width = lower - floor
             if gap_top - low > resolution:
                 reentrant = True
@@ -131,12 +131,12 @@ def islands_of_map(
 
 
 def islands_by_blocks(
-    ground: Ground, lower: float, floor: float, bottom: float, resolution: float
+    g: Ground, lower: float, floor: float, bottom: float, resolution: float
 ) -> tuple[Islands, int]:
     """Look for islands below the critical value by single blocks: a finding, not a proof.
 
     Args:
-        ground: the ground under the blocks.
+        g: the excitation of the blocks.
         lower: greatest k_r that topples.
         floor: least k_r to look at; every one below it topples, or is below `bottom`.
         bottom: least k_r of interest.
@@ -159,7 +159,7 @@ def islands_by_blocks(
     resolved: float | None = None
     reentrant = False
     while resolved is None or not reentrant:
-        turn = int(first_turn(ground, kr, at, inside))
+        turn = int(first_turn(g, kr, at, inside))
         runs += min(turn, kr.size - 1) - at + 1
         if turn == kr.size:
             edge = bottom
@@ -167,7 +167,7 @@ def islands_by_blocks(
                 break
         else:
             low_side, high_side, made, _ = border(
-                ground, float(kr[turn]), -1.0 if inside else 1.0, float(kr[turn - 1]), BORDER,
+                g, float(kr[turn]), -1.0 if inside else 1.0, float(kr[turn - 1]), BORDER,
                 0, unknown, False,
             )  # fmt: skip
             runs += made

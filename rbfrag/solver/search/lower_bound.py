@@ -9,7 +9,7 @@ block that leaves |phi| <= phi_m, tan(phi_m) the greatest of k_r and of what is 
 toppled; within, cos(phi), cos(phi/2) and sin(phi) have bounds. Since theta >= 0, no block that has
 not toppled falls back faster than theta'/p = x - 2 sin(theta_c/2). In a stretch of q > K a motion
 that starts from theta = 0 with that rate, and is carried on below 0 until it turns, is behind every
-block with k_r <= K from there on: those that re-seat meanwhile start again at once. If a block at
+block with k_r <= K from there on: those that impact meanwhile start again at once. If a block at
 rest there topples, all do.
 """
 
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rbfrag.solver.integrator.block_excitation import Ground
 from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.excursion import TOPPLED, fly, rest_state
+from rbfrag.solver.integrator.excursion import TOPPLED, integrate_excursion, rest_state
 
 FloatArray = NDArray[np.float64]
 
@@ -73,13 +73,13 @@ def topples_from_any_state(
     while rate < 0.0:
         if i >= n - 1 or g.q[i + 1] <= kb:
             return False, steps
-        _, i, _, theta, rate, s, c, made = fly(
+        _, i, _, theta, rate, s, c, made = integrate_excursion(
             g, kb, i, 0.0, theta, rate, s, c, False, i + 1, 0.0, False, 0, 0.0
         )
         steps += made
     if i >= n - 1:
         return False, steps
-    event, _, _, _, _, _, _, made = fly(
+    event, _, _, _, _, _, _, made = integrate_excursion(
         g, kb, i, 0.0, 0.0, 0.0, s0, c0, True, n - 1, 0.0, True, 0, 0.0
     )
     return event == TOPPLED, steps + made
@@ -87,10 +87,10 @@ def topples_from_any_state(
 
 @kernel
 def all_topple_below(g: Ground, bottom: float, top: float, margin: float) -> tuple[float, int, int]:
-    """Return K_low between two k_r (`bottom` where none is found), flights, and steps.
+    """Return K_low between two k_r (`bottom` where none is found), trajectories, and steps.
 
     Args:
-        g: the ground under a block; D >= 0 throughout, not the linear model.
+        g: the excitation of a block; D >= 0 throughout, not the linear model.
         bottom: least k_r of interest.
         top: greatest k_r of interest.
         margin: relative margin on k_r.
@@ -98,25 +98,25 @@ def all_topple_below(g: Ground, bottom: float, top: float, margin: float) -> tup
     n = g.q.size
     bound = np.empty(n)
     least_rate(g, top, bound)
-    flights = 0
+    trajectories = 0
     steps = 0
     # in the linear model a state topples if theta'/p + (drive to come) > theta_c - theta
     best = bottom
     node = -1
     for i in range(n - 1):
-        guess = min(min(0.5 * (g.still[i] + bound[i]), g.q[i]), top)
+        guess = min(min(0.5 * (g.remaining[i] + bound[i]), g.q[i]), top)
         if guess > best:
             best = guess
             node = i
     if node < 0:
-        return bottom, flights, steps
+        return bottom, trajectories, steps
     for share in SHARES:
         kr = share * best
         if kr <= bottom:
             break
-        flights += 1
+        trajectories += 1
         good, made = topples_from_any_state(g, kr, margin, node, bound)
         steps += made
         if good:
-            return kr, flights, steps
-    return bottom, flights, steps
+            return kr, trajectories, steps
+    return bottom, trajectories, steps

@@ -99,7 +99,7 @@ def march(
     """Give verdicts from `top` downwards until the goal or `bottom` is reached.
 
     Args:
-        g: the ground under a block.
+        g: the excitation of a block.
         top: k_r to start from.
         bottom: k_r to stop at.
         margin: relative margin on k_r of the enclosing motions.
@@ -122,7 +122,7 @@ def march(
         Number of intervals, k_r reached, runs, steps.
     """
     n = g.q.size
-    # fresh starts over the whole record at one k_r, and over the part of it that they leave
+    # starts from rest over the whole record at one k_r, and over the part of it that they leave
     # open at a greater one
     coarse = no_starts(n)
     coarse_k = math.inf

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rbfrag.solver.integrator.block_excitation import Ground
 from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.excursion import IN_AIR, RESEATED, fly, rest_state
+from rbfrag.solver.integrator.excursion import IMPACT, IN_AIR, integrate_excursion, rest_state
 from rbfrag.solver.integrator.single_run import next_lifting_node
 from rbfrag.solver.search.rises import next_start
 
@@ -22,10 +22,10 @@ _KR, _AHEAD, _OTHER = range(3)
 
 
 class Starts(NamedTuple):
-    """Fresh excursions of one k_r, flown in turn and only as far into the record as is asked.
+    """Excursions from rest of one k_r, each made when asked for, and no further than asked.
 
     Every excursion of a block with a larger k_r starts in a stretch of q above this one and is
-    behind the fresh one, so it is over when that is, and topples only if that does.
+    behind the one from rest, so it is over when that is, and topples only if that does.
 
     Args:
         stretches: first node of each stretch, node after its last, first node at which the
@@ -51,7 +51,7 @@ def no_starts(n: int) -> Starts:
 def begin(
     starts: Starts,
     kr: float,
-    k_ahead: float,
+    k_upper: float,
     kr_other: float,
     check: bool,
     first: int,
@@ -62,7 +62,7 @@ def begin(
     Args:
         starts: the room for the stretches.
         kr: the stretches are those of q > kr.
-        k_ahead: k_r that the excursions are flown with, <= kr.
+        k_upper: k_r that the excursions are integrated with, <= kr.
         kr_other: the largest k_r that conclusions are drawn for.
         check: check D >= 0.
         first: look at stretches from this node on ...
@@ -73,7 +73,7 @@ def begin(
     starts.at[_STOP] = stop
     starts.at[_CHECK] = 1 if check else 0
     starts.levels[_KR] = kr
-    starts.levels[_AHEAD] = k_ahead
+    starts.levels[_AHEAD] = k_upper
     starts.levels[_OTHER] = kr_other
 
 
@@ -96,7 +96,7 @@ def one_more(g: Ground, starts: Starts) -> bool:
     fails = False
     if i < n:
         s0, c0 = rest_state(levels[_AHEAD], g.linear)
-        event, there, fraction, _, _, _, _, made = fly(
+        event, there, fraction, _, _, _, _, made = integrate_excursion(
             g,
             levels[_AHEAD],
             i,
@@ -113,7 +113,7 @@ def one_more(g: Ground, starts: Starts) -> bool:
             levels[_OTHER],
         )
         at[_STEPS] += made
-        if event == RESEATED:
+        if event == IMPACT:
             cover = there + 1 if fraction > 0.0 else there
         else:
             fails = event != IN_AIR
@@ -140,7 +140,7 @@ def all_known(g: Ground, starts: Starts) -> tuple[int, int]:
 
 @kernel
 def work_of(starts: Starts) -> tuple[int, int]:
-    """Return how many excursions were flown so far, and in how many steps."""
+    """Return how many excursions were integrated so far, and in how many steps."""
     return starts.at[_COUNT], starts.at[_STEPS]
 
 
@@ -158,9 +158,9 @@ def last_rest(g: Ground, starts: Starts, ib: int, rest_from: int, at_rest: int) 
     """Find the last instant of rest before the first failing stretch that is still to come.
 
     Args:
-        g: the ground under a block.
-        starts: the fresh excursions.
-        ib: interval of the first re-seat: stretches that end before it are past.
+        g: the excitation of a block.
+        starts: the excursions from rest.
+        ib: interval of the first impact: stretches that end before it are past.
         rest_from: node by which the present excursions are over; larger than any for never.
         at_rest: node at which all are known to be at rest; -1 for none.
 

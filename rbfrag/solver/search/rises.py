@@ -77,14 +77,14 @@ def common_start(
         w: 1 + k_v at the nodes, shape (n,).
         q: k_h/(1 + k_v) at the nodes, shape (n,).
         k2: greatest k_r.
-        kb: k_r of the motion behind, >= k2.
+        kb: k_r of the lower bounding trajectory, >= k2.
         ie: interval of the earliest start e.
         te: its fraction.
-        ia: interval of the last re-seat.
+        ia: interval of the last impact.
         ta: its fraction.
 
     Returns:
-        LIFTED and the first position from the re-seat on with q >= kb, if min(q, kb) does not
+        LIFTED and the first position from the impact on with q >= kb, if min(q, kb) does not
         fall between e and there; TURNED_BACK and a position by which all are lifted, if q turns
         between k2 and kb; APART if q turns lower. Last, the value of q at the turn (NaN where
         it turns at e).
@@ -127,7 +127,7 @@ def restart_floor(q: FloatArray, k1: float, k2: float, i: int) -> int:
     """Rule C: first node at which a block lifted at a position in interval i may start anew.
 
     If q stays >= k2 after the common start and then falls without a rise to <= k1, no block
-    with k_r in [k1, k2] re-seats before q has fallen below its k_r, nor starts before that
+    with k_r in [k1, k2] impacts before q has fallen below its k_r, nor starts before that
     node. -1 where q does otherwise; n if the record ends first.
     """
     n = q.size

@@ -1,4 +1,4 @@
-"""K_up: no block with a larger k_r topples, because no fresh excursion of one does."""
+"""K_up: no block with a larger k_r topples, because no excursion from rest of one does."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rbfrag.solver.integrator.block_excitation import Ground
 from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.excursion import TOPPLED, fly, rest_state
+from rbfrag.solver.integrator.excursion import TOPPLED, integrate_excursion, rest_state
 from rbfrag.solver.integrator.single_run import next_lifting_node
 from rbfrag.solver.search.from_rest import linear_distance
 from rbfrag.solver.search.renewal import END, FAILS, FIRST, all_known, begin, no_starts, work_of
@@ -21,14 +21,14 @@ NOTHING_FAILS, FOUND, AT_THE_TOP = 0, 1, 2
 
 
 @kernel
-def fresh_margin(
+def margin_from_rest(
     g: Ground,
     kr: float,
-    k_ahead: float,
+    k_upper: float,
     first: int,
     stop: int,
 ) -> tuple[float, int, int]:
-    """How far the fresh excursions that begin in [first, stop) are from toppling.
+    """How far the excursions from rest that begin in [first, stop) are from toppling.
 
     Positive if one topples. The size is the linear model's estimate of the distance in k_r:
     good for a secant, and nothing is concluded from it.
@@ -39,10 +39,10 @@ def fresh_margin(
     block_max_q = g.block_max_q
     linear = g.linear
     n = q.size
-    s0, c0 = rest_state(k_ahead, linear)
+    s0, c0 = rest_state(k_upper, linear)
     best = -math.inf
     steps = 0
-    flights = 0
+    trajectories = 0
     node = next_lifting_node(q, block_max_q, first, stop, kr)
     while node > 0 and node < stop and q[node - 1] > kr:
         node -= 1
@@ -50,9 +50,9 @@ def fresh_margin(
         i, tau = next_start(k_h, w, q, block_max_q, kr, max(node - 1, 0), 0.0)
         if i >= n:
             break
-        event, at, fraction, _, rate, s, c, made = fly(
+        event, at, fraction, _, rate, s, c, made = integrate_excursion(
             g,
-            k_ahead,
+            k_upper,
             i,
             tau,
             0.0,
@@ -67,15 +67,15 @@ def fresh_margin(
             0.0,
         )
         steps += made
-        flights += 1
+        trajectories += 1
         distance = linear_distance(g, i, tau, at, fraction, rate, s, c, event == TOPPLED)
         best = max(best, distance)
         while node < n and q[node] > kr:
             node += 1
         node = next_lifting_node(q, block_max_q, node, stop, kr)
-    if flights == 0:
+    if trajectories == 0:
         best = -kr
-    return best, flights, steps
+    return best, trajectories, steps
 
 
 @kernel
@@ -104,17 +104,17 @@ def border_of(
     margin: float,
     width: float,
 ) -> tuple[float, float, bool, int, int]:
-    """Bracket the k_r below which a fresh excursion that begins in [first, stop) topples.
+    """Bracket the k_r below which a excursion from rest that begins in [first, stop) topples.
 
     Returns:
-        A k_r that fails, one that does not (or `top`), whether any fails at all, flights, steps.
+        A k_r that fails, one that does not (or `top`), whether any fails, trajectories, steps.
     """
     low = bottom
     high = top
     at_low = math.inf
     at_high = -math.inf
     known = False
-    flights = 0
+    trajectories = 0
     steps = 0
     side = 0
     tries = 0
@@ -123,11 +123,11 @@ def border_of(
     reach = 0.004
     k = guess
     while high - low > width * high:
-        distance, made_flights, made = fresh_margin(
+        distance, made_trajectories, made = margin_from_rest(
             g, k,
             k * (1.0 - margin), first, stop,
         )  # fmt: skip
-        flights += made_flights
+        trajectories += made_trajectories
         steps += made
         if distance > 0.0:
             known = True
@@ -138,7 +138,7 @@ def border_of(
             side = 1
         else:
             if k <= bottom:
-                return bottom, bottom, known, flights, steps
+                return bottom, bottom, known, trajectories, steps
             high = k
             at_high = distance
             if side < 0:
@@ -163,7 +163,7 @@ def border_of(
                 gauge = high - low
             k = between(low, high, at_low, at_high, side, edge, slow)
             slow = False
-    return low, high, known, flights, steps
+    return low, high, known, trajectories, steps
 
 
 @kernel
@@ -178,30 +178,30 @@ def upper_bound(
     """Find K_up between two k_r.
 
     Args:
-        g: the ground under a block.
+        g: the excitation of a block.
         bottom: least k_r of interest.
         top: greatest q of the record.
-        margin: the excursions are flown with k_r (1 - margin).
+        margin: the excursions are integrated with k_r (1 - margin).
         width: relative width to which K_up is bisected.
         check: check D >= 0; where it fails the answer is `top`.
 
     Returns:
-        NOTHING_FAILS (no fresh excursion at `bottom` topples), FOUND or AT_THE_TOP;
-        a k_r with a failing fresh excursion and K_up; flights; steps.
+        NOTHING_FAILS (no excursion from rest at `bottom` topples), FOUND or AT_THE_TOP;
+        a k_r with a failing excursion from rest and K_up; trajectories; steps.
     """
     q = g.q
     n = q.size
-    guess = g.still_max
+    guess = g.remaining_max
     node = g.still_node
-    flights = 0
+    trajectories = 0
     steps = 0
     starts = no_starts(n)
     begin(starts, top, top * (1.0 - margin), top, check, 0, n)
     count, failing = all_known(g, starts)
-    flights += count
+    trajectories += count
     steps += work_of(starts)[1]
     if failing > 0:
-        return AT_THE_TOP, top, top, flights, steps
+        return AT_THE_TOP, top, top, trajectories, steps
     high = top
     first = 0
     stop = n
@@ -213,11 +213,11 @@ def upper_bound(
         stop = node + 1
         while stop < n and q[stop] > bottom:
             stop += 1
-        low, high, known, made_flights, made = border_of(
+        low, high, known, made_trajectories, made = border_of(
             g,
             bottom, min(guess, top), top, first, stop, margin, width,
         )  # fmt: skip
-        flights += made_flights
+        trajectories += made_trajectories
         steps += made
     if not known:
         low = bottom
@@ -226,12 +226,12 @@ def upper_bound(
         # no other stretch may fail at `high`
         begin(starts, high, high * (1.0 - margin), top, check, 0, n)
         count, failing = all_known(g, starts)
-        flights += count
+        trajectories += count
         steps += work_of(starts)[1]
         if failing == 0:
-            return FOUND if known else NOTHING_FAILS, low, high, flights, steps
+            return FOUND if known else NOTHING_FAILS, low, high, trajectories, steps
         if high >= top:
-            return AT_THE_TOP, top, top, flights, steps
+            return AT_THE_TOP, top, top, trajectories, steps
         known = True
         first = n
         stop = 0
@@ -240,7 +240,7 @@ def upper_bound(
                 first = min(first, starts.stretches[FIRST, m])
                 stop = max(stop, starts.stretches[END, m])
         before = high
-        low, high, _, made_flights, made = border_of(
+        low, high, _, made_trajectories, made = border_of(
             g,
             high,
             high * 1.001,
@@ -250,7 +250,7 @@ def upper_bound(
             margin,
             width,
         )
-        flights += made_flights
+        trajectories += made_trajectories
         steps += made
         if high <= before:  # it is the order of motions that is lost
-            return AT_THE_TOP, top, top, flights, steps
+            return AT_THE_TOP, top, top, trajectories, steps

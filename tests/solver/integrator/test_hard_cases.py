@@ -86,7 +86,7 @@ def brake_to_the_base() -> float:
 def test_grazing_the_base(off: float) -> None:
     """Whether the block touches or turns just above makes no difference to what follows.
 
-    To turn at theta = 0 it needs q > k_r there, so that a touch re-seats it with next to no
+    To turn at theta = 0 it needs q > k_r there, so that a touch have impacts it with next to no
     speed and lifts it again at once: from (0, ~0) either way. But the speed that a touch takes
     away goes as the root of its depth. An error of 1e-16 in theta becomes one of 1e-8 in the
     rate, for any solver in doubles, and the error estimate has to say so.

@@ -14,10 +14,10 @@ from rbfrag.solver.integrator.taylor import step8, turn
 from tests.solver.search.test_critical import shaking
 
 START = (0.3, 0.12, -0.2)
-"""Critical angle, rotation and theta'/p at the start of a flight."""
+"""Critical angle, rotation and theta'/p at the start of a trajectory."""
 
 
-def flown(
+def integrated(
     drive: Excitation, p: float, length: int, nodes: int, rows: int = 0
 ) -> tuple[float, float]:
     """Rotation and theta'/p after `nodes` intervals, by spans of `length` or by single steps."""
@@ -50,15 +50,15 @@ def test_spans_fly_as_single_steps_do(length: int, with_vertical: bool) -> None:
     drive = excitation(shaking(7, npts=600), vertical)
     for ph, error in ((0.04, 3e-8), (0.01, 3e-11)):
         p = ph / (length * 0.01)
-        exact = flown(drive, p, 0, 512)
-        spanned = flown(drive, p, length, 512)
+        exact = integrated(drive, p, 0, 512)
+        spanned = integrated(drive, p, length, 512)
         assert abs(exact[0] - spanned[0]) + abs(exact[1] - spanned[1]) < error
 
 
 def test_what_the_cubics_miss_is_taken_into_account() -> None:
     drive = excitation(shaking(7, npts=600))
     length, p = 32, 0.0125 / 0.32
-    exact = flown(drive, p, 0, 512)
+    exact = integrated(drive, p, 0, 512)
     table = np.empty((16, COLUMNS))
     fill_spans(drive.interval_s, drive.k_h, drive.w, length, table)
     # for a cubic drive nothing is missed
@@ -69,7 +69,7 @@ def test_what_the_cubics_miss_is_taken_into_account() -> None:
     assert np.abs(plain[0, 10:]).max() < 1e-15
     np.testing.assert_allclose(plain[0, 2:10], [0.3, 0.4, 0, 0, 1, 0, 0, 0], atol=1e-13)
     assert np.abs(table[:, 10]).max() > 1e-7
-    spanned = flown(drive, p, length, 512)
+    spanned = integrated(drive, p, length, 512)
     assert abs(exact[0] - spanned[0]) < 1e-10
 
 

@@ -8,7 +8,7 @@ import pytest
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.batch import simulate_many
-from rbfrag.solver.integrator.block_excitation import ground_of
+from rbfrag.solver.integrator.block_excitation import block_excitation
 from rbfrag.solver.integrator.single_run import TOPPLED
 from rbfrag.solver.search.lower_bound import all_topple_below, least_rate
 from rbfrag.solver.toppling_run import respond
@@ -23,8 +23,8 @@ def test_every_block_below_topples(with_vertical: bool) -> None:
         vertical = shaking(seed + 70, pga_g=0.3) if with_vertical else None
         drive = excitation(shaking(seed), vertical)
         for p2 in (30.0, 4.0, 0.5):
-            ground = ground_of(drive, p2=p2, linear=False)
-            low, _, _ = all_topple_below(ground, 1e-3, 0.5, 1e-9)
+            g = block_excitation(drive, p2=p2, linear=False)
+            low, _, _ = all_topple_below(g, 1e-3, 0.5, 1e-9)
             if low > 1e-3:
                 found += 1
                 runs = simulate_many(drive, p2=p2, kr=rng.uniform(1e-3, low, 60))
@@ -37,9 +37,9 @@ def test_no_block_that_stays_falls_back_faster_than_the_bound() -> None:
     for seed in range(6):
         drive = excitation(shaking(seed))
         for p2, kr in ((30.0, 0.2), (4.0, 0.1), (0.5, 0.05)):
-            ground = ground_of(drive, p2=p2, linear=False)
+            g = block_excitation(drive, p2=p2, linear=False)
             bound = np.empty(drive.q.size)
-            least_rate(ground, kr, bound)
+            least_rate(g, kr, bound)
             history = respond(shaking(seed), p2=p2, kr=1.2 * kr, history=True).history
             assert history is not None
             run = respond(shaking(seed), p2=p2, kr=0.9 * kr, history=True)
@@ -47,7 +47,7 @@ def test_no_block_that_stays_falls_back_faster_than_the_bound() -> None:
             if run.outcome != "stable":
                 continue
             phi = np.arctan(0.9 * kr) - run.history.theta_rad
-            x = run.history.theta_dot_rad_s / ground.p + 2.0 * np.sin(0.5 * phi)
+            x = run.history.theta_dot_rad_s / g.p + 2.0 * np.sin(0.5 * phi)
             at_nodes = np.interp(run.history.time_s, drive.time_s, bound)
             nodes = np.isin(run.history.time_s, drive.time_s)
             assert (x >= at_nodes - 1e-12)[nodes].all()
@@ -57,9 +57,9 @@ def test_no_block_that_stays_falls_back_faster_than_the_bound() -> None:
 
 def test_one_long_push_topples_all_that_it_lifts() -> None:
     push = GroundMotion.from_nodes([0.0, 0.0, 20.0, 20.0], [0.0, 0.3, 0.3, 0.0])
-    ground = ground_of(excitation(push), p2=1.0, linear=False)
-    low, _, _ = all_topple_below(ground, 0.001, 0.3, 1e-9)
+    g = block_excitation(excitation(push), p2=1.0, linear=False)
+    low, _, _ = all_topple_below(g, 0.001, 0.3, 1e-9)
     # the linear estimate is half of what is to come: the worst block is falling from balance
     assert 0.14 < low < 0.15
-    nothing, _, _ = all_topple_below(ground, 0.2, 0.3, 1e-9)
+    nothing, _, _ = all_topple_below(g, 0.2, 0.3, 1e-9)
     assert nothing == 0.2

@@ -17,7 +17,7 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.single_run import TOPPLED
 from rbfrag.solver.toppling_run import runner
-from tests.solver.fresh_excursions import largest_failing
+from tests.solver.excursions_from_rest import largest_failing
 from tests.synthetic import shaking
 
 P2 = (30.0, 3.0, 0.3)

@@ -185,7 +185,7 @@ def run_phase(
 
     moving = rate != 0.0 or not sticks
     sense = -1 if rate < 0.0 else 1
-    fresh = False  # started where the acceleration is zero
+    just_lifted = False  # started where the acceleration is zero
     barred = 0  # sense in which the block has just come to a standstill: not resumed at once
     inspect = False  # accelerations have jumped: conditions must be looked at anew
     f_drive = f_resist = r_drive = r_resist = 0.0
@@ -234,7 +234,7 @@ def run_phase(
                 barred = 0
                 continue
             start = 2.0
-            fresh = False
+            just_lifted = False
             if f0 > 0.0 and barred != 1:
                 start = tau
                 sense = 1
@@ -245,13 +245,13 @@ def run_phase(
                 if f1 > 0.0 and f1 > f0:
                     start = tau + (1.0 - tau) * max(-f0, 0.0) / (f1 - f0)
                     sense = 1
-                    fresh = True
+                    just_lifted = True
                 if may_reverse and r1 < 0.0 and r1 < r0:
                     other = tau + (1.0 - tau) * max(r0, 0.0) / (r0 - r1)
                     if other < start:
                         start = other
                         sense = -1
-                        fresh = True
+                        just_lifted = True
             barred = 0
             if start > 1.0:
                 if free:
@@ -398,10 +398,10 @@ def run_phase(
             first = 0
             if rate == 0.0:
                 first = 1
-                if fresh:
+                if just_lifted:
                     u[1] = 0.0
                     first = 2
-                fresh = False
+                just_lifted = False
             # a start that rounding turns into the other sense is none
             standstill = 0.0
             if u[first] * sense > 0.0 or not sticks:

@@ -1,4 +1,4 @@
-"""The map of one combination against its bracket and its simulations."""
+"""The map of one combination against its bracket, its simulations and another map of it."""
 
 from __future__ import annotations
 
@@ -13,6 +13,12 @@ _ROUNDING = 1e-12
 
 # The critical block is taken up to this share of its k_r clear of the border.
 _CLEARANCE = 1.01e-8
+
+BORDER_ERROR = 1e-7
+"""Relative error of a border that another processor's last bits can make."""
+
+Interval = tuple[float, float, str]
+"""Lower end, upper end [k_r/PGA] and outcome."""
 
 
 def interval_problems(
@@ -97,3 +103,28 @@ def _holding(intervals: Sequence[Row[Any]], k: float) -> Row[Any] | None:
         if interval.k_lo * (1.0 + _ROUNDING) < k < interval.k_hi * (1.0 - _ROUNDING):
             return interval
     return None
+
+
+def contradictions(
+    one: Sequence[Interval], other: Sequence[Interval]
+) -> Iterator[tuple[float, float, str, str]]:
+    """Yield stretches that one map has toppling and the other safe.
+
+    Args:
+        one: intervals by rising ends.
+        other: likewise.
+
+    Returns:
+        Lower end, upper end, what the first says, what the second says.
+    """
+    i = j = 0
+    while i < len(one) and j < len(other):
+        low, high, word = one[i]
+        low_2, high_2, word_2 = other[j]
+        bottom, top = max(low, low_2), min(high, high_2)
+        if {word, word_2} == {"topples", "safe"} and top - bottom > BORDER_ERROR * top:
+            yield bottom, top, word, word_2
+        if high <= high_2:
+            i += 1
+        else:
+            j += 1

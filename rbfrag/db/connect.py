@@ -1,0 +1,158 @@
+"""SQLAlchemy engines of a file or a server, whose errors are rbfrag's own."""
+
+from __future__ import annotations
+
+import importlib.util
+import sqlite3
+from pathlib import Path
+from typing import Any, cast
+
+from sqlalchemy import (
+    URL,
+    Connection,
+    Engine,
+    ExceptionContext,
+    QueuePool,
+    create_engine,
+    event,
+    exc,
+    make_url,
+)
+
+from rbfrag.db.sqlite_file import (
+    connect_sqlite,
+    sqlite_error_in_words,
+)
+from rbfrag.errors import (
+    DatabaseBusyError,
+    DatabaseError,
+    DatabaseFailedError,
+    DatabaseNotFoundError,
+    DatabaseReadOnlyError,
+    InputError,
+    MissingExtraError,
+)
+
+BUSY_TIMEOUT_S = 30.0
+"""How long a connection waits for another process's lock [s]."""
+
+
+def database_label(url: URL) -> str:
+    """Return the database as messages name it: the file, or the URL without its password."""
+    if url.get_backend_name() == "sqlite":
+        return url.database or ""
+    return url.set(drivername="postgresql").render_as_string(hide_password=True)
+
+
+def raw_sqlite(connection: Connection) -> sqlite3.Connection:
+    """Return the sqlite3 connection under an SQLAlchemy one."""
+    return cast(sqlite3.Connection, connection.connection.dbapi_connection)
+
+
+def unchecked_engine(
+    place: Path | str,
+    *,
+    read_only: bool = False,
+    foreign_keys: bool = True,
+    busy_timeout_s: float = BUSY_TIMEOUT_S,
+) -> Engine:
+    """Return an engine without asking whose database it is, for checks and migrations.
+
+    Args:
+        place: what :func:`rbfrag.db.location.locate` returned.
+        read_only: forbid writes.
+        foreign_keys: False lets a migration rebuild a table that others point to (SQLite).
+        busy_timeout_s: how long to wait for another process's lock [s].
+    """
+    url = sqlalchemy_url(place)
+    if isinstance(place, Path):
+        engine = _sqlite_engine(url, place, read_only, foreign_keys, busy_timeout_s)
+    else:
+        engine = _server_engine(url, read_only)
+    event.listen(engine, "handle_error", _raise_in_words)
+    return engine
+
+
+def _sqlite_engine(
+    url: URL, path: Path, read_only: bool, foreign_keys: bool, busy_timeout_s: float
+) -> Engine:
+    path = path.absolute()  # the working directory may change while the engine lives
+
+    def connect() -> sqlite3.Connection:
+        raw = connect_sqlite(
+            path, read_only=read_only, busy_timeout_s=busy_timeout_s, check_same_thread=False
+        )
+        if not foreign_keys:
+            raw.execute("PRAGMA foreign_keys = OFF")
+        return raw
+
+    engine = create_engine(url, creator=connect, poolclass=QueuePool)
+    begin = "BEGIN" if read_only else "BEGIN IMMEDIATE"
+
+    def begin_by_hand(connection: Connection) -> None:
+        connection.exec_driver_sql(begin)
+
+    event.listen(engine, "begin", begin_by_hand)
+    return engine
+
+
+def _server_engine(url: URL, read_only: bool) -> Engine:
+    if importlib.util.find_spec("psycopg") is None:
+        raise MissingExtraError("PostgreSQL databases need psycopg", "postgres")
+    # A connection that the server closed between two transactions is replaced without a word.
+    engine = create_engine(url, pool_pre_ping=True)
+    if read_only:
+        # All queries of one transaction see the same moment, as SQLite's do.
+        return engine.execution_options(postgresql_readonly=True, isolation_level="REPEATABLE READ")
+    return engine
+
+
+def sqlalchemy_url(place: Path | str) -> URL:
+    """Return the URL of what :func:`rbfrag.db.location.locate` returned."""
+    if isinstance(place, Path):
+        return URL.create("sqlite", database=str(place))
+    try:
+        url = make_url(place)
+    except (exc.ArgumentError, ValueError):
+        raise InputError(
+            "--db: the URL cannot be read: write it as postgresql://user@host:5432/name"
+        ) from None
+    return url.set(drivername="postgresql+psycopg")
+
+
+def _raise_in_words(context: ExceptionContext) -> None:
+    error = context.original_exception
+    url = context.engine.url if context.engine is not None else None
+    label = database_label(url) if url is not None else "the database"
+    if isinstance(error, sqlite3.Error):
+        if not isinstance(error, sqlite3.IntegrityError | sqlite3.ProgrammingError):
+            raise sqlite_error_in_words(error, label) from error
+        return
+    words = _server_error_in_words(error, label)
+    if words is not None:
+        raise words from error
+
+
+def _server_error_in_words(error: BaseException, label: str) -> DatabaseError | None:
+    # psycopg is an extra: its classes are told by what they carry, not by import.
+    state: Any = getattr(error, "sqlstate", None)
+    if type(error).__module__.partition(".")[0] != "psycopg":
+        return None
+    reason = " ".join(str(error).split())
+    if state is None and type(error).__name__ == "OperationalError":
+        return DatabaseNotFoundError(
+            f"cannot reach {label}: {reason}; check host, port, user and database name"
+        )
+    if state in ("25006", "42501"):  # read_only_sql_transaction, insufficient_privilege
+        return DatabaseReadOnlyError(f"{label} may not be written: {reason}")
+    if state in ("55P03", "40P01", "40001"):  # lock_not_available, deadlock, serialization
+        return DatabaseBusyError(
+            f"{label} is locked by another session; what was finished is kept: run the same "
+            f"command again ({reason})"
+        )
+    if state is not None and state[:2] in ("08", "53", "57", "58"):
+        return DatabaseFailedError(
+            f"{label}: the server gave up: {reason}; what was finished is kept: run the same "
+            "command again"
+        )
+    return None
