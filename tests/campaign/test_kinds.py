@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rbfrag.fragility.fit.check import check_models
-from rbfrag.fragility.fit.fitting import fit
 from sqlalchemy import Engine, select, update
 
 from rbfrag.campaign.resimulate import resimulate
@@ -27,6 +25,8 @@ from rbfrag.db.queries import combination_table
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.exchange.database_tables import export_database
+from rbfrag.fragility.fit.check import check_models
+from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.critical import critical

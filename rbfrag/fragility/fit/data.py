@@ -81,9 +81,14 @@ class FitSource:
     def only(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> FitSource:
         """Return some of the combinations."""
         part = {f.name: getattr(self.table, f.name)[chosen] for f in fields(self.table)}
-        others = (getattr(self, f.name) for f in fields(self)[1:])
+        slid, strength = self.displacement_m, self.strength_g
         return FitSource(
-            CombinationTable(**part), *(None if a is None else a[chosen] for a in others)
+            CombinationTable(**part),
+            self.xp_m_s[chosen],
+            self.k_over_pga[chosen],
+            self.failed[chosen],
+            None if slid is None else slid[chosen],
+            None if strength is None else strength[chosen],
         )
 
     def judged_outcomes(self, strength: FloatArray, critical: FloatArray) -> tuple[FloatArray, str]:

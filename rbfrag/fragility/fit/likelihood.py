@@ -100,8 +100,10 @@ class Binomial:
 
     def only(self, chosen: Chosen) -> Binomial:
         """Return some of the rows."""
-        parts = (self.columns, self.outcome, self.weights, self.event)
-        return Binomial(self.link, *(part[chosen] for part in parts))
+        columns, outcome, weights = (
+            part[chosen] for part in (self.columns, self.outcome, self.weights)
+        )
+        return Binomial(self.link, columns, outcome, weights, self.event[chosen])
 
     def probability(self, b: FloatArray) -> FloatArray:
         """Return P of each row."""

@@ -244,8 +244,9 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
             f"{fit.parameters[1]:.4g}): these motions cannot carry a fragility model in "
             f"{term.symbol}; use another term or more motions"
         )
-    variance = variance_m2_s2(fit.parameters, x)
-    residuals = y - mean_m_s(fit.parameters, x)
+    parameters = fit.parameters.tolist()
+    variance = variance_m2_s2(parameters, x)
+    residuals = y - mean_m_s(parameters, x)
     line, clustered, r_squared = clustered_line(x, y, 1.0 / variance, events)
     naive = naive_line_errors(x, 1.0 / variance, residuals)
     samples, unstable = event_bootstrap(
@@ -266,7 +267,7 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
         here, own = data.event == event, events == event
         held_out[here] = probabilities(method, form, data, part)[here]
         density[own] = _log_density(part, x[own], y[own])
-    mean = mean_m_s(fit.parameters, data.x)
+    mean = mean_m_s(parameters, data.x)
     with np.errstate(divide="ignore", invalid="ignore"):
         ln_residual = np.where(data.found & (mean > 0.0) & (data.y > 0.0),
                                np.log(data.y / mean), np.nan)  # fmt: skip
@@ -367,8 +368,9 @@ def _refuse_without_scatter(x: FloatArray, y: FloatArray) -> None:
 
 
 def _log_density(b: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    variance = variance_m2_s2(b, x)
-    squares = (y - mean_m_s(b, x)) ** 2 / variance
+    parameters = b.tolist()
+    variance = variance_m2_s2(parameters, x)
+    squares = (y - mean_m_s(parameters, x)) ** 2 / variance
     return np.asarray(-0.5 * (np.log(2.0 * np.pi * variance) + squares), dtype=np.float64)
 
 
@@ -390,7 +392,7 @@ def _warnings(
             "intervals are rough"
         )
     result += few_events(n_events)
-    doubtful = negative_share(fit.parameters, x, arrays()) > NEGATIVE_SHARE_LIMIT
+    doubtful = negative_share(fit.parameters.tolist(), x, arrays()) > NEGATIVE_SHARE_LIMIT
     share = float(np.mean(doubtful))
     if share > 0.0:
         low, high = x[doubtful][[0, -1]]

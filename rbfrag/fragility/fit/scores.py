@@ -210,7 +210,10 @@ def calibration_bins(judged: Judged, held_out: FloatArray, *, seed: int = 0) -> 
     def share(chosen: NDArray[np.int64]) -> FloatArray:
         total = count[chosen].sum(axis=0)
         none = np.full(total.shape, np.nan)
-        return np.divide(failures[chosen].sum(axis=0), total, out=none, where=total > 0)
+        found: FloatArray = np.divide(
+            failures[chosen].sum(axis=0), total, out=none, where=total > 0
+        )
+        return found
 
     rng = np.random.default_rng(seed)
     draws = [share(rng.integers(events.size, size=events.size)) for _ in range(REPLICATIONS)]
