@@ -10,8 +10,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from rbfrag.version import __version__
-
 if TYPE_CHECKING:
     from rbfrag.campaign.add_motions import add_motions as add_motions
     from rbfrag.campaign.simulate import simulate as simulate
@@ -25,8 +23,6 @@ if TYPE_CHECKING:
     from rbfrag.exchange.database_tables import read_table as read_table
     from rbfrag.exchange.hazard_curves import read_hazard_curves as read_hazard_curves
     from rbfrag.fragility.fit.fitting import fit as fit
-    from rbfrag.fragility.kind_prediction import predict_sliding as predict_sliding
-    from rbfrag.fragility.kind_prediction import predict_slumping as predict_slumping
     from rbfrag.fragility.predict import predict as predict
     from rbfrag.hazards.answer import HazardAnswer as HazardAnswer
     from rbfrag.hazards.answer import hazard as hazard
@@ -46,8 +42,10 @@ if TYPE_CHECKING:
     from rbfrag.solver.stability.arrays import stability_arrays as stability_arrays
     from rbfrag.solver.stability.single import Stability as Stability
     from rbfrag.solver.stability.single import stability as stability
+    from rbfrag.version import __version__ as __version__
 
 _HOME = {
+    "__version__": "rbfrag.version",
     "Block": "rbfrag.solver.block.geometry",
     "BlockArray": "rbfrag.solver.block.arrays",
     "CriticalResult": "rbfrag.solver.results",
@@ -70,8 +68,6 @@ _HOME = {
     "fit": "rbfrag.fragility.fit.fitting",
     "hazard": "rbfrag.hazards.answer",
     "predict": "rbfrag.fragility.predict",
-    "predict_sliding": "rbfrag.fragility.kind_prediction",
-    "predict_slumping": "rbfrag.fragility.kind_prediction",
     "read_hazard_curves": "rbfrag.exchange.hazard_curves",
     "read_motions": "rbfrag.motions.recognise",
     "read_table": "rbfrag.exchange.database_tables",
@@ -83,7 +79,7 @@ _HOME = {
     "toppling_spectrum": "rbfrag.motions.toppling_spectrum",
 }
 
-__all__ = [*sorted(_HOME), "__version__"]
+__all__ = [*sorted(_HOME)]
 
 
 def __getattr__(name: str) -> object:

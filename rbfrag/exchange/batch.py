@@ -22,48 +22,63 @@ from rbfrag.exchange.batch_table import (
 )
 from rbfrag.exchange.block_table import table_path
 from rbfrag.files import reading, written_whole
-from rbfrag.fragility.answers import PredictionArray
-from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import answer_given
+from rbfrag.fragility.predict import MEASURES, answer_given
+from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.solver.kinds import model_of_kind
 
 FloatArray = NDArray[np.float64]
 
-BLOCK_COLUMNS = {"p2_1_s2": "p2", "kr": "kr"}
-MEASURE_COLUMNS = ("pgv_m_s", "pga_g", "tm_s", "pgd_m")
+BLOCK_COLUMNS = {
+    "p2_1_s2": "p2",
+    "kr": "kr",
+    "ky": "ky",
+    "displacement_m": "displacement_m",
+    "beta_deg": "beta_deg",
+    "ks": "ks",
+    "ps2_1_s2": "ps2",
+    "leaves_g": "leaves_g",
+}
+"""Columns that describe blocks, with the names that `predict` has for them."""
+
 ANSWERS = ("probability", "ci_low", "ci_high", "in_domain", "reason")
 """The columns that are appended; a table that has them gets new ones."""
 
-NUMERIC = (*BLOCK_COLUMNS, *MEASURE_COLUMNS)
+NUMERIC = (*BLOCK_COLUMNS, *MEASURES)
 """Columns that hold numbers."""
 
-NOT_TOPPLING = "the block's mode is {mode}: the toppling model says nothing about it"
+OTHER_MODE = "the block's mode is {mode}: the {kind} model says nothing about it"
 
 
 def predict_table(
     source: str | PathLike[str],
     target: str | PathLike[str],
     *,
-    measures: Mapping[str, float],
+    given: Mapping[str, float],
     model: str | None,
     level: float,
     db: str | PathLike[str] | None,
+    kind: str | None = None,
+    rotation_deg: float | None = None,
 ) -> dict[str, object]:
     """Answer every block of a table and write the table with the answers.
 
     A row that cannot be answered keeps an empty probability and says why; a row whose `mode` is
-    not `topple` is not answered.
+    another than that of the model's kind is not answered.
 
     Args:
-        source: table, ``.csv`` or ``.parquet``, with columns p2_1_s2, kr and measures.
+        source: table, ``.csv`` or ``.parquet``, with columns that describe blocks, and measures.
         target: table to write, of either kind; written whole or not at all.
-        measures: measures that are the same for all rows.
+        given: what is the same for all rows, by the names of :func:`rbfrag.predict`.
         model: name of the model; None for the best for what is given.
         level: confidence level of the interval.
         db: database of the model.
+        kind: how the blocks fail; None for what they are given by.
+        rotation_deg: rotation that counts as failure [deg], where models of several are fitted.
 
     Returns:
-        Counts: rows, answered, without an answer, in_domain; model, term, method; warnings.
+        Counts: rows, answered, without an answer, in_domain; kind, model, term, method; warnings.
 
     Raises:
         InputError: a file that cannot be read or written, a missing column, a cell that holds
@@ -79,20 +94,21 @@ def predict_table(
         with reading(origin, "a block table"), ExitStack() as stack:
             opened = csv_parts if suffix == ".csv" else parquet_parts
             header, parts = opened(origin, NUMERIC, stack)
-            names = _columns(origin, header, measures)
-            chosen = find_model(model, [*BLOCK_COLUMNS.values(), *names.values(), *measures], db)
+            names = _columns(origin, header, given)
+            known = [*names.values(), *given]
+            chosen = find_model(model, known, db, kind=kind, rotation_deg=rotation_deg)
             partial = stack.enter_context(written_whole(goal))
             writer = csv_writer if goal.suffix.lower() == ".csv" else parquet_writer
             kept = [name for name in header if name not in ANSWERS]
             write = writer(partial, kept, ANSWERS, NUMERIC, stack)
             counts = np.zeros(3, dtype=np.int64)
             for first_line, part in parts:
-                answer = _answer(origin, part, names, first_line, measures, chosen, level)
+                answer = _answer(origin, part, names, first_line, given, chosen, level)
                 for name in ANSWERS:
                     part.pop(name, None)
                 write(part, answer)
-                known = np.isfinite(answer["probability"])
-                counts += [known.size, int(known.sum()), int(answer["in_domain"].sum())]
+                told = np.isfinite(answer["probability"])
+                counts += [told.size, int(told.sum()), int(answer["in_domain"].sum())]
     except csv.Error as error:
         raise InputError(f"{origin}: not a CSV file: {error}") from None
     rows, answered, inside = counts.tolist()
@@ -101,6 +117,7 @@ def predict_table(
         "answered": answered,
         "without_answer": rows - answered,
         "in_domain": inside,
+        "kind": chosen.kind,
         "model": chosen.name,
         "term": chosen.term.name,
         "method": chosen.row.method,
@@ -108,22 +125,29 @@ def predict_table(
     }
 
 
-def _columns(origin: Path, header: list[str], measures: Mapping[str, float]) -> dict[str, str]:
+def _columns(origin: Path, header: list[str], given: Mapping[str, float]) -> dict[str, str]:
     """Return what each column of numbers is called in `predict`."""
-    for name in BLOCK_COLUMNS:
-        if name not in header:
+    block = block_of([*(BLOCK_COLUMNS.get(name, "") for name in header), *given])
+    columns = {
+        column: name
+        for column, name in BLOCK_COLUMNS.items()
+        if name in (*block.names, *block.options)
+    }
+    for column, name in columns.items():
+        if name in block.names and name not in given and column not in header:
             raise InputError(
-                f"{origin}: there is no column {name}; the columns are "
+                f"{origin}: there is no column {column}; the columns are "
                 f"{', '.join(header) or 'none'}"
             )
     doubled = [name for name in header if header.count(name) > 1]
     if doubled:
         raise InputError(f"{origin}: the column {doubled[0]} is there twice")
-    found = {name: name for name in MEASURE_COLUMNS if name in header}
-    for name in found:
-        if name in measures:
-            raise InputError(f"{name} is an option and a column of {origin}: give it once")
-    return {**BLOCK_COLUMNS, **found}
+    columns |= {name: name for name in MEASURES}
+    found = {column: name for column, name in columns.items() if column in header}
+    for column, name in found.items():
+        if name in given:
+            raise InputError(f"{column} is an option and a column of {origin}: give it once")
+    return found
 
 
 def _answer(
@@ -131,12 +155,12 @@ def _answer(
     part: dict[str, Any],
     names: Mapping[str, str],
     first_line: int,
-    measures: Mapping[str, float],
+    given: Mapping[str, float],
     model: FragilityModel,
     level: float,
 ) -> dict[str, NDArray[Any]]:
     values = {names[column]: numbers(origin, column, part[column], first_line) for column in names}
-    predicted = answer_given(model, {**values, **measures}, level)
+    predicted = answer_given(model, {**values, **given}, level)
     assert isinstance(predicted, PredictionArray)
     answer: dict[str, NDArray[Any]] = {
         "probability": predicted.probability,
@@ -147,10 +171,12 @@ def _answer(
     }
     if "mode" in part:
         modes = np.array(["" if m is None else str(m).strip() for m in part["mode"]], dtype=object)
-        other = ~np.isin(modes.astype(str), ("", "topple"))
+        other = ~np.isin(modes.astype(str), ("", str(model_of_kind(model.kind).mode)))
         for name in ("probability", "ci_low", "ci_high"):
             answer[name][other] = np.nan
         answer["in_domain"][other] = False
         for i in np.flatnonzero(other).tolist():
-            answer["reason"][i] = NOT_TOPPLING.format(mode=str(modes[i]).replace("_", " "))
+            answer["reason"][i] = OTHER_MODE.format(
+                mode=str(modes[i]).replace("_", " "), kind=model.kind
+            )
     return answer

@@ -12,9 +12,9 @@ from scipy.special import ndtr, ndtri
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import FragilityFunction, IntensityType
-from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.predict import Model, predict
+from rbfrag.fragility.prediction_array import PredictionArray
 
 FloatArray = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""What can be wrong or doubtful about the input of a prediction.
+"""What can be wrong or doubtful about a question, and the answer where there is something to say.
 
 Every check is written once and looks at single numbers or at arrays. No sentence holds a
 semicolon, which separates the reasons of an array's element.
@@ -7,25 +7,36 @@ semicolon, which separates the reasons of an array's element.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic
+from typing import Any, NamedTuple
 
-from rbfrag.fragility.formulas import ABOVE_SPECTRUM, ABOVE_TWICE_PGV, LINE, NOT_LIFTED
-from rbfrag.fragility.functions import Functions, N
-from rbfrag.fragility.methods import wls as straight_line
-from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST
+from rbfrag.fragility.methods import Eta, Numbers
+from rbfrag.fragility.model import LEAST, FragilityModel
 
-NEGATIVE_SHARE_LIMIT = 0.025
-"""Probability of a negative critical velocity above which a straight line is doubted."""
-
+_SIZE = "p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m"
+_STRENGTH = (
+    "the block's yield acceleration coefficient at rest, tan(critical angle) (a block with k_r "
+    "<= 0 falls without an earthquake)"
+)
 _WORDS = {
-    "p2": ("1/s²", "p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m"),
-    "kr": (
+    "p2": ("1/s²", _SIZE),
+    "ps2": ("1/s²", "p_s², the squared frequency parameter of slumping at rest"),
+    "kr": ("", _STRENGTH),
+    "ky": (
         "",
-        "the block's yield acceleration coefficient at rest, tan(critical angle) (a block "
-        "with k_r <= 0 falls without an earthquake)",
+        "the block's yield acceleration coefficient of sliding, tan(phi - beta) (a block with k_y "
+        "<= 0 slides without an earthquake)",
     ),
+    "ks": (
+        "",
+        "the block's yield acceleration coefficient of slumping (a block with k_s <= 0 slumps "
+        "without an earthquake)",
+    ),
+    "displacement_m": ("m", "the displacement that is too far in m, above 0"),
+    "beta_deg": ("°", "the dip of the base in degrees, out of the slope positive"),
+    "leaves_g": ("g", "the acceleration in g at which the block leaves its back plane"),
     "pgv_m_s": ("m/s", "the peak ground velocity in m/s, 0 or more"),
     "pga_g": ("g", "the peak ground acceleration in g, 0 or more"),
     "pgd_m": ("m", "the peak ground displacement in m, 0 or more"),
@@ -34,80 +45,178 @@ _WORDS = {
     "intensity_m_s": ("m/s", ""),
     "y_m_s": ("m/s", ""),
     "pgv_over_pga_s": ("s", ""),
+    "k_over_pga": ("", ""),
 }
+"""Unit of each value, and what is to be given."""
 
-# Beyond these no rock block and no earthquake exists, and arithmetic might overflow.
-_LOWEST_P2, _HIGHEST = 1e-9, 1e9
-
-_SUSPECTS = (
-    ("pgv_m_s", 0.0, 5.0, "larger than ever recorded (it is in m/s): did you mean cm/s?"),
-    ("pga_g", 0.0, 5.0, "larger than ever recorded (it is in g): did you mean cm/s² or m/s²?"),
-    ("pgd_m", 0.0, 20.0, "larger than ever recorded (it is in m): did you mean cm?"),
-    (
-        "pgv_over_pga_s",
-        0.005,
-        2.0,
-        "not that of an earthquake (PGV in m/s over 9.81 times PGA in g lies between 0.005 and 2 "
-        "s): is PGV in m/s and PGA in g?",
-    ),
-    ("tm_s", 0.02, 10.0, "not the mean period of an earthquake (it is in s): is it a frequency?"),
-    ("kr", 0.0, 5.0, "steeper than 78°: it is the tangent of the critical angle, not degrees"),
-)
+_ABOVE_ZERO = {"p2": "block", "ps2": "block", "displacement_m": "block", "tm_s": "earthquake"}
 
 
 @dataclass(frozen=True)
-class Finding(Generic[N]):
-    """One thing found about the input.
+class Finding:
+    """One thing found about a question.
 
     Args:
         holds: whether (where) it is so.
-        name: the input concerned.
-        value: its value.
+        name: the value concerned.
+        value: what it is.
         text: what is wrong and what to do.
     """
 
     holds: Any
     name: str
-    value: N
+    value: Any
     text: str
 
     def about(self, value: float) -> str:
         """Return the sentence for one value."""
+        if not self.name:
+            return self.text
         unit = _WORDS[self.name][0]
         return f"{self.name} = {value:.6g}{' ' if unit else ''}{unit} {self.text}"
 
     def in_general(self) -> str:
         """Return the sentence for many values."""
-        return f"{self.name} {self.text}"
+        return f"{self.name} {self.text}" if self.name else self.text
 
 
-def refusals(values: Mapping[str, N], needed: Collection[str]) -> Iterator[Finding[N]]:
-    """Yield what makes an answer impossible; k_r <= 0 is left to the caller."""
+NO_SHAKING = "no shaking: P = 0 by definition, not by the model"
+
+
+def refusals(
+    values: Mapping[str, Any], needed: Collection[str], signed: Collection[str] = ()
+) -> Iterator[Finding]:
+    """Yield what makes an answer impossible; `signed` names the values that may be negative."""
     for name in needed:
         value = values[name]
         wanted = _WORDS[name][1]
         yield Finding(value != value, name, value, f"is not a number: give {wanted}")
-        if name == "p2":
+        if name in _ABOVE_ZERO:
             yield Finding(value <= 0.0, name, value, f"is not above zero: give {wanted}")
-            low = (value > 0.0) & (value < _LOWEST_P2)
-            yield Finding(low, name, value, f"is too small for any block: give {wanted}")
-        elif name == "tm_s":
-            yield Finding(value <= 0.0, name, value, f"is not above zero: give {wanted}")
-            low = (value > 0.0) & (value < 1.0 / _HIGHEST)
-            yield Finding(low, name, value, f"is too small for any earthquake: give {wanted}")
-        elif name != "kr":
+            low = (value > 0.0) & (value < LOWEST)
+            of = _ABOVE_ZERO[name]
+            yield Finding(low, name, value, f"is too small for any {of}: give {wanted}")
+        elif name not in signed:
             yield Finding(value < 0.0, name, value, f"is negative: give {wanted}")
-        large = (value > _HIGHEST) | (value == -math.inf)
+        large = (value > HIGHEST) | (value == -math.inf)
         yield Finding(large, name, value, f"is beyond any block or earthquake: give {wanted}")
 
 
-def unstable(values: Mapping[str, N]) -> Finding[N]:
-    """Return whether the block falls at rest."""
-    kr = values["kr"]
-    return Finding(kr <= 0.0, "kr", kr, f"is not above zero: give {_WORDS['kr'][1]}")
+class Judgement(NamedTuple):
+    """An answer with what was found about the question.
+
+    Args:
+        probability: P.
+        low: lower end of its interval.
+        high: upper end.
+        eta: argument of the link, or None where nothing had to be evaluated.
+        values: the completed values.
+        intensity_m_s: the intensity term as it is [m/s].
+        missing: where no answer is possible.
+        in_domain: whether block and motion lie in the ranges that were fitted.
+        ruled: where the answer is not the model's.
+    """
+
+    probability: Any
+    low: Any
+    high: Any
+    eta: Eta | None
+    values: dict[str, Any]
+    intensity_m_s: Any
+    missing: Any
+    in_domain: Any
+    ruled: Any
 
 
-def outside_domain(model: FragilityModel, values: Mapping[str, N]) -> Iterator[Finding[N]]:
+def judged(
+    model: FragilityModel,
+    given: Mapping[str, Any],
+    needed: Collection[str],
+    half_width: float | None,
+    ns: Numbers,
+    *,
+    say: Callable[[Any, Finding], None],
+    refuse: Callable[[Any, Finding], None],
+    fails_at_rest: Callable[[Any, Finding], None],
+    nothing: Any,
+) -> Judgement:
+    """Answer a question of which there may be something to say.
+
+    Args:
+        model: the model that answers.
+        given: what is given, by name: numbers, or arrays of one shape.
+        needed: names of the values without which there is no answer.
+        half_width: quantile of the confidence level; None for no interval.
+        ns: functions for the kind of number given.
+        say: called with where a sentence holds, and the finding.
+        refuse: the same for what makes an answer impossible.
+        fails_at_rest: the same where a block fails without an earthquake.
+        nothing: False, or an array of it in the shape of the values.
+    """
+    block, term = model.method.block, model.term
+    missing = nothing
+    for finding in refusals(given, needed, (block.strength, *block.options)):
+        refuse(finding.holds, finding)
+        missing = missing | finding.holds
+    strength = given[block.strength]
+    wanted = _WORDS[block.strength][1]
+    at_rest = (strength <= 0.0) & _not(missing)
+    fails_at_rest(
+        at_rest, Finding(at_rest, block.strength, strength, f"is not above zero: give {wanted}")
+    )
+    floored = dict(given)
+    for name in (block.strength, "pga_g"):
+        if name in floored:
+            floored[name] = ns.maximum(floored[name], LEAST)
+    values = block.completed(floored, term, ns)
+    for bound in block.refuses:
+        holds = bound.holds(values) & _not(missing) & _not(at_rest)
+        refuse(holds, Finding(holds, bound.about, values.get(bound.about), bound.text))
+        missing = missing | holds
+    intensity = values["intensity_m_s"]
+    for name in ("y_m_s", "intensity_m_s", "displacement_m", "pgv_m_s"):
+        if name in values:
+            values[name] = ns.maximum(values[name], LEAST)
+    model.with_ratios(values)
+    no_shaking = (given[term.inputs[0]] == 0.0) & _not(missing) & _not(at_rest)
+    say(no_shaking, Finding(no_shaking, "", 0.0, NO_SHAKING))
+    unanswered = missing | at_rest | no_shaking
+    ruled = unanswered
+    bounds = model.form.bounds
+    if "pga_g" in given and not model.vertical and block.at_rest not in bounds:
+        bounds = (block.at_rest, *bounds)
+    for bound in bounds:
+        holds = bound.holds(values) & _not(ruled)
+        say(holds, Finding(holds, bound.about, values.get(bound.about), bound.text))
+        ruled = ruled | holds
+    p, low, high, eta = _answer(model, values, half_width, ns, ruled)
+    in_domain = _not(missing)
+    for finding in outside_domain(model, values):
+        holds = finding.holds & _not(ruled)
+        say(holds, finding)
+        in_domain = in_domain & _not(holds)
+    for finding in doubts(model, values, ns):
+        say(finding.holds & _not(unanswered), finding)
+    return Judgement(p, low, high, eta, values, intensity, missing, in_domain, ruled)
+
+
+def _answer(
+    model: FragilityModel,
+    values: Mapping[str, Any],
+    half_width: float | None,
+    ns: Numbers,
+    ruled: Any,
+) -> tuple[Any, Any, Any, Eta | None]:
+    if ruled is True:
+        return 0.0, 0.0, 0.0, None
+    return model.answer(values, half_width, ns)
+
+
+def _not(condition: Any) -> Any:
+    return condition ^ True
+
+
+def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator[Finding]:
     """Yield the variables that lie outside their fitted range."""
     for name, (low, high) in model.row.domain.items():
         if name not in values:
@@ -126,62 +235,14 @@ def outside_domain(model: FragilityModel, values: Mapping[str, N]) -> Iterator[F
             )
 
 
-def doubts(
-    model: FragilityModel, values: Mapping[str, N], functions: Functions[N]
-) -> Iterator[Finding[N]]:
+def doubts(model: FragilityModel, values: Mapping[str, Any], ns: Numbers) -> Iterator[Finding]:
     """Yield where the model stops making sense, and suspicious values."""
-    x, y = values["intensity_m_s"], values["y_m_s"]
-    if model.shape == LINE:
-        outside = "outside the range where the straight-line normal model makes sense"
-        share = straight_line.negative_share(model.parameters, x, functions)
-        yield Finding(
-            share > NEGATIVE_SHARE_LIMIT,
-            "intensity_m_s",
-            x,
-            f"is {outside}: there it gives more than {100 * NEGATIVE_SHARE_LIMIT:g} % probability "
-            "to negative critical velocities",
-        )
-        yield Finding(
-            straight_line.rise(model.parameters, x, y) < 0.0,
-            "y_m_s",
-            y,
-            f"is {outside}: there the probability falls with growing intensity",
-        )
-    for name, low, high, text in _SUSPECTS:
+    if model.method.doubts is not None:
+        for holds, name, text in model.method.doubts(model.parameters, values, ns):
+            yield Finding(holds, name, values[name], text)
+    for bound in model.method.block.doubts:
+        yield Finding(bound.holds(values), bound.about, values.get(bound.about), bound.text)
+    for name, (low, high, text) in CREDIBLE.items():
         if name in values:
             value = values[name]
             yield Finding((value < low) | (value > high), name, value, f"is {text}")
-
-
-def not_lifted(model: FragilityModel, values: Mapping[str, N]) -> Finding[N] | None:
-    """Return where PGA is known and does not lift the block: P is 0, whatever the model."""
-    if "pga_g" not in values or model.vertical:
-        return None
-    kr = values["kr"]
-    return Finding(
-        kr >= values["pga_g"],
-        "kr",
-        kr,
-        "is not below PGA: without vertical motion the ground cannot lift this block, P = 0 by "
-        "mechanics, not by the model",
-    )
-
-
-BOUNDS = {
-    NOT_LIFTED: (
-        "kr",
-        "is not below PGA: without vertical motion the ground cannot lift this block, P = 0 by "
-        "mechanics, not by the model",
-    ),
-    ABOVE_TWICE_PGV: (
-        "y_m_s",
-        "is not below 2 PGV, which no fresh excursion exceeds: P = 0 by mechanics, not by the "
-        "model",
-    ),
-    ABOVE_SPECTRUM: (
-        "y_m_s",
-        "is not below the toppling spectrum X(p) of the motion, which no fresh excursion exceeds: "
-        "P = 0 by mechanics, not by the model",
-    ),
-}
-"""What is said where :func:`rbfrag.fragility.formulas.bound` says that P is 0."""

@@ -25,10 +25,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.fragility import formulas
 from rbfrag.fragility.fit.data import FitSource
-from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.quantiles import student_half_width
+from rbfrag.fragility.methods import arrays
+from rbfrag.fragility.model import (
+    FLOOR_FROM,
+    FLOOR_NODES,
+    FLOOR_SHARE_STEP,
+    FLOOR_STEP,
+    FragilityModel,
+    student_half_width,
+)
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]
@@ -41,16 +47,6 @@ FEW_EARTHQUAKES = 30
 SHARE_OF_FEW = 0.9
 """Share of blocks and motions with the same eta for which the interval is no narrower, if the fit
 has fewer earthquakes than that; all of them otherwise."""
-
-RICHER = {
-    "pgv": ("pgv_pga", "pgv_pga_tm"),
-    "pga_tm": ("pgv_pga_tm",),
-    "pgd_tm": ("xp",),
-    "pgv_pga": ("pgv_pga_tm",),
-    "pgv_pga_tm": ("xp",),
-    "xp": (),
-}
-"""The terms of the models that know more than one of each term, directly or by their table."""
 
 _ROUNDING = np.array([0.06, 0.24, 0.4, 0.24, 0.06])
 """Weights of a node and its neighbours, a bell of standard deviation one node."""
@@ -131,56 +127,52 @@ def interval_floor(
         richer: models that know more, with their own tables.
         sample: where they are compared.
     """
-    from rbfrag.fragility.compiled_formulas import answers, etas
-
     if not richer:
         return []
-    eta, widest = np.empty(sample.y.size), np.zeros(sample.y.size)
-    x = sample.intensity_m_s[model.term.name]
-    etas(
-        model.shape,
-        np.array(model.padded),
-        sample.y,
-        sample.p,
-        x,
-        sample.pga_g,
-        sample.tm_s,
-        eta,
-    )
+    widest = np.zeros(sample.y.size)
+    values, possible = _values(model, sample)
+    x, ns = sample.intensity_m_s[model.term.name], arrays()
+    with np.errstate(all="ignore"):
+        eta = np.where(possible, model.form.eta(model.parameters, values, ns).eta, np.nan)
     # what a width is multiplied by when this model answers, which has degrees of freedom of its own
     reach = student_half_width(LEVEL, model.degrees_of_freedom)
     for other in richer:
-        middle, low, high = np.empty((3, sample.y.size))
         half_width = student_half_width(LEVEL, other.degrees_of_freedom)
-        answers(
-            other.shape,
-            other.link,
-            np.array(other.padded),
-            np.array(other.packed_covariance),
-            np.array(other.floor or (0.0,) * (2 * formulas.FLOOR_NODES)),
-            half_width,
-            sample.y,
-            sample.p,
-            sample.intensity_m_s[other.term.name],
-            sample.pga_g,
-            sample.tm_s,
-            middle,
-            low,
-            high,
-        )
+        values, possible = _values(other, sample)
+        with np.errstate(all="ignore"):
+            _, low, high, _ = other.answer(values, half_width, ns)
+            width = np.where(possible, high - low, 0.0)
         told = np.isfinite(sample.intensity_m_s[other.term.name])
-        widest = np.where(told, np.fmax(widest, (high - low) / reach), widest)
+        widest = np.where(told, np.fmax(widest, width / reach), widest)
     few = min(_earthquakes(other) for other in richer) < FEW_EARTHQUAKES
     share = SHARE_OF_FEW if few else 1.0
     # eta of an intensity that is not known is a number like any other
     known = np.isfinite(eta) & np.isfinite(x)
     by_y = sample.y[known] / (2.0 * x[known])
     places = (
-        (eta[known] - formulas.FLOOR_FROM) / formulas.FLOOR_STEP,
-        by_y / formulas.FLOOR_SHARE_STEP,
+        (eta[known] - FLOOR_FROM) / FLOOR_STEP,
+        by_y / FLOOR_SHARE_STEP,
     )
     widest = widest[known] * MARGIN
     return [value for place in places for value in _table(place, widest, share)]
+
+
+def _values(
+    model: FragilityModel, sample: Sample
+) -> tuple[dict[str, FloatArray], NDArray[np.bool_]]:
+    """Return what the model reads, and where mechanics leaves it the answer."""
+    values = {
+        "y_m_s": sample.y,
+        "p": sample.p,
+        "kr": sample.y * sample.p / STANDARD_GRAVITY_M_S2,
+        "pga_g": sample.pga_g,
+        "tm_s": sample.tm_s,
+        "intensity_m_s": sample.intensity_m_s[model.term.name],
+    }
+    possible = np.ones(sample.y.size, dtype=np.bool_)
+    for bound in model.form.bounds:
+        possible &= ~bound.holds(values)
+    return values, possible
 
 
 def _earthquakes(model: FragilityModel) -> int:
@@ -196,8 +188,8 @@ def _table(place: FloatArray, width: FloatArray, share: float) -> list[float]:
         width: its width.
         share: quantile of a cell's widths that stands for it.
     """
-    cell = np.clip(np.floor(place), 0, formulas.FLOOR_NODES - 2).astype(np.int64)
-    nodes = np.zeros(formulas.FLOOR_NODES)
+    cell = np.clip(np.floor(place), 0, FLOOR_NODES - 2).astype(np.int64)
+    nodes = np.zeros(FLOOR_NODES)
     for each in np.unique(cell).tolist():
         own = np.quantile(width[cell == each], share)
         nodes[each : each + 2] = np.maximum(nodes[each : each + 2], own)

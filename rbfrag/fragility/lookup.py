@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 
@@ -13,13 +12,9 @@ from rbfrag.db.location import DEFAULT_NAME, REFERENCE, locate, reference_file
 from rbfrag.db.model_file import unknown_model
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.fragility.measures import TERMS, terms_from
-from rbfrag.fragility.model import BEST_ON_PGV, METHODS_BEST_FIRST, FragilityModel
-
-_BLOCK = ("p2", "kr")
-
-LEVELS = {"xp": 3, "pgv_pga_tm": 2, "pgv_pga": 1}
-"""How much a term knows of the motion; the single terms know least, 0."""
+from rbfrag.fragility.measures import MEASURES, TERMS, terms_from
+from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, methods
+from rbfrag.fragility.model import FragilityModel
 
 FROM_REFERENCE = (
     "answered by the reference model that is shipped with rbfrag: there is no rbfrag.db here and "
@@ -36,14 +31,25 @@ class _Store:
     Args:
         place: its name in messages.
         stamp: what tells whether the file has changed since; () where nothing can.
-        models: the models of toppling.
-        suited: those that have been found to suit some measures, by the names of these.
+        rows: the models of all kinds.
+        notes: what each of them says of where it comes from.
+        models: those that have answered, by name.
+        suited: those that have been found to suit a question, the recommended first.
     """
 
     place: str
     stamp: _Stamp
-    models: list[FragilityModel]
-    suited: dict[tuple[str, ...], list[FragilityModel]] = field(default_factory=dict)
+    rows: list[ModelRow]
+    notes: tuple[str, ...] = ()
+    models: dict[str, FragilityModel] = field(default_factory=dict)
+    suited: dict[tuple[object, ...], list[FragilityModel]] = field(default_factory=dict)
+
+    def model(self, row: ModelRow) -> FragilityModel:
+        """Return one of its models, ready to answer."""
+        found = self.models.get(row.name)
+        if found is None:
+            found = self.models[row.name] = FragilityModel.from_row(row, self.notes)
+        return found
 
 
 _SHIPPED = str(REFERENCE)
@@ -52,36 +58,61 @@ _rows_before: dict[int, tuple[ModelRow, FragilityModel]] = {}
 _MOST_ROWS = 64
 
 
+def block_of(given: Collection[str]) -> BlockParameters:
+    """Return what a question describes its block by; toppling where it says nothing of one."""
+    if "p2" in given:
+        return TOPPLING_BLOCK
+    blocks = {method.block for method in methods()}
+    named = [block for block in blocks if set(given) & {*block.names, *block.options}]
+    return named[0] if named else TOPPLING_BLOCK
+
+
 def find_model(
     model: ModelRow | FragilityModel | str | None,
     given: Collection[str],
     db: str | PathLike[str] | None = None,
+    *,
+    kind: str | None = None,
+    rotation_deg: float | None = None,
 ) -> FragilityModel:
-    """Return the model that answers for the given measures of the motion.
+    """Return the model that answers for a block and the given measures of the motion.
 
     The more is known of the motion, the better the model: one on X(p), then PGV with PGA and Tm,
-    then PGV with PGA, then a single term. Among the stored models of the best kind that the
+    then PGV with PGA, then a single term. Among the stored models of the best term that the
     measures suffice for, the database's default answers, else the best method.
 
     Args:
         model: a model, the name of a stored one, or None.
-        given: names of the measures that are known (``pgv_m_s``, ``pga_g``, …).
+        given: names of what is known of block and motion (``p2``, ``kr``, ``pgv_m_s``, …).
         db: database; None for ``RBFRAG_DB``, or else ``rbfrag.db`` in the current folder, or
             else the reference that is shipped.
+        kind: how the block fails; None for what it is given by, or what the model is of.
+        rotation_deg: rotation that counts as failure [deg], where there are models of several.
 
     Raises:
-        InputError: the measures do not suffice.
+        InputError: the measures do not suffice, or the model is of another kind or criterion.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
     if type(model) is FragilityModel:
         chosen = model
     elif model is None:
-        return _suited(tuple(given), db)[0]
+        return _suited(tuple(given), db, kind, rotation_deg)[0]
     elif isinstance(model, str):
         chosen = _named(model, db)
     else:
         chosen = _of_row(model)  # type: ignore[arg-type]
+    if kind is not None and chosen.row.kind != kind:
+        raise InputError(f"model {chosen.name!r} is of kind {chosen.kind}, not {kind}")
+    block = chosen.method.block
+    _check_block(chosen.kind, block, given, chosen)
+    if block.criterion is not None or rotation_deg is not None:
+        _check_criterion(chosen.kind, block, rotation_deg)
+        if chosen.criterion != rotation_deg:
+            raise InputError(
+                f"model {chosen.name!r} tells of {_failure(chosen.criterion)}, asked is "
+                f"{_failure(rotation_deg)}"
+            )
     for name in chosen.term.inputs:
         if name not in given:
             raise InputError(_wanting(chosen, _measures(given)))
@@ -89,64 +120,77 @@ def find_model(
 
 
 def suited_models(
-    given: Collection[str], db: str | PathLike[str] | None = None
+    given: Collection[str],
+    db: str | PathLike[str] | None = None,
+    *,
+    kind: str | None = None,
+    rotation_deg: float | None = None,
 ) -> list[FragilityModel]:
     """Return one stored model for each term that the measures suffice for, the recommended first.
 
-    Args:
-        given: names of the measures that are known.
-        db: database, as for :func:`find_model`.
+    Arguments as for :func:`find_model`.
 
     Raises:
         InputError: the measures do not suffice for any.
-        UnknownModelError: the database holds no model.
+        UnknownModelError: the database holds no such model.
         DatabaseError: the database cannot be read.
     """
-    return list(_suited(tuple(given), db))
+    return list(_suited(tuple(given), db, kind, rotation_deg))
 
 
-_terms_from = lru_cache(terms_from)
+def _suited(
+    given: tuple[str, ...],
+    db: str | PathLike[str] | None,
+    kind: str | None,
+    rotation_deg: float | None,
+) -> list[FragilityModel]:
+    store = _store(db)
+    key = (given, kind, rotation_deg)
+    before = store.suited.get(key)
+    if before is None:
+        before = store.suited[key] = _suited_in(store, given, kind, rotation_deg)
+    return before
 
 
-def _suited(given: tuple[str, ...], db: str | PathLike[str] | None) -> list[FragilityModel]:
-    possible = _terms_from(given)
+def _suited_in(
+    store: _Store, given: tuple[str, ...], kind: str | None, rotation_deg: float | None
+) -> list[FragilityModel]:
+    possible = terms_from(given)
     if not possible:
         wanted = ", or ".join(" and ".join(TERMS[name].inputs) for name in _ASKED)
         raise InputError(
             f"{_known(_measures(given))} is given: a prediction needs {wanted}, or a motion"
         )
-    store = _store(db)
-    before = store.suited.get(given)
-    if before is None:
-        before = store.suited[given] = _suited_in(store, given, possible)
-    return before
-
-
-def _suited_in(
-    store: _Store, given: tuple[str, ...], possible: tuple[str, ...]
-) -> list[FragilityModel]:
-    if not store.models:
+    asked = block_of(given)
+    kind = asked.kind if kind is None else kind
+    if not store.rows:
         raise UnknownModelError(unknown_model(None, [], store.place))
+    of_kind = [store.model(row) for row in store.rows if row.kind == kind]
+    if not of_kind:
+        raise UnknownModelError(
+            f"{store.place} holds no {kind} model: make one with  rbfrag simulate --kind {kind}  "
+            f"and  rbfrag fit --kind {kind}"
+        )
+    block = of_kind[0].method.block
+    _check_block(kind, block, given, None)
+    _check_criterion(kind, block, rotation_deg)
     best: dict[str, FragilityModel] = {}
-    for model in store.models:
+    for model in of_kind:
         name = model.term.name
-        if name in possible and (name not in best or _merit(model) > _merit(best[name])):
+        suits = name in possible and model.criterion == rotation_deg
+        if suits and (name not in best or _merit(model) > _merit(best[name])):
             best[name] = model
     if not best:
-        have = ", ".join(f"{model.name} ({model.term.name})" for model in store.models)
-        raise InputError(
-            f"no stored model works with {_known(_measures(given))}; stored are {have}: give the "
-            "measures that one of them needs, or fit another with  rbfrag fit --term "
-            f"{' or '.join(possible)}"
+        have = ", ".join(f"{m.name} ({m.term.name}{_of_criterion(m)})" for m in of_kind)
+        of = "" if block.criterion is None else f" of {_failure(rotation_deg)}"
+        raise (InputError if block.criterion is None else UnknownModelError)(
+            f"no stored {kind} model{of} works with {_known(_measures(given))}; stored are {have}: "
+            "give the measures that one of them needs, or fit another with  rbfrag fit --kind "
+            f"{kind} --term {' or '.join(possible)}"
         )
-    order = {name: number for number, name in enumerate(possible)}
     return sorted(
         best.values(),
-        key=lambda model: (
-            -LEVELS.get(model.term.name, 0),
-            not model.row.is_default,
-            order[model.term.name],
-        ),
+        key=lambda m: (-m.term.level, not m.row.is_default, possible.index(m.term.name)),
     )
 
 
@@ -154,12 +198,56 @@ _ASKED = ("pgv", "pga_tm", "pgd_tm")
 
 
 def _merit(model: FragilityModel) -> tuple[bool, int]:
-    order = BEST_ON_PGV if model.term.name == "pgv" else METHODS_BEST_FIRST
-    return model.row.is_default, -order.index(model.row.method)
+    return model.row.is_default, -model.form.rank
+
+
+def _check_block(
+    kind: str, block: BlockParameters, given: Collection[str], model: FragilityModel | None
+) -> None:
+    """Refuse a question that describes its block in another way than a kind needs it.
+
+    Measures of the motion alone are no description: the caller has the block.
+    """
+    described = [name for name in given if name not in MEASURES]
+    missing = [name for name in block.names if name not in given]
+    others = [name for name in described if name not in block.names and name not in block.options]
+    if not described or not (missing or others):
+        return
+    if others and len(missing) == len(block.names):
+        who = f"kind {kind}" if model is None else f"model {model.name!r} is of kind {kind}: it"
+        raise InputError(
+            f"{who} reads {' and '.join(block.names)}, given is {' and '.join(others)}"
+        )
+    if missing:
+        raise InputError(
+            f"{missing[0]} is missing: a block of kind {kind} is given by "
+            f"{' and '.join(block.names)}"
+        )
+    raise InputError(f"{others[0]} does not go with kind {kind}: leave it out")
+
+
+def _check_criterion(kind: str, block: BlockParameters, rotation_deg: float | None) -> None:
+    """Refuse a criterion of failure that blocks of a kind do not have."""
+    if rotation_deg is None:
+        return
+    if block.criterion is None:
+        raise InputError(f"a rotation is no failure of a block of kind {kind}: leave it out")
+    if isinstance(rotation_deg, bool) or not isinstance(rotation_deg, int | float):
+        raise InputError(f"rotation_deg = {rotation_deg!r} is not a number")
+
+
+def _failure(rotation_deg: float | None) -> str:
+    return "failure past recovery" if rotation_deg is None else f"a rotation of {rotation_deg:g}°"
+
+
+def _of_criterion(model: FragilityModel) -> str:
+    if model.method.block.criterion is None:
+        return ""
+    return f", {_failure(model.criterion)}"
 
 
 def _measures(given: Collection[str]) -> list[str]:
-    return [name for name in given if name not in _BLOCK]
+    return [name for name in given if name in MEASURES]
 
 
 def _known(measures: Collection[str]) -> str:
@@ -197,16 +285,11 @@ def _place(db: str | PathLike[str] | None) -> tuple[Path | str, bool]:
 
 def _named(name: str, db: str | PathLike[str] | None) -> FragilityModel:
     store = _store(db)
-    for model in store.models:
-        if model.name == name:
-            return model
-    known = sorted(model.name for model in store.models)
+    for row in store.rows:
+        if row.name == name:
+            return store.model(row)
+    known = sorted(row.name for row in store.rows)
     raise UnknownModelError(unknown_model(name, known, store.place))
-
-
-def uses_reference(db: str | PathLike[str] | None) -> bool:
-    """Return whether the shipped reference answers for want of another database."""
-    return _place(db)[1]
 
 
 def stored_rows(db: str | PathLike[str] | None = None) -> list[ModelRow]:
@@ -239,7 +322,7 @@ def _store(db: str | PathLike[str] | None) -> _Store:
     if isinstance(place, Path):
         return _unchanged(str(place), shipped) or _read_again(place, shipped)
     rows, label = _stored_on_server(place)
-    return _Store(label, (), [_of_row(row) for row in rows if row.kind == "toppling"])
+    return _Store(label, (), rows)
 
 
 def _unchanged(path: str, shipped: bool) -> _Store | None:
@@ -252,11 +335,7 @@ def _read_again(path: Path, shipped: bool) -> _Store:
 
     key = str(path)
     stamp = _stamp(key, shipped)
-    rows = [row for row in read_models(path) if row.kind == "toppling"]
-    models = [FragilityModel.from_row(row) for row in rows]
-    if shipped:
-        models = [replace(model, notes=(FROM_REFERENCE,)) for model in models]
-    store = _Store(key, stamp, models)
+    store = _Store(key, stamp, read_models(path), (FROM_REFERENCE,) if shipped else ())
     if stamp:
         _stores_before[key, shipped] = store
     return store

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.functions import Functions, N
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
@@ -46,41 +45,27 @@ class Term:
         """Axis label with the unit."""
         return f"{self.title}, {self.symbol} [m/s]"
 
-    def intensity_m_s(self, measures: Mapping[str, N]) -> N:
+    def intensity_m_s(self, measures: Mapping[str, Any]) -> Any:
         """Return the term [m/s] from measures by name (more than it needs may be given)."""
-        result: N = self.formula(*(measures[name] for name in self.inputs))
-        return result
+        return self.formula(*[measures[name] for name in self.inputs])
 
 
-def toppling_velocity_m_s(p2: N, kr: N, functions: Functions[N]) -> N:
-    """Return a block's toppling velocity y = k_r g/p [m/s].
-
-    Args:
-        p2: frequency parameter p² [1/s²].
-        kr: toppling yield acceleration coefficient at rest [-].
-        functions: functions for the kind of number given.
-
-    Equation (4.30) of the dissertation with M = 1.
-    """
-    return kr * STANDARD_GRAVITY_M_S2 / functions.sqrt(p2)
-
-
-def pgv_m_s(pgv_m_s: N) -> N:
+def pgv_m_s(pgv_m_s: Any) -> Any:
     """Return the peak ground velocity [m/s] itself."""
     return pgv_m_s
 
 
-def pga_tm_m_s(pga_g: N, tm_s: N) -> N:
+def pga_tm_m_s(pga_g: Any, tm_s: Any) -> Any:
     """Return PGA·g·Tm/2π [m/s] from PGA [g] and the mean period [s] (equation 4.31)."""
     return pga_g * STANDARD_GRAVITY_M_S2 * tm_s / (2.0 * math.pi)
 
 
-def first_m_s(*measures: N) -> N:
+def first_m_s(*measures: Any) -> Any:
     """Return the first measure [m/s]; the others enter the model by themselves."""
     return measures[0]
 
 
-def pgd_tm_m_s(pgd_m: N, tm_s: N) -> N:
+def pgd_tm_m_s(pgd_m: Any, tm_s: Any) -> Any:
     """Return 2π·PGD/Tm [m/s] from PGD [m] and the mean period [s] (equation 4.31)."""
     return pgd_m * (2.0 * math.pi) / tm_s
 
@@ -143,6 +128,9 @@ TERMS: Mapping[str, Term] = {
 }
 """The terms by name: those of the dissertation, then those that know more of the motion."""
 
+MEASURES = frozenset(name for term in TERMS.values() for name in term.inputs)
+"""The names of all measures."""
+
 SINGLE_TERMS = ("pgv", "pga_tm", "pgd_tm")
 """Terms that are one number: what the dissertation compares."""
 
@@ -167,3 +155,29 @@ def intensity_term(name: str) -> Term:
 def terms_from(given: Collection[str]) -> tuple[str, ...]:
     """Return the names of the terms that the given measures suffice for, best first."""
     return tuple(name for name in BEST_FIRST if set(TERMS[name].inputs) <= set(given))
+
+
+LOWEST, HIGHEST = 1e-9, 1e9
+"""Beyond these no rock block and no earthquake exists, and arithmetic might overflow."""
+
+_STEEP = "steeper than 78°: it is the tangent of an angle, not degrees"
+CREDIBLE = {
+    "pgv_m_s": (0.0, 5.0, "larger than ever recorded (it is in m/s): did you mean cm/s?"),
+    "pga_g": (0.0, 5.0, "larger than ever recorded (it is in g): did you mean cm/s² or m/s²?"),
+    "pgd_m": (0.0, 20.0, "larger than ever recorded (it is in m): did you mean cm?"),
+    "pgv_over_pga_s": (
+        0.005,
+        2.0,
+        "not that of an earthquake (PGV in m/s over 9.81 times PGA in g lies between 0.005 and 2 "
+        "s): is PGV in m/s and PGA in g?",
+    ),
+    "tm_s": (0.02, 10.0, "not the mean period of an earthquake (it is in s): is it a frequency?"),
+    "kr": (
+        0.0,
+        5.0,
+        "steeper than 78°: it is the tangent of the critical angle, not degrees",
+    ),
+    "ky": (0.0, 5.0, _STEEP),
+    "ks": (0.0, 5.0, _STEEP),
+}
+"""Least and greatest credible value of a question, and what is said of others."""

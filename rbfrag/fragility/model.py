@@ -1,41 +1,36 @@
-"""A fitted fragility model, ready to answer.
-
-No library is loaded here: `predict` needs it.
-"""
+"""A fitted fragility model of any kind, ready to answer. No library is loaded here."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 from rbfrag.db.rows import ModelRow
-from rbfrag.errors import ModelError
-from rbfrag.fragility import formulas
-from rbfrag.fragility.measures import TERMS, Term
+from rbfrag.errors import InputError, ModelError
+from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, TERMS, Term
+from rbfrag.fragility.methods import Eta, Form, Method, Numbers, method_named, method_names
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
-_OF_CRITICAL = (
-    "probability that the critical toppling velocity of the motion is at least the block's; "
-    "safe islands below the critical value are not taken off"
-)
-_OF_OUTCOME = "probability that the block topples"
+LEAST = 1e-290
+"""Velocities, accelerations and strengths are taken for at least this, for logarithms."""
 
-MEANINGS: Mapping[str, str] = {
-    "wls": _OF_CRITICAL,
-    "lognormal": _OF_CRITICAL,
-    "logistic": _OF_OUTCOME,
-    "weibull": _OF_OUTCOME,
-    "bounded": _OF_OUTCOME,
-    "record": _OF_OUTCOME,
-    "power": _OF_OUTCOME,
-}
-"""What the probability of each method is a probability of."""
+FLOOR_NODES = 41
+"""Nodes at which the least width of an interval, over its quantile, is tabulated: by eta, and by
+y/2x, the share of twice the velocity."""
+FLOOR_FROM, FLOOR_STEP = -10.0, 0.5
+"""The first node of eta, and from one to the next."""
+FLOOR_SHARE_STEP = 0.025
 
-METHODS_BEST_FIRST = ("record", "bounded", "weibull", "power", "logistic", "lognormal", "wls")
-"""The methods by falling skill on held-out earthquakes (docs/theory/model-choice.md)."""
 
-BEST_ON_PGV = ("weibull", "bounded", "logistic", "lognormal", "wls")
-"""The same for PGV alone, where the third parameter of `bounded` gains nothing."""
+class Range(NamedTuple):
+    """Where a value needs no words."""
+
+    name: str
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -45,16 +40,13 @@ class FragilityModel:
     Args:
         row: the model as stored.
         term: the intensity term it reads.
-        shape: number of its formula in :mod:`rbfrag.fragility.formulas`.
-        link: number of its link there.
-        parameters: values of the coefficients, without those that the model does not have.
-        padded: the six parameters of the formula.
-        packed_covariance: the 21 numbers of :func:`rbfrag.fragility.formulas.standard_error`.
-        floor: least widths of the interval over its quantile, of
-            :func:`rbfrag.fragility.formulas.least_width`, or empty.
-        limits: edges of the fitted ranges for :func:`rbfrag.fragility.formulas.is_plain`.
-        limits_with_both: the same where PGV and PGA are both given, with the range of PGV/PGA
-            that earthquakes have.
+        method: how it was fitted.
+        form: the method's formula on that term.
+        parameters: values of the coefficients.
+        packed_covariance: the covariance on and below its diagonal, row by row, those off it
+            doubled.
+        floor: least widths of the interval over its quantile at the nodes of eta, and at those of
+            y/2x; empty for none.
         vertical: whether it was fitted with vertical motion.
         degrees_of_freedom: of the standard errors, which the interval is widened by, at most the
             earthquakes less one; 0 for none.
@@ -63,33 +55,37 @@ class FragilityModel:
 
     row: ModelRow
     term: Term
-    shape: int
-    link: int
+    method: Method
+    form: Form
     parameters: tuple[float, ...]
-    padded: tuple[float, ...]
     packed_covariance: tuple[float, ...]
-    floor: tuple[float, ...]
-    limits: tuple[float, ...]
-    limits_with_both: tuple[float, ...]
+    floor: tuple[tuple[float, ...], ...]
     vertical: bool
     degrees_of_freedom: int
     notes: tuple[str, ...] = ()
+    ranges: dict[tuple[str, ...], tuple[Range, ...]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
+    """What :meth:`clear_ranges` has found for some names."""
 
     @classmethod
-    def from_row(cls, row: ModelRow) -> FragilityModel:
+    def from_row(cls, row: ModelRow, notes: tuple[str, ...] = ()) -> FragilityModel:
         """Return the model of a stored row.
 
         Raises:
             ModelError: this rbfrag does not know the model's term or method, or the row is
                 not whole.
         """
-        term, shape = TERMS.get(row.term), formulas.SHAPES.get((row.method, row.term))
-        if term is None or shape is None:
-            methods = ", ".join(dict.fromkeys(method for method, _ in formulas.SHAPES))
+        try:
+            method: Method | None = method_named(row.method)
+        except InputError:
+            method = None
+        form = method.forms.get(row.term) if method is not None else None
+        if method is None or form is None:
             raise ModelError(
-                f"model {row.name!r} is of term {row.term!r} and method {row.method!r}, which "
-                f"this rbfrag does not know (terms {', '.join(TERMS)}; methods "
-                f"{methods}): update rbfrag or choose another model"
+                f"model {row.name!r} is of kind {row.kind}, term {row.term!r} and method "
+                f"{row.method!r}, which this rbfrag does not know (terms {', '.join(TERMS)}; "
+                f"methods {', '.join(method_names())}): update rbfrag or choose another model"
             )
         parameters = tuple(float(value) for value in row.coefficients.values())
         size = len(parameters)
@@ -98,39 +94,25 @@ class FragilityModel:
                 f"model {row.name!r} has {size} coefficients but a covariance of another size: "
                 "fit it again"
             )
-        names = formulas.PARAMETERS[shape]
-        if not 2 <= size <= len(names) or tuple(row.coefficients) != names[:size]:
+        names = form.parameters
+        fewest = len(names) - (method.exponent is not None)
+        if not fewest <= size <= len(names) or tuple(row.coefficients) != names[:size]:
             raise ModelError(
                 f"model {row.name!r} has the coefficients {', '.join(row.coefficients)}, but "
                 f"method {row.method} on {row.term} has {', '.join(names)}: fit it again"
             )
-        floor = row.diagnostics.get("interval_floor") or ()
-        if isinstance(floor, list | tuple) and len(floor) == formulas.FLOOR_NODES:
-            # stored before there was a second table, which must not be the lower one then
-            floor = [*floor, *[max(floor)] * formulas.FLOOR_NODES]
-        if not isinstance(floor, list | tuple) or len(floor) not in (0, 2 * formulas.FLOOR_NODES):
-            raise ModelError(
-                f"model {row.name!r} holds a table of least widths of another size: fit it again"
-            )
-        limits = tuple(
-            edge
-            for variable in ("p2", "intensity_m_s", "y_m_s", "tm_s", "pgv_over_pga_s")
-            for edge in row.domain.get(variable, (formulas.LEAST_Y_M_S, math.inf))
-        )
         freedom = row.diagnostics.get("degrees_of_freedom")
         return cls(
             row=row,
-            term=term,
-            shape=shape,
-            link=formulas.LINKS[row.method],
+            term=TERMS[row.term],
+            method=method,
+            form=form,
             parameters=parameters,
-            padded=parameters + (0.0,) * (formulas.MOST_PARAMETERS - size),
             packed_covariance=packed(row.covariance),
-            floor=tuple(float(value) for value in floor),
-            limits=limits,
-            limits_with_both=(*limits[:8], max(limits[8], 0.005), min(limits[9], 2.0)),
+            floor=_floor(row),
             vertical=row.diagnostics.get("vertical", "without") != "without",
             degrees_of_freedom=freedom if isinstance(freedom, int) else 0,
+            notes=notes,
         )
 
     @property
@@ -139,16 +121,227 @@ class FragilityModel:
         return self.row.name
 
     @property
+    def kind(self) -> str:
+        """The kind of failure."""
+        return self.row.kind
+
+    @property
     def meaning(self) -> str:
         """What the probability is a probability of."""
-        return MEANINGS[self.row.method]
+        if self.kind != self.method.block.kind:
+            return f"probability that the block fails ({self.kind})"
+        return self.method.meaning
+
+    @property
+    def criterion(self) -> float | None:
+        """What counts as failure where there are several criteria; None for the usual one."""
+        name = self.method.block.criterion
+        value = self.row.diagnostics.get(name) if name is not None else None
+        return float(value) if isinstance(value, int | float) else None
+
+    @property
+    def has_exponent(self) -> bool:
+        """Whether the exponent M was estimated: P then depends on p beside y."""
+        return self.method.exponent in self.row.coefficients
+
+    def with_ratios(self, values: dict[str, Any]) -> dict[str, Any]:
+        """Add PGV/(PGA g) [s] and k/PGA where they are judged by; return the values."""
+        if "pga_g" in values:
+            pga = values["pga_g"]
+            if "pgv_m_s" in values:
+                values["pgv_over_pga_s"] = values["pgv_m_s"] / (pga * STANDARD_GRAVITY_M_S2)
+            if "k_over_pga" in self.row.domain:
+                values["k_over_pga"] = values[self.method.block.strength] / pga
+        return values
+
+    def clear_ranges(self, values: Collection[str]) -> tuple[Range, ...]:
+        """Return the ranges within which nothing is to be said of the values of some names."""
+        key = tuple(values)
+        found = self.ranges.get(key)
+        if found is None:
+            found = self.ranges[key] = tuple(
+                self._clear_range(name) for name in key if name not in self.method.block.options
+            )
+        return found
+
+    def _clear_range(self, name: str) -> Range:
+        low, high = LOWEST, HIGHEST
+        for least, most, *_ in (
+            self.row.domain.get(name, (low, high)),
+            CREDIBLE.get(name, (low, high)),
+        ):
+            low, high = max(low, least), min(high, most)
+        return Range(name, low, high)
+
+    def half_width(self, level: float) -> float:
+        """Return the quantile that the interval reaches to.
+
+        Raises:
+            InputError: the level is not a number between 0 and 1.
+        """
+        try:
+            return student_half_width(level, self.degrees_of_freedom)
+        except TypeError:  # not even hashable
+            raise _no_level(level) from None
+
+    def answer(
+        self, values: Mapping[str, Any], half_width: float | None, ns: Numbers
+    ) -> tuple[Any, Any, Any, Eta]:
+        """Return P, the ends of its interval, and eta.
+
+        Args:
+            values: completed values, within what the bounds allow.
+            half_width: quantile of the confidence level; None for no interval.
+            ns: functions for the kind of number given.
+        """
+        found = self.form.eta(self.parameters, values, ns)
+        link, eta = self.method.link.probability, found.eta
+        middle = link(eta, ns)
+        if half_width is None:
+            return middle, middle, middle, found
+        error = standard_error(self.packed_covariance, found.slopes, ns)
+        low, high = link(eta - half_width * error, ns), link(eta + half_width * error, ns)
+        if self.floor:
+            by_eta, by_share = self.floor
+            share = values["y_m_s"] / (2.0 * values["intensity_m_s"])
+            least = ns.minimum(
+                ns.between(eta, FLOOR_FROM, FLOOR_STEP, by_eta),
+                ns.between(share, 0.0, FLOOR_SHARE_STEP, by_share),
+            )
+            low, high = widened(half_width * least, middle, low, high, ns)
+        return middle, low, high, found
+
+
+def standard_error(packed_covariance: Sequence[float], slopes: Sequence[Any], ns: Numbers) -> Any:
+    """Return sqrt(fᵀ Σ f) for the slopes f and a packed covariance Σ."""
+    total, k = 0.0, 0
+    for i, slope in enumerate(slopes):
+        inner = packed_covariance[k + i] * slope
+        for j in range(i):
+            inner = inner + packed_covariance[k + j] * slopes[j]
+        total = total + inner * slope
+        k += i + 1
+    return ns.sqrt(ns.maximum(total, 0.0))
+
+
+def widened(least: Any, middle: Any, low: Any, high: Any, ns: Numbers) -> tuple[Any, Any]:
+    """Return the ends of an interval of at least some width, inside 0 and 1.
+
+    What lacks is added in proportion to what is left below and above the middle.
+    """
+    lacking = ns.maximum(least - (high - low), 0.0)
+    low, high = low - lacking * middle, high + lacking * (1.0 - middle)
+    below, above = ns.maximum(-low, 0.0), ns.maximum(high - 1.0, 0.0)
+    return ns.maximum(low - above, 0.0), ns.minimum(high + below, 1.0)
 
 
 def packed(covariance: tuple[tuple[float, ...], ...]) -> tuple[float, ...]:
-    """Return a covariance as the 21 numbers of `formulas.standard_error`."""
-    size = len(covariance)
+    """Return a covariance as :func:`standard_error` reads it."""
     return tuple(
-        (float(covariance[i][j]) * (1.0 if i == j else 2.0)) if i < size else 0.0
-        for i in range(formulas.MOST_PARAMETERS)
+        float(covariance[i][j]) * (1.0 if i == j else 2.0)
+        for i in range(len(covariance))
         for j in range(i + 1)
     )
+
+
+def _floor(row: ModelRow) -> tuple[tuple[float, ...], ...]:
+    floor = row.diagnostics.get("interval_floor") or ()
+    if isinstance(floor, list | tuple) and len(floor) == FLOOR_NODES:
+        # stored before there was a second table, which must not be the lower one then
+        floor = [*floor, *[max(floor)] * FLOOR_NODES]
+    if not isinstance(floor, list | tuple) or len(floor) not in (0, 2 * FLOOR_NODES):
+        raise ModelError(
+            f"model {row.name!r} holds a table of least widths of another size: fit it again"
+        )
+    values = tuple(float(value) for value in floor)
+    return (values[:FLOOR_NODES], values[FLOOR_NODES:]) if values else ()
+
+
+FEWEST_FREEDOMS = 2
+
+
+@lru_cache(maxsize=256)
+def student_half_width(level: float, degrees_of_freedom: int) -> float:
+    """Return t such that a Student number lies within ±t with probability `level`.
+
+    Clustered errors come from as many independent numbers as there are earthquakes: their
+    intervals reach to Student's t with one degree of freedom less, not to the normal quantile.
+
+    Args:
+        level: confidence level, between 0 and 1.
+        degrees_of_freedom: earthquakes less one; 0 for the normal quantile.
+
+    Raises:
+        InputError: the level is not between 0 and 1.
+    """
+    if isinstance(level, bool):
+        raise _no_level(level)
+    start = normal_half_width(level)
+    if degrees_of_freedom < FEWEST_FREEDOMS:
+        return start
+    t = start * (1.0 + (start * start + 1.0) / (4.0 * degrees_of_freedom))
+    target = 0.5 * (1.0 - level)
+    for _ in range(100):
+        excess = _upper_tail(t, degrees_of_freedom)
+        # Newton's method on the logarithm of the tail, which bends one way
+        step = excess / _density(t, degrees_of_freedom) * math.log(excess / target)
+        t += step
+        if abs(step) <= 1e-14 * t:
+            break
+    return t
+
+
+def _density(t: float, nu: int) -> float:
+    scale = math.lgamma(0.5 * (nu + 1)) - math.lgamma(0.5 * nu) - 0.5 * math.log(nu * math.pi)
+    return math.exp(scale - 0.5 * (nu + 1) * math.log1p(t * t / nu))
+
+
+def _upper_tail(t: float, nu: int) -> float:
+    # For whole nu the distribution function is a finite sum (Abramowitz & Stegun 26.7.3-4),
+    # subtracted from a half; the tail of interest is far from rounding.
+    theta = math.atan(t / math.sqrt(nu))
+    cos2 = math.cos(theta) ** 2
+    if nu % 2:
+        term, total = math.cos(theta), 0.0
+        for k in range(1, nu - 1, 2):
+            total += term
+            term *= cos2 * (k + 1) / (k + 2)
+        inside = (theta + math.sin(theta) * total) * 2.0 / math.pi
+    else:
+        term, total = 1.0, 0.0
+        for k in range(0, nu - 1, 2):
+            total += term
+            term *= cos2 * (k + 1) / (k + 2)
+        inside = math.sin(theta) * total
+    return max(0.5 * (1.0 - inside), 1e-300)
+
+
+def normal_half_width(level: float) -> float:
+    """Return q such that a standard normal number lies within ±q with probability `level`.
+
+    Newton's method on the logarithm of the upper tail, ln Q(q) = ln((1 - level)/2); the
+    logarithm is concave, so that the iteration ends from one side.
+
+    Args:
+        level: confidence level, between 0 and 1.
+
+    Raises:
+        InputError: the level is not between 0 and 1.
+    """
+    if not isinstance(level, int | float) or not 0.0 < level < 1.0:
+        raise _no_level(level)
+    tail = 0.5 * (1.0 - level)
+    target = math.log(tail)
+    q = 1.0
+    for _ in range(60):
+        upper = 0.5 * math.erfc(q * math.sqrt(0.5))
+        density = math.exp(-0.5 * q * q) / math.sqrt(2.0 * math.pi)
+        step = upper / density * (math.log(upper) - target)
+        q += step
+        if abs(step) <= 1e-15 * abs(q):
+            break
+    return q
+
+
+def _no_level(level: object) -> InputError:
+    return InputError(f"level = {level!r}: a confidence level lies between 0 and 1, such as 0.95")

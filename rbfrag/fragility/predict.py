@@ -1,4 +1,4 @@
-"""The probability that a block topples: `predict`.
+"""The probability that a block fails: `predict`, for every kind of failure.
 
 For single numbers neither numpy nor any other library is loaded.
 """
@@ -6,26 +6,23 @@ For single numbers neither numpy nor any other library is loaded.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from rbfrag.db.rows import ModelRow
 from rbfrag.errors import InputError
-from rbfrag.fragility import formulas
-from rbfrag.fragility.answers import Prediction, PredictionArray
-from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.lookup import find_model, suited_models
+from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction_values import neutral_tm_s, pgv_over_pga_s
-from rbfrag.fragility.quantiles import student_half_width
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+    from rbfrag.fragility.checks import Finding
+    from rbfrag.fragility.prediction_array import PredictionArray
     from rbfrag.motions.ground_motion import GroundMotion
-
-    Given = Mapping[str, float] | Mapping[str, ArrayLike]
 
 Model = ModelRow | FragilityModel | str
 Polarity = Literal["forward", "reverse", "both"]
@@ -36,11 +33,88 @@ MEASURES = ("pgv_m_s", "pga_g", "tm_s", "pgd_m")
 """What may be known of a motion."""
 
 
+@dataclass(frozen=True)
+class Prediction:
+    """Probability that one block fails in one motion.
+
+    Args:
+        kind: how the block fails.
+        probability: P, between 0 and 1.
+        ci_low: lower end of the confidence interval of P.
+        ci_high: upper end of it.
+        level: confidence level of the interval.
+        model: name of the model that answered.
+        term: its intensity term.
+        method: how it was fitted.
+        failure: what the probability is one of, in words.
+        y_m_s: velocity k g/p of the block [m/s]; None where it has no size.
+        intensity_m_s: the intensity term of the motion [m/s].
+        in_domain: True when block and motion lie in the ranges that were fitted.
+        warnings: sentences about suspicious input or an answer to be doubted.
+        pgv_over_pga_s: PGV over PGA [s] where both are known, else None: what tells long from
+            short pulses where Tm is not known.
+        median_displacement_m: the displacement that is exceeded with P = 1/2 [m]; None where the
+            kind has none and where the block does not move.
+    """
+
+    kind: str
+    probability: float
+    ci_low: float
+    ci_high: float
+    level: float
+    model: str
+    term: str
+    method: str
+    failure: str
+    y_m_s: float | None
+    intensity_m_s: float
+    in_domain: bool
+    warnings: tuple[str, ...] = ()
+    pgv_over_pga_s: float | None = None
+    median_displacement_m: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract."""
+        return {**vars(self), "warnings": list(self.warnings)}
+
+
+@dataclass(frozen=True)
+class MotionPrediction(Prediction):
+    """Probability that one block fails in a recorded motion of unknown direction.
+
+    Every number of :class:`Prediction` is the mean of the two polarities.
+
+    Args:
+        forward: the answer where positive samples drive forward rotation.
+        reverse: the answer where they drive backward.
+    """
+
+    forward: Prediction | None = None
+    reverse: Prediction | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract, and both polarities."""
+        result = super().as_dict()
+        both = {name: result.pop(name) for name in ("forward", "reverse")}
+        result["polarities"] = {
+            name: None if answer is None else answer.as_dict() for name, answer in both.items()
+        }
+        return result
+
+
 @overload
 def predict(
-    p2: float,
-    kr: float,
+    p2: float | None = ...,
+    kr: float | None = ...,
     *,
+    kind: str | None = ...,
+    ky: float | None = ...,
+    displacement_m: float | None = ...,
+    beta_deg: float | None = ...,
+    ks: float | None = ...,
+    ps2: float | None = ...,
+    rotation_deg: float | None = ...,
+    leaves_g: float | None = ...,
     pgv_m_s: float | None = ...,
     pga_g: float | None = ...,
     tm_s: float | None = ...,
@@ -51,14 +125,23 @@ def predict(
     level: float = ...,
     db: str | PathLike[str] | None = ...,
     nan: Literal["propagate", "raise"] = ...,
+    interval: bool = ...,
 ) -> Prediction: ...
 
 
 @overload
 def predict(
-    p2: ArrayLike,
-    kr: ArrayLike,
+    p2: ArrayLike | None = ...,
+    kr: ArrayLike | None = ...,
     *,
+    kind: str | None = ...,
+    ky: ArrayLike | None = ...,
+    displacement_m: ArrayLike | None = ...,
+    beta_deg: ArrayLike | None = ...,
+    ks: ArrayLike | None = ...,
+    ps2: ArrayLike | None = ...,
+    rotation_deg: float | None = ...,
+    leaves_g: ArrayLike | None = ...,
     pgv_m_s: ArrayLike | None = ...,
     pga_g: ArrayLike | None = ...,
     tm_s: ArrayLike | None = ...,
@@ -69,13 +152,22 @@ def predict(
     level: float = ...,
     db: str | PathLike[str] | None = ...,
     nan: Literal["propagate", "raise"] = ...,
+    interval: bool = ...,
 ) -> Prediction | PredictionArray: ...
 
 
 def predict(
-    p2: ArrayLike,
-    kr: ArrayLike,
+    p2: ArrayLike | None = None,
+    kr: ArrayLike | None = None,
     *,
+    kind: str | None = None,
+    ky: ArrayLike | None = None,
+    displacement_m: ArrayLike | None = None,
+    beta_deg: ArrayLike | None = None,
+    ks: ArrayLike | None = None,
+    ps2: ArrayLike | None = None,
+    rotation_deg: float | None = None,
+    leaves_g: ArrayLike | None = None,
     pgv_m_s: ArrayLike | None = None,
     pga_g: ArrayLike | None = None,
     tm_s: ArrayLike | None = None,
@@ -86,23 +178,37 @@ def predict(
     level: float = 0.95,
     db: str | PathLike[str] | None = None,
     nan: Literal["propagate", "raise"] = "propagate",
+    interval: bool = True,
 ) -> Prediction | PredictionArray:
-    """Return the probability that a block topples, with its confidence interval.
+    """Return the probability that a block fails, with its confidence interval.
 
     P = F(eta), with eta and F of the model's method (docs/theory/fragility.md). The interval is
     F(eta ± t s), s being the standard error of eta by the delta method from the covariance of
     all parameters and t Student's quantile for as many earthquakes as were fitted; it is never
     narrower than that of a model which knows more. Without shaking, and where mechanics
-    forbids toppling (k_r >= PGA, say), P is 0 whatever the model says.
+    forbids failure (k >= PGA, say), P is 0 whatever the model says.
+
+    A block is given by p2 and kr (it topples), by ky and displacement_m (it slides further than
+    that), or by ks and ps2 (it slumps); each is a number or an array.
 
     Args:
-        p2: frequency parameter p² of the block [1/s²], scalar or array.
+        p2: frequency parameter p² of the block [1/s²].
         kr: its yield acceleration coefficient for toppling at rest [-].
+        kind: how it fails; None for what the block is given by.
+        ky: yield acceleration coefficient of sliding, tan(phi - beta) [-].
+        displacement_m: the displacement down the base that is too far [m].
+        beta_deg: with ky: dip of the base, out of the slope positive [deg]; level if not given.
+        ks: yield acceleration coefficient of slumping [-].
+        ps2: frequency parameter p_s² of slumping at rest [1/s²].
+        rotation_deg: with ks: rotation that counts as failure [deg], of which there must be a
+            model; None for failure past recovery.
+        leaves_g: with ks: acceleration at which the block leaves its back plane [g]: above it the
+            answer warns.
         pgv_m_s: peak ground velocity of the horizontal component [m/s].
         pga_g: peak ground acceleration [g].
         tm_s: mean period [s].
         pgd_m: peak ground displacement [m].
-        motion: the accelerogram itself, instead of its measures; its toppling spectrum answers.
+        motion: the accelerogram itself, instead of its measures.
         polarity: ``forward`` or ``reverse`` where it is known how the motion points at the slope;
             ``both`` gives the mean of the two, which stand beside it (motion only).
         model: a model, the name of a stored one, or None for the best one that what is given
@@ -112,12 +218,14 @@ def predict(
             ``rbfrag.db`` in the current folder, or else the reference that is shipped.
         nan: in arrays, ``propagate`` answers NaN with its reason where the input cannot be
             used, ``raise`` refuses such arrays.
+        interval: in arrays, False leaves the interval out (its ends are then NaN), which takes
+            less time.
 
     Returns:
-        :class:`Prediction` when every argument is a single number (with `motion` and unknown
-        polarity its kind :class:`MotionPrediction`), otherwise :class:`PredictionArray` of the
-        broadcast shape. In arrays a block with k_r <= 0 falls at rest: P = 1 with the reason
-        ``unstable``.
+        :class:`Prediction` when every argument is a single number (with `motion` and both
+        polarities :class:`MotionPrediction`), otherwise
+        :class:`~rbfrag.fragility.prediction_array.PredictionArray` of the broadcast shape. In
+        arrays a block with a strength <= 0 fails at rest: P = 1 with the reason ``unstable``.
 
     Raises:
         InputError: a value that cannot be used, or measures the model cannot work with.
@@ -131,6 +239,18 @@ def predict(
         given["p2"] = p2
     if kr is not None:
         given["kr"] = kr
+    if ky is not None:
+        given["ky"] = ky
+    if displacement_m is not None:
+        given["displacement_m"] = displacement_m
+    if beta_deg is not None:
+        given["beta_deg"] = beta_deg
+    if ks is not None:
+        given["ks"] = ks
+    if ps2 is not None:
+        given["ps2"] = ps2
+    if leaves_g is not None:
+        given["leaves_g"] = leaves_g
     if pgv_m_s is not None:
         given["pgv_m_s"] = pgv_m_s
     if pga_g is not None:
@@ -139,18 +259,13 @@ def predict(
         given["tm_s"] = tm_s
     if pgd_m is not None:
         given["pgd_m"] = pgd_m
-    if "p2" not in given or "kr" not in given:
-        missing = "p2" if "p2" not in given else "kr"
-        raise InputError(f"{missing} is missing: a block is given by p2 [1/s²] and kr [-]")
     if motion is not None:
-        # Kept apart: a motion needs numpy.
-        from rbfrag.fragility.prediction_motion import predict_motion
-
-        return predict_motion(
-            given, motion, polarity=polarity, model=model, level=level, db=db, nan=nan
-        )
-    chosen = find_model(model, given, db)
-    return answer_given(chosen, given, level, nan=nan)
+        return _predict_motion(
+            given, motion, kind=kind, rotation_deg=rotation_deg, polarity=polarity, model=model,
+            level=level, db=db,
+        )  # fmt: skip
+    chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
+    return answer_given(chosen, given, level, nan=nan, interval=interval)
 
 
 def answer_given(
@@ -159,34 +274,32 @@ def answer_given(
     level: float,
     *,
     nan: Literal["propagate", "raise"] = "propagate",
+    interval: bool = True,
 ) -> Prediction | PredictionArray:
     """Return the answer of one model for values by name; see :func:`predict`."""
-    half_width = half_width_of(model, level)
+    for name in model.method.block.names:
+        if name not in given:
+            raise InputError(
+                f"{name} is missing: a block of kind {model.kind} is given by "
+                f"{' and '.join(model.method.block.names)}"
+            )
+    half_width = model.half_width(level)
     singles: dict[str, float] = {}
     for name, value in given.items():
-        if not is_single(value):
+        if type(value) is float:  # for speed
+            singles[name] = value  # type: ignore[unreachable]
+        elif is_single(value):
+            singles[name] = single(name, value)
+        else:
             break
-        singles[name] = single(name, value)
     else:
         return _predict_one(model, singles, level, half_width)
     # Kept apart so that single numbers do not load numpy.
     from rbfrag.fragility.prediction_array import predict_many
 
-    return predict_many(model, given, level, half_width, refuse_nan=nan == "raise")
-
-
-def half_width_of(model: FragilityModel, level: float) -> float:
-    """Return the quantile that the interval of a model reaches to.
-
-    Raises:
-        InputError: the level is not between 0 and 1.
-    """
-    try:
-        return student_half_width(level, model.degrees_of_freedom)
-    except TypeError:  # not even hashable
-        raise InputError(
-            f"level = {level!r}: a confidence level lies between 0 and 1, such as 0.95"
-        ) from None
+    return predict_many(
+        model, given, level, half_width if interval else None, refuse_nan=nan == "raise"
+    )
 
 
 def is_single(value: object) -> bool:
@@ -205,8 +318,6 @@ def single(name: str, value: object) -> float:
     Raises:
         InputError: it is no number.
     """
-    if type(value) is float:
-        return value
     if isinstance(value, bool | str | bytes):
         raise InputError(f"{name} = {value!r} is not a number: give a number or an array")
     try:
@@ -216,60 +327,225 @@ def single(name: str, value: object) -> float:
 
 
 def _predict_one(
-    model: FragilityModel, values: dict[str, float], level: float, half_width: float
+    model: FragilityModel, given: dict[str, float], level: float, half_width: float
 ) -> Prediction:
-    p2, kr = values["p2"], values["kr"]
-    pgv, pga = values.get("pgv_m_s"), values.get("pga_g")
-    tm = values.get("tm_s")
-    both = pgv is not None and pga is not None
-    if p2 > 0.0:
-        try:
-            x: float = model.term.formula(*[values[name] for name in model.term.inputs])
-        except ArithmeticError:  # Tm = 0, which the words below refuse
-            x = math.nan
-        p = math.sqrt(p2)
-        y = kr * STANDARD_GRAVITY_M_S2 / p
-        if formulas.is_plain(
-            model.shape,
-            model.padded,
-            model.limits_with_both if both else model.limits,
-            p2,
-            p,
-            kr,
-            y,
-            x,
-            1.0 if pgv is None else pgv,
-            5.0 if pga is None else pga,
-            neutral_tm_s(model) if tm is None else tm,
-            values.get("pgd_m", 1.0),
-        ):
-            probability, low, high = formulas.answer(
-                model.shape,
-                model.link,
-                model.padded,
-                model.packed_covariance,
-                model.floor,
-                half_width,
-                y,
-                p,
-                x,
-                5.0 if pga is None else pga,
-                1.0 if tm is None else tm,
-            )
-            return Prediction(
-                probability,
-                low,
-                high,
-                level,
-                model.name,
-                model.term.name,
-                model.row.method,
-                y,
-                x,
-                True,
-                model.notes,
-                pgv_over_pga_s(pgv, pga) if both else None,
-            )
-    from rbfrag.fragility.prediction_words import predict_with_words
+    method = model.method
+    block = method.block
+    warnings: tuple[str, ...] = model.notes
+    try:
+        values = model.with_ratios(block.completed(given, model.term, SINGLE))
+        clear = _is_clear(model, values)
+    except (ArithmeticError, ValueError):  # the checks find the words
+        clear = False
+    if clear:
+        probability, low, high, eta = model.answer(values, half_width, SINGLE)
+        x, in_domain = values["intensity_m_s"], True
+    else:
+        probability, low, high, eta, values, x, in_domain, said = _with_words(
+            model, given, half_width
+        )
+        warnings = (*warnings, *said)
+    median = None
+    if method.median_of is not None and eta is not None:
+        # the asked value, not the one that is adjusted for the base's dip
+        median = given[method.median_of] * math.exp(eta.eta * math.exp(eta.log_sigma))
+    return Prediction(
+        model.row.kind,
+        probability,
+        low,
+        high,
+        level,
+        model.row.name,
+        model.term.name,
+        method.name,
+        model.row.kind if method.failure is None else method.failure(given, model.criterion),
+        values.get("y_m_s"),
+        x,
+        in_domain,
+        warnings,
+        values.get("pgv_over_pga_s"),
+        median,
+    )
 
-    return predict_with_words(model, values, level, half_width)
+
+def _is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
+    """Return whether there is nothing to say about a question but its probability."""
+    for name, low, high in model.clear_ranges(values):
+        if not low <= values[name] <= high:
+            return False
+    block, method = model.method.block, model.method
+    if "pga_g" in values and block.at_rest.holds(values):
+        return False
+    for bound in model.form.bounds:
+        if bound.holds(values):
+            return False
+    for bound in (*block.refuses, *block.doubts):
+        if bound.holds(values):
+            return False
+    return method.doubts is None or not any(
+        holds for holds, _, _ in method.doubts(model.parameters, values, SINGLE)
+    )
+
+
+def _with_words(
+    model: FragilityModel, given: dict[str, float], half_width: float
+) -> tuple[float, float, float, Any, dict[str, Any], float, bool, list[str]]:
+    # Kept apart: most questions need no words.
+    from rbfrag.fragility.checks import judged
+
+    said: list[str] = []
+
+    def say(holds: bool, finding: Finding) -> None:
+        if holds:
+            said.append(finding.about(finding.value))
+
+    def refuse(holds: bool, finding: Finding) -> None:
+        if holds:
+            raise InputError(finding.about(finding.value))
+
+    found = judged(
+        model, given, tuple(given), half_width, SINGLE,
+        say=say, refuse=refuse, fails_at_rest=refuse, nothing=False,
+    )  # fmt: skip
+    return (
+        found.probability,
+        found.low,
+        found.high,
+        found.eta,
+        found.values,
+        found.intensity_m_s,
+        found.in_domain,
+        said,
+    )
+
+
+def _predict_motion(
+    given: Mapping[str, ArrayLike],
+    motion: GroundMotion,
+    *,
+    kind: str | None,
+    rotation_deg: float | None,
+    polarity: Polarity,
+    model: Model | None,
+    level: float,
+    db: str | PathLike[str] | None,
+) -> Prediction:
+    """Return the probability for one block; arguments as for :func:`predict`.
+
+    Raises:
+        InputError: measures beside the motion, several blocks, an unknown polarity.
+    """
+    # Kept apart: a motion needs numpy.
+    from rbfrag.fragility.prediction_motion import measures_of
+
+    extra = [name for name in given if name in MEASURES]
+    if extra:
+        raise InputError(
+            f"{' and '.join(extra)} given beside a motion: the motion has them; leave them out"
+        )
+    if polarity not in ("forward", "reverse", "both"):
+        raise InputError(f"polarity = {polarity!r}: use 'forward', 'reverse' or 'both'")
+    several = [name for name, value in given.items() if not is_single(value)]
+    if several:
+        raise InputError(
+            f"{' and '.join(several)} must be single numbers with a motion: call it once for each "
+            "block, or use rbfrag.toppling_spectrum and a model of the term xp"
+        )
+    block = {name: single(name, value) for name, value in given.items()}
+    answers: dict[str, Prediction] = {}
+    for direction in ("forward", "reverse") if polarity == "both" else (polarity,):
+        own = {**block, **measures_of(motion, block.get("p2"), direction)}
+        chosen = find_model(model, own, db, kind=kind, rotation_deg=rotation_deg)
+        answer = answer_given(chosen, own, level)
+        assert isinstance(answer, Prediction)
+        answers[direction] = answer
+    if polarity != "both":
+        return answers[polarity]
+    return _mean(answers["forward"], answers["reverse"])
+
+
+def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
+    def half(name: str) -> float:
+        return 0.5 * (float(getattr(forward, name)) + float(getattr(reverse, name)))
+
+    said = [f"forward: {text}" for text in forward.warnings]
+    said += [f"reverse: {text}" for text in reverse.warnings]
+    return MotionPrediction(
+        kind=forward.kind,
+        failure=forward.failure,
+        median_displacement_m=forward.median_displacement_m,
+        probability=half("probability"),
+        ci_low=half("ci_low"),
+        ci_high=half("ci_high"),
+        level=forward.level,
+        model=forward.model,
+        term=forward.term,
+        method=forward.method,
+        y_m_s=forward.y_m_s,
+        intensity_m_s=half("intensity_m_s"),
+        in_domain=forward.in_domain and reverse.in_domain,
+        warnings=tuple(said),
+        pgv_over_pga_s=forward.pgv_over_pga_s,
+        forward=forward,
+        reverse=reverse,
+    )
+
+
+def prediction_document(
+    given: Mapping[str, float],
+    *,
+    kind: str | None = None,
+    rotation_deg: float | None = None,
+    motion: GroundMotion | None = None,
+    polarity: str = "both",
+    model: str | None = None,
+    level: float = 0.95,
+    db: str | PathLike[str] | None = None,
+    remarks: Sequence[str] = (),
+) -> dict[str, Any]:
+    """Return the answer under the keys of the JSON contract, and that of every suited model.
+
+    Args:
+        given: block and what is known of the motion, by the names of :func:`predict`.
+        kind: how the block fails; None for what it is given by.
+        rotation_deg: rotation that counts as failure, where models of several are fitted [deg].
+        motion: the accelerogram itself.
+        polarity: forward, reverse or both; with `motion` only.
+        model: name of a stored model; None for the best for each term that the measures
+            suffice for.
+        level: confidence level of the interval.
+        db: database of the models, as for :func:`predict`.
+        remarks: warnings about the block, which go before those of the answer.
+
+    Raises:
+        InputError: a value that cannot be used, or measures no model can work with.
+        UnknownModelError: no model of that name.
+        DatabaseError: the database cannot be read.
+    """
+    asked: dict[str, Any] = {"kind": kind, "rotation_deg": rotation_deg}
+    others: list[Prediction]
+    if motion is not None or model is not None:
+        ask: Any = predict
+        if motion is not None:
+            asked |= {"motion": motion, "polarity": polarity}
+        others = [ask(**given, **asked, model=model, level=level, db=db)]
+    else:
+        suited = suited_models(given, db, **asked)
+        others = [answer_given(each, given, level) for each in suited]  # type: ignore[misc]
+    recommended = others[0]
+    document = recommended.as_dict()
+    document["warnings"] = [*remarks, *recommended.warnings]
+    document["answers"] = [
+        {
+            "model": each.model,
+            "term": each.term,
+            "method": each.method,
+            "probability": each.probability,
+            "ci_low": each.ci_low,
+            "ci_high": each.ci_high,
+            "in_domain": each.in_domain,
+            "recommended": each is recommended,
+        }
+        for each in others
+    ]
+    return document

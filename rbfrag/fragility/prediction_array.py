@@ -3,41 +3,104 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility import formulas
-from rbfrag.fragility.answers import PredictionArray, Reasons
-from rbfrag.fragility.checks import BOUNDS, doubts, not_lifted, outside_domain, refusals, unstable
-from rbfrag.fragility.functions import array_functions
-from rbfrag.fragility.measures import toppling_velocity_m_s
+from rbfrag.fragility.checks import Finding, judged
+from rbfrag.fragility.methods import Numbers, arrays
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction_values import NEUTRAL, derived, neutral_tm_s
 
 FloatArray = NDArray[np.float64]
 
-CHUNK = 1 << 17
+CHUNK = 1 << 14
 """Rows that are worked on at a time: what they need stays near the processor."""
 
-COMPILED_FROM = 20_000
-"""Rows from which on the compiled formulas are worth loading."""
 
-NO_FLOOR = (0.0,) * (2 * formulas.FLOOR_NODES)
+class Reasons:
+    """Sentences by element, kept as one number each until somebody reads them."""
 
-_COMPILED = "rbfrag.fragility.compiled_formulas"
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        """Start with no sentence for any element."""
+        self.shape = shape
+        self._places: list[NDArray[np.intp]] = []
+        self._texts: list[NDArray[np.object_]] = []
+
+    def put(self, places: NDArray[np.intp], texts: NDArray[np.object_]) -> None:
+        """Keep the texts of the elements at flat positions."""
+        self._places.append(places)
+        self._texts.append(texts)
+
+    def array(self) -> NDArray[np.object_]:
+        """Return the text of every element, empty where there is none."""
+        result = np.full(self.shape, "", dtype=object)
+        for places, texts in zip(self._places, self._texts, strict=True):
+            result.flat[places] = texts
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class PredictionArray:
+    """Probabilities of many blocks or motions; all arrays have the broadcast shape.
+
+    Args:
+        kind: how the blocks fail.
+        probability: P; NaN where the input cannot be used.
+        ci_low: lower end of the confidence interval of P; NaN where none was asked for.
+        ci_high: upper end of it.
+        in_domain: True where block and motion lie in the ranges that were fitted.
+        reasons: why an answer is missing, ruled or to be doubted; read them by :attr:`reason`.
+        y_m_s: velocity k g/p of the blocks [m/s]; NaN where they have no size.
+        intensity_m_s: intensity term of the motions [m/s].
+        level: confidence level of the interval.
+        model: name of the model that answered.
+        term: its intensity term.
+        method: how it was fitted.
+        notes: sentences about the model that hold for every element.
+    """
+
+    kind: str
+    probability: FloatArray
+    ci_low: FloatArray
+    ci_high: FloatArray
+    in_domain: NDArray[np.bool_]
+    reasons: Reasons
+    y_m_s: FloatArray
+    intensity_m_s: FloatArray
+    level: float
+    model: str
+    term: str
+    method: str
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def reason(self) -> NDArray[np.object_]:
+        """Why an answer is missing, ruled or to be doubted; empty text elsewhere."""
+        return self.reasons.array()
+
+
+@dataclass(frozen=True, eq=False)
+class _Columns:
+    """The answers that are filled, flat arrays."""
+
+    probability: FloatArray
+    low: FloatArray
+    high: FloatArray
+    y: FloatArray
+    x: FloatArray
+    in_domain: NDArray[np.bool_]
 
 
 def predict_many(
     model: FragilityModel,
     given: Mapping[str, object],
     level: float,
-    half_width: float,
+    half_width: float | None,
     *,
     refuse_nan: bool,
 ) -> PredictionArray:
@@ -45,9 +108,9 @@ def predict_many(
 
     Args:
         model: the model that answers.
-        given: p2, kr and measures of the motion by name, numbers or arrays.
+        given: block and measures of the motion by name, numbers or arrays.
         level: confidence level of the interval.
-        half_width: the quantile that belongs to it.
+        half_width: the quantile that belongs to it; None for no interval.
         refuse_nan: raise instead of answering NaN.
 
     Raises:
@@ -56,217 +119,133 @@ def predict_many(
     """
     values, shape = _flat(given)
     size = int(np.prod(shape))
-    probability, low, high, y, x = (np.empty(size) for _ in range(5))
-    in_domain = np.ones(size, dtype=np.bool_)
+    ns = arrays()
+    empty = np.empty((5, size))
+    out = _Columns(empty[0], empty[1], empty[2], empty[3], empty[4], np.ones(size, dtype=np.bool_))
+    for ends in (out.low, out.high) if half_width is None else ():
+        ends[:] = np.nan
     reasons = Reasons(shape)
-    compiled = size >= COMPILED_FROM or _COMPILED in sys.modules
 
-    def work(start: int) -> list[tuple[NDArray[np.intp], NDArray[np.object_]]]:
+    def work(start: int) -> tuple[NDArray[np.intp], NDArray[np.object_]] | None:
         part = slice(start, min(start + CHUNK, size))
         own = {name: v if v.size == 1 else v[part] for name, v in values.items()}
         with np.errstate(all="ignore"):
-            intensity = np.asarray(model.term.intensity_m_s(own), dtype=np.float64)
-        x[part] = intensity
-        odd = _plain_part(
-            model, own, intensity, half_width, y[part], probability[part], low[part], high[part],
-            compiled=compiled,
-        )  # fmt: skip
-        if not odd.size:
-            return []
-        chosen = {n: v.repeat(odd.size) if v.size == 1 else v[odd] for n, v in own.items()}
-        place = odd + start
-        texts = _with_words(
-            model, chosen, half_width, place, shape, refuse_nan=refuse_nan,
-            out=(probability, low, high, y, x, in_domain),
-        )  # fmt: skip
-        return [(place, texts)]
+            flagged = _answer_part(model, own, half_width, part, out, ns)
+            if not flagged.size:
+                return None
+            chosen = {
+                n: v.repeat(flagged.size) if v.size == 1 else v[flagged] for n, v in own.items()
+            }
+            place = flagged + start
+            return place, _with_words(
+                model, chosen, half_width, place, shape, out, refuse_nan=refuse_nan
+            )
 
     starts = range(0, size, CHUNK)
-    if len(starts) > 1:
-        with ThreadPoolExecutor(min(len(starts), os.cpu_count() or 1)) as pool:
+    workers = min(len(starts), os.cpu_count() or 1)
+    if workers > 1:
+        with ThreadPoolExecutor(workers) as pool:
             found = list(pool.map(work, starts))
     else:
         found = [work(start) for start in starts]
     for each in found:
-        for place, texts in each:
-            reasons.put(place, texts)
+        if each is not None:
+            reasons.put(*each)
     return PredictionArray(
-        probability=probability.reshape(shape),
-        ci_low=low.reshape(shape),
-        ci_high=high.reshape(shape),
-        in_domain=in_domain.reshape(shape),
+        kind=model.kind,
+        probability=out.probability.reshape(shape),
+        ci_low=out.low.reshape(shape),
+        ci_high=out.high.reshape(shape),
+        in_domain=out.in_domain.reshape(shape),
         reasons=reasons,
-        y_m_s=y.reshape(shape),
-        intensity_m_s=x.reshape(shape),
+        y_m_s=out.y.reshape(shape),
+        intensity_m_s=out.x.reshape(shape),
         level=level,
         model=model.name,
         term=model.term.name,
-        method=model.row.method,
+        method=model.method.name,
         notes=model.notes,
     )
 
 
-def _plain_part(
+def _answer_part(
     model: FragilityModel,
-    values: Mapping[str, FloatArray],
-    x: FloatArray,
-    half_width: float,
-    y: FloatArray,
-    probability: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-    *,
-    compiled: bool,
+    given: Mapping[str, FloatArray],
+    half_width: float | None,
+    part: slice,
+    out: _Columns,
+    ns: Numbers,
 ) -> NDArray[np.intp]:
-    """Fill the answers that need no words; return the positions of the others."""
-    neutral = {**NEUTRAL, "tm_s": neutral_tm_s(model)}
-    columns = [
-        values["p2"],
-        values["kr"],
-        x,
-        *(
-            values.get(name, np.array([neutral[name]]))
-            for name in ("pgv_m_s", "pga_g", "tm_s", "pgd_m")
-        ),
-    ]
-    both = "pgv_m_s" in values and "pga_g" in values
-    plain = np.zeros(y.size, dtype=np.bool_)
-    if compiled:
-        from rbfrag.fragility.compiled_formulas import plain_answers
-
-        plain_answers(model.shape, model.link)(
-            model.padded,
-            model.packed_covariance,
-            np.array(model.floor or NO_FLOOR),
-            half_width,
-            model.limits_with_both if both else model.limits,
-            *columns,
-            y,
-            probability,
-            low,
-            high,
-            plain,
-        )
-    return np.flatnonzero(~plain)
+    """Fill the answers of a part; return where there is something to say, which is not answered."""
+    method, block = model.method, model.method.block
+    values = model.with_ratios(block.completed(given, model.term, ns))
+    clear = np.ones(part.stop - part.start, dtype=np.bool_)
+    for name, least, most in model.clear_ranges(values):
+        clear &= values[name] >= least
+        clear &= values[name] <= most
+    bounds = [*model.form.bounds, *block.refuses, *block.doubts]
+    if "pga_g" in values and block.at_rest not in bounds:
+        bounds.append(block.at_rest)
+    flags = [bound.holds(values) for bound in bounds]
+    if method.doubts is not None:
+        flags += [holds for holds, _, _ in method.doubts(model.parameters, values, ns)]
+    for holds in flags:
+        clear &= np.logical_not(holds)
+    middle, low, high, _ = model.answer(values, half_width, ns)
+    out.probability[part] = middle
+    if half_width is not None:
+        out.low[part], out.high[part] = low, high
+    out.y[part] = values.get("y_m_s", np.nan)
+    out.x[part] = values["intensity_m_s"]
+    return np.flatnonzero(~clear)
 
 
 def _with_words(
     model: FragilityModel,
-    values: dict[str, FloatArray],
-    half_width: float,
+    given: dict[str, FloatArray],
+    half_width: float | None,
     place: NDArray[np.intp],
     shape: tuple[int, ...],
+    out: _Columns,
     *,
     refuse_nan: bool,
-    out: tuple[Any, ...],
 ) -> NDArray[np.object_]:
     """Answer elements of which there may be something to say; return what is said."""
-    n = place.size
-    functions = array_functions()
-    said = _Sentences(n)
-    missing = np.zeros(n, dtype=bool)
-    for refusal in refusals(values, ("p2", "kr", *model.term.inputs)):
-        if refuse_nan and refusal.holds.any():
-            first = int(np.flatnonzero(refusal.holds)[0])
+    said = _Sentences(place.size)
+    at_rest = np.zeros(place.size, dtype=np.bool_)
+
+    def say(holds: NDArray[np.bool_], finding: Finding) -> None:
+        said.add(holds, finding.in_general())
+
+    def refuse(holds: NDArray[np.bool_], finding: Finding) -> None:
+        if refuse_nan and holds.any():
+            first = int(np.flatnonzero(holds)[0])
             where = tuple(int(i) for i in np.unravel_index(place[first], shape))
-            raise InputError(f"element {where}: {refusal.about(float(refusal.value[first]))}")
-        said.add(refusal.holds, refusal.in_general())
-        missing |= refusal.holds
+            raise InputError(f"element {where}: {finding.about(float(finding.value[first]))}")
+        say(holds, finding)
 
-    falls = unstable(values).holds & ~missing
-    still = (values[model.term.inputs[0]] == 0.0) & ~missing & ~falls
-    ruled = missing | falls | still
-    with np.errstate(all="ignore"):
-        x = np.asarray(model.term.intensity_m_s(values), dtype=np.float64)
-        y = np.maximum(
-            toppling_velocity_m_s(values["p2"], values["kr"], functions), formulas.LEAST_Y_M_S
-        )
-        values = derived({**values, "intensity_m_s": x, "y_m_s": y})
-        gate = not_lifted(model, values)
-        kept = np.zeros(n, dtype=bool) if gate is None else gate.holds & ~ruled
-        middle, low, high = (np.zeros(n) for _ in range(3))
-        asked = np.flatnonzero(~ruled & ~kept)
-        codes = _answer_each(model, values, half_width, asked, middle, low, high)
-        certain = ruled | kept
-        certain[asked[codes != formulas.FREE]] = True
-        if gate is not None:
-            said.add(kept, gate.in_general())
-        for code, (name, text) in BOUNDS.items():
-            holds = np.zeros(n, dtype=bool)
-            holds[asked[codes == code]] = True
-            said.add(holds, f"{name} {text}")
-        in_domain = ~missing
-        for finding in outside_domain(model, values):
-            holds = finding.holds & ~certain
-            in_domain &= ~holds
-            said.add(holds, finding.in_general())
-        for finding in doubts(model, values, functions):
-            said.add(finding.holds & ~ruled, finding.in_general())
-    for answer in (middle, low, high):
-        answer[missing] = np.nan
-        answer[falls] = 1.0
-    said.add(falls, "unstable")
-    said.add(still, "no shaking: P = 0 by definition, not by the model")
-    y[missing] = x[missing] = np.nan
-    for target, filled in zip(out, (middle, low, high, y, x, in_domain), strict=True):
-        target[place] = filled
+    def fails_at_rest(holds: NDArray[np.bool_], _: Finding) -> None:
+        at_rest[:] = holds
+        said.add(holds, "unstable")
+
+    block = model.method.block
+    needed = [*block.names, *model.term.inputs, *(o for o in block.options if o in given)]
+    found = judged(
+        model, given, needed, half_width, arrays(),
+        say=say, refuse=refuse, fails_at_rest=fails_at_rest,
+        nothing=np.zeros(place.size, dtype=np.bool_),
+    )  # fmt: skip
+    ends = () if half_width is None else ((out.low, found.low), (out.high, found.high))
+    for target, answer in ((out.probability, found.probability), *ends):
+        answer = np.where(found.ruled, 0.0, answer)
+        answer[at_rest] = 1.0
+        answer[found.missing] = np.nan
+        target[place] = answer
+    y = found.values.get("y_m_s", np.full(place.size, np.nan))
+    for target, answer in ((out.y, y), (out.x, found.intensity_m_s)):
+        target[place] = np.where(found.missing, np.nan, answer)
+    out.in_domain[place] = found.in_domain
     return said.texts()
-
-
-def _answer_each(
-    model: FragilityModel,
-    values: Mapping[str, FloatArray],
-    half_width: float,
-    asked: NDArray[np.intp],
-    middle: FloatArray,
-    low: FloatArray,
-    high: FloatArray,
-) -> NDArray[np.int64]:
-    """Fill the answers at some positions; return the bound that holds at each."""
-    n = asked.size
-    y, p = values["y_m_s"][asked], np.sqrt(values["p2"][asked])
-    x = np.maximum(values["intensity_m_s"][asked], formulas.LEAST_Y_M_S)
-    pga, tm = (
-        values[name][asked] if name in values else np.full(n, NEUTRAL[name])
-        for name in ("pga_g", "tm_s")
-    )
-    pga = np.maximum(pga, formulas.LEAST_Y_M_S)
-    codes = np.zeros(n, dtype=np.int64)
-    if n >= COMPILED_FROM or _COMPILED in sys.modules:
-        from rbfrag.fragility.compiled_formulas import answers, bounds
-
-        three = np.empty((3, n))
-        bounds(model.shape, y, p, x, pga, codes)
-        answers(
-            model.shape,
-            model.link,
-            np.array(model.padded),
-            np.array(model.packed_covariance),
-            np.array(model.floor or NO_FLOOR),
-            half_width,
-            y, p, x, pga, tm, *three,
-        )  # fmt: skip
-        middle[asked], low[asked], high[asked] = three
-        return codes
-    columns = zip(
-        asked.tolist(), y.tolist(), p.tolist(), x.tolist(), pga.tolist(), tm.tolist(), strict=True
-    )
-    for number, (i, y_i, p_i, x_i, pga_i, tm_i) in enumerate(columns):
-        codes[number] = formulas.bound(model.shape, y_i, p_i, x_i, pga_i)
-        middle[i], low[i], high[i] = formulas.answer(
-            model.shape,
-            model.link,
-            model.padded,
-            model.packed_covariance,
-            model.floor,
-            half_width,
-            y_i,
-            p_i,
-            x_i,
-            pga_i,
-            tm_i,
-        )
-    return codes
 
 
 class _Sentences:

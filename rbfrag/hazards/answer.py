@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Model, predict
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.annual_rate import failure_rate, normal_steps, probability_in
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.conversions import velocity_conversion

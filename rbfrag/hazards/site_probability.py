@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.predict import Model, predict
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.annual_rate import normal_steps
 from rbfrag.hazards.conversions import Component
 

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
-from rbfrag.fragility.formulas import EXPONENTS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.plots.canvas import density, new_figure, plain_numbers, plot_path, save_figure
 from rbfrag.plots.model_lines import (
@@ -66,7 +65,7 @@ def plot_fit(
     """
     plot_path(path)
     term = model.term
-    alone = term.name in ONE_NUMBER_TERMS and EXPONENTS.isdisjoint(model.row.coefficients)
+    alone = term.name in ONE_NUMBER_TERMS and not model.has_exponent
     spectrum = np.full(table.p2.shape, np.nan) if xp_m_s is None else xp_m_s
     x = (
         np.asarray(

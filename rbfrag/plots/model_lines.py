@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
-from rbfrag.fragility.answers import PredictionArray
-from rbfrag.fragility.formulas import EXPONENTS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import answer_given, predict
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]
@@ -141,7 +140,7 @@ def held_measures(
             "cannot stand for them: this figure draws models of "
             f"{', '.join((*ONE_NUMBER_TERMS, *MORE_TERMS))}"
         )
-    if not EXPONENTS.isdisjoint(model.row.coefficients):
+    if model.has_exponent:
         raise InputError(
             f"model {model.name!r} has an estimated exponent M: its probability depends on the "
             "size of the block too; draw one fitted with M = 1"

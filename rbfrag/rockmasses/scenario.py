@@ -6,18 +6,17 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.answers import PredictionArray
 from rbfrag.fragility.checks import refusals
-from rbfrag.fragility.functions import normal_half_width
-from rbfrag.fragility.kind_arrays import KindAnswers, kind_answers
-from rbfrag.fragility.kind_model import find_kind_model
 from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.model import normal_half_width
 from rbfrag.fragility.predict import Model, predict
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.stability.arrays import slumping_p2
@@ -32,7 +31,7 @@ def other_modes(
     rotation_deg: float | None,
     level: float,
     db: str | PathLike[str] | None,
-) -> Iterator[tuple[ModeName, str, NDArray[np.bool_], KindAnswers]]:
+) -> Iterator[tuple[ModeName, str, NDArray[np.bool_], PredictionArray]]:
     """Yield, for sliding and for slumping, the model, which blocks it answers for, and how.
 
     Args:
@@ -50,19 +49,19 @@ def other_modes(
     distance = positive(displacement_m, "displacement_m", "m")
     if "pgv_m_s" not in measures:
         raise InputError("models of sliding and slumping read PGV: give pgv_m_s (--pgv) too")
-    pgv, pga = measures["pgv_m_s"], measures.get("pga_g")
+    motion: dict[str, Any] = {
+        name: measures[name] for name in ("pgv_m_s", "pga_g") if name in measures
+    }
     found = made.stability
     stable = made.is_block & (found.state_code == STABLE)
     k = found.yield_acceleration
 
     slides = stable & (found.mode_code == SLIDE) & (k > 0.0)
     if slides.any():
-        phi, beta = np.radians(made.phi_deg[slides]), np.radians(made.beta_deg[slides])
-        level_m = distance * np.cos(phi) / np.cos(phi - beta)
-        model = find_kind_model("sliding", with_pga=pga is not None, db=db)
-        block = {"ky": k[slides], "displacement_m": level_m}
-        answers = kind_answers(model, block, pgv_m_s=pgv, pga_g=pga, level=level)
-        yield "slide", model.name, slides, answers
+        block = {"ky": k[slides], "beta_deg": made.beta_deg[slides]}
+        answers = predict(**block, displacement_m=distance, **motion, level=level, db=db)
+        assert isinstance(answers, PredictionArray)
+        yield "slide", answers.model, slides, answers
 
     p2 = slumping_p2(
         alpha1_deg=made.blocks.alpha1_deg,
@@ -76,12 +75,11 @@ def other_modes(
     )
     slumps = stable & (found.mode_code == SLUMP) & (k > 0.0) & np.isfinite(p2)
     if slumps.any():
-        model = find_kind_model(
-            "slumping", with_pga=pga is not None, rotation_deg=rotation_deg, db=db
+        answers = predict(
+            ks=k[slumps], ps2=p2[slumps], rotation_deg=rotation_deg, **motion, level=level, db=db
         )
-        block = {"ks": k[slumps], "ps2": p2[slumps]}
-        answers = kind_answers(model, block, pgv_m_s=pgv, pga_g=pga, level=level)
-        yield "slump", model.name, slumps, answers
+        assert isinstance(answers, PredictionArray)
+        yield "slump", answers.model, slumps, answers
 
 
 FloatArray = NDArray[np.float64]

@@ -38,8 +38,9 @@ class ModelAnswer(_Document):
 
 
 class PredictAnswer(_Document):
-    """Probability that one block topples: what `rbfrag predict --json` prints."""
+    """Probability that one block fails: what `rbfrag predict --json` prints."""
 
+    kind: str
     probability: float
     ci_low: float
     ci_high: float
@@ -47,11 +48,13 @@ class PredictAnswer(_Document):
     model: str
     term: str
     method: str
-    y_m_s: float
+    failure: str
+    y_m_s: float | None
     intensity_m_s: float
     in_domain: bool
     warnings: list[str]
     pgv_over_pga_s: float | None
+    median_displacement_m: float | None
     answers: list[ModelAnswer]
 
 
@@ -63,6 +66,7 @@ class PredictArrays(_Document):
     ci_high: list[float | None]
     in_domain: list[bool]
     reason: list[str]
+    kind: str
     level: float
     model: str
     term: str

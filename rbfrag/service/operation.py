@@ -157,6 +157,50 @@ KR = Parameter(
     {"exclusiveMinimum": 0},
     required=True,
 )
+OTHER_BLOCKS = (
+    Parameter(
+        "kind",
+        "string",
+        "How the block fails. Default: what it is given by.",
+        None,
+        {"minLength": 1},
+    ),
+    Parameter(
+        "ky",
+        "number",
+        "Sliding: yield acceleration coefficient tan(phi - beta).",
+        None,
+        {"exclusiveMinimum": 0},
+    ),
+    Parameter(
+        "displacement",
+        "number",
+        "Sliding: the displacement that is too far [m].",
+        None,
+        {"exclusiveMinimum": 0},
+    ),
+    Parameter("beta", "number", "Sliding: dip of the base, out of the slope positive [deg].", None),
+    Parameter(
+        "ks",
+        "number",
+        "Slumping: yield acceleration coefficient k_s.",
+        None,
+        {"exclusiveMinimum": 0},
+    ),
+    Parameter(
+        "ps2",
+        "number",
+        "Slumping: frequency parameter p_s² at rest [1/s²].",
+        None,
+        {"exclusiveMinimum": 0},
+    ),
+    Parameter(
+        "rotation",
+        "number",
+        "Slumping: rotation that counts as failure [deg]. Default: failure past recovery.",
+        None,
+    ),
+)
 MEASURES = (
     Parameter("pgv", "number", "Peak ground velocity [m/s].", 0.6, {"minimum": 0}),
     Parameter("pga", "number", "Peak ground acceleration [g].", None, {"minimum": 0}),

@@ -27,7 +27,7 @@ from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.exchange.database_tables import export_database
 from rbfrag.fragility.fit.check import check_models
 from rbfrag.fragility.fit.fitting import fit
-from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping
+from rbfrag.fragility.predict import predict
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.critical import critical
 from rbfrag.solver.mechanism import shaken_mechanism
@@ -275,11 +275,11 @@ def test_models_are_fitted_stored_and_asked(tmp_path: Path) -> None:
         with engine.connect() as connection:
             checks = check_models(connection, model_rows(connection))
         assert [each.state for each in checks] == ["unchanged"] * 4
-    slid = predict_sliding(0.05, 0.02, pgv_m_s=0.5, pga_g=0.4, db=place)
+    slid = predict(ky=0.05, displacement_m=0.02, pgv_m_s=0.5, pga_g=0.4, db=place)
     assert slid.model == "sliding-pgv_pga"
     assert 0.0 < slid.probability <= 1.0
-    assert predict_sliding(0.05, 0.02, pgv_m_s=0.5, db=place).model == "sliding-pgv"
-    fell = predict_slumping(0.1, 5.0, pgv_m_s=0.5, pga_g=0.4, rotation_deg=1.0, db=place)
+    assert predict(ky=0.05, displacement_m=0.02, pgv_m_s=0.5, db=place).model == "sliding-pgv"
+    fell = predict(ks=0.1, ps2=5.0, pgv_m_s=0.5, pga_g=0.4, rotation_deg=1.0, db=place)
     assert fell.model == "slumping-1deg-pgv_pga"
     with pytest.raises(UnknownModelError, match="rotation of 1°"):
-        predict_slumping(0.1, 5.0, pgv_m_s=0.5, pga_g=0.4, db=place)
+        predict(ks=0.1, ps2=5.0, pgv_m_s=0.5, pga_g=0.4, db=place)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping
+from rbfrag.fragility.predict import predict
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.mechanism import shaken_mechanism
 from tests.cli.conftest import Refuses, Shell
@@ -25,12 +25,19 @@ def block(tmp_path: Path) -> Path:
 def test_a_slide_is_answered_as_from_python(shell: Shell, block: Path) -> None:
     asked = ("predict", "--kind", "sliding", "--displacement", "0.05", *MOTION)
     told = shell.json(*asked, "--ky", "0.1", "--beta", "10")
-    answer = predict_sliding(0.1, 0.05, pgv_m_s=0.4, pga_g=0.5, beta_deg=10.0)
+    answer = predict(ky=0.1, displacement_m=0.05, pgv_m_s=0.4, pga_g=0.5, beta_deg=10.0)
+    answers = told.pop("answers")
     assert told == answer.as_dict()
+    assert [each["model"] for each in answers] == ["sliding-pgv_pga", "sliding-pgv"]
+    assert told == {
+        k: v
+        for k, v in shell.json(*asked[:1], *asked[3:], "--ky", "0.1", "--beta", "10").items()
+        if k != "answers"
+    }
     assert any("reference" in text for text in told["warnings"])
     block.write_text(SLIDE)
     from_file = shell.json(*asked, "--block", block)
-    by_hand = predict_sliding(0.36397023, 0.05, pgv_m_s=0.4, pga_g=0.5, beta_deg=20.0)
+    by_hand = predict(ky=0.36397023, displacement_m=0.05, pgv_m_s=0.4, pga_g=0.5, beta_deg=20.0)
     assert from_file["probability"] == pytest.approx(by_hand.probability, rel=1e-5)
     assert "median_displacement_m" in shell(*asked, "--ky", "0.1").stdout
 
@@ -43,8 +50,8 @@ def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
     for rotation_deg, option in ((None, ()), (2.0, ("--rotation", "2"))):
         asked = ("predict", "--kind", "slumping", *MOTION, *option)
         told = shell.json(*asked, "--block", block)
-        answer = predict_slumping(
-            shaken.yield_g, shaken.p2, pgv_m_s=0.4, pga_g=0.5, rotation_deg=rotation_deg
+        answer = predict(
+            ks=shaken.yield_g, ps2=shaken.p2, pgv_m_s=0.4, pga_g=0.5, rotation_deg=rotation_deg
         )
         assert told["probability"] == answer.probability
         numbers = shell.json(*asked, "--ks", str(shaken.yield_g), "--ps2", str(shaken.p2))
@@ -56,14 +63,17 @@ def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
     [
         (("--kind", "sliding", "--ky", "0.1", *MOTION), "--displacement is missing"),
         (("--kind", "sliding", "--displacement", "0.1", *MOTION), "--ky is missing"),
-        (("--kind", "sliding", "--ky", "0.1", "--displacement", "0.1"), "--pgv is missing"),
+        (("--kind", "sliding", "--ky", "0.1", "--displacement", "0.1"), "nothing about the motion"),
         (("--kind", "slumping", "--ks", "0.1", *MOTION), "--ps2 is missing"),
-        (("--kind", "slumping", "--kr", "0.1", *MOTION), "--kr goes with --kind toppling"),
-        (("--p2", "3", "--kr", "0.1", "--ky", "1", *MOTION), "--ky goes with --kind sliding"),
-        (("--kind", "confined_toppling", *MOTION), "there are models of toppling, sliding"),
+        (("--kind", "slumping", "--kr", "0.1", *MOTION), "kind slumping reads ks and ps2"),
+        (("--p2", "3", "--kr", "0.1", "--ky", "1", *MOTION), "ky does not go with kind toppling"),
+        (
+            ("--kind", "confined_toppling", "--p2", "3", "--kr", "1", *MOTION),
+            "no confined_toppling model",
+        ),
         (
             ("--kind", "slumping", "--ks", "0.1", "--ps2", "3", "--rotation", "7", *MOTION),
-            "no slumping model of a rotation of 7°",
+            "no stored slumping model of a rotation of 7°",
         ),
     ],
 )

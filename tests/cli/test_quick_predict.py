@@ -8,7 +8,7 @@ import pytest
 import typer
 
 from rbfrag.cli.main import app
-from rbfrag.cli.quick_predict import NAMES, NUMBERS, plain_options, quick_predict
+from rbfrag.cli.start import NAMES, NUMBERS, numbers_and_names, quick_predict
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from tests.cli.conftest import Shell
@@ -24,6 +24,10 @@ PLAIN = [
     ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--model", "nobody"],
     ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--level", "95"],
     ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--db", "none.db"],
+    ["--p2", "3"],
+    ["--ky", "0.1", "--pgv", "0.6"],
+    ["--ky", "0.1", "--displacement", "0.1", "--pgv", "0.6", "--kind", "sliding"],
+    ["--ks", "0.1", "--ps2", "3", "--rotation", "2", "--pgv", "0.6", "--json"],
 ]
 
 
@@ -51,7 +55,6 @@ def test_the_same_answers_and_errors(arguments, shell: Shell, capsys):
     [
         ["--help"],
         [],
-        ["--p2", "3"],
         ["--p2", "three", "--kr", "0.1"],
         ["--p2", "3", "--kr", "0.1", "--pgv"],
         ["--p2", "3", "--kr", "0.1", "--pgx", "0.6"],
@@ -63,7 +66,7 @@ def test_the_same_answers_and_errors(arguments, shell: Shell, capsys):
     ],
 )
 def test_all_else_is_left_to_the_full_command(arguments):
-    assert plain_options(arguments) is None
+    assert numbers_and_names(arguments) is None
 
 
 def test_every_quick_option_is_one_of_the_command():
@@ -72,19 +75,24 @@ def test_every_quick_option_is_one_of_the_command():
     assert {*NUMBERS, *NAMES, "--json"} <= known
 
 
-@pytest.mark.usefixtures("database")
-def test_a_plain_question_loads_no_command_line_library(tmp_path):
+def test_a_question_of_numbers_loads_few_modules_and_no_library(tmp_path):
     program = (
         "import sys; sys.argv = ['rbfrag', 'predict', '--p2', '3', '--kr', '0.1', '--pgv', '0.6']\n"
         "from rbfrag.cli.start import run\n"
         "try:\n    run()\nfinally:\n"
         "    heavy = {'typer', 'pydantic', 'numpy', 'scipy', 'numba', 'sqlalchemy', 'pandas'}\n"
         "    print(sorted(heavy & set(sys.modules)))\n"
+        "    own = [name for name, module in sys.modules.items()\n"
+        "           if name.startswith('rbfrag') and not hasattr(module, '__path__')]\n"
+        "    print(*sorted(own))\n"
     )
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    plain = {key: value for key, value in os.environ.items() if key != "RBFRAG_DB"}
+    environment = {**plain, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     done = subprocess.run(
         [sys.executable, "-c", program],
         capture_output=True, text=True, cwd=tmp_path, env=environment, check=True,
     )  # fmt: skip
-    assert done.stdout.splitlines()[0].startswith("probability")
-    assert done.stdout.splitlines()[-1] == "[]"
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith("kind")
+    assert lines[-2] == "[]"
+    assert len(lines[-1].split()) <= 14

@@ -39,10 +39,8 @@ def answer(
     with opened_database(str(database), create=True) as engine, engine.begin() as connection:
         save_model(connection, model_row())
 
-    def run(source: Path, target: Path, **measures: float) -> dict[str, object]:
-        return predict_table(
-            source, target, measures=measures, model=None, level=0.95, db=str(database)
-        )
+    def run(source: Path, target: Path, **given: float) -> dict[str, object]:
+        return predict_table(source, target, given=given, model=None, level=0.95, db=str(database))
 
     return run
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 from rbfrag.errors import InputError, ModelError
-from rbfrag.fragility.answers import Prediction, PredictionArray
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
+from rbfrag.fragility.predict import Prediction, predict
+from rbfrag.fragility.prediction_array import PredictionArray
 
 G = 9.80665
 
@@ -56,9 +56,13 @@ def test_probability_and_interval_against_scipy(row, term, level):
 def test_keys_of_the_json_contract(row):
     answer = predict(3.0, 0.1, pgv_m_s=0.6, model=row())
     assert list(answer.as_dict()) == [
-        "probability", "ci_low", "ci_high", "level", "model", "term", "method",
+        "kind", "probability", "ci_low", "ci_high", "level", "model", "term", "method", "failure",
         "y_m_s", "intensity_m_s", "in_domain", "warnings", "pgv_over_pga_s",
+        "median_displacement_m",
     ]  # fmt: skip
+    assert (answer.kind, answer.failure, answer.median_displacement_m) == (
+        "toppling", "toppling", None,
+    )  # fmt: skip
     assert (answer.level, answer.model, answer.term, answer.method) == (
         0.95, "wls-pgv", "pgv", "wls",
     )  # fmt: skip
@@ -121,7 +125,7 @@ def draws(n, seed=2):
 
 
 @pytest.mark.parametrize("term", ["pgv", "pga_tm", "pgd_tm"])
-def test_arrays_have_the_bits_of_scalars(row, term):
+def test_arrays_agree_with_scalars(row, term):
     columns = draws(2000)
     many = predict(**columns, model=row(term))
     assert isinstance(many, PredictionArray)
@@ -130,18 +134,29 @@ def test_arrays_have_the_bits_of_scalars(row, term):
     for i in range(2000):
         one = predict(**{k: float(c[i]) for k, c in columns.items()}, model=row(term))
         assert isinstance(one, Prediction)
-        assert one.probability == many.probability[i]
-        assert one.ci_low == many.ci_low[i]
-        assert one.ci_high == many.ci_high[i]
+        assert [many.probability[i], many.ci_low[i], many.ci_high[i]] == pytest.approx(
+            [one.probability, one.ci_low, one.ci_high], rel=1e-12, abs=1e-250
+        )
         assert one.in_domain == many.in_domain[i]
         assert len(one.warnings) == len([r for r in many.reason[i].split("; ") if r])
+
+
+def test_an_interval_may_be_left_out(row):
+    kr = np.array([0.1, 0.2, np.nan, -1.0])
+    whole = predict(3.0, kr, pgv_m_s=0.6, model=row())
+    alone = predict(3.0, kr, pgv_m_s=0.6, model=row(), interval=False)
+    assert np.array_equal(alone.probability, whole.probability, equal_nan=True)
+    assert np.array_equal(alone.reason, whole.reason)
+    assert np.isnan(alone.ci_low).all()
+    assert np.isnan(alone.ci_high).all()
 
 
 def test_broadcast_shapes(row):
     answer = predict(np.ones((3, 1, 1)), np.full((4, 1), 0.1), pgv_m_s=[0.1, 0.2], model=row())
     for name in ("probability", "ci_low", "ci_high", "in_domain", "reason", "y_m_s"):
         assert getattr(answer, name).shape == (3, 4, 2)
-    assert answer.probability[0, 0, 1] == predict(1, 0.1, pgv_m_s=0.2, model=row()).probability
+    one = predict(1, 0.1, pgv_m_s=0.2, model=row()).probability
+    assert answer.probability[0, 0, 1] == pytest.approx(one, rel=1e-12)
     assert predict([], 0.1, pgv_m_s=0.2, model=row()).probability.shape == (0,)
     with pytest.raises(InputError, match=r"p2 \(3,\).*kr \(2,\)"):
         predict(np.ones(3), np.ones(2), pgv_m_s=0.1, model=row())
@@ -188,7 +203,7 @@ def test_arrays_give_a_reason_for_every_special_element(row):
 def test_what_the_model_does_not_need_may_be_missing_in_tables(row):
     answer = predict([3.0, 3.0], 0.1, pgv_m_s=0.6, pga_g=[0.5, np.nan], tm_s=np.nan, model=row())
     expected = predict(3.0, 0.1, pgv_m_s=0.6, model=row()).probability
-    assert answer.probability.tolist() == [expected, expected]
+    assert answer.probability.tolist() == pytest.approx([expected, expected], rel=1e-12)
 
 
 def test_masked_elements_are_missing(row):
@@ -236,6 +251,11 @@ def test_nan_can_be_refused_in_arrays(row):
         ({"tm_s": 0.0}, "tm_s = 0 s is not above zero"),
         ({"pga_g": -1.0}, "pga_g = -1 g is negative"),
         ({"level": 95}, "level = 95"),
+        ({"level": np.array([0.9, 0.95])}, "level = .*lies between 0 and 1"),
+        ({"level": "0.9"}, "level = '0.9'"),
+        ({"ky": 0.1}, "ky does not go with kind toppling"),
+        ({"rotation_deg": 2.0}, "a rotation is no failure of a block of kind toppling"),
+        ({"kind": "sliding"}, "of kind toppling, not sliding"),
         ({"p2": ["a", "b"]}, "p2 is not an array of numbers"),
         ({"p2": [[1.0], [1.0, 2.0]]}, "p2 is not an array of numbers"),
     ],
@@ -285,7 +305,7 @@ def test_suspicious_values_are_mentioned(row, changes, words):
     assert any(words in warning for warning in answer.warnings)
     many = predict(**{**arguments, "p2": [3.0]}, model=row())
     assert words in many.reason[0]
-    assert many.probability[0] == answer.probability
+    assert many.probability[0] == pytest.approx(answer.probability, rel=1e-12)
 
 
 def test_a_model_of_an_unknown_method_or_a_torn_row_is_refused(row):

@@ -2,7 +2,7 @@ import pytest
 from scipy.stats import norm, t
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.quantiles import student_half_width
+from rbfrag.fragility.model import student_half_width
 
 
 @pytest.mark.parametrize("freedom", [2, 3, 4, 9, 46, 47, 300])

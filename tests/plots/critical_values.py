@@ -43,13 +43,16 @@ def critical_values(n: int = N) -> CombinationTable:
 
 def straight_line_model(term: str = "pgv") -> FragilityModel:
     """A straight-line model with a domain."""
+    coefficients = {"c0": 0.002, "c1": 0.72, "v0": 1e-4, "v1": 2e-3}
+    if term == "pgd_tm":
+        coefficients["v2"] = 0.0
     return FragilityModel.from_row(
         ModelRow(
             name=f"wls-{term}",
             term=term,
             method="wls",
-            coefficients={"c0": 0.002, "c1": 0.72, "v0": 1e-4, "v1": 2e-3},
-            covariance=tuple(map(tuple, (1e-6 * np.eye(4)).tolist())),
+            coefficients=coefficients,
+            covariance=tuple(map(tuple, (1e-6 * np.eye(len(coefficients))).tolist())),
             domain={"p2": (0.1, 30.0), "intensity_m_s": (0.02, 1.2), "y_m_s": (0.01, 1.0)},
             data_fingerprint="",
             diagnostics={"n": 360, "events": 7},

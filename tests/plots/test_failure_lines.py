@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import predict
 from rbfrag.plots.model_lines import failure_line
 from tests.plots.critical_values import straight_line_model
@@ -38,9 +41,9 @@ def test_a_line_below_zero_is_none() -> None:
 
 
 def test_an_estimated_exponent_is_refused() -> None:
-    from dataclasses import replace
-
-    model = straight_line_model()
-    row = replace(model.row, coefficients={**model.row.coefficients, "m_minus_1": 0.1})
+    row = straight_line_model().row
+    names = ("ln_median", "slope", "ln_sigma", "m_minus_1")
+    coefficients = dict(zip(names, (-0.2, 1.0, -1.2, 0.1), strict=True))
+    row = replace(row, method="lognormal", coefficients=coefficients)
     with pytest.raises(InputError, match="exponent"):
-        failure_line(replace(model, row=row), X, 0.5)
+        failure_line(FragilityModel.from_row(row), X, 0.5)

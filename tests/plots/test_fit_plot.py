@@ -109,7 +109,7 @@ def test_the_failure_lines_have_their_probabilities(table, model, tmp_path, draw
 
 
 def test_nothing_overlaps(table, model, tmp_path, drawn):
-    for term in ("pgv", "pgd_tm"):
+    for term in ("pgv", "pga_tm"):
         other = FragilityModel.from_row(replace(model.row, term=term))
         plot_fit(table, other, tmp_path / "fit.png")
         figure = drawn[-1]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.kind_prediction import predict_sliding, predict_slumping
+from rbfrag.fragility.predict import predict
 from rbfrag.rockmasses.joint_sets import RockMass
 from rbfrag.rockmasses.scenario import Scenario, scenario
 from rbfrag.solver.block.geometry import Block
@@ -45,9 +45,9 @@ def test_blocks_are_answered_as_one_by_one(answer: Scenario) -> None:
     found = MADE.stability
     slides = np.flatnonzero((found.mode_code == SLIDE) & (found.state_code == STABLE))[:6]
     for i in slides.tolist():
-        one = predict_sliding(
-            float(found.yield_acceleration[i]),
-            0.05,
+        one = predict(
+            ky=float(found.yield_acceleration[i]),
+            displacement_m=0.05,
             pgv_m_s=0.6,
             pga_g=0.7,
             beta_deg=float(MADE.beta_deg[i]),
@@ -66,7 +66,7 @@ def test_blocks_are_answered_as_one_by_one(answer: Scenario) -> None:
             beta_deg=float(MADE.beta_deg[i]),
             phi_deg=float(MADE.phi_deg[i]),
         )
-        slump = predict_slumping(shaken.yield_g, shaken.p2, pgv_m_s=0.6, pga_g=0.7)
+        slump = predict(ks=shaken.yield_g, ps2=shaken.p2, pgv_m_s=0.6, pga_g=0.7)
         assert answer.probability[i] == pytest.approx(slump.probability, rel=1e-9, abs=1e-12)
         assert answer.in_domain[i] == slump.in_domain
 

@@ -56,7 +56,7 @@ def test_average_is_that_of_single_predictions(made: Realisations, model: Fragil
         if given is None:
             assert math.isnan(answer.probability[i])
         else:
-            assert answer.probability[i] == given[0]
+            assert answer.probability[i] == pytest.approx(given[0], rel=1e-12)
             singles.setdefault(mode, []).append(given)
     everything = [one for several in singles.values() for one in several]
     modes = {mode.mode: mode for mode in answer.modes}

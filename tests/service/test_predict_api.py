@@ -2,27 +2,21 @@
 
 import json
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import rbfrag
-from rbfrag.cli.predict_answer import answer_one, show
+from rbfrag.cli.start import answer_one, show
 
 KEYWORD = {"pgv": "pgv_m_s", "pga": "pga_g", "tm": "tm_s", "pgd": "pgd_m"}
 
 
 def printed(capsys, database, values, **more):
     """What `rbfrag predict --json` prints."""
-    measures = {KEYWORD[name]: value for name, value in values.items() if name in KEYWORD}
+    given = {KEYWORD.get(name, name): value for name, value in values.items()}
     capsys.readouterr()
-    document, warnings = answer_one(
-        values["p2"], values["kr"], None, measures, motion=None, polarity="both",
-        model=more.get("model"), level=more.get("level", 0.95), units=None, dt=None,
-        db=str(database),
-    )  # fmt: skip
-    show(document, warnings, json=True)
+    show(answer_one(given, **more, db=str(database)), json=True)
     return json.loads(capsys.readouterr().out)
 
 
@@ -62,8 +56,21 @@ def test_lists_are_answered_within_rounding_of_single_blocks(client, rows):
         query = {name: row[name] for name in names} | {"pga": 0.5, "model": found["model"]}
         one = client.get("/v1/predict", params=query).json()
         for name in ("probability", "ci_low", "ci_high"):
-            assert abs(found[name][i] - one[name]) <= 4.0 * np.spacing(max(one[name], 1e-300))
+            assert found[name][i] == pytest.approx(one[name], rel=1e-12, abs=1e-250)
         assert found["in_domain"][i] == one["in_domain"]
+
+
+def test_every_kind_is_answered_and_lists_of_it(client):
+    for block, kind in (
+        ({"ky": 0.1, "displacement": 0.05, "beta": 10}, "sliding"),
+        ({"ks": 0.1, "ps2": 3.0, "rotation": 2}, "slumping"),
+    ):
+        one = client.get("/v1/predict", params={**block, "pgv": 0.4, "pga": 0.5}).json()
+        assert one["kind"] == kind
+        many = client.post("/v1/predict", json={**block, "pgv": [0.4, -1.0], "pga": 0.5}).json()
+        assert many["probability"][0] == pytest.approx(one["probability"], rel=1e-12)
+        assert many["probability"][1] is None
+        assert many["kind"] == kind
 
 
 def test_a_list_says_which_element_cannot_be_used(client):
@@ -80,6 +87,9 @@ def test_a_list_says_which_element_cannot_be_used(client):
     [
         ("p2=3&kr=0.1", "nothing about the motion is given"),
         ("p2=3&pgv=0.6", "kr is missing"),
+        ("ky=0.1&pgv=0.6", "displacement_m is missing"),
+        ("p2=3&kr=0.1&ky=0.1&pgv=0.6", "ky does not go with kind toppling"),
+        ("p2=3&kr=0.1&kind=falls&pgv=0.6", "no falls model"),
         ("p2=3&kr=0&pgv=0.6", "kr = 0"),
         ("p2=3&kr=nan&pgv=0.6", "kr = nan"),
         ("p2=3&kr=0.1&pgv=inf", "pgv_m_s = inf"),

@@ -8,7 +8,7 @@ import typer
 
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.predict_answer import answer_one, show
+from rbfrag.cli.start import answer_one, show
 from rbfrag.errors import InputError
 
 EXAMPLE = "Example:  rbfrag predict --p2 3 --kr 0.1 --pgv 0.6 --json"
@@ -27,13 +27,19 @@ def predict(
             "--block",
             metavar="FILE",
             help="Block file (.toml or .csv) with beta_deg and phi_deg, instead of numbers; "
-            "refused unless its mode is that of --kind.",
+            "refused unless its mode is that of the kind.",
             show_default=False,
         ),
     ] = None,
     kind: Annotated[
-        str, typer.Option("--kind", help="How the block fails: toppling, slumping or sliding.")
-    ] = "toppling",
+        str | None,
+        typer.Option(
+            "--kind",
+            help="How the block fails: toppling, slumping or sliding. Default: what the block is "
+            "given by, --p2, --ks or --ky.",
+            show_default=False,
+        ),
+    ] = None,
     ky: Annotated[
         float | None, _number("--ky", "Sliding: yield acceleration coefficient tan(phi - beta).")
     ] = None,
@@ -81,8 +87,9 @@ def predict(
         typer.Option(
             "--batch",
             metavar="FILE",
-            help="Block table (.csv or .parquet) with columns p2_1_s2, kr and any of pgv_m_s, "
-            "pga_g, tm_s, pgd_m; measures that are the same for all rows may be options.",
+            help="Block table (.csv or .parquet) with columns p2_1_s2 and kr (or ky and "
+            "displacement_m; or ks and ps2_1_s2) and any of pgv_m_s, pga_g, tm_s, pgd_m; what is "
+            "the same for all rows may be an option.",
             show_default=False,
         ),
     ] = None,
@@ -106,70 +113,33 @@ def predict(
     """Print the probability that a block fails, with its confidence interval.
 
     What is known of the motion decides which model answers: PGV; PGV and PGA; these and Tm; or
-    the motion itself. Where the measures suffice for several terms, each is answered. With
-    --kind slumping or sliding, PGV, or better PGV and PGA.
+    the motion itself. Where the measures suffice for several terms, each is answered.
     """
-    from rbfrag.cli.commands.predict_kind import predict_kind, refuse_options_of_other_kinds
-
-    refuse_options_of_other_kinds(
-        kind,
-        {
-            "--p2": p2 is not None,
-            "--kr": kr is not None,
-            "--tm": tm is not None,
-            "--pgd": pgd is not None,
-            "--motion": motion is not None,
-            "--polarity": polarity != "both",
-            "--batch": batch is not None,
-            "--out": out is not None,
-            "--ky": ky is not None,
-            "--beta": beta is not None,
-            "--displacement": displacement is not None,
-            "--ks": ks is not None,
-            "--ps2": ps2 is not None,
-            "--rotation": rotation is not None,
-        },
-    )
-    if kind != "toppling":
-        predict_kind(
-            kind, block=block, ky=ky, beta_deg=beta, displacement_m=displacement, ks=ks, ps2=ps2,
-            rotation_deg=rotation, pgv_m_s=pgv, pga_g=pga, model=model, level=level, db=db,
-            json=json,
-        )  # fmt: skip
-        return
-    given = {"pgv_m_s": pgv, "pga_g": pga, "tm_s": tm, "pgd_m": pgd}
-    measures = {name: value for name, value in given.items() if value is not None}
+    options_given = {
+        "p2": p2, "kr": kr, "ky": ky, "beta_deg": beta, "displacement_m": displacement, "ks": ks,
+        "ps2": ps2, "pgv_m_s": pgv, "pga_g": pga, "tm_s": tm, "pgd_m": pgd,
+    }  # fmt: skip
+    given = {name: value for name, value in options_given.items() if value is not None}
+    asked: dict[str, Any] = {
+        "kind": kind, "rotation_deg": rotation, "model": model, "level": level, "db": db
+    }  # fmt: skip
     if batch is not None or out is not None:
-        if p2 is not None or kr is not None or block is not None or motion is not None:
-            raise InputError(
-                "--batch FILE describes the blocks: leave out --p2, --kr, --block and --motion"
-            )
-        _predict_table(batch, out, measures, model=model, level=level, db=db, json=json)
+        if block is not None or motion is not None:
+            raise InputError("--batch FILE describes the blocks: leave out --block and --motion")
+        _predict_table(batch, out, given, asked, json=json)
         return
-    document, warnings = answer_one(
-        p2,
-        kr,
-        block,
-        measures,
-        motion=motion,
-        polarity=polarity,
-        model=model,
-        level=level,
-        units=units,
-        dt=dt,
-        db=db,
+    document = answer_one(
+        given, block=block, motion=motion, polarity=polarity, units=units, dt=dt, **asked
     )
-    show(document, warnings, json=json)
+    show(document, json=json)
 
 
 def _predict_table(
     batch: str | None,
     out: str | None,
-    measures: dict[str, float],
+    given: dict[str, float],
+    asked: dict[str, Any],
     *,
-    model: str | None,
-    level: float,
-    db: str | None,
     json: bool,
 ) -> None:
     from rbfrag.exchange.batch import predict_table
@@ -178,7 +148,7 @@ def _predict_table(
         raise InputError(
             "--batch and --out go together: --batch FILE names the blocks, --out FILE the answers"
         )
-    summary = predict_table(batch, out, measures=measures, model=model, level=level, db=db)
+    summary = predict_table(batch, out, given=given, **asked)
     warnings = summary.pop("warnings")
     if json:
         print_json({**summary, "warnings": warnings})

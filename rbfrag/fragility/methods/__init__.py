@@ -32,6 +32,11 @@ class Numbers(NamedTuple):
         ndtr: standard normal distribution function.
         expm1: exponential less one.
         maximum: the larger of two.
+        minimum: the smaller of two.
+        sin: sine of an angle [rad].
+        cos: its cosine.
+        between: ``between(x, first, step, table)`` is the value of a table with nodes in equal
+            steps, on the line from node to node and constant beyond the ends.
     """
 
     log: Callable[[Any], Any]
@@ -40,14 +45,31 @@ class Numbers(NamedTuple):
     ndtr: Callable[[Any], Any]
     expm1: Callable[[Any], Any]
     maximum: Callable[[Any, Any], Any]
+    minimum: Callable[[Any, Any], Any]
+    sin: Callable[[Any], Any]
+    cos: Callable[[Any], Any]
+    between: Callable[[Any, float, float, Sequence[float]], Any]
 
 
 def _exp(x: float) -> float:
     return math.exp(x) if x < _LARGEST_EXPONENT else math.inf
 
 
+def _ndtr(z: float) -> float:
+    return 0.5 * math.erfc(-z * _ROOT_HALF)
+
+
+def _between(x: float, first: float, step: float, table: Sequence[float]) -> float:
+    at = (x - first) / step
+    last = len(table) - 1
+    if not 0.0 < at < last:
+        return table[last if at > 0.0 else 0]
+    node = int(at)
+    return table[node] + (at - node) * (table[node + 1] - table[node])
+
+
 SINGLE = Numbers(
-    math.log, _exp, math.sqrt, lambda z: 0.5 * math.erfc(-z * _ROOT_HALF), math.expm1, max
+    math.log, _exp, math.sqrt, _ndtr, math.expm1, max, min, math.sin, math.cos, _between
 )
 """For single numbers."""
 
@@ -58,7 +80,15 @@ def arrays() -> Numbers:
     import numpy as np
     from scipy.special import ndtr
 
-    return Numbers(np.log, np.exp, np.sqrt, ndtr, np.expm1, np.maximum)
+    def between(x: Any, first: float, step: float, table: Sequence[float]) -> Any:
+        nodes = np.array([*table, table[-1]])
+        at = np.clip((x - first) / step, 0.0, len(table) - 1.0)
+        node = np.nan_to_num(at).astype(np.intp)  # what is not a number stays so in `at`
+        return nodes[node] + (at - node) * np.diff(nodes, append=0.0)[node]
+
+    return Numbers(
+        np.log, np.exp, np.sqrt, ndtr, np.expm1, np.maximum, np.minimum, np.sin, np.cos, between
+    )
 
 
 class Eta(NamedTuple):
@@ -136,6 +166,9 @@ class BlockParameters:
         criterion: name of the criterion of failure that a model is fitted for, if there are
             several.
         options: names of what else a question may state.
+        adjust: changes the values by what is stated so, before anything reads them.
+        refuses: the combinations of values that no block has.
+        doubts: the combinations that make an answer doubtful.
     """
 
     names: tuple[str, ...]
@@ -145,13 +178,19 @@ class BlockParameters:
     at_rest: Bound
     criterion: str | None = None
     options: tuple[str, ...] = ()
+    adjust: Callable[[dict[str, Any], Numbers], None] | None = None
+    refuses: tuple[Bound, ...] = ()
+    doubts: tuple[Bound, ...] = ()
 
     def completed(self, given: Mapping[str, Any], term: Term, ns: Numbers) -> dict[str, Any]:
         """Return the given values with what formulas read.
 
         These are ``intensity_m_s`` and, for a block of a size, ``p`` [1/s] and ``y_m_s`` = k g/p.
+        Values that no logarithm takes are left to the caller.
         """
         values = dict(given)
+        if self.adjust is not None:
+            self.adjust(values, ns)
         values["intensity_m_s"] = term.intensity_m_s(values)
         if self.size is not None:
             values["p"] = p = ns.sqrt(values[self.size])
@@ -202,8 +241,8 @@ class Method:
         meaning: what the probability is one of, in words.
         fit: module and function that fit it, as ``module:function``.
         exponent: name of the parameter that is fitted where the exponent M is asked for.
-        failure: words for what a question asks the probability of, from its values; None: the
-            name of the kind.
+        failure: words for what a question asks the probability of, from its values and the
+            model's criterion; None: the name of the kind.
         median_of: name of the block's parameter whose median is told beside the probability.
         doubts: yields (holds, name of the value, text) where the model makes no sense, from
             parameters, values and functions.
@@ -217,7 +256,7 @@ class Method:
     meaning: str
     fit: str
     exponent: str | None = None
-    failure: Callable[[Mapping[str, Any]], str] | None = None
+    failure: Callable[[Mapping[str, Any], float | None], str] | None = None
     median_of: str | None = None
     doubts: (
         Callable[[Sequence[float], Mapping[str, Any], Numbers], Iterator[tuple[Any, str, str]]]

@@ -35,6 +35,14 @@ BLOCK = BlockParameters(
     ),
     criterion="rotation_deg",
     options=("leaves_g",),
+    doubts=(
+        Bound(
+            lambda v: "leaves_g" in v and "pga_g" in v and v["pga_g"] > v["leaves_g"],
+            "pga_g",
+            "is above leaves_g, at which the block leaves its back plane: the model takes it to "
+            "stay there",
+        ),
+    ),
 )
 """Blocks known by the yield acceleration coefficient k_s and p_s² at rest [1/s²]."""
 
@@ -54,8 +62,7 @@ def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     return Eta(eta, (-per, -log_y * per, -eta), b[2], (0.0, 0.0, 1.0))
 
 
-def _failure(asked: Mapping[str, Any]) -> str:
-    rotation = asked.get("rotation_deg")
+def _failure(_: Mapping[str, Any], rotation: float | None) -> str:
     if rotation is None:
         return "failure past recovery"
     return f"a rotation of {rotation:g} degrees or failure past recovery"

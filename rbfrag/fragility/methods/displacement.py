@@ -13,6 +13,7 @@ P = Φ(eta). A rectangular pulse gives the first with c = ln(1/2), b1 = b2 = 1.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -27,6 +28,17 @@ from rbfrag.fragility.methods import (
 )
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
+
+def _level(values: dict[str, Any], ns: Numbers) -> None:
+    """Make the displacement down a base that dips that on a level plane, d cos φ/cos(φ - β)."""
+    if "beta_deg" not in values:
+        return
+    beta = values["beta_deg"] * (math.pi / 180.0)
+    sin, cos = ns.sin(beta), ns.cos(beta)
+    values["displacement_m"] = values["displacement_m"] * (cos - values["ky"] * sin)
+    values["sin_phi"] = sin + values["ky"] * cos
+
+
 BLOCK = BlockParameters(
     ("ky", "displacement_m"),
     "sliding",
@@ -38,6 +50,19 @@ BLOCK = BlockParameters(
         "is not below PGA: the block does not move, P = 0 by mechanics, not by the model",
     ),
     options=("beta_deg",),
+    adjust=_level,
+    refuses=(
+        Bound(
+            lambda v: (
+                "beta_deg" in v
+                and (abs(v["beta_deg"]) >= 90.0)
+                | (v["displacement_m"] <= 0.0)
+                | (v["sin_phi"] < 0.0)
+            ),
+            "beta_deg",
+            "means, with this ky, a friction angle that is not from 0 to below 90 degrees",
+        ),
+    ),
 )
 """Blocks known by k_y = tan(φ - β) and the displacement that is too far [m]."""
 
@@ -85,6 +110,6 @@ METHOD = Method(
     reads="critical",
     meaning="probability that the block slides further than the displacement",
     fit="rbfrag.fragility.fit.critical:fit_censored",
-    failure=lambda asked: f"permanent displacement above {asked['displacement_m']:g} m",
+    failure=lambda asked, _: f"permanent displacement above {asked['displacement_m']:g} m",
     median_of="displacement_m",
 )  # fmt: skip

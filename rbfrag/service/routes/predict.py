@@ -1,8 +1,9 @@
-"""`/v1/predict`: the probability that blocks topple."""
+"""`/v1/predict`: the probability that blocks fail."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
@@ -10,7 +11,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from rbfrag.db.location import locate
 from rbfrag.errors import InputError
-from rbfrag.fragility.prediction_document import prediction_document
+from rbfrag.fragility.predict import prediction_document
 from rbfrag.service.body import Bodies
 from rbfrag.service.documents import PredictAnswer, PredictArrays
 from rbfrag.service.json_body import answer, json_answer, json_text, read_json
@@ -20,9 +21,9 @@ from rbfrag.service.operation import (
     LEVEL,
     MEASURES,
     MODEL,
+    OTHER_BLOCKS,
     P2,
     by_name,
-    measures_in,
     operation,
     plain_router,
     read_query,
@@ -30,7 +31,16 @@ from rbfrag.service.operation import (
 from rbfrag.service.settings import Settings
 from rbfrag.service.work import WorkerPool
 
-PARAMETERS = by_name((P2, KR, *MEASURES, MODEL, LEVEL))
+PARAMETERS = by_name(
+    (
+        replace(P2, required=False),
+        replace(KR, required=False),
+        *OTHER_BLOCKS,
+        *MEASURES,
+        MODEL,
+        LEVEL,
+    )
+)
 
 ROWS_AT_ONCE = 64
 """So many rows are answered while others wait."""
@@ -38,17 +48,26 @@ ROWS_AT_ONCE = 64
 ROWS_BESIDE = 5000
 """So many rows are answered beside others; more than these, by another process."""
 
-ARRAYS = ("p2", "kr", *KEYWORD)
-"""Names of the body that may be a list."""
+KEYWORDS = {
+    "p2": "p2",
+    "kr": "kr",
+    "ky": "ky",
+    "displacement": "displacement_m",
+    "beta": "beta_deg",
+    "ks": "ks",
+    "ps2": "ps2",
+    **KEYWORD,
+}
+"""Keywords of :func:`rbfrag.predict` by the names of the body that may be a list."""
 
 
 def answer_one(query: bytes, db: str | None) -> dict[str, Any]:
     """Return the answer to the query of a URL."""
     values = read_query(query, PARAMETERS)
     return prediction_document(
-        values["p2"],
-        values["kr"],
-        measures_in(values),
+        _given(values),
+        kind=values.get("kind"),
+        rotation_deg=values.get("rotation"),
         model=values.get("model"),
         level=values.get("level", 0.95),
         db=db,
@@ -59,11 +78,15 @@ def answer_many(given: dict[str, Any], db: str | None) -> bytes:
     """Return the answer to numbers and lists of numbers by name, as :func:`checked` gives them."""
     from rbfrag.fragility.predict import predict
 
-    # an array of one element, so that single numbers are answered by lists too
+    values = _given(given)
+    if values and not any(isinstance(value, list) for value in values.values()):
+        # an array of one element, so that single numbers are answered by lists too
+        first = next(iter(values))
+        values[first] = [values[first]]
     found: Any = predict(
-        [given["p2"]] if isinstance(given["p2"], float) else given["p2"],
-        given["kr"],
-        **measures_in(given),
+        **values,
+        kind=given.get("kind"),
+        rotation_deg=given.get("rotation"),
         model=given.get("model"),
         level=given.get("level", 0.95),
         db=db,
@@ -75,6 +98,7 @@ def answer_many(given: dict[str, Any], db: str | None) -> bytes:
             "ci_high": _plain(found.ci_high),
             "in_domain": found.in_domain.tolist(),
             "reason": found.reason.tolist(),
+            "kind": found.kind,
             "level": found.level,
             "model": found.model,
             "term": found.term,
@@ -82,6 +106,10 @@ def answer_many(given: dict[str, Any], db: str | None) -> bytes:
             "warnings": list(found.notes),
         }
     )
+
+
+def _given(values: dict[str, Any]) -> dict[str, Any]:
+    return {keyword: values[name] for name, keyword in KEYWORDS.items() if name in values}
 
 
 def _plain(values: Any) -> list[float | None]:
@@ -102,11 +130,8 @@ def checked(stated: Any, row_limit: int) -> dict[str, Any]:
         if stated[name] is None:
             raise InputError(f"{name} is null: leave it out, or give {PARAMETERS[name].words}")
     values = dict(stated)
-    for name in ("p2", "kr"):
-        if name not in values:
-            raise InputError(f"{name} is missing: {PARAMETERS[name].words}")
     lengths = {}
-    for name in ARRAYS:
+    for name in KEYWORDS:
         value = values.get(name)
         if isinstance(value, list):
             lengths[name] = len(value)
@@ -122,9 +147,13 @@ def checked(stated: Any, row_limit: int) -> dict[str, Any]:
     if len({length for length in lengths.values() if length > 1}) > 1:
         sizes = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise InputError(f"the lists differ in length: {sizes}; give one length, or one number")
-    model, level = values.get("model"), values.get("level", 0.95)
-    if model is not None and not (isinstance(model, str) and model):
-        raise InputError("model is not a text: give the name of a stored model")
+    for name in ("model", "kind"):
+        text = values.get(name)
+        if text is not None and not (isinstance(text, str) and text):
+            raise InputError(f"{name} is not a text: {PARAMETERS[name].words}")
+    if "rotation" in values:
+        values["rotation"] = _number("rotation", values["rotation"], None)
+    level = values.get("level", 0.95)
     if isinstance(level, bool) or not isinstance(level, int | float):
         raise InputError("level is not a number: a confidence level lies between 0 and 1")
     values["level"] = float(level)
@@ -158,7 +187,7 @@ def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
     @routes.get(
         "/v1/predict",
         **operation(
-            "Probability that one block topples",
+            "Probability that one block fails",
             PredictAnswer,
             parameters=PARAMETERS,
             description="What `rbfrag predict --json` prints for the same values.",
@@ -184,23 +213,22 @@ def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
             ],
             "description": PARAMETERS[name].words,
         }
-        for name in ARRAYS
+        for name in KEYWORDS
     }
     others = {
         name: {**PARAMETERS[name].schema(), "description": PARAMETERS[name].words}
-        for name in ("model", "level")
+        for name in ("kind", "rotation", "model", "level")
     }
     body = {
         "type": "object",
         "properties": {**lists, **others},
-        "required": ["p2", "kr"],
         "additionalProperties": False,
     }
 
     @routes.post(
         "/v1/predict",
         **operation(
-            "Probability that each of many blocks topples",
+            "Probability that each of many blocks fails",
             PredictArrays,
             body={
                 "application/json": {

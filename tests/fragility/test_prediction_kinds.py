@@ -1,0 +1,233 @@
+"""Answers about blocks that slide or slump, by the same `predict`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import ndtr
+
+from rbfrag.db.rows import ModelRow
+from rbfrag.errors import InputError, ModelError, UnknownModelError
+from rbfrag.fragility.methods import method_named
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.predict import MotionPrediction, Prediction, predict
+from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from tests.fragility.test_outcome_prediction import shaking
+
+METHODS = {"sliding": "displacement", "slumping": "capacity"}
+
+
+def row_of(kind: str, term: str = "pgv_pga", **changes: Any) -> ModelRow:
+    form = method_named(METHODS[kind]).forms[term]
+    size = len(form.parameters)
+    covariance = tuple(tuple(0.01 * (i == j) for j in range(size)) for i in range(size))
+    values: dict[str, Any] = {
+        "name": f"{kind}-{term}",
+        "kind": kind,
+        "term": term,
+        "method": METHODS[kind],
+        "coefficients": dict(zip(form.parameters, form.start, strict=True)),
+        "covariance": covariance,
+        "domain": {"pgv_over_pga_s": (0.02, 0.4), "k_over_pga": (0.01, 1.0)},
+        "data_fingerprint": "f",
+        "diagnostics": {"degrees_of_freedom": 40, "rotation_deg": None},
+    }
+    return ModelRow(**{**values, **changes})
+
+
+SLIDE = {"ky": 0.1, "displacement_m": 0.1}
+SLUMP = {"ks": 0.15, "ps2": 3.0}
+
+
+def one(**asked: Any) -> Prediction:
+    answer = predict(**asked)
+    assert isinstance(answer, Prediction)
+    return answer
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    ky=st.floats(0.01, 0.5),
+    d=st.floats(0.001, 1.0),
+    pgv=st.floats(0.01, 2.0),
+    pga=st.floats(0.02, 1.5),
+)
+def test_probabilities_fall_with_strength_and_distance(
+    ky: float, d: float, pgv: float, pga: float
+) -> None:
+    asked: dict[str, Any] = {"ky": ky, "pgv_m_s": pgv, "pga_g": pga, "model": row_of("sliding")}
+    here = one(displacement_m=d, **asked)
+    assert 0.0 <= here.ci_low <= here.probability <= here.ci_high <= 1.0
+    further = one(displacement_m=1.5 * d, **asked)
+    assert further.probability <= here.probability
+    if ky >= pga:
+        assert here.probability == here.ci_high == 0.0
+        assert any("does not move" in text for text in here.warnings)
+        assert here.median_displacement_m is None
+    else:
+        assert here.median_displacement_m is not None
+        # what is exceeded with P = 1/2 splits the distances
+        assert (d < here.median_displacement_m) == (here.probability > 0.5)
+
+
+def test_a_base_that_dips_is_a_shorter_distance_on_a_level_one() -> None:
+    asked: dict[str, Any] = {"pgv_m_s": 0.5, "pga_g": 0.6, "model": row_of("sliding")}
+    factor = math.cos(math.atan(0.1)) / math.cos(math.radians(25.0) + math.atan(0.1))
+    inclined = one(ky=0.1, displacement_m=0.2, beta_deg=25.0, **asked)
+    level = one(ky=0.1, displacement_m=0.2 / factor, **asked)
+    assert inclined.probability == pytest.approx(level.probability, rel=1e-12)
+    assert inclined.failure == "permanent displacement above 0.2 m"
+    assert inclined.median_displacement_m == pytest.approx(factor * level.median_displacement_m)
+    for beta in (88.0, 95.0, -10.0):
+        with pytest.raises(InputError, match="friction angle"):
+            predict(ky=0.1, displacement_m=0.2, beta_deg=beta, **asked)
+    many = predict(ky=0.1, displacement_m=0.2, beta_deg=[25.0, 88.0, -5.0], **asked)
+    assert isinstance(many, PredictionArray)
+    assert many.probability[0] == pytest.approx(inclined.probability, rel=1e-12)
+    assert np.isnan(many.probability).tolist() == [False, True, False]
+    assert "friction angle" in many.reason[1]
+
+
+def test_a_slump_is_answered_by_its_formula() -> None:
+    ks, ps2, pgv, pga = 0.15, 3.0, 0.5, 0.6
+    c, b, s0 = method_named("capacity").forms["pgv_pga"].start
+    asked: dict[str, Any] = {"ks": ks, "ps2": ps2, "pgv_m_s": pgv}
+    found = one(**asked, pga_g=pga, model=row_of("slumping"))
+    r = ks / pga
+    z = math.sqrt(ps2) * pgv / (pga * STANDARD_GRAVITY_M_S2)
+    eta = (math.log((1 - r) / r) - c + b * math.log(z)) / math.exp(s0)
+    assert found.probability == pytest.approx(float(ndtr(eta)), rel=1e-12)
+    assert found.y_m_s == pytest.approx(ks * STANDARD_GRAVITY_M_S2 / math.sqrt(ps2))
+    assert (found.in_domain, found.kind, found.failure) == (
+        True, "slumping", "failure past recovery",
+    )  # fmt: skip
+    without = one(**asked, model=row_of("slumping", "pgv"))
+    assert 0.0 < without.probability < 1.0
+    thrown = one(**asked, pga_g=pga, leaves_g=0.5, model=row_of("slumping"))
+    assert any("leaves its back plane" in text for text in thrown.warnings)
+    assert thrown.probability == found.probability
+    still = one(ks=0.7, ps2=ps2, pgv_m_s=pgv, pga_g=pga, model=row_of("slumping"))
+    assert still.probability == 0.0
+    far = one(ks=ks, ps2=ps2, pgv_m_s=5.0, pga_g=pga, model=row_of("slumping"))
+    assert not far.in_domain
+    assert any("pgv_over_pga_s" in text for text in far.warnings)
+
+
+def test_the_same_warnings_and_types_as_for_toppling() -> None:
+    for block, kind in ((SLIDE, "sliding"), (SLUMP, "slumping")):
+        model = row_of(kind)
+        large = one(**block, pgv_m_s=60.0, pga_g=0.5, model=model)
+        assert any("did you mean cm/s" in text for text in large.warnings)
+        nothing = one(**block, pgv_m_s=0.0, pga_g=0.0, model=model)
+        assert (nothing.probability, nothing.ci_high) == (0.0, 0.0)
+        assert any("no shaking" in text for text in nothing.warnings)
+        plain = one(**block, pgv_m_s=0.5, pga_g=0.5, model=model)
+        for number in (np.float32, np.float64, np.array):
+            half = {name: number(value) for name, value in block.items()}
+            assert one(**half, pgv_m_s=0.5, pga_g=0.5, model=model).probability == pytest.approx(
+                plain.probability, rel=1e-5
+            )
+        with pytest.raises(InputError, match="lies between 0 and 1"):
+            predict(**block, pgv_m_s=0.5, pga_g=0.5, model=model, level=np.array([0.9, 0.95]))
+
+
+@pytest.mark.parametrize("term", ["pgv", "pgv_pga"])
+@pytest.mark.parametrize("kind", ["sliding", "slumping"])
+def test_arrays_agree_with_scalars(kind: str, term: str) -> None:
+    model, rng, n = row_of(kind, term), np.random.default_rng(3), 400
+    pga = np.exp(rng.uniform(-4, 1, n))
+    names = ("ky", "displacement_m") if kind == "sliding" else ("ks", "ps2")
+    columns = {
+        names[0]: np.where(rng.uniform(size=n) < 0.05, -0.1, pga * rng.uniform(0.01, 1.2, n)),
+        names[1]: np.exp(rng.uniform(-5, 3, n)),
+        "pgv_m_s": pga * np.exp(rng.normal(-0.1, 1.0, n)),
+        "pga_g": pga,
+    }
+    many = predict(**columns, model=model, level=0.9)
+    assert isinstance(many, PredictionArray)
+    assert many.kind == kind
+    for i in range(n):
+        if columns[names[0]][i] < 0.0:
+            assert (many.probability[i], many.reason[i]) == (1.0, "unstable")
+            continue
+        alone = one(**{name: float(v[i]) for name, v in columns.items()}, model=model, level=0.9)
+        assert [many.probability[i], many.ci_low[i], many.ci_high[i]] == pytest.approx(
+            [alone.probability, alone.ci_low, alone.ci_high], rel=1e-12, abs=1e-250
+        )
+        assert many.in_domain[i] == alone.in_domain
+        assert len(alone.warnings) == len([r for r in many.reason[i].split("; ") if r])
+
+
+def test_a_motion_answers_for_every_kind() -> None:
+    motion = shaking()
+    found = one(**SLUMP, motion=motion, model=row_of("slumping"))
+    measured = one(**SLUMP, pgv_m_s=motion.pgv_m_s, pga_g=motion.pga_g, model=row_of("slumping"))
+    assert isinstance(found, MotionPrediction)
+    assert found.probability == measured.probability
+    assert found.forward == found.reverse
+    assert set(found.as_dict()["polarities"]) == {"forward", "reverse"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"ky": 0.0}, "ky = 0 is not above zero"),
+        ({"displacement_m": math.nan}, "displacement_m = nan"),
+        ({"displacement_m": 0.0}, "displacement_m = 0 m is not above zero"),
+        ({"displacement_m": None}, "displacement_m is missing"),
+        ({"pgv_m_s": -1.0}, "pgv_m_s = -1 m/s is negative"),
+        ({"pga_g": None}, "needs pgv_m_s and pga_g"),
+        ({"level": 2}, "level"),
+        ({"ky": "0.1"}, "ky = '0.1' is not a number"),
+        ({"ky": None, "displacement_m": None, **SLUMP}, "of kind sliding: it reads ky and"),
+        ({"kr": 0.1}, "kr does not go with kind sliding"),
+        ({"kind": "slumping"}, "of kind sliding, not slumping"),
+        ({"rotation_deg": 2.0}, "a rotation is no failure"),
+    ],
+)
+def test_what_cannot_be_answered_is_refused(changes: dict[str, Any], words: str) -> None:
+    asked = {**SLIDE, "pgv_m_s": 0.5, "pga_g": 0.5, "model": row_of("sliding"), **changes}
+    with pytest.raises(InputError, match=words):
+        predict(**asked)
+
+
+def test_a_model_of_another_rotation_is_refused() -> None:
+    asked: dict[str, Any] = {**SLUMP, "pgv_m_s": 0.5, "pga_g": 1.0, "rotation_deg": 2.0}
+    with pytest.raises(InputError, match="failure past recovery, asked is a rotation of 2°"):
+        predict(**asked, model=row_of("slumping"))
+    two = row_of("slumping", diagnostics={"rotation_deg": 2.0})
+    assert one(**asked, model=two).failure == "a rotation of 2 degrees or failure past recovery"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"term": "xp"},
+        {"method": "wls"},
+        {"coefficients": {"c": 1.0}},
+        {"covariance": ((1.0,),)},
+    ],
+)
+def test_torn_rows_are_refused(changes: dict[str, Any]) -> None:
+    with pytest.raises(ModelError):
+        FragilityModel.from_row(replace(row_of("sliding"), **changes))
+
+
+def test_an_unknown_model_or_kind_is_named(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("RBFRAG_DB", raising=False)
+    with pytest.raises(UnknownModelError, match="none-such"):
+        predict(**SLIDE, pgv_m_s=0.5, pga_g=0.5, model="none-such")
+    with pytest.raises(UnknownModelError, match="no falls model: make one with"):
+        predict(3.0, 0.1, kind="falls", pgv_m_s=0.5)
+    assert one(**SLIDE, pgv_m_s=0.5, pga_g=0.5).model == "sliding-pgv_pga"
+    assert one(**SLIDE, pgv_m_s=0.5).model == "sliding-pgv"
+    with pytest.raises(UnknownModelError, match="no stored slumping model of a rotation of 7°"):
+        predict(**SLUMP, pgv_m_s=0.5, rotation_deg=7.0)
