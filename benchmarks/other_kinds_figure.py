@@ -12,7 +12,7 @@ from rbfrag.fragility.fit.data import FitData
 from rbfrag.fragility.methods import arrays
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.plots.canvas import new_figure, plain_numbers, plot_path, save_figure
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure, written_numbers
 
 
 def plot_other_kinds(
@@ -96,8 +96,8 @@ def _slumps(axes: Any, model: FragilityModel, data: FitData) -> None:
         )  # fmt: skip
     axes.set_xscale("log")
     axes.set_yscale("log")
-    plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
-    plain_numbers(axes.yaxis, 1.0)
+    written_numbers(axes.xaxis, 1.0, 2.0, 5.0)
+    written_numbers(axes.yaxis, 1.0)
     axes.set_xlabel(r"$z = p_s\,\mathrm{PGV}/(\mathrm{PGA}\,g)$")
     axes.set_ylabel(r"$(1-r)/r$ at failure, $r=k_s/\mathrm{PGA}$")
     axes.set_title("slumping past recovery", fontsize=10)

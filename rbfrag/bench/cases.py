@@ -49,9 +49,6 @@ def find_records(folder: str | os.PathLike[str] | None = None) -> Records:
         folder: folder (or file) of accelerograms. None for the folder that the environment
             variable RBFRAG_TEST_RECORDS names, else the sample records of
             rbfrag[samples], else analytic pulses.
-
-    Raises:
-        InputError: there is no such folder, or no readable horizontal accelerogram in it.
     """
     if folder is None and not os.environ.get(RECORDS_VARIABLE):
         samples = sample_folder()
@@ -96,9 +93,6 @@ def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[Case,
         records: where the motions come from.
         number: how many cases.
         seed: the same seed draws the same cases.
-
-    Raises:
-        InputError: no block lifts off in any of many draws.
     """
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(records.motions))

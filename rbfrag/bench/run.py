@@ -77,9 +77,6 @@ def run_bench(
         records: file or folder of accelerograms; None as for :func:`cases.find_records`.
         quick: few cases, under a minute.
         say: told what comes next.
-
-    Raises:
-        InputError: no records there.
     """
     size = QUICK if quick else FULL
     started = time.perf_counter()

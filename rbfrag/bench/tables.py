@@ -91,11 +91,7 @@ def markdown(table: Table) -> str:
 
 
 def write_csv(rows: Sequence[Row], path: Path) -> None:
-    """Write rows, one column per field.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
+    """Write rows, one column per field."""
     table = [asdict(row) for row in rows]
     try:
         with path.open("w", newline="", encoding="utf-8") as file:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, bindparam, exists, select
 
-from rbfrag.db.insert import insert_row, insert_rows, update_rows, utc_now
+from rbfrag.db.insert import insert_row, insert_rows, portions, update_rows, utc_now
 from rbfrag.db.keys import canonical_json, combination_key
 from rbfrag.db.schema import campaign, combination, outcome_interval, simulation
 from rbfrag.errors import InputError
@@ -52,8 +52,6 @@ GRID_MEETS_POINT = (
 """What becomes of a block that was run before, for another reason, where the grid meets it."""
 
 _INTERVAL_COLUMNS = ("combination_id", "k_lo", "k_hi", "outcome")
-
-_KEYS_AT_ONCE = 500  # below the number of variables that any SQLite build takes
 
 
 @dataclass(frozen=True)
@@ -159,7 +157,7 @@ def known_combinations(connection: Connection, keys: Iterable[str]) -> dict[str,
         exists().where(outcome_interval.c.combination_id == column.id),
     ).where(column.natural_key.in_(bindparam("keys", expanding=True)))
     found: dict[str, KnownCombination] = {}
-    for some in _portions(keys):
+    for some in portions(keys):
         for key, *values in connection.execute(query, {"keys": some}):
             found[key] = KnownCombination(*values)
     return found
@@ -188,7 +186,7 @@ def combinations_with_points(
     # Compared here: a long list of strengths is no list of variables for every database.
     wanted = set(kr_over_pga)
     found: Counter[str] = Counter()
-    for some in _portions(keys):
+    for some in portions(keys):
         found.update(key for key, k in connection.execute(query, {"keys": some}) if k in wanted)
     return {key for key, number in found.items() if number == len(wanted)}
 
@@ -262,7 +260,7 @@ def _of_campaign(connection: Connection, campaign_id: int, keys: Iterable[str]) 
         combination.c.campaign_id == campaign_id,
     )
     found: set[str] = set()
-    for some in _portions(keys):
+    for some in portions(keys):
         found.update(connection.scalars(query, {"keys": some}))
     return found
 
@@ -350,12 +348,6 @@ def _insert_intervals(
 ) -> None:
     rows = [row for key, result in results.items() for row in _interval_rows(known[key].id, result)]
     insert_rows(connection, outcome_interval, _INTERVAL_COLUMNS, rows)
-
-
-def _portions(keys: Iterable[str]) -> Iterator[list[str]]:
-    wanted = list(dict.fromkeys(keys))
-    for start in range(0, len(wanted), _KEYS_AT_ONCE):
-        yield wanted[start : start + _KEYS_AT_ONCE]
 
 
 def _combination_row(campaign_id: int, record: CombinationRecord) -> tuple[object, ...]:

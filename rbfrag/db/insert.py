@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import cache
 from typing import Any
@@ -22,6 +22,8 @@ from sqlalchemy import (
 from sqlalchemy.dialects import postgresql, sqlite
 
 from rbfrag.db.digest import NOT_DIGESTED, ValueType, row_digests
+
+_KEYS_AT_ONCE = 500
 
 
 def insert_if_new(connection: Connection, table: Table, values: Mapping[str, object]) -> bool:
@@ -165,3 +167,10 @@ def storable(text: str) -> str:
     """
     visible = text.replace("\x00", "\\x00")
     return visible.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def portions(keys: Iterable[str]) -> Iterator[list[str]]:
+    """Yield keys, each once, so many at a time as any SQLite build takes variables."""
+    wanted = list(dict.fromkeys(keys))
+    for start in range(0, len(wanted), _KEYS_AT_ONCE):
+        yield wanted[start : start + _KEYS_AT_ONCE]

@@ -7,36 +7,31 @@ import json
 import math
 import numbers
 from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
+
+if TYPE_CHECKING:
+    from sqlalchemy import RowMapping
 
 
 def combination_key(
     *,
-    motion_sha256: str,
-    dt_s: float,
-    vertical_sha256: str | None,
-    polarity: str,
-    kind: str,
     p2: float | None,
     settings: Mapping[str, object],
-    numerics_version: str,
-    linear: bool = False,
     block: Mapping[str, object] | None = None,
+    **inputs: Any,
 ) -> str:
-    """Return the key of one critical search: equal inputs, equal key, on every machine.
+    """Return the key of one combination: equal inputs, equal key, on every machine.
 
     Args:
-        motion_sha256: hash of the horizontal samples.
-        dt_s: their interval [s].
-        vertical_sha256: hash of the vertical samples; None without vertical motion.
-        polarity: ``forward`` or ``reverse``.
-        kind: response kind (``toppling``).
-        p2: block frequency parameter p² [1/s²]; None for sliding.
-        settings: whatever else changes the answer (search limit, resolution, ...).
-        numerics_version: of the solver.
-        linear: True for the linear verification model.
-        block: what else says which block it is; None for toppling.
+        p2: block frequency parameter p² [1/s²]; None where the block needs none.
+        settings: whatever else changes the answer (search limit, tolerance, ...).
+        block: what else says which block it is; None where p² says all.
+        inputs: `motion_sha256`, hash of the horizontal samples; `dt_s`, their interval [s];
+            `vertical_sha256`, hash of the vertical samples or None; `polarity`, ``forward`` or
+            ``reverse``; `kind`, the response kind; `numerics_version`, of the solver; `linear`,
+            True for the linear verification model (False when left out).
 
     Returns:
         SHA-256 as 64 hexadecimal digits.
@@ -44,64 +39,67 @@ def combination_key(
     Raises:
         InputError: a number that is not finite.
     """
-    inputs = {
+    given = _inputs(**inputs) | {"p2": None if p2 is None else float(p2), "settings": settings}
+    return _digest(given if block is None else {**given, "block": block})
+
+
+def response_key(*, p2: float, kr: float, **inputs: Any) -> str:
+    """Return the key of one stored response: that of its block under its motion.
+
+    Args:
+        p2: block frequency parameter p² [1/s²].
+        kr: rocking acceleration coefficient.
+        inputs: motions, polarity, kind, numerics and model, as for :func:`combination_key`.
+
+    Returns:
+        SHA-256 as 64 hexadecimal digits.
+
+    Raises:
+        InputError: a number that is not finite.
+    """
+    return _digest({**_inputs(**inputs), "p2": float(p2), "kr": float(kr)})
+
+
+def key_of_row(
+    row: Mapping[str, Any] | RowMapping,
+    motion_sha256: str,
+    dt_s: float,
+    vertical_sha256: str | None,
+) -> str:
+    """Return the key that a row of `combination` has by its columns and the samples given.
+
+    Raises:
+        ValueError: its settings or its block are no JSON.
+    """
+    return combination_key(
+        motion_sha256=motion_sha256,
+        dt_s=dt_s,
+        vertical_sha256=vertical_sha256,
+        settings=json.loads(row["settings"]),
+        block=None if row["block"] is None else json.loads(row["block"]),
+        **{name: row[name] for name in ("polarity", "kind", "p2", "numerics_version", "linear")},
+    )
+
+
+def _inputs(
+    *,
+    motion_sha256: str,
+    dt_s: float,
+    vertical_sha256: str | None,
+    polarity: str,
+    kind: str,
+    numerics_version: str,
+    linear: bool = False,
+) -> dict[str, object]:
+    return {
         "motion": motion_sha256,
         "dt_s": float(dt_s),
         "vertical": vertical_sha256 or "-",
         "polarity": polarity,
         "kind": kind,
         "linear": bool(linear),
-        "p2": None if p2 is None else float(p2),
-        "settings": settings,
         "numerics": numerics_version,
     }
-    return _digest(inputs if block is None else {**inputs, "block": block})
-
-
-def response_key(
-    *,
-    motion_sha256: str,
-    dt_s: float,
-    vertical_sha256: str | None,
-    polarity: str,
-    kind: str,
-    p2: float,
-    kr: float,
-    numerics_version: str,
-    linear: bool = False,
-) -> str:
-    """Return the key of one stored response: that of its block under its motion.
-
-    Args:
-        motion_sha256: hash of the horizontal samples.
-        dt_s: their interval [s].
-        vertical_sha256: hash of the vertical samples; None without vertical motion.
-        polarity: ``forward`` or ``reverse``.
-        kind: response kind (``toppling``).
-        p2: block frequency parameter p² [1/s²].
-        kr: rocking acceleration coefficient.
-        numerics_version: of the solver.
-        linear: True for the linear verification model.
-
-    Returns:
-        SHA-256 as 64 hexadecimal digits.
-
-    Raises:
-        InputError: a number that is not finite.
-    """
-    return _digest(
-        {
-            "motion": motion_sha256,
-            "dt_s": float(dt_s),
-            "vertical": vertical_sha256 or "-",
-            "polarity": polarity,
-            "kind": kind,
-            "linear": bool(linear),
-            "p2": float(p2),
-            "kr": float(kr),
-            "numerics": numerics_version,
-        }
-    )
 
 
 def canonical_json(value: object) -> str:

@@ -39,6 +39,17 @@ __all__ = [
     "suite_names",
 ]
 
+MEASURES = (
+    "pga_g", "pgv_m_s", "pgd_m", "tm_s", "final_velocity_m_s", "final_displacement_m",
+)  # fmt: skip
+"""Columns of a motion that are calculated from its samples."""
+
+_OF_ROWS = (
+    "id", "component", "orientation_deg", "is_vertical", "dt_s", "npts", *MEASURES, "source_file",
+    "trace_index", "file_format", "processing", "source_sha256", "start_time",
+)  # fmt: skip
+# Sums over some 1e5 samples, in another order on another processor.
+_ROUNDING = 1e-9
 _ID_LIMIT = 2**31  # drivers refuse larger integers in words of their own
 
 
@@ -115,7 +126,7 @@ def add_motion(
         if stored["guessed"] and not earthquake.guessed:
             labels["recording_id"] = _recording_id_for(connection, *place)
             update_rows(connection, schema.motion, schema.motion.c.id == stored["id"], labels)
-            _delete_orphans(connection, stored["recording_id"])
+            delete_orphans(connection, stored["recording_id"])
         elif not earthquake.guessed:
             _refuse_contradiction(motion, stored, earthquake, is_vertical)
     if suite is not None:
@@ -172,7 +183,7 @@ def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
             f"motion {motion_id}: this database was written without samples; add the record's file"
         )
     blob = bytes(row["samples"])
-    if hashlib.sha256(blob).hexdigest() != row["samples_sha256"] or len(blob) != 8 * row["npts"]:
+    if hashlib.sha256(blob).hexdigest() != row["sha256"] or len(blob) != 8 * row["npts"]:
         raise DatabaseError(
             f"motion {motion_id}: the stored samples are damaged (their sha256 differs): restore "
             "the database from a copy; rbfrag db check lists what else is wrong"
@@ -219,6 +230,24 @@ def same_source(connection: Connection, motion_id: int) -> list[int]:
     return list(connection.scalars(query))
 
 
+def same_measure(
+    name: str, one: float | None, other: float | None, pgv_m_s: float, pgd_m: float
+) -> bool:
+    """Return whether a measure is the same but for sums in another order on another processor.
+
+    Args:
+        name: one of :data:`MEASURES`.
+        one: its value.
+        other: its value elsewhere.
+        pgv_m_s: PGV of the motion [m/s], which a final velocity is what is left of.
+        pgd_m: PGD of the motion [m].
+    """
+    if one is None or other is None:
+        return one is other
+    scale = {"final_velocity_m_s": pgv_m_s, "final_displacement_m": pgd_m}.get(name, 0.0)
+    return math.isclose(one, other, rel_tol=_ROUNDING, abs_tol=_ROUNDING * scale)
+
+
 def _applied(motion: GroundMotion) -> str | None:
     return None if motion.processing_applied is None else canonical_json(motion.processing_applied)
 
@@ -253,12 +282,7 @@ def _measured(motion: GroundMotion) -> dict[str, Any]:
     values = {
         "dt_s": motion.dt_s,
         "npts": motion.npts,
-        "pga_g": measures.pga_g,
-        "pgv_m_s": measures.pgv_m_s,
-        "pgd_m": measures.pgd_m,
-        "tm_s": measures.tm_s,
-        "final_velocity_m_s": measures.final_velocity_m_s,
-        "final_displacement_m": measures.final_displacement_m,
+        **{name: getattr(measures, name) for name in MEASURES},
     }
     for name, value in values.items():
         if value is not None and not math.isfinite(value):
@@ -307,20 +331,21 @@ def _recording_id_for(
     return found
 
 
-def _delete_orphans(connection: Connection, recording_id: int) -> None:
-    # The guess that nothing refers to any more.
-    connection.execute(
-        delete(schema.recording).where(
-            schema.recording.c.id == recording_id,
-            ~exists().where(schema.motion.c.recording_id == schema.recording.c.id),
-        )
+def delete_orphans(connection: Connection, recording_id: int) -> None:
+    """Delete a recording without motions, and a guessed earthquake that nothing refers to.
+
+    Args:
+        connection: inside the caller's transaction.
+        recording_id: the recording that a motion was moved away from.
+    """
+    recording, event = schema.recording, schema.earthquake
+    event_id = connection.scalar(
+        select(recording.c.earthquake_id).where(recording.c.id == recording_id)
     )
-    connection.execute(
-        delete(schema.earthquake).where(
-            schema.earthquake.c.guessed,
-            ~exists().where(schema.recording.c.earthquake_id == schema.earthquake.c.id),
-        )
-    )
+    used = exists().where(schema.motion.c.recording_id == recording.c.id)
+    connection.execute(delete(recording).where(recording.c.id == recording_id, ~used))
+    used = exists().where(recording.c.earthquake_id == event.c.id)
+    connection.execute(delete(event).where(event.c.id == event_id, event.c.guessed, ~used))
 
 
 def _refuse_contradiction(
@@ -340,66 +365,27 @@ def _refuse_contradiction(
 
 def _row_query() -> Select[Any]:
     return select(
-        schema.motion.c.id,
         schema.earthquake.c.event_id,
-        schema.earthquake.c.guessed,
+        schema.earthquake.c.guessed.label("event_guessed"),
         schema.earthquake.c.name.label("event_name"),
         schema.earthquake.c.magnitude,
         schema.recording.c.name.label("recording"),
         schema.recording.c.station,
-        schema.motion.c.component,
-        schema.motion.c.orientation_deg,
-        schema.motion.c.is_vertical,
-        schema.motion.c.dt_s,
-        schema.motion.c.npts,
-        schema.motion.c.pga_g,
-        schema.motion.c.pgv_m_s,
-        schema.motion.c.pgd_m,
-        schema.motion.c.tm_s,
-        schema.motion.c.final_velocity_m_s,
-        schema.motion.c.final_displacement_m,
-        schema.motion.c.source_file,
-        schema.motion.c.trace_index,
-        schema.motion.c.file_format,
-        schema.motion.c.processing,
+        *(schema.motion.c[name] for name in _OF_ROWS),
         schema.motion.c.processing_applied,
-        schema.motion.c.source_sha256,
-        schema.motion.c.start_time,
-        schema.motion.c.samples_sha256,
+        schema.motion.c.samples_sha256.label("sha256"),
         schema.motion.c.flags,
     ).select_from(schema.motion.join(schema.recording).join(schema.earthquake))
 
 
 def _motion_row(row: RowMapping) -> MotionRow:
     label = " ".join(part for part in (row["station"], row["component"]) if part)
+    names = ("event_id", "event_guessed", "magnitude", "recording", "station", "sha256", *_OF_ROWS)
     return MotionRow(
-        id=row["id"],
         name=label or f"{row['source_file']}#{row['trace_index']}",
-        event_id=row["event_id"],
-        event_guessed=row["guessed"],
-        magnitude=row["magnitude"],
-        recording=row["recording"],
-        station=row["station"],
-        component=row["component"],
-        orientation_deg=row["orientation_deg"],
-        is_vertical=row["is_vertical"],
-        dt_s=row["dt_s"],
-        npts=row["npts"],
-        pga_g=row["pga_g"],
-        pgv_m_s=row["pgv_m_s"],
-        pgd_m=row["pgd_m"],
-        tm_s=row["tm_s"],
-        final_velocity_m_s=row["final_velocity_m_s"],
-        final_displacement_m=row["final_displacement_m"],
-        source_file=row["source_file"],
-        trace_index=row["trace_index"],
-        file_format=row["file_format"],
-        processing=row["processing"],
         processing_applied=_parameters(row["processing_applied"]),
-        source_sha256=row["source_sha256"],
-        start_time=row["start_time"],
-        sha256=row["samples_sha256"],
         flags=tuple(json.loads(row["flags"])),
+        **{name: row[name] for name in names},
     )
 
 

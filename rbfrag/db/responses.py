@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import Connection, bindparam, select
 
-from rbfrag.db.insert import insert_rows
+from rbfrag.db.insert import insert_rows, portions
 from rbfrag.db.schema import response
 from rbfrag.errors import InputError
 from rbfrag.solver.results import Response, ResponseHistory
@@ -19,8 +19,6 @@ _COLUMNS = (
     "numerics_version", "outcome", "peak_theta_n", "peak_theta_rad", "npts", "time_s",
     "theta_rad", "theta_dot_rad_s", "k_h", "k_v",
 )  # fmt: skip
-
-_KEYS_AT_ONCE = 500  # below the number of variables that any SQLite build takes
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +63,12 @@ def insert_responses(connection: Connection, records: Sequence[ResponseRecord]) 
 
 def known_responses(connection: Connection, keys: Iterable[str]) -> set[str]:
     """Return those natural keys whose responses are stored already."""
-    wanted = list(dict.fromkeys(keys))
     query = select(response.c.natural_key).where(
         response.c.natural_key.in_(bindparam("keys", expanding=True))
     )
     found: set[str] = set()
-    for start in range(0, len(wanted), _KEYS_AT_ONCE):
-        found.update(connection.scalars(query, {"keys": wanted[start : start + _KEYS_AT_ONCE]}))
+    for some in portions(keys):
+        found.update(connection.scalars(query, {"keys": some}))
     return found
 
 

@@ -59,7 +59,7 @@ class FailureRate:
 
     Args:
         annual_rate: rates [1/a], shape (m,).
-        edges: levels between which contributions are told, shape (k + 1,).
+        edges: levels between which contributions are given, shape (k + 1,).
         contribution: part of the rate from each interval [1/a], shape (m, k).
         above: rate that shaking beyond the last level of the curve adds at least [1/a],
             shape (m,); part of `annual_rate`.
@@ -94,7 +94,7 @@ def failure_rate(curve: HazardCurve, fragility: Fragility) -> FailureRate:
     u = np.log(curve.levels)
     log_rate = np.log(curve.annual_rate)
     slope = -np.diff(log_rate) / np.diff(u)
-    # contributions are told on a finer grid than a curve of ten levels has
+    # contributions are given on a finer grid than a curve of ten levels has
     parts = np.concatenate([np.linspace(a, b, _BINS, endpoint=False) for a, b in pairwise(u)])
     edges = np.append(parts, u[-1])
     segment = np.repeat(np.arange(slope.size), _BINS)

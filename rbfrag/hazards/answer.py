@@ -43,7 +43,7 @@ class HazardAnswer:
         model: name of the model that answered.
         term: its intensity term.
         method: how it was fitted.
-        edges: levels of the curve's measure between which contributions are told, (k + 1,).
+        edges: levels of the curve's measure between which contributions are given, (k + 1,).
         contribution: part of each rate from each interval [1/a], shape (m, k).
         above: part from beyond the last level, at least [1/a], shape (m,).
         above_at_most: the same at most.

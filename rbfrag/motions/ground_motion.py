@@ -121,9 +121,6 @@ class GroundMotion:
             station: label.
             event: label.
             component: label.
-
-        Raises:
-            InputError: lengths differ, times fall, a value is not finite.
         """
         return cls(
             np.asarray(acceleration_g, dtype=np.float64),

@@ -60,9 +60,6 @@ def intensity_measures(
             is a jump.
         dt_s: the sampling interval [s], or None for samples that are not equally spaced
             (then there is no mean period).
-
-    Raises:
-        InputError: the integrals exceed the range of floating-point numbers.
     """
     scaled, scale = _scaled(acceleration_g)
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):

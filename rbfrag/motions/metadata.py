@@ -97,10 +97,6 @@ def read_metadata(path: str | os.PathLike[str]) -> MotionMetadata:
     Args:
         path: CSV with the columns of :data:`COLUMNS` (``file`` at least). Files are named
             relative to the folder of the CSV. A ``trace_index`` left out means 0.
-
-    Raises:
-        MotionFileError: the table cannot be used: no column ``file``, a value that cannot be
-            read, a trace given twice; the message names the line.
     """
     table = Path(path)
     rows: list[TraceMetadata] = []

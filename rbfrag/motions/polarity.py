@@ -21,9 +21,6 @@ def driving_acceleration_g(acceleration_g: FloatArray, polarity: Polarity) -> Fl
     Args:
         acceleration_g: samples [g], shape (n,).
         polarity: ``forward`` (positive samples drive forward) or ``reverse``.
-
-    Raises:
-        InputError: an unknown polarity.
     """
     if polarity not in POLARITIES:
         raise InputError(f"polarity must be 'forward' or 'reverse', not {polarity!r}")

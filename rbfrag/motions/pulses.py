@@ -23,9 +23,6 @@ def rectangular(amplitude_g: float, duration_s: float) -> GroundMotion:
     Args:
         amplitude_g: acceleration [g].
         duration_s: length of the lobe [s].
-
-    Raises:
-        InputError: a value that is not finite, a duration that is not positive.
     """
     a, length = _finite("amplitude", amplitude_g), _positive("duration", duration_s)
     return GroundMotion.from_nodes(
@@ -39,9 +36,6 @@ def rectangular_cycle(amplitude_g: float, lobe_duration_s: float) -> GroundMotio
     Args:
         amplitude_g: acceleration of the first lobe [g].
         lobe_duration_s: length of each lobe, half the period [s].
-
-    Raises:
-        InputError: a value that is not finite, a duration that is not positive.
     """
     a, lobe = _finite("amplitude", amplitude_g), _positive("lobe duration", lobe_duration_s)
     return GroundMotion.from_nodes(
@@ -57,9 +51,6 @@ def triangle(amplitude_g: float, duration_s: float) -> GroundMotion:
     Args:
         amplitude_g: acceleration at the apex [g].
         duration_s: length of the lobe [s].
-
-    Raises:
-        InputError: a value that is not finite, a duration that is not positive.
     """
     a, length = _finite("amplitude", amplitude_g), _positive("duration", duration_s)
     return GroundMotion.from_nodes(
@@ -75,9 +66,6 @@ def half_sine(amplitude_g: float, duration_s: float, dt_s: float) -> GroundMotio
         duration_s: length of the lobe [s].
         dt_s: longest sampling interval [s]; shortened where that is needed for the lobe to
             hold a whole, even number of intervals.
-
-    Raises:
-        InputError: a value that is not finite, a duration or dt that is not positive.
     """
     a = _finite("amplitude", amplitude_g)
     lobe, interval = _sine_lobe(duration_s, dt_s)
@@ -91,9 +79,6 @@ def sine_cycle(amplitude_g: float, period_s: float, dt_s: float) -> GroundMotion
         amplitude_g: acceleration at the peaks [g].
         period_s: period T [s].
         dt_s: longest sampling interval [s], as for :func:`half_sine`.
-
-    Raises:
-        InputError: a value that is not finite, a period or dt that is not positive.
     """
     return _two_lobes(amplitude_g, 1.0, period_s, dt_s, "sine cycle")
 
@@ -106,10 +91,6 @@ def reversal_pulse(amplitude_g: float, ratio: float, period_s: float, dt_s: floa
         ratio: r >= 0, size of the second lobe over that of the first.
         period_s: period T, the length of both lobes together [s].
         dt_s: longest sampling interval [s], as for :func:`half_sine`.
-
-    Raises:
-        InputError: a value that is not finite, a negative ratio, a period or dt that is not
-            positive.
     """
     r = _finite("ratio", ratio)
     if r < 0.0:

@@ -92,10 +92,6 @@ def motions_in(
         name: what messages call it; nothing of that name is looked for.
         units: as for :func:`read_motions`.
         dt_s: as for :func:`read_motions`.
-
-    Raises:
-        MotionFileError: as for :func:`read_motions`.
-        InputError: an unknown unit, or a dt that is not positive.
     """
     _check_stated(units, dt_s)
     # readers look for an index beside a file, and beside this one there is nothing
@@ -183,10 +179,6 @@ def read_motion(
         units: as for :func:`read_motions`.
         dt_s: as for :func:`read_motions`.
         allow_partial: as for :func:`read_motions`.
-
-    Raises:
-        MotionFileError: the file cannot be read, has several traces and no index is given,
-            or has no trace of that index.
     """
     name = os.fspath(text)
     index: int | None = None

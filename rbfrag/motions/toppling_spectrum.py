@@ -228,9 +228,6 @@ def spectrum_as_dict(
         ground: the motion itself.
         p2: frequency parameters [1/s²].
         polarity: forward or reverse.
-
-    Raises:
-        InputError: a p² that cannot be used.
     """
     return {
         "motion": motion,

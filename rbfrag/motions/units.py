@@ -46,9 +46,6 @@ def acceleration_unit(text: str) -> str:
 
     Returns:
         One of ``g``, ``m/s2``, ``cm/s2``, ``mm/s2``.
-
-    Raises:
-        InputError: the spelling is not known.
     """
     key = text.strip().lower().replace("^", "").replace("**", "").replace("²", "2").replace(" ", "")
     try:

@@ -60,8 +60,8 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
     return target
 
 
-def plain_numbers(axis: Axis, *digits: float) -> None:
-    """Put plain numbers beside a logarithmic axis.
+def written_numbers(axis: Axis, *digits: float) -> None:
+    """Write numbers without powers of ten beside a logarithmic axis.
 
     Args:
         axis: the axis.

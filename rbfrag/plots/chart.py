@@ -10,7 +10,7 @@ import numpy as np
 
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.plots.canvas import new_figure, plain_numbers, plot_path, save_figure, spread_out
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure, spread_out, written_numbers
 from rbfrag.plots.model_lines import MORE_TERMS, HeldMeasures, failure_line, held_measures
 
 if TYPE_CHECKING:
@@ -74,8 +74,8 @@ def plot_chart(
     _shade_outside(axes, held.fitted_range(model, low, high), domain.get("y_m_s"))
     axes.set_xlabel(TERMS["pgv"].label if model.term.name in MORE_TERMS else model.term.label)
     axes.set_ylabel("toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
-    plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
-    plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    written_numbers(axes.xaxis, 1.0, 2.0, 5.0)
+    written_numbers(axes.yaxis, 1.0, 2.0, 5.0)
     axes.grid(visible=True, which="major", lw=0.6, color="#9a9a9a")
     axes.grid(visible=True, which="minor", lw=0.3, color="#c8c8c8")
     axes.set_axisbelow(True)

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import density, new_figure, plain_numbers, plot_path, save_figure
+from rbfrag.plots.canvas import density, new_figure, plot_path, save_figure, written_numbers
 
 FloatArray = NDArray[np.float64]
 
@@ -147,8 +147,8 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
         fontsize=10,
     )
     axes.grid(visible=True, which="major", lw=0.3, alpha=0.5)
-    plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
-    plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    written_numbers(axes.xaxis, 1.0, 2.0, 5.0)
+    written_numbers(axes.yaxis, 1.0, 2.0, 5.0)
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.09), fontsize=8.5, frameon=False)
     return save_figure(figure, path)
 
@@ -236,8 +236,8 @@ def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
     axes.set_yscale("log")
     density(figure, axes, pairs.without, pairs.with_vertical, edges, edges)
     axes.plot(edges, edges, color="#b2182b", lw=1.2, label="no change")
-    plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
-    plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    written_numbers(axes.xaxis, 1.0, 2.0, 5.0)
+    written_numbers(axes.yaxis, 1.0, 2.0, 5.0)
     axes.set_xlabel(r"critical $k_r/\mathrm{PGA}$ without vertical motion")
     axes.set_ylabel(r"critical $k_r/\mathrm{PGA}$ with it")
     axes.legend(loc="upper left", fontsize=8.5, frameon=False)

@@ -223,13 +223,13 @@ def _draw_scene(
 
 def _draw_trace(axes: Axes, history: ResponseHistory, time_s: FloatArray) -> Any:
     """Draw the ground below the scene; return the line that marks the present."""
-    drive = history.k_h / (1.0 + history.k_v)
-    axes.plot(history.time_s, drive, color=GROUND, lw=0.7, label="ground: $k_h/(1+k_v)$")
+    driving = history.k_h / (1.0 + history.k_v)
+    axes.plot(history.time_s, driving, color=GROUND, lw=0.7, label="ground: $k_h/(1+k_v)$")
     if history.strength_g is not None:
         axes.plot(history.time_s, history.strength_g, color=STRENGTH, lw=1.1, label="strength")
     axes.legend(loc="upper right", fontsize=7, ncols=2)
     axes.set_xlim(time_s[0], time_s[-1])
-    top = 1.1 * float(np.abs(drive).max())
+    top = 1.1 * float(np.abs(driving).max())
     axes.set_ylim(-top, 1.35 * top)
     axes.set_xlabel("time [s]")
     axes.set_ylabel("[g]")

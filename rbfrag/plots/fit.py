@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.plots.canvas import density, new_figure, plain_numbers, plot_path, save_figure
+from rbfrag.plots.canvas import density, new_figure, plot_path, save_figure, written_numbers
 from rbfrag.plots.model_lines import (
     ONE_NUMBER_TERMS,
     failure_line,
@@ -109,8 +109,8 @@ def plot_fit(
         axes.set_yscale("log")
     density(figure, axes, x, y, (left, right), (bottom, top), beside=[beside, above])
     if log:
-        plain_numbers(axes.xaxis, 1.0, 2.0, 5.0)
-        plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+        written_numbers(axes.xaxis, 1.0, 2.0, 5.0)
+        written_numbers(axes.yaxis, 1.0, 2.0, 5.0)
     for (_, style, colour, words), (line_x, line) in zip(_LINES, lines, strict=True):
         label = words if np.isfinite(line).any() else f"{words}\n(below zero)"
         axes.plot(line_x, line, style, color=colour, linewidth=1.8, label=label)

@@ -64,15 +64,15 @@ def plot_islands(
     if not result.intervals.outcome:
         why = f"no map of outcomes (status {result.status})"
         raise InputError(f"nothing to draw: {why}; islands need a motion that lifts blocks")
-    drive = excitation(motion, vertical, result.polarity)
+    excited = excitation(motion, vertical, result.polarity)
     figure = new_figure(width_in=7.5, height_in=6.2)
     whole, part = figure.subplots(2, 1)
     bottom = float(result.intervals.k_lo[0])
     known = result.k_up_over_pga or bottom
     top = min(max(1.25 * known, 2.0 * bottom), float(result.intervals.k_hi[-1]))
     low, high, what = enlarged_range(result)
-    _panel(whole, drive, result, bottom, top, logarithmic=True)
-    _panel(part, drive, result, low, high, logarithmic=False)
+    _panel(whole, excited, result, bottom, top, logarithmic=True)
+    _panel(part, excited, result, low, high, logarithmic=False)
     for edge in (low, high):
         whole.axvline(edge, color="black", lw=0.8, ls=":")
     whole.annotate(
@@ -123,7 +123,7 @@ def enlarged_range(result: CriticalResult) -> tuple[float, float, str]:
 
 def _panel(
     axes: Axes,
-    drive: Excitation,
+    excited: Excitation,
     result: CriticalResult,
     low: float,
     high: float,
@@ -135,7 +135,7 @@ def _panel(
         drawn = min(k_hi, high) - max(k_lo, low)
         if drawn > (LEAST_DRAWN * (high - low) if outcome == "undecided" else 0.0):
             axes.axvspan(k_lo, k_hi, color=BANDS[outcome], lw=0.0)
-    ratios, theta_n = rotations(drive, result, low, high, logarithmic=logarithmic)
+    ratios, theta_n = rotations(excited, result, low, high, logarithmic=logarithmic)
     axes.plot(ratios, theta_n, color=ROTATION, lw=1.0)
     axes.axhline(1.0, color="black", lw=0.6, ls="--")
     if result.k_up_over_pga is not None and low <= result.k_up_over_pga <= high:
@@ -155,7 +155,7 @@ def _panel(
 
 
 def rotations(
-    drive: Excitation, result: CriticalResult, low: float, high: float, *, logarithmic: bool
+    excited: Excitation, result: CriticalResult, low: float, high: float, *, logarithmic: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Run blocks from `low` to `high` and at both sides of the borders between.
 
@@ -171,8 +171,8 @@ def rotations(
         [np.outer(edges, 1.0 - offsets).ravel(), np.outer(edges, 1.0 + offsets).ravel()]
     )
     ratios = np.sort(np.concatenate([spread, beside[(beside > low) & (beside < high)]]))
-    run = runner(drive, p2=result.p2, linear=result.linear)
-    kr = ratios * drive.pga_g
+    run = runner(excited, p2=result.p2, linear=result.linear)
+    kr = ratios * excited.pga_g
     theta_c = kr if result.linear else np.arctan(kr)
     return ratios, np.array([run(k).peak_rad for k in kr.tolist()]) / theta_c
 

@@ -97,10 +97,10 @@ def _panels(
     """Draw acceleration against strength; return the figure, its upper and its empty lower part."""
     figure = new_figure(width_in=7.5, height_in=5.6)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.25, 1.0])
-    drive = history.k_h / (1.0 + history.k_v)
-    upper.plot(history.time_s, drive, color=GROUND, lw=0.7, label="ground: $k_h/(1+k_v)$")
+    driving = history.k_h / (1.0 + history.k_v)
+    upper.plot(history.time_s, driving, color=GROUND, lw=0.7, label="ground: $k_h/(1+k_v)$")
     upper.plot(history.time_s, strength, color=STRENGTH, lw=1.3, label=label)
-    top = 1.15 * max(float(np.abs(drive).max()), least_top)
+    top = 1.15 * max(float(np.abs(driving).max()), least_top)
     upper.set_ylim(-top, 1.25 * top)
     upper.axhline(0.0, color="black", lw=0.5)
     upper.set_ylabel("acceleration [g]")

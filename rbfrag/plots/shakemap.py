@@ -111,12 +111,12 @@ def _frame(
         if near:
             x, y = np.append(x, epicentre[0]), np.append(y, epicentre[1])
     margin = max(0.2 * float(np.ptp(x)), 0.2 * float(np.ptp(y)), 0.05)
-    room = 0.02 * max(float(np.ptp(lon)), float(np.ptp(lat)), 0.1)
+    rim = 0.02 * max(float(np.ptp(lon)), float(np.ptp(lat)), 0.1)
     return (
-        max(float(x.min()) - margin, float(lon.min()) - room),
-        min(float(x.max()) + margin, float(lon.max()) + room),
-        max(float(y.min()) - margin, float(lat.min()) - room),
-        min(float(y.max()) + margin, float(lat.max()) + room),
+        max(float(x.min()) - margin, float(lon.min()) - rim),
+        min(float(x.max()) + margin, float(lon.max()) + rim),
+        max(float(y.min()) - margin, float(lat.min()) - rim),
+        min(float(y.max()) + margin, float(lat.max()) + rim),
     )
 
 

@@ -15,7 +15,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES, Polarity
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.plots.canvas import new_figure, plain_numbers, plot_path, save_figure
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure, written_numbers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -90,11 +90,11 @@ def plot_spectrum(
     axes.set_xlabel("frequency parameter of the block, $p^2$ [1/s$^2$]")
     axes.set_ylabel("toppling spectrum $X(p)$ and PGV [m/s]")
     axes.grid(visible=True, which="both", lw=0.3, alpha=0.5)
-    plain_numbers(axes.xaxis, 1.0, 3.0)
-    plain_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    written_numbers(axes.xaxis, 1.0, 3.0)
+    written_numbers(axes.yaxis, 1.0, 2.0, 5.0)
     above = axes.secondary_xaxis("top", functions=(block_size_m, block_size_m))
     above.set_xlabel("size of a rectangular block, $r_3 = 3g/(4p^2)$ [m]", labelpad=7)
-    plain_numbers(above.xaxis, 1.0, 2.0, 5.0)
+    written_numbers(above.xaxis, 1.0, 2.0, 5.0)
     for words, style in _key(polarities):
         axes.plot([], [], style, color="black", lw=1.2, label=words)
     figure.legend(loc="outside lower center", ncols=2, fontsize=8.5, frameon=False)

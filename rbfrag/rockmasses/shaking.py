@@ -106,7 +106,7 @@ class Shaking:
     vertical: GroundMotion | None = None
     polarity: Polarity = "forward"
 
-    def drives(self) -> list[Excitation]:
+    def excitations(self) -> list[Excitation]:
         """Return the excitation at each scale."""
         unscaled = excitation(self.motion, self.vertical, self.polarity)
         return [unscaled.scaled(scale) for scale in self.scales]
@@ -160,7 +160,7 @@ class BlockOutcomes:
 
 def run_blocks(work: BlocksToRun) -> BlockOutcomes:
     """Run blocks, one after another, each at the scales at which it moves."""
-    drives = work.shaking.drives()
+    excitations = work.shaking.excitations()
     code = np.full(work.moves.shape, AT_REST, dtype=np.int8)
     displacement_m = np.where(work.mode_code == MODES.index("topple"), np.nan, 0.0)
     displacement_m = np.broadcast_to(displacement_m, code.shape).copy()
@@ -171,7 +171,7 @@ def run_blocks(work: BlocksToRun) -> BlockOutcomes:
         mode_code = int(work.mode_code[j])
         try:
             run = _runner(work, j)
-            outcomes = [(i, run(drive)) for i, drive in enumerate(drives) if work.moves[i, j]]
+            outcomes = [(i, run(one)) for i, one in enumerate(excitations) if work.moves[i, j]]
         except InputError as error:
             raise InputError(f"block {int(work.place[j]) + 1}: {error}") from None
         for i, end in outcomes:
@@ -358,14 +358,14 @@ def plan_shaking(
     k = found.yield_acceleration
     stable = made.is_block & (found.state_code == mechanism.STABLE) & (k > 0.0) & np.isfinite(k)
     locked = made.is_block & (found.state_code == mechanism.LOCKED)
-    drives = shaking.drives()
-    code = np.full((len(drives), made.n), AT_REST, dtype=np.int8)
+    excitations = shaking.excitations()
+    code = np.full((len(excitations), made.n), AT_REST, dtype=np.int8)
     moves = np.zeros(code.shape, dtype=np.bool_)
-    for i, drive in enumerate(drives):
-        moves[i] = stable & (k < drive.max_q)
+    for i, one in enumerate(excitations):
+        moves[i] = stable & (k < one.max_q)
         code[i, made.is_block & ~stable] = UNSTABLE
         code[i, locked] = LOCKED
-        if drive.jump_node < drive.w.size:
+        if one.jump_node < one.w.size:
             code[i, (stable & ~moves[i]) | locked] = OUTCOMES.index("jump")
         code[i, ~made.is_block] = NO_BLOCK
     return ShakingPlan(
@@ -374,8 +374,8 @@ def plan_shaking(
         limits=FailureLimits() if limits is None else limits,
         code=code,
         moves=moves,
-        pga_g=np.array([drive.pga_g for drive in drives]),
-        warnings=_about_motion(motion, vertical, drives[0].warnings),
+        pga_g=np.array([one.pga_g for one in excitations]),
+        warnings=_about_motion(motion, vertical, excitations[0].warnings),
     )
 
 

@@ -1,4 +1,4 @@
-"""The answers as OpenAPI describes them. They are written by other rooms, and only named here."""
+"""The answers as OpenAPI describes them; the packages below write them."""
 
 from __future__ import annotations
 

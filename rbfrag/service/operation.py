@@ -232,15 +232,15 @@ def measures_in(values: Mapping[str, Any]) -> dict[str, Any]:
     return {keyword: values[name] for name, keyword in KEYWORD.items() if name in values}
 
 
-class _PlainRoute(APIRoute):
+class _OwnRoute(APIRoute):
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """Return the endpoint itself: there are no dependencies that would have to be solved."""
         return self.endpoint
 
 
-def plain_router() -> APIRouter:
+def own_router() -> APIRouter:
     """Return a router for functions from a request to a response."""
-    return APIRouter(route_class=_PlainRoute)
+    return APIRouter(route_class=_OwnRoute)
 
 
 PROBLEMS = {

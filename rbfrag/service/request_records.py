@@ -144,4 +144,4 @@ CONFIGURATION: dict[str, Any] = {
     "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "json"}},
     "root": {"handlers": ["stderr"], "level": "INFO"},
 }
-"""What the logging library is told."""
+"""Configuration of the logging library."""

@@ -31,7 +31,7 @@ class Workers(Multiprocess):
 
 
 VARIABLE = "RBFRAG_SERVICE"
-"""Environment variable in which the service, and each of its processes, finds what it is told."""
+"""Environment variable in which the service, and each of its processes, finds its options."""
 
 
 @dataclass(frozen=True)
@@ -102,16 +102,16 @@ class ServeOptions:
 
 
 def serve() -> None:
-    """Answer requests until the process is told to stop, as the environment says."""
-    told = _options()
-    settings = told.settings()
+    """Answer requests until the process is stopped, as the environment says."""
+    chosen = _options()
+    settings = chosen.settings()
     import uvicorn
 
     from rbfrag.service.protocol import BoundedProtocol
     from rbfrag.service.request_records import CONFIGURATION, SHARED_FOLDER
 
     with TemporaryDirectory(prefix="rbfrag-metrics-") as folder:
-        if told.workers > 1:
+        if chosen.workers > 1:
             os.environ[SHARED_FOLDER] = folder
         config = uvicorn.Config(
             f"{__name__}:app",
@@ -119,9 +119,9 @@ def serve() -> None:
             interface="asgi3",
             http=BoundedProtocol,
             ws="none",
-            host=told.host,
-            port=told.port,
-            workers=told.workers,
+            host=chosen.host,
+            port=chosen.port,
+            workers=chosen.workers,
             log_config=CONFIGURATION,
             access_log=False,
             server_header=False,
@@ -129,11 +129,11 @@ def serve() -> None:
             limit_concurrency=2000,
             timeout_graceful_shutdown=int(settings.body_time_s + settings.time_limit_s) + 1,
         )
-        with listener(told.host, told.port) as found:
+        with listener(chosen.host, chosen.port) as found:
             name, port = found.getsockname()[:2]
             shown = f"[{name}]" if ":" in name else name
             logging.getLogger(__name__).info("answering at http://%s:%d", shown, port)
-            if told.workers == 1:
+            if chosen.workers == 1:
                 uvicorn.Server(config).run(sockets=[found])
             else:
                 Workers(config, sockets=[found]).run()
@@ -155,7 +155,7 @@ def listener(host: str, port: int) -> socket.socket:
             f"--host {host} --port {port}: {reason}: choose another port or address"
         ) from None
     found.set_inheritable(True)
-    # Head and body of an answer leave in two pieces, and the connections inherit this: without it
+    # Head and body of an answer leave in two packets, and the connections inherit this: without it
     # the second waits for word of the first, which a client may keep back for 40 ms.
     found.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return found
@@ -170,7 +170,7 @@ def app() -> FastAPI:
 
 def _options() -> ServeOptions:
     try:
-        told = ServeOptions(**json.loads(os.environ.get(VARIABLE, "{}")))
+        chosen = ServeOptions(**json.loads(os.environ.get(VARIABLE, "{}")))
     except (ValueError, TypeError) as error:
         raise InputError(f"{VARIABLE} cannot be read ({error}): start with  rbfrag serve") from None
-    return told
+    return chosen

@@ -1,4 +1,4 @@
-"""What a service is told when it is started, and its bearer token."""
+"""Settings of a service, and its bearer token."""
 
 from __future__ import annotations
 

@@ -226,8 +226,8 @@ def _text(body: bytes) -> str:
     return text
 
 
-PIECES = 500
-"""So many pieces of work does a process do before a fresh one takes its place."""
+TASKS_PER_PROCESS = 500
+"""Tasks that a process does before a new one takes its place."""
 
 
 class WorkerPool:
@@ -235,7 +235,7 @@ class WorkerPool:
 
     Args:
         jobs: how many.
-        time_limit_s: longest time [s] that a piece of work may take, its waiting included.
+        time_limit_s: longest time [s] that a task may take, its waiting included.
     """
 
     def __init__(self, jobs: int, time_limit_s: float) -> None:
@@ -249,7 +249,10 @@ class WorkerPool:
             # a forked copy of a process with threads and sockets would be none to rely on
             context = multiprocessing.get_context("spawn")
             self._pool = ProcessPool(
-                max_workers=self._jobs, max_tasks=PIECES, initializer=_begin, context=context
+                max_workers=self._jobs,
+                max_tasks=TASKS_PER_PROCESS,
+                initializer=_begin,
+                context=context,
             )
         return self._pool
 

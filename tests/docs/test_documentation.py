@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import pkgutil
 import re
 import shlex
 from collections.abc import Iterator
@@ -146,6 +147,12 @@ def test_every_public_name_is_in_the_reference_with_a_docstring() -> None:
     assert documented == public
     for name in public:
         assert getattr(rbfrag, name).__doc__, name
+
+
+def test_every_name_in_the_reference_exists() -> None:
+    text = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
+    for name in re.findall(r"^\.\. auto\w+:: (\S+)$", text, re.M):
+        assert pkgutil.resolve_name(name).__doc__, name
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))

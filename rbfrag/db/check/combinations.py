@@ -13,7 +13,7 @@ from sqlalchemy import Connection, Row, RowMapping, Select, select
 
 from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
 from rbfrag.db.check.maps import interval_problems
-from rbfrag.db.keys import combination_key
+from rbfrag.db.keys import key_of_row
 from rbfrag.db.schema import campaign, combination, motion, outcome_interval, simulation
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -110,28 +110,13 @@ def _problems(
 
 
 def _key_problems(row: RowMapping) -> Iterator[str]:
-    try:
-        block = None if row["block"] is None else json.loads(row["block"])
-    except ValueError as error:
-        yield f"its block cannot be read: {error}"
-        return
-    try:
-        settings = json.loads(row["settings"])
-        expected = combination_key(
-            motion_sha256=row["samples_sha256"],
-            dt_s=row["dt_s"],
-            vertical_sha256=row["vertical_sha256"],
-            polarity=row["polarity"],
-            kind=row["kind"],
-            p2=row["p2"],
-            settings=settings,
-            numerics_version=row["numerics_version"],
-            linear=row["linear"],
-            block=block,
-        )
-    except ValueError as error:
-        yield f"its settings cannot be read: {error}"
-        return
+    for name in ("block", "settings"):
+        try:
+            json.loads(row[name] or "{}")
+        except ValueError as error:
+            yield f"its {name} cannot be read: {error}"
+            return
+    expected = key_of_row(row, row["samples_sha256"], row["dt_s"], row["vertical_sha256"])
     if expected != row["natural_key"]:
         yield "its natural key is not the hash of its inputs"
 

@@ -13,7 +13,7 @@ import numpy as np
 from sqlalchemy import Connection, select
 
 from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
-from rbfrag.db.motions import load_motion
+from rbfrag.db.motions import MEASURES, load_motion, same_measure
 from rbfrag.db.schema import motion, toppling_spectrum
 from rbfrag.errors import InputError, RbfragError
 from rbfrag.motions.ground_motion import GroundMotion
@@ -74,29 +74,9 @@ def _measure_problems(row: Any, samples: np.ndarray) -> Iterator[str]:
     except InputError as error:
         yield f"the samples are no accelerogram: {error}"
         return
-    # what cancels is compared with what it is the rest of
-    scale = {
-        "final_velocity_m_s": measures.pgv_m_s,
-        "final_displacement_m": measures.pgd_m,
-    }
-    for name in (
-        "pga_g",
-        "pgv_m_s",
-        "pgd_m",
-        "tm_s",
-        "final_velocity_m_s",
-        "final_displacement_m",
-    ):
+    for name in MEASURES:
         stored, now = row[name], getattr(measures, name)
-        if stored is None and now is None:
-            continue
-        if (
-            stored is None
-            or now is None
-            or not math.isclose(
-                stored, now, rel_tol=_ROUNDING, abs_tol=_ROUNDING * scale.get(name, 0.0)
-            )
-        ):
+        if not same_measure(name, stored, now, measures.pgv_m_s, measures.pgd_m):
             yield f"{name} is {stored!r}, the samples give {now!r}"
 
 

@@ -12,7 +12,7 @@ from rbfrag.db.check.database import check_database
 from rbfrag.db.connect import database_label
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import locate
-from rbfrag.db.merge.ledger import CONFLICTS_SHOWN, Ledger
+from rbfrag.db.merge.ledger import CONFLICTS_SHOWN, Ledger, Merge
 from rbfrag.db.merge.motions import merge_motions, merge_suites
 from rbfrag.db.merge.results import (
     merge_campaigns,
@@ -82,13 +82,14 @@ def merge_databases(
             )
         with opened_database(db, create=True) as ours, ours.begin() as target:
             _keep_writers_out(target)
-            motions = merge_motions(source, target, ledger)
-            merge_suites(source, target, motions.ids, ledger)
-            campaigns = merge_campaigns(source, target, ledger)
-            merge_spectra(source, target, motions, ledger)
-            merge_combinations(source, target, motions, campaigns, ledger)
-            merge_responses(source, target, motions, ledger)
-            merge_models(source, target, ledger)
+            merge = Merge(source, target, ledger)
+            merge_motions(merge)
+            merge_suites(merge)
+            merge_campaigns(merge)
+            merge_spectra(merge)
+            merge_combinations(merge)
+            merge_responses(merge)
+            merge_models(merge)
             if ledger.conflicts:
                 raise _refusal(ledger, database_label(ours.url), label)
     return MergeReport(

@@ -1,9 +1,11 @@
-"""What a merge did, and what stands in its way."""
+"""Two databases that are merged: what was done, and what stands in the way."""
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
+
+from sqlalchemy import Connection
 
 CONFLICTS_SHOWN = 5
 
@@ -64,3 +66,26 @@ class Ledger:
         note = f"kept: {Conflict(table, row, column, here, there)}"
         if note not in self.notes:
             self.notes.append(note)
+
+
+@dataclass(frozen=True)
+class Merge:
+    """The two databases, and where the rows of the other are now.
+
+    Args:
+        source: the other database.
+        target: the database that is merged into, inside the caller's transaction.
+        ledger: what was done.
+        motions: the row id here of each motion there.
+        campaigns: the row id here of each campaign there.
+        other_bits: of motions made from the same samples of a file by the same filter, whose
+            last bits another machine rounded otherwise: the sha256 of the samples here, by the
+            row id there.
+    """
+
+    source: Connection
+    target: Connection
+    ledger: Ledger = field(default_factory=Ledger)
+    motions: dict[int, int] = field(default_factory=dict)
+    campaigns: dict[int, int] = field(default_factory=dict)
+    other_bits: dict[int, str] = field(default_factory=dict)

@@ -2,61 +2,30 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from typing import Any
 
-from sqlalchemy import Connection, RowMapping, Select, delete, exists, func, select
+from sqlalchemy import Connection, RowMapping, Select, func, select
 
 from rbfrag.db.insert import insert_if_new, insert_row, update_rows
-from rbfrag.db.merge.ledger import Ledger
+from rbfrag.db.merge.ledger import Ledger, Merge
+from rbfrag.db.motions import MEASURES, delete_orphans, same_measure
 from rbfrag.db.schema import earthquake, motion, recording, suite, suite_motion
 
-_MEASURED = (
-    "pga_g",
-    "pgv_m_s",
-    "pgd_m",
-    "tm_s",
-    "final_velocity_m_s",
-    "final_displacement_m",
-)
 _OWN = ("id", "recording_id", "dt_s", "npts", "samples_sha256", "samples", "added", "digest")
-_LABELS = tuple(c.name for c in motion.c if c.name not in (*_OWN, *_MEASURED))
-# Sums over some 1e5 samples, in another order on another processor.
-_ROUNDING = 1e-9
+_LABELS = tuple(c.name for c in motion.c if c.name not in (*_OWN, *MEASURES))
 
 UNKNOWN_EVENT = "unknown event of "
 """How the id of an event begins of which nothing at all is known."""
 
 
-@dataclass(frozen=True)
-class MergedMotions:
-    """Where the motions of the other database are now.
-
-    Args:
-        ids: the row id here of each motion there.
-        other_bits: of motions made from the same samples of a file by the same filter, whose
-            last bits another machine rounded otherwise: the sha256 of the samples here, by the
-            row id there.
-    """
-
-    ids: dict[int, int] = field(default_factory=dict)
-    other_bits: dict[int, str] = field(default_factory=dict)
-
-
-def merge_motions(source: Connection, target: Connection, ledger: Ledger) -> MergedMotions:
+def merge_motions(merge: Merge) -> None:
     """Bring motions in; what makes a motion is its samples and their interval.
 
     The same samples of a file, processed alike, are one motion too (as for `motions add`).
-
-    Args:
-        source: the other database.
-        target: the database that is merged into, inside the caller's transaction.
-        ledger: what was done, and conflicts.
     """
-    merged = MergedMotions()
-    ids = merged.ids
+    source, target, ledger = merge.source, merge.target, merge.ledger
+    ids = merge.motions
     left: set[int] = set()
     for theirs in list(source.execute(_motions().order_by(*_key())).mappings()):
         ours = _find(target, theirs)
@@ -66,9 +35,9 @@ def merge_motions(source: Connection, target: Connection, ledger: Ledger) -> Mer
             continue
         ids[theirs["id"]] = ours["id"]
         if ours["samples_sha256"] != theirs["samples_sha256"]:
-            merged.other_bits[theirs["id"]] = ours["samples_sha256"]
+            merge.other_bits[theirs["id"]] = ours["samples_sha256"]
         _compare_measures(ours, theirs, ledger)
-        same_bits = theirs["id"] not in merged.other_bits
+        same_bits = theirs["id"] not in merge.other_bits
         if same_bits and ours["no_samples"] and not theirs["no_samples"]:
             samples = {"samples": _samples(source, theirs["id"])}
             update_rows(target, motion, motion.c.id == ours["id"], samples)
@@ -81,21 +50,13 @@ def merge_motions(source: Connection, target: Connection, ledger: Ledger) -> Mer
         else:
             ledger.same["motion"] += 1
             _compare_labels(target, ours, theirs, ledger)
-    _delete_left(target, left)
-    return merged
+    for recording_id in left:
+        delete_orphans(target, recording_id)
 
 
-def merge_suites(
-    source: Connection, target: Connection, ids: dict[int, int], ledger: Ledger
-) -> None:
-    """Bring suites in: a suite of the same name becomes the union of both.
-
-    Args:
-        source: the other database.
-        target: the database that is merged into, inside the caller's transaction.
-        ids: the row id here of each motion there.
-        ledger: what was done.
-    """
+def merge_suites(merge: Merge) -> None:
+    """Bring suites in: a suite of the same name becomes the union of both."""
+    source, target, ledger = merge.source, merge.target, merge.ledger
     rows = source.execute(select(suite.c.id, suite.c.name).order_by(suite.c.name)).all()
     for their_id, name in rows:
         new = insert_if_new(target, suite, {"name": name})
@@ -103,7 +64,7 @@ def merge_suites(
         our_id = target.execute(select(suite.c.id).where(suite.c.name == name)).scalar_one()
         members = select(suite_motion.c.motion_id).where(suite_motion.c.suite_id == their_id)
         for motion_id in source.scalars(members):
-            values = {"suite_id": our_id, "motion_id": ids[motion_id]}
+            values = {"suite_id": our_id, "motion_id": merge.motions[motion_id]}
             new = insert_if_new(target, suite_motion, values)
             (ledger.added if new else ledger.same)["suite_motion"] += 1
 
@@ -150,7 +111,7 @@ def _name(row: RowMapping) -> str:
 
 
 def _add(source: Connection, target: Connection, theirs: RowMapping, ledger: Ledger) -> int:
-    copied = ("dt_s", "npts", "samples_sha256", "added", *_MEASURED, *_LABELS)
+    copied = ("dt_s", "npts", "samples_sha256", "added", *MEASURES, *_LABELS)
     values = {name: theirs[name] for name in copied}
     values["samples"] = _samples(source, theirs["id"])
     values["recording_id"] = _recording_id(target, theirs, ledger)
@@ -221,19 +182,12 @@ def _earthquake_id(target: Connection, theirs: RowMapping, event_id: str, ledger
 
 
 def _compare_measures(ours: RowMapping, theirs: RowMapping, ledger: Ledger) -> None:
-    scale = {"final_velocity_m_s": ours["pgv_m_s"], "final_displacement_m": ours["pgd_m"]}
-    for column in ("npts", *_MEASURED):
-        here, there = ours[column], theirs[column]
-        if here == there:
-            continue
-        if (
-            here is None
-            or there is None
-            or not math.isclose(
-                here, there, rel_tol=_ROUNDING, abs_tol=_ROUNDING * scale.get(column, 0.0)
-            )
-        ):
-            ledger.conflict("motion", _name(ours), column, here, there)
+    peaks = (ours["pgv_m_s"], ours["pgd_m"])
+    if ours["npts"] != theirs["npts"]:
+        ledger.conflict("motion", _name(ours), "npts", ours["npts"], theirs["npts"])
+    for column in MEASURES:
+        if not same_measure(column, ours[column], theirs[column], *peaks):
+            ledger.conflict("motion", _name(ours), column, ours[column], theirs[column])
 
 
 def _compare_labels(
@@ -256,23 +210,3 @@ def _differing_labels(ours: RowMapping, theirs: RowMapping) -> Iterator[tuple[st
     for column in ("recording", "station", *_LABELS):
         if ours[column] != theirs[column]:
             yield column, ours[column], theirs[column]
-
-
-def _delete_left(target: Connection, recordings: set[int]) -> None:
-    """Delete guesses that nothing refers to any more."""
-    for recording_id in recordings:
-        event = select(recording.c.earthquake_id).where(recording.c.id == recording_id)
-        earthquake_id = target.scalar(event)
-        target.execute(
-            delete(recording).where(
-                recording.c.id == recording_id,
-                ~exists().where(motion.c.recording_id == recording.c.id),
-            )
-        )
-        target.execute(
-            delete(earthquake).where(
-                earthquake.c.id == earthquake_id,
-                earthquake.c.guessed,
-                ~exists().where(recording.c.earthquake_id == earthquake.c.id),
-            )
-        )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -15,9 +14,8 @@ from rbfrag.db.campaigns import GRID_MEETS_POINT, known_combinations
 from rbfrag.db.check.maps import BORDER_ERROR, contradictions
 from rbfrag.db.digest import NOT_DIGESTED
 from rbfrag.db.insert import insert_if_new, insert_row, insert_rows, update_rows
-from rbfrag.db.keys import combination_key
-from rbfrag.db.merge.ledger import Ledger
-from rbfrag.db.merge.motions import MergedMotions
+from rbfrag.db.keys import key_of_row
+from rbfrag.db.merge.ledger import Ledger, Merge
 from rbfrag.db.model_file import encode_model
 from rbfrag.db.models import model_rows
 from rbfrag.db.rows import ModelRow
@@ -48,18 +46,10 @@ Point = tuple[float, float | None, str, float | None, int | None]
 AnyRow = RowMapping | Mapping[str, Any]
 
 
-def merge_campaigns(source: Connection, target: Connection, ledger: Ledger) -> dict[int, int]:
-    """Bring campaigns in; two are one when settings, versions and start are the same.
-
-    Args:
-        source: the other database.
-        target: the database that is merged into, inside the caller's transaction.
-        ledger: what was done.
-
-    Returns:
-        The row id here of each campaign there.
-    """
-    ids: dict[int, int] = {}
+def merge_campaigns(merge: Merge) -> None:
+    """Bring campaigns in; two are one when settings, versions and start are the same."""
+    source, target, ledger = merge.source, merge.target, merge.ledger
+    ids = merge.campaigns
     for theirs in source.execute(select(campaign).order_by(campaign.c.id)).mappings():
         key = {
             name: theirs[name]
@@ -77,59 +67,36 @@ def merge_campaigns(source: Connection, target: Connection, ledger: Ledger) -> d
             continue
         ids[theirs["id"]] = insert_row(target, campaign, {**key, "finished": theirs["finished"]})
         ledger.added["campaign"] += 1
-    return ids
 
 
-def merge_combinations(
-    source: Connection,
-    target: Connection,
-    motions: MergedMotions,
-    campaigns: Mapping[int, int],
-    ledger: Ledger,
-) -> None:
-    """Bring combinations in, each with its map and its simulations.
-
-    Args:
-        source: the other database.
-        target: the database that is merged into, inside the caller's transaction.
-        motions: where the motions are here.
-        campaigns: the row id here of each campaign there.
-        ledger: what was done, and conflicts.
-    """
+def merge_combinations(merge: Merge) -> None:
+    """Bring combinations in, each with its map and its simulations."""
     last = 0
     while True:
         query = select(combination).where(combination.c.id > last).order_by(combination.c.id)
-        found = source.execute(query.limit(_AT_ONCE)).mappings().all()
+        found = merge.source.execute(query.limit(_AT_ONCE)).mappings().all()
         if not found:
             return
         last = found[-1]["id"]
-        rows = [{**row, "natural_key": _key_here(source, row, motions)} for row in found]
-        known = known_combinations(target, (row["natural_key"] for row in rows))
-        _add(source, target, [row for row in rows if row["natural_key"] not in known],
-             motions, campaigns, ledger)  # fmt: skip
+        rows = [{**row, "natural_key": _key_here(merge, row)} for row in found]
+        known = known_combinations(merge.target, (row["natural_key"] for row in rows))
+        _add(merge, [row for row in rows if row["natural_key"] not in known])
         shared = [row for row in rows if row["natural_key"] in known]
         if shared:
             ids = {key: stored.id for key, stored in known.items()}
-            _compare(source, target, shared, ids, ledger)
+            _compare(merge, shared, ids)
 
 
-def _add(
-    source: Connection,
-    target: Connection,
-    rows: Sequence[Mapping[str, Any]],
-    motions: MergedMotions,
-    campaigns: Mapping[int, int],
-    ledger: Ledger,
-) -> None:
+def _add(merge: Merge, rows: Sequence[Mapping[str, Any]]) -> None:
     if not rows:
         return
+    target, ledger = merge.target, merge.ledger
     values = []
     for row in rows:
         own = {
             **row,
-            "campaign_id": campaigns[row["campaign_id"]],
-            "motion_id": motions.ids[row["motion_id"]],
-            "vertical_motion_id": _vertical(motions, row["vertical_motion_id"]),
+            "campaign_id": merge.campaigns[row["campaign_id"]],
+            **_motions_here(merge, row),
         }
         values.append(tuple(own[name] for name in _COLUMNS))
     insert_rows(target, combination, _COLUMNS, values)
@@ -140,39 +107,28 @@ def _add(
         names = _written(table)
         children = [
             (here[their_id], *child)
-            for their_id, of_it in _children(source, table, list(here)).items()
+            for their_id, of_it in _children(merge.source, table, list(here)).items()
             for child in of_it
         ]
         insert_rows(target, table, names, children)
         ledger.added[table.name] += len(children)
 
 
-def _vertical(motions: MergedMotions, motion_id: int | None) -> int | None:
-    return None if motion_id is None else motions.ids[motion_id]
+def _motions_here(merge: Merge, row: AnyRow) -> dict[str, int | None]:
+    names = ("motion_id", "vertical_motion_id")
+    return {name: None if row[name] is None else merge.motions[row[name]] for name in names}
 
 
-def _key_here(source: Connection, row: AnyRow, motions: MergedMotions) -> str:
+def _key_here(merge: Merge, row: AnyRow) -> str:
     """Return the natural key that a combination there has with the samples here."""
     inputs = (row["motion_id"], row["vertical_motion_id"])
-    if not motions.other_bits.keys() & set(inputs):
+    if not merge.other_bits.keys() & set(inputs):
         return str(row["natural_key"])
-    shas = {None: None}
     query = select(motion.c.id, motion.c.samples_sha256, motion.c.dt_s)
-    rows = source.execute(query.where(motion.c.id.in_([i for i in inputs if i]))).all()
-    shas |= {row.id: motions.other_bits.get(row.id, row.samples_sha256) for row in rows}
+    rows = merge.source.execute(query.where(motion.c.id.in_([i for i in inputs if i]))).all()
+    shas = {found.id: merge.other_bits.get(found.id, found.samples_sha256) for found in rows}
     (dt_s,) = {found.dt_s for found in rows if found.id == row["motion_id"]}
-    return combination_key(
-        motion_sha256=str(shas[row["motion_id"]]),
-        dt_s=dt_s,
-        vertical_sha256=shas[row["vertical_motion_id"]],
-        polarity=row["polarity"],
-        kind=row["kind"],
-        p2=row["p2"],
-        settings=json.loads(row["settings"]),
-        numerics_version=row["numerics_version"],
-        linear=row["linear"],
-        block=None if row["block"] is None else json.loads(row["block"]),
-    )
+    return key_of_row(row, shas[row["motion_id"]], dt_s, shas.get(row["vertical_motion_id"]))
 
 
 def _children(
@@ -192,13 +148,8 @@ def _written(table: Table) -> tuple[str, ...]:
     return tuple(column.name for column in table.c if column.name != "digest")
 
 
-def _compare(
-    source: Connection,
-    target: Connection,
-    rows: Sequence[Mapping[str, Any]],
-    known: Mapping[str, int],
-    ledger: Ledger,
-) -> None:
+def _compare(merge: Merge, rows: Sequence[Mapping[str, Any]], known: Mapping[str, int]) -> None:
+    source, target, ledger = merge.source, merge.target, merge.ledger
     our_ids = [known[row["natural_key"]] for row in rows]
     query = select(combination).where(combination.c.id.in_(our_ids))
     ours_by_key = {row["natural_key"]: row for row in target.execute(query).mappings()}
@@ -317,19 +268,11 @@ def _differ(one: float | None, other: float | None) -> bool:
     return not math.isclose(one, other, rel_tol=ROTATION_ERROR, abs_tol=1e-12)
 
 
-def merge_spectra(
-    source: Connection, target: Connection, motions: MergedMotions, ledger: Ledger
-) -> None:
-    """Bring toppling spectra in.
-
-    Args:
-        source: the other database.
-        target: the database that is merged into, inside the caller's transaction.
-        motions: where the motions are here.
-        ledger: what was done, and conflicts.
-    """
+def merge_spectra(merge: Merge) -> None:
+    """Bring toppling spectra in."""
+    source, target, ledger = merge.source, merge.target, merge.ledger
     for theirs in source.execute(select(toppling_spectrum)).mappings():
-        values = {**theirs, "motion_id": motions.ids[theirs["motion_id"]]}
+        values = {**theirs, "motion_id": merge.motions[theirs["motion_id"]]}
         del values["digest"]
         if insert_if_new(target, toppling_spectrum, values):
             ledger.added["toppling_spectrum"] += 1
@@ -342,28 +285,19 @@ def merge_spectra(
             ledger.conflict("toppling_spectrum", row, "x_m_s", here, values["x_m_s"])
 
 
-def merge_responses(
-    source: Connection, target: Connection, motions: MergedMotions, ledger: Ledger
-) -> None:
-    """Bring histories in.
-
-    Args:
-        source: the other database.
-        target: the database that is merged into, inside the caller's transaction.
-        motions: where the motions are here.
-        ledger: what was done, and conflicts.
-    """
+def merge_responses(merge: Merge) -> None:
+    """Bring histories in."""
+    source, target, ledger = merge.source, merge.target, merge.ledger
     for their_id in list(source.scalars(select(response.c.id).order_by(response.c.id))):
         theirs = source.execute(select(response).where(response.c.id == their_id)).mappings().one()
-        if motions.other_bits.keys() & {theirs["motion_id"], theirs["vertical_motion_id"]}:
+        if merge.other_bits.keys() & {theirs["motion_id"], theirs["vertical_motion_id"]}:
             ledger.notes.append(
                 f"left out: history {theirs['natural_key'][:12]}… of samples whose last bits "
                 "are other here: rbfrag simulate  makes it again"
             )
             continue
         values = {name: value for name, value in theirs.items() if name not in NOT_DIGESTED}
-        values["motion_id"] = motions.ids[theirs["motion_id"]]
-        values["vertical_motion_id"] = _vertical(motions, theirs["vertical_motion_id"])
+        values |= _motions_here(merge, theirs)
         if insert_if_new(target, response, values):
             ledger.added["response"] += 1
             continue
@@ -382,17 +316,13 @@ def merge_responses(
             ledger.within_error += 1
 
 
-def merge_models(source: Connection, target: Connection, ledger: Ledger) -> None:
+def merge_models(merge: Merge) -> None:
     """Bring models in; of two that differ under one name, the other's gets a number.
 
     A model "m" that differs from the "m" here is stored as "m-2", or the first number that is
     free. The defaults stay; a database without models of a kind takes the other's.
-
-    Args:
-        source: the other database.
-        target: the database that is merged into, inside the caller's transaction.
-        ledger: what was done.
     """
+    source, target, ledger = merge.source, merge.target, merge.ledger
     ours = {row.name: row for row in model_rows(target)}
     had = {row.kind for row in ours.values()}
     for theirs in model_rows(source):

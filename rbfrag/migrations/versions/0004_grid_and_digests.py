@@ -13,7 +13,7 @@ import sqlalchemy as sa
 from alembic import op
 
 from rbfrag.db.insert import table_digests
-from rbfrag.db.keys import canonical_json, combination_key
+from rbfrag.db.keys import canonical_json, key_of_row
 
 revision = "0004"
 down_revision = "0003"
@@ -116,24 +116,16 @@ def _take_maps_out_of_keys(connection: sa.Connection) -> None:
     for row in connection.execute(query.order_by(combination.c.id)).mappings():
         settings = json.loads(row["settings"])
         extent, depth = settings.pop("map", None), settings.pop("map_depth", None)
-        key = combination_key(
-            motion_sha256=row["samples_sha256"],
-            dt_s=row["dt_s"],
-            vertical_sha256=row["vertical_sha256"],
-            polarity=row["polarity"],
-            kind=row["kind"],
-            p2=row["p2"],
-            settings=settings,
-            numerics_version=row["numerics_version"],
-            linear=row["linear"],
-            block=None if row["block"] is None else json.loads(row["block"]),
+        text = canonical_json(settings)
+        key = key_of_row(
+            {**row, "settings": text}, row["samples_sha256"], row["dt_s"], row["vertical_sha256"]
         )
         order = (extent != "full", extent is None, depth or 0.0, row["id"])
         other = best.get(key)
         if other is not None:
             superseded.append(max((order, row["id"]), other[:2])[1])
         if other is None or order < other[0]:
-            best[key] = (order, row["id"], canonical_json(settings))
+            best[key] = (order, row["id"], text)
     for table in ("simulation", "outcome_interval"):
         _execute_many(
             connection, f"DELETE FROM {table} WHERE combination_id = :id", {"id": superseded}

@@ -79,9 +79,6 @@ def write(motion: GroundMotion) -> Iterator[str]:
     Args:
         motion: equally spaced samples. The labels that AT2 has are kept: event, station and
             component, without commas and other than printable ASCII characters.
-
-    Raises:
-        InputError: a motion from nodes.
     """
     if motion.dt_s is None:
         raise InputError(f"{motion.label}: only equally spaced samples can be written")

@@ -85,9 +85,6 @@ def write(motions: Sequence[GroundMotion]) -> Iterator[str]:
 
     Args:
         motions: equally spaced motions.
-
-    Raises:
-        InputError: a motion from nodes.
     """
     for motion in motions:
         if motion.dt_s is None:

@@ -25,11 +25,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a file: byte-order mark removed, newlines as ``\\n``.
-
-    Raises:
-        MotionFileError: there is no such file, it is a folder, empty, binary or too large.
-    """
+    """Return the text of a file: byte-order mark removed, newlines as ``\\n``."""
     try:
         if path.is_dir():
             raise MotionFileError(path, "this is a folder, not a file: name a file in it")
@@ -52,11 +48,7 @@ def read_text(path: Path) -> str:
 
 
 def decoded(path: Path, raw: bytes) -> str:
-    """Return the text of a file's bytes: byte-order mark removed, newlines as ``\\n``.
-
-    Raises:
-        MotionFileError: they are none, or not text.
-    """
+    """Return the text of a file's bytes: byte-order mark removed, newlines as ``\\n``."""
     if not raw.removeprefix(codecs.BOM_UTF8).strip():
         raise MotionFileError(path, "the file is empty: export the record again")
     if b"\0" in raw:
@@ -139,9 +131,6 @@ def finite_number(path: Path, text: str, line: int, what: str) -> float:
         text: the number as the file has it.
         line: 1-based line number.
         what: what the number is.
-
-    Raises:
-        MotionFileError: it is no number, or not finite.
     """
     if _NUMBER.fullmatch(text):
         value = float(text)

@@ -109,9 +109,6 @@ def sampling_interval(
         line_numbers: their 1-based lines, shape (n,).
         stated_dt_s: interval that the caller states [s], or None. It is used if it reproduces
             the times, and refused otherwise.
-
-    Raises:
-        MotionFileError: times are not equally spaced, do not rise, or contradict the caller.
     """
     count = len(tokens)
     if count == 1:

@@ -11,7 +11,7 @@ from fastapi import APIRouter, Request, Response
 from rbfrag.errors import InputError
 from rbfrag.service.documents import BlockAnswer, DrawingAnswer
 from rbfrag.service.json_body import json_answer
-from rbfrag.service.operation import KR, P2, Parameter, by_name, operation, plain_router, read_query
+from rbfrag.service.operation import KR, P2, Parameter, by_name, operation, own_router, read_query
 
 if TYPE_CHECKING:
     from rbfrag.solver.block.geometry import Block
@@ -121,7 +121,7 @@ def drawing_answer(query: bytes) -> dict[str, Any]:
 
 def router() -> APIRouter:
     """Return the operations on `/v1/block` and `/v1/drawing`."""
-    routes = plain_router()
+    routes = own_router()
 
     @routes.get(
         "/v1/block",

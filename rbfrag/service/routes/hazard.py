@@ -17,7 +17,7 @@ from rbfrag.service.operation import (
     Parameter,
     by_name,
     operation,
-    plain_router,
+    own_router,
     read_query,
 )
 from rbfrag.service.settings import Settings
@@ -60,7 +60,7 @@ EXAMPLE = "pgv_m_s,annual_rate\n0.05,0.05\n0.1,0.02\n0.2,0.006\n0.5,0.0008\n1.0,
 
 def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
     """Return the operation on `/v1/hazard`."""
-    routes = plain_router()
+    routes = own_router()
 
     @routes.post(
         "/v1/hazard",

@@ -11,7 +11,7 @@ from rbfrag.service import work
 from rbfrag.service.body import FILE_FORM, MULTIPART, Bodies
 from rbfrag.service.documents import CriticalAnswer, SpectrumAnswer
 from rbfrag.service.json_body import answer
-from rbfrag.service.operation import P2, Parameter, by_name, operation, plain_router, read_query
+from rbfrag.service.operation import P2, Parameter, by_name, operation, own_router, read_query
 from rbfrag.service.work import WorkerPool
 
 MOST_SIZES = 100
@@ -84,7 +84,7 @@ ACCELEROGRAM = {
 
 def router(bodies: Bodies, pool: WorkerPool) -> APIRouter:
     """Return the operations on accelerograms."""
-    routes = plain_router()
+    routes = own_router()
 
     @routes.post(
         "/v1/spectrum",

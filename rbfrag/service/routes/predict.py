@@ -25,7 +25,7 @@ from rbfrag.service.operation import (
     P2,
     by_name,
     operation,
-    plain_router,
+    own_router,
     read_query,
 )
 from rbfrag.service.settings import Settings
@@ -180,7 +180,7 @@ def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
         bodies: reads what is sent.
         pool: where long work is done.
     """
-    routes = plain_router()
+    routes = own_router()
     # a server's answer is waited for; a file's models are in memory
     on_server = isinstance(locate(settings.db), str)
 

@@ -18,7 +18,7 @@ from rbfrag.service.operation import (
     by_name,
     measures_in,
     operation,
-    plain_router,
+    own_router,
     read_query,
 )
 from rbfrag.service.problem import RequestRefusedError
@@ -84,7 +84,7 @@ _FORMS: dict[str, Literal["toml", "json", "csv"]] = {
 
 def router(settings: Settings, bodies: Bodies, pool: WorkerPool) -> APIRouter:
     """Return the operation on `/v1/rockmass`."""
-    routes = plain_router()
+    routes = own_router()
 
     @routes.post(
         "/v1/rockmass",

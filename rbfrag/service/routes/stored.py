@@ -9,7 +9,7 @@ from rbfrag.fragility.lookup import stored_rows
 from rbfrag.fragility.model_list import model_list
 from rbfrag.service.documents import Health, ModelListed
 from rbfrag.service.json_body import json_answer
-from rbfrag.service.operation import operation, plain_router
+from rbfrag.service.operation import operation, own_router
 from rbfrag.service.request_records import CONTENT_TYPE, Metrics
 from rbfrag.service.settings import Settings
 from rbfrag.version import __version__
@@ -17,7 +17,7 @@ from rbfrag.version import __version__
 
 def router(settings: Settings) -> APIRouter:
     """Return the operations on `/v1/models`, and on `/v1/healthz`, which asks for no token."""
-    routes = plain_router()
+    routes = own_router()
 
     @routes.get(
         "/v1/models",
@@ -42,7 +42,7 @@ def router(settings: Settings) -> APIRouter:
 
 def metrics_router(metrics: Metrics) -> APIRouter:
     """Return the operation on `/v1/metrics`, which the OpenAPI document leaves out."""
-    routes = plain_router()
+    routes = own_router()
 
     @routes.get("/v1/metrics", include_in_schema=False)
     async def counts(request: Request) -> Response:  # noqa: ARG001
