@@ -6,7 +6,7 @@ import json
 import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 
 def print_json(document: object) -> None:
@@ -150,3 +150,32 @@ class ProgressLine:
             self._shown = True
         else:
             print(text, file=sys.stderr, flush=True)
+
+
+def show_prediction(document: dict[str, Any], *, json: bool) -> None:
+    """Print what `rbfrag predict` answers for one block."""
+    if json:
+        print_json(document)
+        return
+    answers = document.pop("answers")
+    polarities = document.pop("polarities", None)
+    warnings = document.pop("warnings")
+    print_pairs({name: value for name, value in document.items() if name not in _LEFT_OUT or value})
+    if polarities:
+        print()
+        print_table(
+            ("polarity", "probability", "ci_low", "ci_high", "intensity_m_s"),
+            [
+                (name, p["probability"], p["ci_low"], p["ci_high"], p["intensity_m_s"])
+                for name, p in polarities.items()
+            ],
+        )
+    if len(answers) > 1:
+        print()
+        columns = ("model", "term", "probability", "ci_low", "ci_high", "in_domain", "recommended")
+        print_table(columns, [tuple(answer[name] for name in columns) for answer in answers])
+    print_warnings(warnings)
+
+
+_LEFT_OUT = ("y_m_s", "median_displacement_m")
+"""Keys that a table leaves out where they do not apply."""

@@ -12,13 +12,45 @@ import math
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from rbfrag.db.rows import ModelRow
 from rbfrag.db.sqlite_file import check_sqlite_database, connect_sqlite, sqlite_error_in_words
 from rbfrag.errors import DatabaseError, InputError, UnknownModelError
+
+
+@dataclass(frozen=True)
+class ModelRow:
+    """One fitted fragility model as stored.
+
+    Args:
+        name: unique name.
+        term: intensity term (``pgv``, ``pga_tm``, ``pgd_tm``).
+        method: fit method (``wls``).
+        coefficients: value of each parameter by name, in a fixed order.
+        covariance: covariance of the parameters in that order.
+        domain: fitted range (low, high) of each variable by name.
+        data_fingerprint: hash of the data that were fitted.
+        diagnostics: everything else a report prints (counts, scores, warnings), JSON-able.
+        is_default: True for the model of its kind that answers when none is named.
+        created: UTC time of the fit, ISO 8601.
+        kind: response kind of the blocks that it answers for.
+    """
+
+    name: str
+    term: str
+    method: str
+    coefficients: Mapping[str, float]
+    covariance: tuple[tuple[float, ...], ...]
+    domain: Mapping[str, tuple[float, float]]
+    data_fingerprint: str
+    diagnostics: Mapping[str, object] = field(default_factory=dict)
+    is_default: bool = False
+    created: str = ""
+    kind: str = "toppling"
+
 
 COLUMNS = (
     "name",

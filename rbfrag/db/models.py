@@ -8,8 +8,7 @@ from sqlalchemy import Connection, Select, and_, delete, select
 
 from rbfrag.db.connect import database_label
 from rbfrag.db.insert import insert_row, update_rows, utc_now
-from rbfrag.db.model_file import COLUMNS, decode_model, encode_model, unknown_model
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.model_file import COLUMNS, ModelRow, decode_model, encode_model, unknown_model
 from rbfrag.db.schema import fragility_model
 from rbfrag.errors import InputError, UnknownModelError
 

@@ -6,7 +6,7 @@ This module loads neither SQLAlchemy nor numpy, because `rbfrag predict` needs i
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -92,34 +92,3 @@ class CombinationTable:
     tm_s: NDArray[np.float64]
     natural_key: NDArray[np.object_]
     block: NDArray[np.object_]
-
-
-@dataclass(frozen=True)
-class ModelRow:
-    """One fitted fragility model as stored.
-
-    Args:
-        name: unique name.
-        term: intensity term (``pgv``, ``pga_tm``, ``pgd_tm``).
-        method: fit method (``wls``).
-        coefficients: value of each parameter by name, in a fixed order.
-        covariance: covariance of the parameters in that order.
-        domain: fitted range (low, high) of each variable by name.
-        data_fingerprint: hash of the data that were fitted.
-        diagnostics: everything else a report prints (counts, scores, warnings), JSON-able.
-        is_default: True for the model of its kind that answers when none is named.
-        created: UTC time of the fit, ISO 8601.
-        kind: response kind of the blocks that it answers for.
-    """
-
-    name: str
-    term: str
-    method: str
-    coefficients: Mapping[str, float]
-    covariance: tuple[tuple[float, ...], ...]
-    domain: Mapping[str, tuple[float, float]]
-    data_fingerprint: str
-    diagnostics: Mapping[str, object] = field(default_factory=dict)
-    is_default: bool = False
-    created: str = ""
-    kind: str = "toppling"

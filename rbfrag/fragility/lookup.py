@@ -9,8 +9,7 @@ from os import PathLike
 from pathlib import Path
 
 from rbfrag.db.location import DEFAULT_NAME, REFERENCE, locate, reference_file
-from rbfrag.db.model_file import unknown_model
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.model_file import ModelRow, unknown_model
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.fragility.measures import MEASURES, TERMS, terms_from
 from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, methods
@@ -165,23 +164,24 @@ def _suited_in(
     kind = asked.kind if kind is None else kind
     if not store.rows:
         raise UnknownModelError(unknown_model(None, [], store.place))
-    of_kind = [store.model(row) for row in store.rows if row.kind == kind]
+    of_kind = [row for row in store.rows if row.kind == kind]
     if not of_kind:
         raise UnknownModelError(
             f"{store.place} holds no {kind} model: make one with  rbfrag simulate --kind {kind}  "
             f"and  rbfrag fit --kind {kind}"
         )
-    block = of_kind[0].method.block
+    suited = [store.model(row) for row in of_kind if row.term in possible]
+    block = suited[0].method.block if suited else asked
     _check_block(kind, block, given, None)
     _check_criterion(kind, block, rotation_deg)
     best: dict[str, FragilityModel] = {}
-    for model in of_kind:
+    for model in suited:
         name = model.term.name
-        suits = name in possible and model.criterion == rotation_deg
+        suits = model.criterion == rotation_deg
         if suits and (name not in best or _merit(model) > _merit(best[name])):
             best[name] = model
     if not best:
-        have = ", ".join(f"{m.name} ({m.term.name}{_of_criterion(m)})" for m in of_kind)
+        have = ", ".join(f"{row.name} ({row.term}{_of_criterion(row, block)})" for row in of_kind)
         of = "" if block.criterion is None else f" of {_failure(rotation_deg)}"
         raise (InputError if block.criterion is None else UnknownModelError)(
             f"no stored {kind} model{of} works with {_known(_measures(given))}; stored are {have}: "
@@ -240,10 +240,11 @@ def _failure(rotation_deg: float | None) -> str:
     return "failure past recovery" if rotation_deg is None else f"a rotation of {rotation_deg:g}°"
 
 
-def _of_criterion(model: FragilityModel) -> str:
-    if model.method.block.criterion is None:
+def _of_criterion(row: ModelRow, block: BlockParameters) -> str:
+    if block.criterion is None:
         return ""
-    return f", {_failure(model.criterion)}"
+    value = row.diagnostics.get(block.criterion)
+    return f", {_failure(value if isinstance(value, int | float) else None)}"
 
 
 def _measures(given: Collection[str]) -> list[str]:

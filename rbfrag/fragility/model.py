@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, TERMS, Term
 from rbfrag.fragility.methods import Eta, Form, Method, Numbers, method_named, method_names

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.model_file import ModelRow
 
 
 def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:

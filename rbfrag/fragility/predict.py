@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model, suited_models
 from rbfrag.fragility.methods import SINGLE

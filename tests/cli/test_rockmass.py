@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from rbfrag.db.engine import opened_database
+from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import save_model
-from rbfrag.db.rows import ModelRow
 from rbfrag.exchange.block_table import read_columns
 from rbfrag.rockmasses.counts import crossings, mode_counts
 from rbfrag.rockmasses.file import read_rock_mass

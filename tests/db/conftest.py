@@ -20,8 +20,9 @@ from rbfrag.db.campaigns import (
     start_campaign,
 )
 from rbfrag.db.engine import open_database
+from rbfrag.db.model_file import ModelRow
 from rbfrag.db.motions import add_motion
-from rbfrag.db.rows import EarthquakeInfo, ModelRow
+from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, SearchPoints
 

@@ -18,8 +18,8 @@ from rbfrag.db.digest import NOT_DIGESTED
 from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import insert_row, insert_rows
 from rbfrag.db.keys import response_key
+from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import save_model
-from rbfrag.db.rows import ModelRow
 from rbfrag.db.spectra import store_spectrum
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES

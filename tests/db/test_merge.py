@@ -21,10 +21,11 @@ from rbfrag.db.engine import open_database, opened_database
 from rbfrag.db.insert import insert_if_new, insert_row, update_rows
 from rbfrag.db.keys import response_key
 from rbfrag.db.merge.databases import MergeReport, merge_databases
+from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import load_model, model_rows, save_model
 from rbfrag.db.motions import add_motion
 from rbfrag.db.queries import database_info
-from rbfrag.db.rows import EarthquakeInfo, ModelRow
+from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import (
     DatabaseError,
     DatabaseNotFoundError,

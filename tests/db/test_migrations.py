@@ -23,9 +23,10 @@ from rbfrag.db.connect import unchecked_engine
 from rbfrag.db.content import table_rows_by_natural_key
 from rbfrag.db.engine import open_database
 from rbfrag.db.location import REVISIONS, SCHEMA_REVISION, VERSION_TABLE
+from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import load_model, save_model
 from rbfrag.db.motions import add_motion, load_motion, motion_rows
-from rbfrag.db.rows import EarthquakeInfo, ModelRow
+from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.schema import combination, metadata, simulation
 from rbfrag.db.upgrade import migrate, upgrade_database
 from rbfrag.motions.ground_motion import GroundMotion

@@ -19,9 +19,15 @@ from sqlalchemy import Engine, update
 from rbfrag.db import schema
 from rbfrag.db.check.database import check_database
 from rbfrag.db.engine import opened_database
-from rbfrag.db.model_file import COLUMNS, decode_model, encode_model, read_model, read_models
+from rbfrag.db.model_file import (
+    COLUMNS,
+    ModelRow,
+    decode_model,
+    encode_model,
+    read_model,
+    read_models,
+)
 from rbfrag.db.models import load_model, model_rows, save_model, set_default
-from rbfrag.db.rows import ModelRow
 from rbfrag.errors import (
     DatabaseError,
     DatabaseNotFoundError,

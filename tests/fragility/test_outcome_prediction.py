@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility import interval_floor, prediction_array
 from rbfrag.fragility.fit import outcomes as outcome_method

@@ -318,7 +318,7 @@ def test_a_model_of_an_unknown_method_or_a_torn_row_is_refused(row):
 def test_single_numbers_load_no_heavy_library():
     program = """
 import sys
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.model_file import ModelRow
 from rbfrag.fragility.predict import predict
 row = ModelRow("m", "pgv", "wls", {"c0": 0.0, "c1": 0.7, "v0": 1e-4, "v1": 2e-3},
                ((1e-6, 0, 0, 0), (0, 1e-4, 0, 0), (0, 0, 1e-10, 0), (0, 0, 0, 1e-8)),

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import ndtr
 
-from rbfrag.db.rows import ModelRow
+from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError, ModelError, UnknownModelError
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rbfrag.db.rows import CombinationTable, ModelRow
+from rbfrag.db.model_file import ModelRow
+from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.model import FragilityModel
 
 N = 400

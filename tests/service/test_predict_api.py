@@ -7,7 +7,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import rbfrag
-from rbfrag.cli.start import answer_one, show
+from rbfrag.cli.commands.predict import answer_one
+from rbfrag.cli.output import show_prediction
 
 KEYWORD = {"pgv": "pgv_m_s", "pga": "pga_g", "tm": "tm_s", "pgd": "pgd_m"}
 
@@ -16,7 +17,7 @@ def printed(capsys, database, values, **more):
     """What `rbfrag predict --json` prints."""
     given = {KEYWORD.get(name, name): value for name, value in values.items()}
     capsys.readouterr()
-    show(answer_one(given, **more, db=str(database)), json=True)
+    show_prediction(answer_one(given, **more, db=str(database)), json=True)
     return json.loads(capsys.readouterr().out)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import typer
 
-from rbfrag.cli.output import print_json, print_pairs, print_warnings
+from rbfrag.cli.output import print_json, print_pairs, print_warnings, show_prediction
 from rbfrag.cli.parameters import options
-from rbfrag.cli.start import answer_one, show
 from rbfrag.errors import InputError
 
 EXAMPLE = "Example:  rbfrag predict --p2 3 --kr 0.1 --pgv 0.6 --json"
@@ -131,7 +131,80 @@ def predict(
     document = answer_one(
         given, block=block, motion=motion, polarity=polarity, units=units, dt=dt, **asked
     )
-    show(document, json=json)
+    show_prediction(document, json=json)
+
+
+def answer_one(
+    given: Mapping[str, float],
+    *,
+    block: str | None = None,
+    kind: str | None = None,
+    rotation_deg: float | None = None,
+    motion: str | None = None,
+    polarity: str = "both",
+    model: str | None = None,
+    level: float = 0.95,
+    units: str | None = None,
+    dt: float | None = None,
+    db: str | None = None,
+) -> dict[str, Any]:
+    """Return the JSON document of one block.
+
+    Args:
+        given: block and measures of the motion, by the names of :func:`rbfrag.predict`.
+        block: a block file instead of the block's numbers.
+        kind: how the block fails.
+        rotation_deg: rotation that counts as failure [deg].
+        motion: the accelerogram itself: a file, ``FILE#INDEX`` or a database id.
+        polarity: forward, reverse or both; with `motion`.
+        model: name of a stored model.
+        level: confidence level of the interval.
+        units: unit of a text file of the motion.
+        dt: sampling interval of such a file [s].
+        db: database.
+    """
+    from rbfrag.fragility.lookup import block_of
+    from rbfrag.fragility.predict import prediction_document
+
+    asked, record = dict(given), None
+    remarks: tuple[str, ...] = ()
+    described = block_of(asked)
+    if block is not None:
+        from rbfrag.cli.parameters.block import block_of_file
+
+        values, remarks = block_of_file(block, described.kind if kind is None else kind)
+        for name in values:
+            if name in asked:
+                raise InputError(
+                    f"{_option(name)} does not go with --block: the file describes the block"
+                )
+        asked |= values
+        described = block_of(asked)
+    missing = [name for name in described.names if name not in asked]
+    if missing and kind in (None, described.kind):
+        raise InputError(
+            f"{_option(missing[0])} is missing: a block of kind {described.kind} is given by "
+            f"{' and '.join(map(_option, described.names))}, or by --block FILE"
+        )
+    if motion is not None:
+        from rbfrag.cli.parameters.motion import find_motion
+
+        record = find_motion(motion, db=db, units=units, dt_s=dt)
+    return prediction_document(
+        asked,
+        kind=kind,
+        rotation_deg=rotation_deg,
+        motion=record,
+        polarity=polarity,
+        model=model,
+        level=level,
+        db=db,
+        remarks=remarks,
+    )
+
+
+def _option(name: str) -> str:
+    return {"displacement_m": "--displacement", "beta_deg": "--beta"}.get(name, f"--{name}")
 
 
 def _predict_table(

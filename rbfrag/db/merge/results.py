@@ -16,9 +16,8 @@ from rbfrag.db.digest import NOT_DIGESTED
 from rbfrag.db.insert import insert_if_new, insert_row, insert_rows, update_rows
 from rbfrag.db.keys import key_of_row
 from rbfrag.db.merge.ledger import Ledger, Merge
-from rbfrag.db.model_file import encode_model
+from rbfrag.db.model_file import ModelRow, encode_model
 from rbfrag.db.models import model_rows
-from rbfrag.db.rows import ModelRow
 from rbfrag.db.schema import (
     campaign,
     combination,

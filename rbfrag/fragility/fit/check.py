@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
+from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import load_model
-from rbfrag.db.rows import ModelRow
 from rbfrag.errors import FitError, InputError, ModelError
 from rbfrag.fragility.fit.data import FitSource, fit_data, read_source
 from rbfrag.fragility.fit.fitting import fit_source

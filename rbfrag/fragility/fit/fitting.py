@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rbfrag.db.rows import CombinationTable, ModelRow
+from rbfrag.db.model_file import ModelRow
+from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.data import FitData, FitSource, fit_data, read_source
 from rbfrag.fragility.fit.report import FitReport, log_correlations, power_law
