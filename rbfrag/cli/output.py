@@ -126,12 +126,7 @@ class ProgressLine:
             print(file=sys.stderr)
 
     def show(self, progress: Progress, remark: str = "") -> None:
-        """Show how far the command is.
-
-        Args:
-            progress: what to tell.
-            remark: something more about what is done, in brackets.
-        """
+        """Show how far the command is."""
         now = time.monotonic()
         finished = progress.done == progress.total
         if not self._terminal and now - self._last < SECONDS_BETWEEN_LINES and not finished:

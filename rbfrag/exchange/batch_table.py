@@ -34,16 +34,9 @@ def pyarrow() -> tuple[Any, Any]:
 
 
 def csv_rows(origin: Path, numeric: Sequence[str], stack: ExitStack) -> tuple[list[str], Parts]:
-    """Return the names of the columns of a CSV file, and its parts, read cell by cell.
+    """Return the names of the columns of a CSV file, and its parts, read cell by cell as texts.
 
-    Args:
-        origin: the file.
-        numeric: columns that hold numbers, which come as texts all the same.
-        stack: closes the file at the end.
-
-    Raises:
-        InputError: while parts are taken: a line with too few or too many cells.
-        OSError: the file cannot be opened.
+    The stack closes the file at the end. A line with too few or too many cells is an InputError.
     """
     del numeric
     reader = csv.reader(stack.enter_context(origin.open(newline="", encoding="utf-8-sig")))
@@ -119,12 +112,7 @@ def _cell_by_cell(origin: Path, header: list[str], reader: Any, done: int = 0) -
 def parquet_parts(
     origin: Path, numeric: Sequence[str], stack: ExitStack
 ) -> tuple[list[str], Parts]:
-    """Return the names of the columns of a Parquet file, and its parts.
-
-    Raises:
-        InputError: not a Parquet file, or a column of numbers holds none.
-        MissingExtraError: pyarrow is not installed.
-    """
+    """Return the names of the columns of a Parquet file, and its parts."""
     arrow, parquet = pyarrow()
     try:
         file = stack.enter_context(parquet.ParquetFile(origin))
@@ -152,11 +140,7 @@ def parquet_parts(
 
 
 def numbers(origin: Path, column: str, cells: Any, first_line: int) -> NDArray[np.float64]:
-    """Return the numbers of some cells; NaN where one is empty.
-
-    Raises:
-        InputError: a text is no number; the message names its line.
-    """
+    """Return the numbers of some cells; NaN where one is empty."""
     if isinstance(cells, np.ndarray):
         return cells
     found = np.empty(len(cells))
@@ -177,15 +161,7 @@ def csv_writer(
     numeric: Sequence[str],
     stack: ExitStack,
 ) -> Write:
-    """Return a function that writes parts as CSV: NaN is an empty cell.
-
-    Args:
-        partial: the file.
-        header: names of the columns of the table that are kept.
-        answers: names of the columns that are appended.
-        numeric: columns that hold numbers.
-        stack: closes the file at the end.
-    """
+    """Return a function that writes parts as CSV: NaN is an empty cell."""
     file = stack.enter_context(partial.open("w", newline="", encoding="utf-8"))
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow([*header, *answers])

@@ -35,6 +35,7 @@ def block_functions(
     kr: FloatArray,
     measure: str,
     *,
+    one_class: bool = False,
     tm_s: float | None = None,
     levels: int = 80,
     model: Model | None = None,
@@ -51,6 +52,7 @@ def block_functions(
         p2: frequency parameters [1/s²], shape (m,).
         kr: toppling yield acceleration coefficients, shape (m,).
         measure: ``pgv_m_s``, or ``pga_g`` with `tm_s`.
+        one_class: the blocks stand for one class: one function, their mean, of one name.
         tm_s: mean period [s], for PGA.
         levels: number of levels of a discrete function.
         model: as in :func:`rbfrag.predict`.
@@ -65,45 +67,17 @@ def block_functions(
         DatabaseError: the database cannot be read.
     """
     x = np.geomspace(_LOWEST, _HIGHEST, _SCANNED)
-    kind, about, rows = _probabilities(x, p2, kr, measure, tm_s, levels, model, db)
+    kind, about, parts = _probabilities(x, p2, kr, measure, tm_s, levels, model, db)
+    if one_class:
+        total = np.zeros_like(x)
+        for part in parts:
+            total += part.sum(axis=0)
+        return [_function(names[0], kind, x, total / p2.size, levels)], about
+    rows = (row for part in parts for row in part)
     functions = [
-        _function(name, kind, x, row, levels)
-        for name, row in zip(names, (row for some in rows for row in some), strict=True)
+        _function(name, kind, x, row, levels) for name, row in zip(names, rows, strict=True)
     ]
     return functions, about
-
-
-def class_function(
-    name: str,
-    p2: FloatArray,
-    kr: FloatArray,
-    measure: str,
-    *,
-    tm_s: float | None = None,
-    levels: int = 80,
-    model: Model | None = None,
-    db: str | PathLike[str] | None = None,
-) -> tuple[FragilityFunction, tuple[str, ...]]:
-    """Return the mean fragility of the blocks of one class, and the model that answered.
-
-    Args:
-        name: identifier of the class.
-        p2: frequency parameters of its blocks [1/s²], shape (m,).
-        kr: their toppling yield acceleration coefficients, shape (m,).
-        measure: as in :func:`block_functions`, as are the others.
-        tm_s: mean period [s].
-        levels: number of levels of a discrete function.
-        model: as in :func:`rbfrag.predict`.
-        db: as in :func:`rbfrag.predict`.
-    """
-    if p2.size == 0:
-        raise InputError(f"class {name!r} has no stable toppling block: it has no fragility")
-    x = np.geomspace(_LOWEST, _HIGHEST, _SCANNED)
-    kind, about, rows = _probabilities(x, p2, kr, measure, tm_s, levels, model, db)
-    total = np.zeros_like(x)
-    for some in rows:
-        total += some.sum(axis=0)
-    return _function(name, kind, x, total / p2.size, levels), about
 
 
 def _probabilities(

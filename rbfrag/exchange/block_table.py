@@ -33,12 +33,7 @@ _ROWS = 1 << 14
 
 
 def table_path(path: str | os.PathLike[str]) -> Path:
-    """Return the path if a table can be written there; ask before long work.
-
-    Raises:
-        InputError: the suffix is neither csv nor parquet, or the folder cannot be written.
-        MissingExtraError: a Parquet file without pyarrow.
-    """
+    """Return the path if a table can be written there; ask before long work."""
     target = output_path(path, SUFFIXES, "table")
     if target.suffix.lower() == ".parquet":
         pyarrow()

@@ -119,11 +119,7 @@ def discrete_function(
     where: str,
     no_damage_limit: float | None = None,
 ) -> FragilityFunction:
-    """Return a checked function of probabilities at levels.
-
-    Raises:
-        InputError: levels that do not rise, probabilities outside 0 to 1 or falling.
-    """
+    """Return a checked function of probabilities at levels."""
     if levels.size < 2 or levels.size != probability.size:
         raise InputError(
             f"{where}: {levels.size} levels and {probability.size} probabilities: at least two of "

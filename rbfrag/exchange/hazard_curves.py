@@ -286,9 +286,6 @@ def table_curves(text: str, source: str) -> list[HazardCurve]:
     The header says what the numbers are: levels ``pga_g``, ``pga_m_s2``, ``pgv_m_s``,
     ``pgv_cm_s`` or ``sa(0.5)_g``; and ``annual_rate`` [1/a] or ``poe_50_years``, the
     probability of exceedance in 50 years.
-
-    Raises:
-        InputError: a header or a row that cannot be used, with its line.
     """
     rows = [
         (number, [cell.strip() for cell in row])

@@ -218,9 +218,6 @@ def nrml_text(
         asset_category: what the assets are.
         loss_category: the loss type that OpenQuake files the model under.
         description: a sentence or two.
-
-    Raises:
-        InputError: nothing to write, an asset twice, or assets with other limit states.
     """
     if not functions:
         raise InputError("there is no fragility function to write")

@@ -27,9 +27,6 @@ def of_measure(
     Args:
         path: NRML (.xml) or a pelicun table (.csv).
         measure: ``pgv_m_s`` or ``pga_g``.
-
-    Raises:
-        InputError: the file cannot be used, holds none of this measure, or too many.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (".xml", ".csv"):

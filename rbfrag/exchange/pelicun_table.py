@@ -58,9 +58,6 @@ def pelicun_text(functions: Sequence[FragilityFunction]) -> str:
     A lognormal function keeps median and standard deviation of the logarithm; any other is a
     ``multilinear_CDF`` through its levels, completed to run from 0 to 1 and rounded to the six
     digits that pelicun keeps.
-
-    Args:
-        functions: functions of PGA or PGV, one limit state for each asset.
     """
     if not functions:
         raise InputError("there is no fragility function to write")

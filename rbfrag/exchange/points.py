@@ -22,11 +22,7 @@ _ROWS = 1 << 13
 
 
 def read_points(path: str | os.PathLike[str]) -> list[tuple[float, float, dict[str, Any]]]:
-    """Return longitude, latitude and properties of every point of a FeatureCollection.
-
-    Raises:
-        InputError: not such a file, or a feature that is no point on the map.
-    """
+    """Return longitude, latitude and properties of every point of a FeatureCollection."""
     try:
         document = json.loads(source_text(path, "GeoJSON"))
     except (ValueError, RecursionError) as error:

@@ -142,14 +142,7 @@ class GridReading:
     def read(
         self, allow_partial: bool
     ) -> tuple[ShakeMapEvent, dict[str, FloatArray], int, int, list[str]]:
-        """Return event, fields by name, columns, rows and warnings.
-
-        Args:
-            allow_partial: go on where the number of nodes is not the declared one.
-
-        Raises:
-            InputError: not such a file, or numbers that cannot be used.
-        """
+        """Return event, fields by name, columns, rows and warnings."""
         parse_xml(self.source, "a ShakeMap grid", start=self.start, end=self.end, text=self.text)
         if not self.is_grid:
             raise InputError(f"{self.source}: not a ShakeMap grid: there is no shakemap_grid")
@@ -357,9 +350,6 @@ def at_places(
         grid: a whole grid.
         lon: longitudes [deg], shape (n,).
         lat: latitudes [deg], shape (n,).
-
-    Raises:
-        InputError: the grid is not whole, or its rows are not regular.
     """
     if not grid.is_whole:
         raise InputError(

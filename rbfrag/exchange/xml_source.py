@@ -27,15 +27,8 @@ def parse_xml(
 ) -> None:
     """Call back for every element of a file, in one pass and bounded memory.
 
-    Args:
-        path: the file.
-        what: what it should be, for messages: "a ShakeMap grid".
-        start: called with local name, attributes and line at a start tag.
-        end: called with local name and line at an end tag.
-        text: called with pieces of text between tags.
-
-    Raises:
-        InputError: the file cannot be read, is not well-formed, or has a DTD.
+    `start` gets local name, attributes and line of a start tag, `end` local name and line of an
+    end tag, `text` parts of the text between tags. `what` is what messages call the file.
     """
     source = Path(path)
     parser = expat.ParserCreate(namespace_separator=" ")

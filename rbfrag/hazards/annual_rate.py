@@ -87,9 +87,6 @@ def failure_rate(curve: HazardCurve, fragility: Fragility) -> FailureRate:
     Args:
         curve: the hazard curve.
         fragility: probabilities of failure at levels of its measure; rows are blocks.
-
-    Raises:
-        InputError: the fragility is not a number somewhere on the curve.
     """
     u = np.log(curve.levels)
     log_rate = np.log(curve.annual_rate)

@@ -18,12 +18,6 @@ def as_dict(
     """Return the answer under the keys of the JSON contract.
 
     One block at one site is an object with its contributions; several are a list in it.
-
-    Args:
-        curves: hazard curves, one a site.
-        names: the blocks.
-        found: annual rates of all blocks at each site.
-        remarks: warnings about the blocks, which go before those of the answers.
     """
     rows = [
         {

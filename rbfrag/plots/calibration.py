@@ -34,10 +34,6 @@ def plot_calibration(
         path: file to write: .png, .pdf or .svg.
         scores: held-out scores by name of the model, for the legend.
         data: what the outcomes are, for the title.
-
-    Raises:
-        InputError: no model or too many, or a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     if not 1 <= len(models) <= MOST_MODELS:

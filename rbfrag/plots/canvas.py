@@ -1,4 +1,8 @@
-"""The sheet of a figure and its file, numbers beside axes, labels, shaded clouds, modes."""
+"""The sheet of a figure and its file, numbers beside axes, labels, shaded clouds, modes.
+
+Every figure refuses a path that cannot be written before it draws (InputError), and says which
+extra brings matplotlib where it is missing (MissingExtraError).
+"""
 
 from __future__ import annotations
 
@@ -39,11 +43,7 @@ def new_figure(width_in: float = 7.0, height_in: float = 5.0) -> Figure:
 
 
 def plot_path(path: str | PathLike[str]) -> Path:
-    """Return the path if a figure can be saved there; ask before long work.
-
-    Raises:
-        InputError: the suffix is none of png, pdf, svg, or the folder cannot be written.
-    """
+    """Return the path if a figure can be saved there; ask before long work."""
     return output_path(path, SUFFIXES, "plot file")
 
 
@@ -61,12 +61,7 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
 
 
 def written_numbers(axis: Axis, *digits: float) -> None:
-    """Write numbers without powers of ten beside a logarithmic axis.
-
-    Args:
-        axis: the axis.
-        digits: leading digits that are written out, such as 1, 2 and 5.
-    """
+    """Write numbers of these leading digits, without powers of ten, beside a logarithmic axis."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axis.set_major_locator(LogLocator(subs=digits))
@@ -77,13 +72,9 @@ def written_numbers(axis: Axis, *digits: float) -> None:
 def spread_out(
     places: Sequence[float], apart: float, lowest: float = -math.inf, highest: float = math.inf
 ) -> list[float]:
-    """Return the places moved as little as keeps neighbours apart, in their order.
+    """Return rising places moved as little as keeps neighbours apart, in their order.
 
-    Args:
-        places: where the labels belong, rising.
-        apart: least distance, in the unit of the places.
-        lowest: no label stands below this, if there is room for all.
-        highest: nor above this.
+    None lies below `lowest` or above `highest`, if there is space for all between.
     """
     highest -= (len(places) - 1) * apart
     # labels that touch move as one group, to the mean of where its members belong

@@ -47,10 +47,6 @@ def plot_chart(
         model: a model of pgv, pga_tm, pgd_tm, pgv_pga or pgv_pga_tm.
         path: file to write: .png, .pdf or .svg.
         held: what is held; None for the middle of the fitted ranges.
-
-    Raises:
-        InputError: a model of another term, or a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     held = held_measures(model) if held is None else held

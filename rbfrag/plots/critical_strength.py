@@ -95,7 +95,6 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
     Raises:
         InputError: no critical value of a motion with a mean period, or a path that cannot
             be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     ratio = 2.0 * np.pi / (table.tm_s * np.sqrt(table.p2))

@@ -59,7 +59,6 @@ def plot_curve(
     Raises:
         InputError: a value that cannot be used, a measure that is missing, or a path that
             cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     varied, *others = model.term.inputs

@@ -62,7 +62,6 @@ def film(
     Raises:
         InputError: no history, a factor that is not positive, an unknown suffix, a folder that
             cannot be written, an .mp4 without ffmpeg.
-        MissingExtraError: matplotlib is not installed.
     """
     target = film_path(path)
     if not (math.isfinite(exaggerate) and exaggerate > 0.0):
@@ -112,11 +111,7 @@ def film(
 
 
 def film_path(path: str | os.PathLike[str]) -> Path:
-    """Return the path if a film can be made there; ask before long work.
-
-    Raises:
-        InputError: an unknown suffix, a folder that cannot be written, an .mp4 without ffmpeg.
-    """
+    """Return the path if a film can be made there; ask before long work."""
     target = output_path(path, SUFFIXES, "film")
     if target.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise InputError(

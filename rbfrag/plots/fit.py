@@ -61,7 +61,6 @@ def plot_fit(
 
     Raises:
         InputError: nothing to draw, or a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     term = model.term

@@ -56,10 +56,6 @@ def plot_islands(
         path: .png, .pdf or .svg.
         vertical: the vertical motion of that search.
         title: name of the motion.
-
-    Raises:
-        InputError: a search without a map, an unknown suffix, a folder that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     if not result.intervals.outcome:
         why = f"no map of outcomes (status {result.status})"

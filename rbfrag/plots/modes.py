@@ -69,10 +69,6 @@ def plot_modes(
         alpha1_deg: angles of the heel of blocks to be shown [deg], shape (m,).
         alpha3_deg: angles of the toe of these blocks [deg], shape (m,).
         title: title of the figure; friction and dip if empty.
-
-    Raises:
-        InputError: an angle outside its range, or a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     nodes = np.arange(-90.0 + 0.5 * _STEP_DEG, 90.0, _STEP_DEG)

@@ -52,10 +52,6 @@ def plot_response(
         linear: the linear model was run.
         reverse: polarity was reversed, for the title.
         title: name of the motion.
-
-    Raises:
-        InputError: no history, an unknown suffix, a folder that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     history = response.history
     if history is None:
@@ -160,10 +156,6 @@ def plot_motion(
         path: .png, .pdf or .svg.
         title: name of the motion.
         reverse: polarity was reversed, for the title.
-
-    Raises:
-        InputError: no history, an unknown suffix, a folder that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     history = response.history
     if history is None or history.displacement_m is None or history.strength_g is None:

@@ -152,10 +152,6 @@ def plot_failures(
         path: file to write: .png, .pdf or .svg.
         level: confidence level of the bands.
         title: title of the figure; the motion and the number of blocks if empty.
-
-    Raises:
-        InputError: a path that cannot be written, a level not between 0 and 1.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     found = failures(shaken, level)

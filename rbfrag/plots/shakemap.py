@@ -45,10 +45,6 @@ def plot_shakemap(
         title: what is drawn.
         epicentre: longitude and latitude of the epicentre [deg].
         shape: rows and columns if the places are the nodes of a whole grid; points otherwise.
-
-    Raises:
-        InputError: nothing to draw, or a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     if not np.isfinite(probability).any():

@@ -54,10 +54,6 @@ def plot_spectrum(
         polarities: the polarities to draw, forward solid, reverse dashed.
         p2: the figure spans at least these frequency parameters [1/s²].
         names: names of the motions in the legend; their labels if empty.
-
-    Raises:
-        InputError: no motion or too many, nothing to draw, a path that cannot be written.
-        MissingExtraError: matplotlib is not installed.
     """
     plot_path(path)
     if not 1 <= len(motions) <= MOST_MOTIONS:

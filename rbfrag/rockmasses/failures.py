@@ -116,12 +116,7 @@ class ScaleFailures:
 
 
 def failures(shaken: ShakenMass, level: float = 0.95) -> tuple[ScaleFailures, ...]:
-    """Count what became of the blocks, scale by scale.
-
-    Args:
-        shaken: the outcomes of the blocks.
-        level: confidence level of the intervals of the shares.
-    """
+    """Count what became of the blocks, scale by scale."""
     made = shaken.made
     found = []
     for i, scale in enumerate(shaken.shaking.scales):

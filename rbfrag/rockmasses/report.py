@@ -25,15 +25,7 @@ def as_dict(
     answer: Scenario | None = None,
     shaking: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
-    """Return the answer under the keys of the JSON contract.
-
-    Args:
-        made: the realisations.
-        counts: blocks by mode.
-        crossings: where cumulative counts cross.
-        answer: the answer to a scenario, if one was asked for.
-        shaking: what a motion did to the blocks, if they were run under one.
-    """
+    """Return the answer under the keys of the JSON contract."""
     return {
         "realisations": made.n,
         "blocks": made.n_blocks,

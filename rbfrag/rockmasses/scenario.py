@@ -41,10 +41,6 @@ def other_modes(
         rotation_deg: rotation that is failure of a block that slumps [deg]; None past recovery.
         level: confidence level of the intervals.
         db: database of the models.
-
-    Raises:
-        InputError: PGV is not known, or the displacement is not above zero.
-        UnknownModelError: there is no model of a mode that has blocks.
     """
     distance = positive(displacement_m, "displacement_m", "m")
     if "pgv_m_s" not in measures:

@@ -63,11 +63,7 @@ class PageFiles(StaticFiles):
 
 
 def make_app(settings: Settings) -> FastAPI:
-    """Return the application.
-
-    Args:
-        settings: what it reads, whom it answers and how much it takes on.
-    """
+    """Return the application."""
     bodies = Bodies(settings)
     pool = WorkerPool(settings.jobs, settings.time_limit_s)
 

@@ -42,13 +42,6 @@ class Bodies:
         """Yield the body of a request; its place is kept until the answer is made.
 
         The body is the request's own, or the one file of a form.
-
-        Args:
-            request: a request whose body nobody has read.
-
-        Raises:
-            RequestRefusedError: it is too long or comes too slowly, or there is no place.
-            MalformedError: a form that is none, or holds no file or several.
         """
         limits = self._settings
         stated = request.headers.get("content-length", "")

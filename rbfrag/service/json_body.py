@@ -22,11 +22,7 @@ def json_text(document: object) -> bytes:
 
 
 def read_json(body: bytes) -> Any:
-    """Return what a body says.
-
-    Raises:
-        MalformedError: it is not JSON, is nested without end, or holds NaN or Infinity.
-    """
+    """Return what a body says."""
     try:
         return json.loads(body.decode("utf-8-sig"), parse_constant=_refuse)
     except UnicodeDecodeError as error:

@@ -71,10 +71,6 @@ def by_name(parameters: Sequence[Parameter]) -> dict[str, Parameter]:
 def read_query(query: bytes, known: Mapping[str, Parameter]) -> dict[str, Any]:
     """Return the values of a query by name.
 
-    Args:
-        query: what follows the question mark of a URL.
-        known: parameters by name.
-
     Raises:
         InputError: a parameter that is not known, given twice or missing, or whose value is not
             of its kind.
@@ -263,16 +259,7 @@ def operation(
     description: str = "",
     problems: tuple[int, ...] = (400, 401, 408, 413, 415, 422, 503),
 ) -> dict[str, Any]:
-    """Return the keywords of a FastAPI operation that reads its request itself.
-
-    Args:
-        summary: what it answers, in a few words.
-        answer: the model of the answer, for the document only.
-        parameters: parameters of its query.
-        body: content of its body by media type, as OpenAPI writes it.
-        description: more words.
-        problems: statuses of the troubles it may have.
-    """
+    """Return the keywords of a FastAPI operation that reads its request itself."""
     extra: dict[str, Any] = {}
     if parameters:
         extra["parameters"] = [each.openapi() for each in parameters.values()]

@@ -36,22 +36,7 @@ VARIABLE = "RBFRAG_SERVICE"
 
 @dataclass(frozen=True)
 class ServeOptions:
-    """What `rbfrag serve` passes on to the service; the names are those of its options.
-
-    Args:
-        db: database of the models.
-        host: address to listen at.
-        port: port to listen at; 0 for any that is free.
-        workers: number of processes that answer.
-        token_file: file with the token.
-        allow_origin: origins of web pages elsewhere whose scripts may read answers.
-        allow_host: further names the service may be asked by.
-        body_limit_mb: longest body [10^6 bytes].
-        body_time: longest time [s] that a body may take to come.
-        row_limit: most blocks of one request.
-        time_limit: longest time [s] that an answer may take.
-        jobs: number of processes that do long work beside each that answers.
-    """
+    """What `rbfrag serve` passes on to the service; its options say what each means."""
 
     db: str | None = None
     host: str = "127.0.0.1"

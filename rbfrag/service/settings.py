@@ -54,9 +54,6 @@ def read_token(file: str | None) -> str | None:
 
     Args:
         file: a file with nothing but the token; None for the environment variable.
-
-    Raises:
-        InputError: the file cannot be read, or the token is none to rely on.
     """
     if file is None:
         token, source = os.environ.get(VARIABLE), VARIABLE
@@ -88,11 +85,7 @@ def is_loopback(host: str) -> bool:
 
 
 def check_reach(host: str, token: str | None) -> None:
-    """Refuse to answer whoever can reach this computer.
-
-    Raises:
-        InputError: the address is not loopback, and there is no token.
-    """
+    """Refuse to answer whoever can reach this computer."""
     if token is None and not is_loopback(host):
         raise InputError(
             f"--host {host}: other computers can ask there, so the service needs a token: put one "

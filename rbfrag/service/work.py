@@ -1,4 +1,8 @@
-"""Long work in processes beside the one that answers, each task with a limit of time."""
+"""Long work in processes beside the one that answers, each task with a limit of time.
+
+A task takes numbers and texts, those of the parameters of its route, and returns JSON, so that
+nothing else travels between the processes.
+"""
 
 from __future__ import annotations
 
@@ -46,19 +50,7 @@ def rock_mass(
     row_limit: int,
     db: str | None,
 ) -> bytes:
-    """Return what `rbfrag rockmass --json` prints.
-
-    Args:
-        body: the description of the rock mass.
-        form: how it is written.
-        measures: measures of the motion, by the keywords of :func:`rbfrag.predict`.
-        n: number of realisations; None for that of the description.
-        seed: seed of the random numbers; None for that of the description.
-        model: name of a stored model, or None.
-        level: confidence level of the interval, or None for 0.95.
-        row_limit: most realisations.
-        db: database of the models.
-    """
+    """Return what `rbfrag rockmass --json` prints."""
     from rbfrag.rockmasses.counts import crossings, mode_counts
     from rbfrag.rockmasses.file import (
         rock_mass_of_csv,
@@ -102,16 +94,7 @@ def spectrum(
     p2: list[float],
     polarity: str,
 ) -> bytes:
-    """Return what `rbfrag spectrum --json` prints.
-
-    Args:
-        body: the accelerogram in any format that rbfrag reads.
-        trace: number of the trace in it, from 0; None where there is one.
-        units: unit of acceleration, where the file does not state it.
-        dt_s: sampling interval [s], where the file does not state it.
-        p2: frequency parameters [1/s²].
-        polarity: forward, reverse or both.
-    """
+    """Return what `rbfrag spectrum --json` prints."""
     from rbfrag.motions.polarity import POLARITIES
     from rbfrag.motions.toppling_spectrum import spectrum_as_dict as as_dict
 
@@ -131,18 +114,7 @@ def critical(
     linear: bool,
     full_map: bool,
 ) -> bytes:
-    """Return what `rbfrag critical --json` prints.
-
-    Args:
-        body: as for :func:`spectrum`.
-        trace: likewise.
-        units: likewise.
-        dt_s: likewise.
-        p2: frequency parameter of the block [1/s²].
-        reverse: positive samples drive backward.
-        linear: the linear model.
-        full_map: map all outcomes.
-    """
+    """Return what `rbfrag critical --json` prints."""
     from rbfrag.solver.reports import critical_as_dict
     from rbfrag.solver.search.critical import critical as search
 
@@ -165,17 +137,7 @@ def hazard(
     given: Mapping[str, Any],
     db: str | None,
 ) -> bytes:
-    """Return what `rbfrag hazard --json` prints.
-
-    Args:
-        body: a file with hazard curves.
-        imt: only curves of this intensity measure.
-        site: only the curve of this site.
-        p2: frequency parameter of the block [1/s²].
-        kr: its yield acceleration coefficient for toppling at rest.
-        given: further arguments of :func:`rbfrag.hazard`.
-        db: database of the models.
-    """
+    """Return what `rbfrag hazard --json` prints."""
     from rbfrag.exchange.hazard_curves import hazard_curves_in, suited_curves
     from rbfrag.hazards.answer import hazard as answer
     from rbfrag.hazards.conversions import velocity_conversion
@@ -263,10 +225,6 @@ class WorkerPool:
             request: who wants to know, its body read; the work ends when the client goes.
             function: a function of a module.
             given: its arguments.
-
-        Raises:
-            RequestRefusedError: it took too long, or waited too long, or the client has gone.
-            RbfragError: as the function raises.
         """
         future = self.open().schedule(function, args=given)
         answer = asyncio.wrap_future(future)

@@ -47,11 +47,7 @@ def critical(
     motion: options.Motion,
     p2: Annotated[
         float | None,
-        typer.Option(
-            "--p2",
-            help="Toppling: frequency parameter p² of the block [1/s²].",
-            show_default=False,
-        ),
+        typer.Option("--p2", help="Toppling: frequency parameter p² of the block [1/s²]."),
     ] = None,
     kind: Annotated[
         str | None,
@@ -59,7 +55,6 @@ def critical(
             "--kind",
             help="toppling, sliding, slumping or confined_toppling. Default: toppling with --p2, "
             "the kind of the failure mode with --block.",
-            show_default=False,
         ),
     ] = None,
     block: Annotated[
@@ -69,7 +64,6 @@ def critical(
             metavar="FILE",
             help="Block file (.toml or .csv) with beta_deg and phi_deg. Slumping and confined "
             "toppling: the factor on the record that brings it down is searched.",
-            show_default=False,
         ),
     ] = None,
     rotation: Annotated[
@@ -78,7 +72,6 @@ def critical(
             "--rotation",
             help="Slumping and confined toppling: rotation that counts as failure [deg]. Default: "
             "failure past recovery.",
-            show_default=False,
         ),
     ] = None,
     displacement: Annotated[
@@ -87,7 +80,6 @@ def critical(
             "--displacement",
             metavar="LIST",
             help="Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.",
-            show_default=False,
         ),
     ] = None,
     vertical: options.Vertical = None,
@@ -107,7 +99,6 @@ def critical(
             metavar="FILE",
             help="Draw the map, peak rotations, bracket and upper bound (.png, .pdf, .svg). "
             "Makes the whole map, as --map does, borders to 1e-7.",
-            show_default=False,
         ),
     ] = None,
     units: options.Units = None,

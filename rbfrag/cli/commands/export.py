@@ -121,22 +121,17 @@ def _functions(
     model: str | None,
     db: str | None,
 ) -> tuple[list[Any], tuple[str, ...], list[str]]:
-    from rbfrag.exchange.block_fragility import block_functions, class_function
+    from rbfrag.exchange.block_fragility import block_functions
 
     measures = {"PGV": "pgv_m_s", "PGA": "pga_g"}
     if imt.upper() not in measures:
         raise InputError(f"--imt {imt}: use PGV, or PGA with --tm")
     measure = measures[imt.upper()]
     table, is_class, remarks = toppling_blocks(p2, kr, block, blocks, rockmass, name=name)
-    p2s, krs = table["p2_1_s2"], table["kr"]
-    if is_class:
-        mean, about = class_function(
-            name, p2s, krs, measure, tm_s=tm, levels=levels, model=model, db=db
-        )
-        return [mean], about, list(remarks)
     made, about = block_functions(
-        list(table["block_id"]), p2s, krs, measure, tm_s=tm, levels=levels, model=model, db=db
-    )
+        [name] if is_class else list(table["block_id"]), table["p2_1_s2"], table["kr"], measure,
+        one_class=is_class, tm_s=tm, levels=levels, model=model, db=db,
+    )  # fmt: skip
     return made, about, list(remarks)
 
 

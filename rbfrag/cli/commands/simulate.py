@@ -31,7 +31,6 @@ def simulate(
             "--p2",
             help="Toppling: frequency parameters p² [1/s²], separated by commas. Default: "
             "30,10,3,1,0.3,0.1.",
-            show_default=False,
         ),
     ] = None,
     rotation: Annotated[
@@ -41,7 +40,6 @@ def simulate(
             metavar="LIST",
             help="Slumping: rotations that count as failure [deg], and the word recovery for "
             "failure past recovery. Default: 2,recovery.",
-            show_default=False,
         ),
     ] = None,
     displacement: Annotated[
@@ -50,7 +48,6 @@ def simulate(
             "--displacement",
             metavar="LIST",
             help="Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.",
-            show_default=False,
         ),
     ] = None,
     vertical: Annotated[
@@ -76,7 +73,6 @@ def simulate(
             metavar="N|LIST",
             help="Toppling: run more blocks than the outcome grid holds: N of them, from 0.99 PGA "
             "down to 0.01 PGA in equal ratios, or at the k_r/PGA of a list.",
-            show_default=False,
         ),
     ] = None,
     store_responses: Annotated[
@@ -86,16 +82,10 @@ def simulate(
             metavar="LIST",
             help="Toppling: keep the motion in time of these blocks, some 300 kB each: k_r/PGA "
             "values, or the word critical for the critical block of each combination.",
-            show_default=False,
         ),
     ] = None,
     jobs: Annotated[
-        int | None,
-        typer.Option(
-            "--jobs",
-            help="Worker processes. Default: one per processor.",
-            show_default=False,
-        ),
+        int | None, typer.Option("--jobs", help="Worker processes. Default: one per processor.")
     ] = None,
     scheduler: Annotated[
         str | None,
@@ -103,7 +93,6 @@ def simulate(
             "--scheduler",
             metavar="URL",
             help="Dask scheduler whose workers take the place of local ones, tcp://host:8786.",
-            show_default=False,
         ),
     ] = None,
     db: options.Db = None,

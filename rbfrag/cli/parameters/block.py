@@ -20,11 +20,6 @@ def toppling_block(
 ) -> tuple[float, float, tuple[str, ...]]:
     """Return p2 [1/s²], k_r and warnings.
 
-    Args:
-        p2: the option --p2.
-        kr: the option --kr.
-        block: the option --block, a block file that states beta_deg and phi_deg.
-
     Raises:
         InputError: an option is missing or given twice, or the block does not topple; the
             message names the mode that governs instead.
@@ -149,9 +144,6 @@ def toppling_blocks(
         rockmass: the option --rockmass, a rock mass file.
         n: number of realisations of the rock mass; None for what its file says.
         name: identifier of a single block.
-
-    Raises:
-        InputError: none of them or several are given, or one that cannot be used.
     """
     import numpy as np
 
@@ -213,9 +205,6 @@ def charted_blocks(
         phi: friction angle that the chart is drawn for [deg].
         phi_back: that of the back plane [deg]; None for the same.
         no_back: whether the chart has no back fracture.
-
-    Raises:
-        InputError: both files are given, or one that cannot be used.
     """
     if blocks is not None and rockmass is not None:
         raise InputError("--blocks does not go with --rockmass: show one of them")

@@ -82,9 +82,6 @@ def find_vertical(
         db: as for :func:`find_motion`.
         units: likewise.
         dt_s: likewise.
-
-    Raises:
-        InputError: no such motion, or it does not fit to the horizontal one.
     """
     if text is None:
         return None, []

@@ -13,12 +13,7 @@ if TYPE_CHECKING:
 
 
 def number_list(text: str, option: str) -> list[float]:
-    """Return the numbers of a list separated by commas.
-
-    Args:
-        text: what was given.
-        option: the option it was given to, for the message.
-    """
+    """Return the numbers of a list separated by commas."""
     values = []
     for part in text.split(","):
         try:

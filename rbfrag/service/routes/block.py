@@ -56,9 +56,6 @@ def block_of(values: Mapping[str, Any]) -> tuple[Block, Stability]:
 
     Args:
         values: those of :data:`PARAMETERS` that were given, by name.
-
-    Raises:
-        InputError: a block that is described in no way, or in two.
     """
     from rbfrag.solver.block.file import described
     from rbfrag.solver.stability.single import stability
