@@ -12,6 +12,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.integrator.single_run import TOPPLED, Run, run_toppling
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
+from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray, Outcome, Polarity, Response, ResponseHistory
 
 OUTCOMES = (Outcome.STABLE, Outcome.TOPPLED, Outcome.UNDETERMINED, Outcome.JUMP)
@@ -58,7 +59,7 @@ def respond(
     The model is eq. (4.2) of Gibson's dissertation with the vertical motion of (4.13).
     """
     p2 = positive(p2, "p2", "1/s²")
-    kr = positive(kr, "kr", "the rocking acceleration coefficient")
+    kr = positive(kr, "kr", "g")
     drive = excitation(motion, vertical, polarity)
     refuse_endless(drive, p2)
     run = simulate(drive, p2=p2, kr=kr, linear=linear)
@@ -113,17 +114,6 @@ def refuse_endless(drive: Excitation, p2: float) -> None:
             f"p2 = {p2:g} 1/s² would take {steps:.1g} steps over this record: a block of 1 mm "
             "has p2 = 7000 1/s²; check its unit"
         )
-
-
-def positive(number: float, name: str, what: str) -> float:
-    """Return `number` as a float, refusing anything that is not positive and finite."""
-    try:
-        result = float(number)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be a number ({what}), not {number!r}") from None
-    if not math.isfinite(result) or result <= 0.0:
-        raise InputError(f"{name} must be a positive finite number ({what}), not {result:g}")
-    return result
 
 
 def _kernel_call(

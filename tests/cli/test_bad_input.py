@@ -27,7 +27,7 @@ def test_block_values(refuses: Refuses, record: Path, option: str, value: str) -
 
 @pytest.mark.parametrize("value", ["0", "-1", "nan"])
 def test_critical_values(refuses: Refuses, record: Path, value: str) -> None:
-    assert "p2 must be a positive" in refuses("critical", record, "--p2", value)
+    assert f"p2 = {value} is not " in refuses("critical", record, "--p2", value)
 
 
 def test_missing_file(refuses: Refuses) -> None:

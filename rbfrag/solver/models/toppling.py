@@ -32,6 +32,7 @@ from rbfrag.solver.kind import (
     Shaking,
     each_once,
 )
+from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import (
     DEFAULT_P2,
     MAP_DEPTH,
@@ -42,7 +43,7 @@ from rbfrag.solver.results import (
     Response,
     SearchPoints,
 )
-from rbfrag.solver.toppling_run import OUTCOMES, positive, refuse_endless, respond, simulate
+from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless, respond, simulate
 
 Y_OVER_PGV = np.concatenate([0.1 * 40.0 ** (np.arange(-10, 0) / 24.0), np.geomspace(0.1, 4.0, 25)])
 """Toppling velocity of the blocks of the outcome grid over PGV: 35 values in steps of ln(40)/24."""

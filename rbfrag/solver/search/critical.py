@@ -19,6 +19,7 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Excitation, kept_excitation, motion_remarks
 from rbfrag.solver.integrator.block_excitation import block_excitation
 from rbfrag.solver.integrator.single_run import TOPPLED, Run
+from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import (
     MAP_DEPTH,
     RESOLUTION,
@@ -38,7 +39,7 @@ from rbfrag.solver.search.certified import (
     surely_topples_below,
 )
 from rbfrag.solver.search.islands import islands_by_blocks, islands_of_map, outcome_intervals
-from rbfrag.solver.toppling_run import OUTCOMES, positive, refuse_endless, runner
+from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless, runner
 
 SLIVERS = 1e-9
 """Undecided length of k_r/PGA up to which an answer still counts as certified."""
@@ -78,8 +79,8 @@ def critical(
     Definition of section 4.3.4 of Gibson's dissertation: the largest k_r/PGA that topples.
     """
     p2 = positive(p2, "p2", "1/s²")
-    search_limit = positive(search_limit, "search_limit", "the smallest k_r/PGA looked at")
-    map_depth = positive(map_depth, "map_depth", "a width of k_r/PGA")
+    search_limit = positive(search_limit, "search_limit", "k_r/PGA")
+    map_depth = positive(map_depth, "map_depth", "k_r/PGA")
     drive = kept_excitation(motion, vertical, polarity)
     refuse_endless(drive, p2)
     search = _Search(drive, p2, linear, search_limit)

@@ -124,21 +124,8 @@ def decide(
                     il = i
                     tl = tau
                     event, i, tau, theta, rate, s, c, made = integrate_excursion(
-                        g,
-                        kb,
-                        i,
-                        tau,
-                        theta,
-                        rate,
-                        s,
-                        c,
-                        False,
-                        i + 1,
-                        0.0,
-                        False,
-                        0,
-                        0.0,
-                    )
+                        g, kb, i, tau, theta, rate, s, c, False, i + 1, 0.0, False, 0, 0.0,
+                    )  # fmt: skip
                     steps += made
                     if rate >= 0.0:
                         mixed = True
@@ -156,38 +143,12 @@ def decide(
             if mixed:
                 # ahead of those that have had no impact since, and of those that have
                 event, _, _, theta, rate, s, c, made = integrate_excursion(
-                    g,
-                    ka,
-                    ixb,
-                    txb,
-                    0.0,
-                    0.0,
-                    sa0,
-                    ca0,
-                    True,
-                    il,
-                    tl,
-                    True,
-                    0,
-                    0.0,
-                )
+                    g, ka, ixb, txb, 0.0, 0.0, sa0, ca0, True, il, tl, True, 0, 0.0,
+                )  # fmt: skip
                 steps += made
                 event, ixa, txa, theta_a, rate_a, s_a, c_a, made = integrate_excursion(
-                    g,
-                    ka,
-                    ixb,
-                    txb,
-                    theta_a,
-                    rate_a,
-                    s_a,
-                    c_a,
-                    False,
-                    il,
-                    tl,
-                    False,
-                    0,
-                    0.0,
-                )
+                    g, ka, ixb, txb, theta_a, rate_a, s_a, c_a, False, il, tl, False, 0, 0.0,
+                )  # fmt: skip
                 steps += made
                 if event != STOPPED:
                     return SPLIT, math.nan, trajectories, steps
@@ -282,21 +243,8 @@ def decide(
         check_ahead = 1 if check else 0
         if event == IN_AIR:
             event, _, _, _, _, _, _, made = integrate_excursion(
-                g,
-                ka,
-                ixa,
-                txa,
-                theta_a,
-                rate_a,
-                s_a,
-                c_a,
-                True,
-                n - 1,
-                0.0,
-                True,
-                check_ahead,
-                kb,
-            )
+                g, ka, ixa, txa, theta_a, rate_a, s_a, c_a, True, n - 1, 0.0, True, check_ahead, kb,
+            )  # fmt: skip
             steps += made
             trajectories += 1
             if event == ORDER_LOST:
@@ -304,21 +252,8 @@ def decide(
             return (ALL_SAFE if event == IN_AIR else SPLIT), math.nan, trajectories, steps
         # the lower bounding trajectory has ended in an impact; bring the upper one there
         event, ixa, txa, theta_a, rate_a, s_a, c_a, made = integrate_excursion(
-            g,
-            ka,
-            ixa,
-            txa,
-            theta_a,
-            rate_a,
-            s_a,
-            c_a,
-            True,
-            ixb,
-            txb,
-            True,
-            check_ahead,
-            kb,
-        )
+            g, ka, ixa, txa, theta_a, rate_a, s_a, c_a, True, ixb, txb, True, check_ahead, kb,
+        )  # fmt: skip
         steps += made
         trajectories += 1
         if event == ORDER_LOST:
@@ -331,21 +266,8 @@ def decide(
         at /= w[ixb] + (w[ixb + 1] - w[ixb]) * txb
         lifting = rate_a >= 0.0 and at >= k1
         event, ia, ta, _, _, _, _, made = integrate_excursion(
-            g,
-            ka,
-            ixa,
-            txa,
-            theta_a,
-            rate_a,
-            s_a,
-            c_a,
-            lifting,
-            n - 1,
-            0.0,
-            True,
-            check_ahead,
-            kb,
-        )
+            g, ka, ixa, txa, theta_a, rate_a, s_a, c_a, lifting, n - 1, 0.0, True, check_ahead, kb,
+        )  # fmt: skip
         steps += made
         if event == ORDER_LOST:
             return NO_ORDER, math.nan, trajectories, steps

@@ -87,21 +87,8 @@ def follow(
         if i >= n or (use and not fails_after(g, starts, i)):
             break
         event, at, fraction, _, rate, s, c, made = integrate_excursion(
-            g,
-            kr,
-            i,
-            tau,
-            0.0,
-            0.0,
-            s0,
-            c0,
-            True,
-            n - 1,
-            0.0,
-            True,
-            0,
-            0.0,
-        )
+            g, kr, i, tau, 0.0, 0.0, s0, c0, True, n - 1, 0.0, True, 0, 0.0,
+        )  # fmt: skip
         steps += made
         distance = linear_distance(g, i, tau, at, fraction, rate, s, c, event == TOPPLED)
         if event == TOPPLED:

@@ -97,21 +97,9 @@ def one_more(g: Ground, starts: Starts) -> bool:
     if i < n:
         s0, c0 = rest_state(levels[_AHEAD], g.linear)
         event, there, fraction, _, _, _, _, made = integrate_excursion(
-            g,
-            levels[_AHEAD],
-            i,
-            tau,
-            0.0,
-            0.0,
-            s0,
-            c0,
-            True,
-            n - 1,
-            0.0,
-            True,
-            at[_CHECK],
+            g, levels[_AHEAD], i, tau, 0.0, 0.0, s0, c0, True, n - 1, 0.0, True, at[_CHECK],
             levels[_OTHER],
-        )
+        )  # fmt: skip
         at[_STEPS] += made
         if event == IMPACT:
             cover = there + 1 if fraction > 0.0 else there

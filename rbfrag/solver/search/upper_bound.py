@@ -51,21 +51,8 @@ def margin_from_rest(
         if i >= n:
             break
         event, at, fraction, _, rate, s, c, made = integrate_excursion(
-            g,
-            k_upper,
-            i,
-            tau,
-            0.0,
-            0.0,
-            s0,
-            c0,
-            True,
-            n - 1,
-            0.0,
-            True,
-            0,
-            0.0,
-        )
+            g, k_upper, i, tau, 0.0, 0.0, s0, c0, True, n - 1, 0.0, True, 0, 0.0,
+        )  # fmt: skip
         steps += made
         trajectories += 1
         distance = linear_distance(g, i, tau, at, fraction, rate, s, c, event == TOPPLED)
@@ -241,15 +228,8 @@ def upper_bound(
                 stop = max(stop, starts.stretches[END, m])
         before = high
         low, high, _, made_trajectories, made = border_of(
-            g,
-            high,
-            high * 1.001,
-            top,
-            first,
-            stop,
-            margin,
-            width,
-        )
+            g, high, high * 1.001, top, first, stop, margin, width,
+        )  # fmt: skip
         trajectories += made_trajectories
         steps += made
         if high <= before:  # it is the order of motions that is lost

@@ -200,11 +200,11 @@ def test_reverse_is_forward_of_the_negated_motion() -> None:
 @pytest.mark.parametrize(
     ("bad", "words"),
     [
-        ({"p2": math.nan}, "p2 must be a positive finite number"),
-        ({"p2": 0.0}, "p2 must be a positive finite number"),
+        ({"p2": math.nan}, "p2 = nan is not finite"),
+        ({"p2": 0.0}, "p2 = 0 is not above zero"),
         ({"p2": -3.0}, "-3"),
         ({"p2": "three"}, "'three'"),
-        ({"p2": 1.0, "search_limit": 0.0}, "search_limit must be"),
+        ({"p2": 1.0, "search_limit": 0.0}, "search_limit = 0 is not above zero"),
         ({"p2": 1.0, "search_limit": math.inf}, "inf"),
         ({"p2": 1.0, "polarity": "uphill"}, "'uphill'"),
     ],

@@ -1,0 +1,116 @@
+"""A kind is one file: a throw-away one answers everywhere, without another line of the package.
+
+Its blocks fail when the peak acceleration exceeds k_r.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import rbfrag
+import rbfrag.solver.models
+from rbfrag.db.engine import opened_database
+from rbfrag.db.motions import add_motion
+from rbfrag.db.rows import EarthquakeInfo
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver import kinds
+from tests.synthetic import shaking
+
+FALLS = '''
+"""A block that falls when |a| exceeds k_r."""
+
+import math
+
+import numpy as np
+
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.kind import Case, CaseResult, Kind
+from rbfrag.solver.models.toppling import Y_OVER_PGV
+from rbfrag.solver.results import Outcome, Response, SearchPoints
+
+
+class Falls(Kind):
+    kind = "falls"
+    parameters = ("p2", "kr")
+    campaign = True
+
+    def respond(self, site, shaking):
+        fails = shaking.motion.pga_g > site.yield_g
+        return Response(
+            kind=self.kind,
+            outcome=Outcome.TOPPLED if fails else Outcome.STABLE,
+            peak_theta_n=None,
+            peak_theta_rad=None,
+            critical_angle_deg=None,
+            started_s=None,
+            toppled_s=None,
+            error_estimate=0.0,
+            steps=0,
+            samples_moved=0,
+            samples_total=0,
+        )
+
+    def cases(self, **asked):
+        self.refuse_foreign(asked, self.campaign_options)
+        return tuple(Case(self.kind, p2) for p2 in (10.0, 1.0))
+
+    def grid(self, case, measures):
+        ground = measures.pga_g * STANDARD_GRAVITY_M_S2
+        return math.sqrt(case.p2) * measures.pgv_m_s / ground * Y_OVER_PGV
+
+    def run_cases(self, motion, vertical, polarity, cases, **asked):
+        results = []
+        for case in cases:
+            k = self.grid(case, motion)
+            words = tuple("toppled" if each < 1.0 else "stable" for each in k)
+            results.append(CaseResult(None, SearchPoints(k, np.where(k < 1.0, np.nan, 0.0), words)))
+        return results
+
+
+MODEL = Falls()
+'''
+
+
+@pytest.fixture
+def falls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    folder = tmp_path / "kinds"
+    folder.mkdir()
+    (folder / "zz_falls.py").write_text(FALLS)
+    path = [*rbfrag.solver.models.__path__, str(folder)]
+    monkeypatch.setattr(rbfrag.solver.models, "__path__", path)
+    kinds.models.cache_clear()
+    yield
+    kinds.models.cache_clear()
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Path:
+    place = tmp_path / "falls.db"
+    with opened_database(place, create=True) as engine, engine.begin() as connection:
+        for seed in range(12):
+            samples = (0.5 + 0.1 * seed) * shaking(seed, 450)
+            motion = GroundMotion(samples, 0.02, source_file=f"{seed}.txt")
+            quake = EarthquakeInfo(f"quake-{seed}", guessed=False)
+            add_motion(connection, motion, earthquake=quake, is_vertical=False, recording=str(seed))
+    return place
+
+
+@pytest.mark.usefixtures("falls")
+def test_respond_answers() -> None:
+    motion = GroundMotion(shaking(3), 0.02)
+    for factor, outcome in ((0.99, "toppled"), (1.01, "stable")):
+        answer = rbfrag.respond(motion, kind="falls", p2=3.0, kr=factor * motion.pga_g)
+        assert (answer.kind, answer.outcome) == ("falls", outcome)
+    with pytest.raises(InputError, match="no search"):
+        rbfrag.critical(motion, kind="falls", p2=3.0)
+
+
+@pytest.mark.usefixtures("falls")
+def test_simulate_answers(database: Path) -> None:
+    summary = rbfrag.simulate(database, kind="falls", jobs=1)
+    assert summary.combinations == summary.not_searched == 12 * 2 * 2
+    assert rbfrag.simulate(database, kind="falls", jobs=1).resumed == summary.combinations
