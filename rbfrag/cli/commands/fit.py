@@ -93,21 +93,19 @@ def fit(
     from rbfrag.fragility.fit.report import FitReport
     from rbfrag.fragility.model import FragilityModel
 
-    # reading takes no lock, so that a campaign may go on meanwhile
-    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        report = run(
-            connection,
-            kind=kind,
-            term=term,
-            method=method,
-            suite=suite,
-            vertical=vertical,  # type: ignore[arg-type]
-            name=name,
-            seed=seed,
-            estimate_m=free_m,
-            doubtful_pgd=doubtful_pgd,
-            rotation_deg=rotation,
-        )
+    report = run(
+        db,
+        kind=kind,
+        term=term,
+        method=method,
+        suite=suite,
+        vertical=vertical,  # type: ignore[arg-type]
+        name=name,
+        seed=seed,
+        estimate_m=free_m,
+        doubtful_pgd=doubtful_pgd,
+        rotation_deg=rotation,
+    )
     with opened_database(db) as engine, engine.begin() as connection:
         row = save_model(connection, report.model.row, replace=replace)
     print_report(FitReport.from_model(FragilityModel.from_row(row)), json=json)

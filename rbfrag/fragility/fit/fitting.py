@@ -43,7 +43,7 @@ class Fitted:
 
 
 def fit(
-    source: str | PathLike[str] | Connection | CombinationTable | FitSource,
+    source: str | PathLike[str] | Connection | CombinationTable | FitSource | None = None,
     *,
     kind: str = "toppling",
     term: str,
@@ -59,8 +59,9 @@ def fit(
     """Fit a fragility model; nothing is stored.
 
     Args:
-        source: the database (a path, URL or connection), or the data themselves (critical values
-            alone carry ``wls`` and ``lognormal``).
+        source: the database (a path, URL or connection; None for ``RBFRAG_DB`` or ``rbfrag.db`` in
+            the current folder), or the data themselves (critical values alone carry ``wls`` and
+            ``lognormal``).
         kind: what the blocks do: any kind that campaigns store.
         term: intensity term: ``pgv``, ``pga_tm``, ``pgd_tm``, ``pgv_pga``, ``pgv_pga_tm`` or
             ``xp``.
@@ -101,7 +102,7 @@ def fit(
     }
     if isinstance(source, CombinationTable):
         source = FitSource.of_table(source)
-    elif isinstance(source, str | PathLike):
+    elif source is None or isinstance(source, str | PathLike):
         from rbfrag.db.engine import opened_database
 
         # reading takes no lock, so that a campaign may go on meanwhile
