@@ -17,6 +17,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from sqlalchemy import select
 
 from rbfrag.db import schema
@@ -24,7 +26,7 @@ from rbfrag.db.campaigns import CombinationRecord, insert_combinations
 from rbfrag.db.engine import opened_database
 from rbfrag.db.sqlite_file import connect_sqlite
 from rbfrag.db.stored_combination import stored_combination
-from rbfrag.solver.results import CriticalResult
+from rbfrag.solver.results import CriticalResult, SearchPoints
 
 TABLES = ("combination", "outcome_interval", "simulation")
 ROUNDS = 3
@@ -101,18 +103,22 @@ def read(finished: Path) -> tuple[dict[int, list[CombinationRecord]], dict[int, 
                     **given,
                     "pga_g": stored.pga_g,
                     "warnings": tuple(json.loads(values["warnings"])),
-                    "points": stored.points,
+                    "points": some_of(stored.points, stored.grid < 0),
                     "intervals": stored.intervals,
                 }
             )
+            blocks = np.flatnonzero(stored.grid >= 0)
             records[stored.motion_id].append(
                 CombinationRecord(
                     natural_key=key,
                     motion_id=stored.motion_id,
                     vertical_motion_id=stored.vertical_motion_id,
-                    result=result,
+                    **{name: values[name] for name in ("polarity", "kind", "p2")},
                     settings=stored.settings,
+                    result=result,
+                    block=stored.block,
                     numerics_version=values["numerics_version"],
+                    grid=some_of(stored.points, blocks[np.argsort(stored.grid[blocks])]),
                 )
             )
     rows: dict[int, Rows] = {motion: {table: [] for table in TABLES} for motion in records}
@@ -122,6 +128,15 @@ def read(finished: Path) -> tuple[dict[int, list[CombinationRecord]], dict[int, 
             rows[motion_of[row[0]]][table].append(row)
     raw.close()
     return records, rows
+
+
+def some_of(points: SearchPoints, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> SearchPoints:
+    """Return some of the simulated blocks."""
+    return SearchPoints(
+        kr_over_pga=points.kr_over_pga[chosen],
+        theta_n=points.theta_n[chosen],
+        outcome=tuple(np.array(points.outcome, dtype=object)[chosen].tolist()),
+    )
 
 
 def make_empty(finished: Path, empty: Path) -> None:
@@ -151,6 +166,8 @@ def by_sqlite3(place: Path, rows: dict[int, Rows], motions: list[int] | None) ->
         raw.execute("BEGIN IMMEDIATE")
         for table in TABLES:
             some = [row for motion in group for row in rows[motion][table]]
+            if not some:
+                continue
             marks = ", ".join("?" for _ in some[0])
             raw.executemany(f"INSERT INTO {table} VALUES ({marks})", some)
         raw.execute("COMMIT")

@@ -18,9 +18,7 @@ class Mark:
         words: what it is.
         low: least value that is accepted.
         high: greatest value that is accepted.
-        value: of the model fitted to all outcomes.
-        by_maps: of the model fitted to the outcomes that the shipped maps decide; None for models
-            of critical values, which do not read outcomes.
+        value: what is reached.
         also: a further condition, in words, with whether it holds.
     """
 
@@ -29,7 +27,6 @@ class Mark:
     low: float
     high: float
     value: float
-    by_maps: float | None = None
     also: tuple[str, bool] | None = None
 
     @property
@@ -43,23 +40,14 @@ class Mark:
             words = f"{self.low:g} to {self.high:g}"
         return words if self.also is None else f"{words}, {self.also[0]}"
 
-    def cell(self, value: float | None) -> str:
-        """Return a value with whether it was reached."""
-        if value is None:
-            return "the same"
-        reached = self.low <= value <= self.high and (self.also is None or self.also[1])
-        return f"{value:.4g}" if reached else f"**{value:.4g}, missed**"
+    @property
+    def cell(self) -> str:
+        """The value with whether it is reached."""
+        reached = self.low <= self.value <= self.high and (self.also is None or self.also[1])
+        return f"{self.value:.4g}" if reached else f"**{self.value:.4g}, missed**"
 
 
 def acceptance_table(marks: Sequence[Mark]) -> str:
     """Return the table of the page."""
-    head = [
-        "model",
-        "what",
-        "asked",
-        "fitted to all outcomes, as shipped",
-        "fitted to what the maps decide",
-    ]
-    return markdown(
-        (head, [[m.model, m.words, m.asked, m.cell(m.value), m.cell(m.by_maps)] for m in marks])
-    )
+    head = ["model", "what", "asked", "reached"]
+    return markdown((head, [[m.model, m.words, m.asked, m.cell] for m in marks]))

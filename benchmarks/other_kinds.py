@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,16 +24,11 @@ from benchmarks.page import ROOT, replaced
 from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
 from rbfrag.db.queries import combination_table
-from rbfrag.fragility.fit.kind_data import KindData, slumping_data
-from rbfrag.fragility.fit.kind_fitting import (
-    Judged,
-    KindFit,
-    fit_kind,
-    judged_by,
-    probabilities,
-)
+from rbfrag.fragility.fit.critical import probabilities
+from rbfrag.fragility.fit.data import FitData, read_source
+from rbfrag.fragility.fit.fitting import Fitted, fit_source, method_of_kind
 from rbfrag.fragility.fit.scores import brier, calibration, log_loss
-from rbfrag.fragility.kind_formulas import FORMULAS
+from rbfrag.fragility.measures import TERMS
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]
@@ -57,23 +53,33 @@ def saygili_rathje_2008(values: dict[str, FloatArray]) -> FloatArray:
     return np.asarray(ndtr((mean - np.log(100.0 * values["displacement_m"])) / sigma))
 
 
-def as_slide(judged: Judged, sliding: KindFit, rotation_deg: float) -> FloatArray:
+def fitted(
+    connection: Connection, kind: str, term: str = "pgv_pga", rotation_deg: float | None = None
+) -> Fitted:
+    """Fit a model of a kind."""
+    method = method_of_kind(kind, None)
+    asked = {"rotation_deg": rotation_deg}
+    source = read_source(connection, method.block, kind=kind, rotation_deg=rotation_deg)
+    return fit_source(source, TERMS[term], method, kind=kind, selection=asked)
+
+
+def as_slide(slump: FitData, sliding: Fitted, rotation_deg: float) -> FloatArray:
     """Return P of a slump as that of a slide: while theta is small, D = theta g/p_s²."""
-    values = dict(judged.values)
-    values["ky"] = values["ks"]
-    values["displacement_m"] = math.radians(rotation_deg) * STANDARD_GRAVITY_M_S2 / values["ps2"]
-    other = Judged(values, judged.failed, judged.event)
-    parameters = np.array(sliding.model.parameters)
-    return probabilities(FORMULAS["sliding", "pgv_pga"], parameters, other)
+    blocks = dict(slump.blocks)
+    blocks["ky"] = blocks["ks"]
+    blocks["displacement_m"] = math.radians(rotation_deg) * STANDARD_GRAVITY_M_S2 / blocks["ps2"]
+    model = sliding.report.model
+    other = replace(slump, blocks=blocks)
+    return probabilities(model.method, model.form, other, np.array(model.parameters))
 
 
-def scored(name: str, p: FloatArray, judged: Judged) -> list[str]:
-    known = judged.known
+def scored(name: str, p: FloatArray, data: FitData) -> list[str]:
+    judged = data.judged
     return [
         name,
-        f"{log_loss(p, judged.failed, known):.3f}",
-        f"{brier(p, judged.failed, known):.3f}",
-        f"{calibration(p, judged.failed, known).slope:.2f}",
+        f"{log_loss(p, judged.failed, judged.known):.3f}",
+        f"{brier(p, judged.failed, judged.known):.3f}",
+        f"{calibration(p, judged.failed, judged.known).slope:.2f}",
     ]
 
 
@@ -88,21 +94,16 @@ def within_motion(residual: FloatArray, group: NDArray[np.intp]) -> tuple[float,
     return within, float(np.std(mean[count > 1]))
 
 
-def slumping_scatter(data: KindData) -> tuple[float, float]:
-    """Return both scatters of ln(y/PGV) at failure, found values alone."""
-    v = data.values
-    y = v["ks"] * STANDARD_GRAVITY_M_S2 / np.sqrt(v["ps2"])
-    found = data.found
-    return within_motion(np.log(y / v["pgv_m_s"])[found], data.group[found])
-
-
-def toppling_scatter(connection: Connection) -> tuple[float, float]:
-    """Return the same of toppling blocks of six sizes."""
-    table = combination_table(connection)
-    found = table.status == "found"
+def scatter(
+    connection: Connection, kind: str, rotation_deg: float | None = None
+) -> tuple[float, float]:
+    """Return both scatters of ln(y/PGV) at failure, found values alone; y = k g/p."""
+    table = combination_table(connection, kind=kind, rotation_deg=rotation_deg)
+    found = (table.status == "found") & (table.kr_over_pga < 1.0)
     names = [f"{m} {p}" for m, p in zip(table.motion_id.tolist(), table.polarity, strict=True)]
     group = np.unique(np.array(names)[found], return_inverse=True)[1]
-    return within_motion(np.log(table.y_m_s[found] / table.pgv_m_s[found]), group.astype(np.intp))
+    y = table.kr_over_pga * table.pga_g * STANDARD_GRAVITY_M_S2 / np.sqrt(table.p2)
+    return within_motion(np.log(y / table.pgv_m_s)[found], group.astype(np.intp))
 
 
 def main() -> None:
@@ -113,41 +114,41 @@ def main() -> None:
     chosen = options.parse_args()
     heads = ["model", "log loss", "Brier", "calibration slope"]
     with opened_database(chosen.database, read_only=True) as engine, engine.connect() as c:
-        sliding = fit_kind(c, kind="sliding")
-        only_pgv = fit_kind(c, kind="sliding", term="pgv")
+        sliding = fitted(c, "sliding")
+        only_pgv = fitted(c, "sliding", "pgv")
         slumps = {
-            (rotation, term): fit_kind(c, kind="slumping", term=term, rotation_deg=rotation)
+            (rotation, term): fitted(c, "slumping", term, rotation)
             for rotation in (None, 2.0)
             for term in ("pgv_pga", "pgv")
         }
-        recovery = slumping_data(c, rotation_deg=None)
-        turned = slumping_data(c, rotation_deg=2.0)
+        slump_scatters = {r: scatter(c, "slumping", r) for r in (None, 2.0)}
+    recovery, turned = slumps[None, "pgv_pga"].data, slumps[2.0, "pgv_pga"].data
     place = chosen.toppling or chosen.database
     with opened_database(place, read_only=True) as engine, engine.connect() as c:
-        topples = toppling_scatter(c)
+        topples = scatter(c, "toppling")
     rows = [
-        scored("`sliding-pgv_pga`, held out", sliding.held_out, sliding.judged),
-        scored("`sliding-pgv`, held out", only_pgv.held_out, only_pgv.judged),
+        scored("`sliding-pgv_pga`, held out", sliding.result.held_out, sliding.data),
+        scored("`sliding-pgv`, held out", only_pgv.result.held_out, only_pgv.data),
         scored(
             "Saygili & Rathje (2008), PGA and PGV",
-            saygili_rathje_2008(sliding.judged.values),
-            sliding.judged,
+            saygili_rathje_2008(sliding.data.blocks),
+            sliding.data,
         ),
-        scored("Jibson (2007), k_y/PGA", jibson_2007(sliding.judged.values), sliding.judged),
+        scored("Jibson (2007), k_y/PGA", jibson_2007(sliding.data.blocks), sliding.data),
     ]
     first = markdown((heads, rows))
     rows = [
-        scored(f"`{fit.row.name}`, held out", fit.held_out, fit.judged) for fit in slumps.values()
+        scored(f"`{fit.report.name}`, held out", fit.result.held_out, fit.data)
+        for fit in slumps.values()
     ]
-    judged = judged_by(turned)
-    rows.append(scored("2 degrees as a slide of 2° g/p_s²", as_slide(judged, sliding, 2.0), judged))
+    rows.append(scored("2 degrees as a slide of 2° g/p_s²", as_slide(turned, sliding, 2.0), turned))
     second = markdown((heads, rows))
     cells = [
         [name, f"{within:.2f}", f"{between:.2f}"]
         for name, (within, between) in (
             ("toppling, six sizes", topples),
-            ("slumping past recovery, 18 blocks", slumping_scatter(recovery)),
-            ("slumping by 2 degrees, 18 blocks", slumping_scatter(turned)),
+            ("slumping past recovery, 18 blocks", slump_scatters[None]),
+            ("slumping by 2 degrees, 18 blocks", slump_scatters[2.0]),
         )
     ]
     third = markdown(
@@ -164,8 +165,8 @@ def main() -> None:
                 replaced(PAGE.read_text(encoding="utf-8"), name, table), encoding="utf-8"
             )
     if chosen.write:
-        slump = slumps[None, "pgv_pga"].model
-        plot_other_kinds(sliding.model, sliding.data, slump, recovery, FIGURE)
+        slump = slumps[None, "pgv_pga"].report.model
+        plot_other_kinds(sliding.report.model, sliding.data, slump, recovery, FIGURE)
         print(Path(FIGURE).relative_to(ROOT))
 
 

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from rbfrag.fragility.fit.kind_data import KindData
-from rbfrag.fragility.fit.kind_fitting import ARRAYS
+from rbfrag.fragility.fit.data import FitData
+from rbfrag.fragility.methods import arrays
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure, written_numbers
 
 
 def plot_other_kinds(
-    sliding: FragilityModel, slides: KindData, slumping: FragilityModel, slumps: KindData,
+    sliding: FragilityModel, slides: FitData, slumping: FragilityModel, slumps: FitData,
     path: str | PathLike[str],
 ) -> Path:  # fmt: skip
     """Draw displacements over PGV²/(k_y g) against k_y/PGA, and critical (1 - r)/r against z.
@@ -43,7 +43,7 @@ def plot_other_kinds(
     return save_figure(figure, path)
 
 
-def _slides(axes: Any, model: FragilityModel, data: KindData) -> None:
+def _slides(axes: Any, model: FragilityModel, data: FitData) -> None:
     v, found = data.values, data.found
     r = v["ky"] / v["pga_g"]
     size = v["pgv_m_s"] ** 2 / (v["ky"] * STANDARD_GRAVITY_M_S2)
@@ -55,7 +55,7 @@ def _slides(axes: Any, model: FragilityModel, data: KindData) -> None:
     pga, pgv = 0.3, 0.3
     line = {"ky": grid * pga, "pgv_m_s": np.full(120, pgv), "pga_g": np.full(120, pga)}
     line["displacement_m"] = np.ones(120)
-    eta = model.formula.eta(model.parameters, line, ARRAYS)
+    eta = model.form.eta(model.parameters, line, arrays())
     sigma = np.exp(eta.log_sigma)
     norm = pgv**2 / (line["ky"] * STANDARD_GRAVITY_M_S2)
     axes.plot(grid, np.exp(eta.eta * sigma) / norm, color="#b2182b", lw=1.8,
@@ -75,7 +75,7 @@ def _slides(axes: Any, model: FragilityModel, data: KindData) -> None:
     axes.legend(loc="lower left", fontsize=8, frameon=False)
 
 
-def _slumps(axes: Any, model: FragilityModel, data: KindData) -> None:
+def _slumps(axes: Any, model: FragilityModel, data: FitData) -> None:
     v = data.values
     r = v["ks"] / v["pga_g"]
     z = np.sqrt(v["ps2"]) * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2)

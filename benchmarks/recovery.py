@@ -15,15 +15,13 @@ from numpy.typing import NDArray
 
 from benchmarks.page import parser, report
 from rbfrag.bench.tables import markdown
-from rbfrag.fragility import formulas
-from rbfrag.fragility.fit import censored_normal
-from rbfrag.fragility.fit import outcomes as outcome_method
-from rbfrag.fragility.fit.binomial import cr3, effective_freedom, jackknife_steps
-from rbfrag.fragility.fit.censored_normal import CensoredData, maximise
+from rbfrag.fragility.fit.clusters import cr3, effective_freedom, jackknife_steps
 from rbfrag.fragility.fit.data import fit_data
-from rbfrag.fragility.fit.variance import Bins
-from rbfrag.fragility.fit.wls import clustered_line, iterate
+from rbfrag.fragility.fit.likelihood import censored_line, from_olsen, maximise
+from rbfrag.fragility.fit.line import Bins, clustered_line, iterate
+from rbfrag.fragility.fit.outcomes import fit_parameters
 from rbfrag.fragility.measures import TERMS
+from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import student_half_width
 from tests.fragility.conftest import critical_values
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
@@ -43,13 +41,9 @@ def outcomes(method: str, term: str, seed: int) -> Draw:
     source = drawn_outcomes(
         method, term, TRUTH[method, term], events=EVENTS, motions=2, shared=SHARED, seed=seed
     )
-    data = fit_data(source, TERMS[term])
-    shape = formulas.SHAPES[method, term]
-    rows = outcome_method.outcome_rows(data, shape, truth.size)
-    link = outcome_method.LINKS_BY_CODE[formulas.LINKS[method]]
-    b = outcome_method.maximum_likelihood(rows.data, link)
-    steps = jackknife_steps(rows.data, link, b)
-    return b, np.sqrt(np.diag(cr3(steps))), truth, effective_freedom(steps)
+    how, of = method_named(method), TERMS[term]
+    _, b, covariance, freedom = fit_parameters(fit_data(source, how, of), how, of)
+    return b, np.sqrt(np.diag(covariance)), truth, freedom
 
 
 def lognormal(seed: int) -> Draw:
@@ -63,14 +57,15 @@ def lognormal(seed: int) -> Draw:
     y = truth[0] + truth[1] * x + np.exp(truth[2]) * noise
     limit = truth[0] + truth[1] * x - 0.4
     found = y > limit
-    points = CensoredData(
+    rows, start = censored_line(
         np.column_stack([np.ones(x.size), x]),
         np.where(found, y, limit),
         found,
         event.astype(np.intp),
     )
-    b = maximise(points)
-    steps = censored_normal.jackknife_steps(points, b)
+    theta, _ = maximise(rows, start)
+    b, jacobian = from_olsen(theta)
+    steps = jackknife_steps(rows, theta) @ jacobian.T
     return b, np.sqrt(np.diag(cr3(steps))), truth, effective_freedom(steps)
 
 

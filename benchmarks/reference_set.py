@@ -114,8 +114,9 @@ def show(progress: CampaignProgress) -> None:
 def reduce(full: Path, made: Path) -> None:
     """Copy the full database without samples, and with no more of each combination than needed.
 
-    Of toppling everything stays, but the grids of combinations with vertical motion, which no
-    shipped model reads. Of sliding those of displacement 0 stay, whose grids are the whole curves.
+    Of toppling all stays but the grids of combinations with vertical motion, which no shipped model
+    reads, and the upper ends of brackets. Of sliding the combinations of displacement 0 stay, whose
+    grids are the whole curves.
     """
     made.unlink(missing_ok=True)
     raw = sqlite3.connect(full)
@@ -133,9 +134,11 @@ def reduce(full: Path, made: Path) -> None:
             owner = child.c.combination_id
             connection.execute(delete(child).where(owner.in_(select(table.c.id).where(spare))))
         connection.execute(delete(table).where(spare))
-        connection.execute(
-            delete(point).where(point.c.grid.is_not(None), point.c.combination_id.in_(vertical))
-        )
+        beside = point.c.grid.is_(None)
+        connection.execute(delete(point).where(~beside, point.c.combination_id.in_(vertical)))
+        upper = point.c.kr_over_pga == table.c.upper
+        ends = select(table.c.id).where(upper, table.c.id == point.c.combination_id)
+        connection.execute(delete(point).where(beside, ends.exists()))
 
 
 def pack(made: Path) -> None:
@@ -232,7 +235,7 @@ builds the file and this page from the records.
 - {outcomes:,} outcomes of the combinations without vertical motion: the whole
   [grid](../howto/run-a-campaign.md) of each, each block simulated for itself, also below the search
   limit. A fit to the file is exactly the model that is shipped in it.
-- {ends:,} blocks at the ends of the brackets.
+- {ends:,} critical blocks.
 - {displacements:,} displacements of sliding blocks, of 23 strengths in both polarities of every
   horizontal motion ([how](../theory/other-kinds.md)).
 - {len(added.added) + len(added.known)} motions of {events} earthquakes with their intensity

@@ -1,22 +1,22 @@
 """Critical values, spectra and outcomes of all motions of a database, simulated directly.
 
-A campaign with maps gives the same; here every block of the grid is run for itself, those below
-the search limit too, and nothing is stored but a file of arrays.
+A campaign gives the same; here nothing is stored but a file of arrays.
 """
 
 from __future__ import annotations
 
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion, motion_rows
 from rbfrag.db.rows import CombinationTable
 from rbfrag.db.vertical_pairs import load_vertical
-from rbfrag.fragility.fit.scores import GRID_OF_Y0_OVER_PGV
-from rbfrag.fragility.fit.source import FitSource
+from rbfrag.fragility.fit.data import Y0_OVER_PGV, FitSource, kr_over_pga_of_grid
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.quality import PGD_IN_DOUBT
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
@@ -40,7 +40,9 @@ def simulated_source(database: str, *, vertical: bool, cache: Path | None = None
     """
     if cache is not None and cache.exists():
         return _from_file(cache)
-    columns: dict[str, list[object]] = {field.name: [] for field in fields(CombinationTable)}
+    columns: dict[str, list[object]] = {
+        field.name: [] for field in fields(CombinationTable) if field.name != "block"
+    }
     spectra, outcomes = [], []
     with opened_database(database, read_only=True) as engine, engine.connect() as connection:
         for row in motion_rows(connection):
@@ -54,7 +56,7 @@ def simulated_source(database: str, *, vertical: bool, cache: Path | None = None
                 drive = excitation(motion, upward, polarity)
                 for p2 in DEFAULT_P2:
                     found = critical(motion, p2=p2, vertical=upward, polarity=polarity)
-                    y0 = row.pgv_m_s * GRID_OF_Y0_OVER_PGV
+                    y0 = row.pgv_m_s * Y0_OVER_PGV
                     run = runner(drive, p2=p2, linear=False)
                     outcomes.append([
                         float(run(float(y) * p2**0.5 / STANDARD_GRAVITY_M_S2).outcome == TOPPLED)
@@ -90,20 +92,29 @@ def simulated_source(database: str, *, vertical: bool, cache: Path | None = None
         )
         for name, column in columns.items()
     }
-    source = FitSource(
-        CombinationTable(**arrays),
+    source = _source(
+        arrays,
         np.array(spectra, dtype=np.float64),
-        np.array(outcomes, dtype=np.float64).reshape(-1, GRID_OF_Y0_OVER_PGV.size),
+        np.array(outcomes, dtype=np.float64).reshape(-1, Y0_OVER_PGV.size),
     )
     if cache is not None:
         flat = {name: a.astype(str) if a.dtype == object else a for name, a in arrays.items()}
-        np.savez_compressed(cache, xp_m_s=source.xp_m_s, topples=source.topples, **flat)  # type: ignore[arg-type]
+        np.savez_compressed(cache, xp_m_s=source.xp_m_s, failed=source.failed, **flat)  # type: ignore[arg-type]
     return source
 
 
 def _from_file(cache: Path) -> FitSource:
     with np.load(cache) as stored:
         arrays = {name: stored[name] for name in stored.files}
-    xp_m_s, topples = arrays.pop("xp_m_s"), arrays.pop("topples")
+    xp_m_s, failed = arrays.pop("xp_m_s"), arrays.pop("failed")
     table = {n: a.astype(object) if a.dtype.kind == "U" else a for n, a in arrays.items()}
-    return FitSource(CombinationTable(**table), xp_m_s, topples)
+    return _source(table, xp_m_s, failed)
+
+
+def _source(
+    columns: dict[str, NDArray[Any]], xp_m_s: NDArray[np.float64], failed: NDArray[np.float64]
+) -> FitSource:
+    columns["block"] = np.full(xp_m_s.size, None, dtype=object)
+    table = CombinationTable(**columns)
+    k = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
+    return FitSource(table, xp_m_s, k, failed)

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from rbfrag.exchange.database_tables import read_table as read_table
     from rbfrag.exchange.hazard_curves import read_hazard_curves as read_hazard_curves
     from rbfrag.fragility.fit.fitting import fit as fit
-    from rbfrag.fragility.fit.kind_fitting import fit_kind as fit_kind
     from rbfrag.fragility.predict import predict as predict
     from rbfrag.hazards.answer import HazardAnswer as HazardAnswer
     from rbfrag.hazards.answer import hazard as hazard
@@ -67,7 +66,6 @@ _HOME = {
     "add_motions": "rbfrag.campaign.add_motions",
     "critical": "rbfrag.solver.critical",
     "fit": "rbfrag.fragility.fit.fitting",
-    "fit_kind": "rbfrag.fragility.fit.kind_fitting",
     "hazard": "rbfrag.hazards.answer",
     "predict": "rbfrag.fragility.predict",
     "read_hazard_curves": "rbfrag.exchange.hazard_curves",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from sqlalchemy import Connection, bindparam, exists, select
 
 from rbfrag.db.insert import insert_row, insert_rows, portions, update_rows, utc_now
-from rbfrag.db.keys import canonical_json, combination_key
+from rbfrag.db.keys import canonical_json
 from rbfrag.db.schema import campaign, combination, outcome_interval, simulation
 from rbfrag.errors import InputError
 from rbfrag.solver.results import (
@@ -20,22 +20,6 @@ from rbfrag.solver.results import (
     SearchPoints,
 )
 from rbfrag.version import __version__
-
-__all__ = [
-    "CombinationRecord",
-    "KnownCombination",
-    "add_grids",
-    "add_maps",
-    "combination_key",
-    "combinations_with_points",
-    "finish_campaign",
-    "insert_combination",
-    "insert_combinations",
-    "insert_points",
-    "known_combinations",
-    "known_keys",
-    "start_campaign",
-]
 
 _COLUMNS = (
     "natural_key", "campaign_id", "motion_id", "vertical_motion_id", "polarity", "kind", "linear",
@@ -62,27 +46,27 @@ class CombinationRecord:
         natural_key: from :func:`rbfrag.db.keys.combination_key`.
         motion_id: the horizontal motion.
         vertical_motion_id: the vertical one, or None.
-        result: the critical value; None where none was looked for.
-        settings: the same that went into the key.
+        polarity: ``forward`` or ``reverse``.
         kind: response kind.
-        numerics_version: the same that went into the key.
+        p2: the same that went into the key [1/s²].
+        settings: the same that went into the key.
+        result: the critical value; None where none was looked for.
         block: which block it is, the same that went into the key; None where p² says all.
         grid: the blocks of the kind's grid, number i of it at place i; None to add them later.
-        polarity: ``forward`` or ``reverse``; that of the result where it is left out.
-        p2: the same that went into the key [1/s²]; that of the result where it is left out.
+        numerics_version: the same that went into the key.
     """
 
     natural_key: str
     motion_id: int
     vertical_motion_id: int | None
-    result: CriticalResult | None
+    polarity: str
+    kind: str
+    p2: float | None
     settings: Mapping[str, object]
-    kind: str = "toppling"
-    numerics_version: str = NUMERICS_VERSION
+    result: CriticalResult | None
     block: Mapping[str, object] | None = None
     grid: SearchPoints | None = None
-    polarity: str | None = None
-    p2: float | None = None
+    numerics_version: str = NUMERICS_VERSION
 
 
 @dataclass(frozen=True)
@@ -189,37 +173,6 @@ def combinations_with_points(
     for some in portions(keys):
         found.update(key for key, k in connection.execute(query, {"keys": some}) if k in wanted)
     return {key for key, number in found.items() if number == len(wanted)}
-
-
-def insert_combination(
-    connection: Connection,
-    *,
-    campaign_id: int,
-    natural_key: str,
-    motion_id: int,
-    vertical_motion_id: int | None,
-    result: CriticalResult,
-    settings: Mapping[str, object],
-    kind: str = "toppling",
-    numerics_version: str = NUMERICS_VERSION,
-) -> bool:
-    """Store one critical search with its simulated points and, where it has one, its map.
-
-    The arguments are those of :class:`CombinationRecord`.
-
-    Returns:
-        True when stored; False when the key was there already and nothing was written.
-    """
-    record = CombinationRecord(
-        natural_key=natural_key,
-        motion_id=motion_id,
-        vertical_motion_id=vertical_motion_id,
-        result=result,
-        settings=settings,
-        kind=kind,
-        numerics_version=numerics_version,
-    )
-    return insert_combinations(connection, campaign_id, [record]) == 1
 
 
 def insert_combinations(
@@ -352,18 +305,15 @@ def _insert_intervals(
 
 def _combination_row(campaign_id: int, record: CombinationRecord) -> tuple[object, ...]:
     result = record.result
-    polarity, p2 = record.polarity, record.p2
-    if result is not None:
-        polarity, p2 = polarity or result.polarity, result.p2 if p2 is None else p2
     inputs = (
         record.natural_key,
         campaign_id,
         record.motion_id,
         record.vertical_motion_id,
-        polarity,
+        record.polarity,
         record.kind,
         result is not None and bool(result.linear),
-        _number(p2),
+        _number(record.p2),
         None if record.block is None else canonical_json(record.block),
         canonical_json(record.settings),
         record.numerics_version,

@@ -66,7 +66,8 @@ def combination_table(
 
     A pair of motion, polarity and block appears once, though several campaigns may have searched
     it with different settings: the search that went lowest counts (of equals, the one of the
-    smaller natural key). Versions of the numerics never mix.
+    smaller natural key). Of blocks that slide it is that of the first motion, whose grid carries
+    the displacements. Versions of the numerics never mix.
 
     Args:
         connection: the database.
@@ -105,7 +106,8 @@ def combination_table(
     settings_of = cache(json.loads)
     rows: dict[tuple[Any, ...], Any] = {}
     for row in connection.execute(query.order_by(*order)).mappings():
-        if settings_of(row["settings"]).get("rotation_deg") != rotation_deg:
+        settings = settings_of(row["settings"])
+        if settings.get("rotation_deg") != rotation_deg or settings.get("displacement_m"):
             continue
         block = (row["p2"], row["block"])
         rows.setdefault((row["motion_id"], row["vertical_motion_id"], row["polarity"], block), row)
@@ -275,19 +277,3 @@ def _combination_query() -> Select[Any]:
         .join(recording)
         .join(earthquake)
     )
-
-
-def stored_blocks(connection: Connection, combination_id: ArrayLike) -> list[str]:
-    """Return the blocks of some combinations as JSON text; empty for toppling.
-
-    Args:
-        connection: the database.
-        combination_id: row ids, shape (n,).
-    """
-    wanted = np.asarray(combination_id, dtype=np.int64).tolist()
-    if not wanted:
-        return []
-    column = combination.c
-    query = select(column.id, column.block).where(column.id.between(min(wanted), max(wanted)))
-    found = {row_id: block or "" for row_id, block in connection.execute(query)}
-    return [found[row_id] for row_id in wanted]

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.fragility.fit.source import FitSource
+from rbfrag.fragility.fit.data import FitSource
 from rbfrag.fragility.methods import arrays
 from rbfrag.fragility.model import (
     FLOOR_FROM,

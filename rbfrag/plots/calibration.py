@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.fit.calibration_bins import CalibrationBins
+from rbfrag.fragility.fit.scores import CalibrationBins
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
 
 COLOURS = ("#1f4e79", "#d98c1f", "#4c9a6a", "#8c2d4f")

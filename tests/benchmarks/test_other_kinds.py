@@ -10,20 +10,22 @@ import pytest
 from benchmarks.other_kinds import jibson_2007, saygili_rathje_2008, within_motion
 from benchmarks.other_kinds_figure import plot_other_kinds
 from rbfrag.errors import InputError
-from rbfrag.fragility.fit.kind_fitting import fit_kind_data
-from tests.fragility.test_kind_models import drawn
+from rbfrag.fragility.fit.fitting import fit_source
+from rbfrag.fragility.measures import TERMS
+from tests.fragility.kind_draws import METHOD_OF, drawn
 
 
 def test_the_figure_is_written(tmp_path: Path) -> None:
-    slides, slumps = drawn("sliding", "pgv_pga", 400), drawn("slumping", "pgv_pga", 400)
-    models = [
-        fit_kind_data(data, "pgv_pga", name="m", selection={}).model for data in (slides, slumps)
+    fits = [
+        fit_source(drawn(kind, "pgv_pga", 400), TERMS["pgv_pga"], METHOD_OF[kind])
+        for kind in ("sliding", "slumping")
     ]
-    path = plot_other_kinds(models[0], slides, models[1], slumps, tmp_path / "kinds.svg")
+    both = [part for fit in fits for part in (fit.report.model, fit.data)]
+    path = plot_other_kinds(*both, tmp_path / "kinds.svg")
     text = path.read_text(encoding="utf-8")
     assert text.count("<g id=") > 20
     with pytest.raises(InputError, match="suffix"):
-        plot_other_kinds(models[0], slides, models[1], slumps, tmp_path / "kinds.txt")
+        plot_other_kinds(*both, tmp_path / "kinds.txt")
 
 
 def one(**values: float) -> dict[str, np.ndarray]:

@@ -25,8 +25,8 @@ from rbfrag.db.queries import combination_table
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.exchange.database_tables import export_database
-from rbfrag.fragility.fit.kind_fitting import fit_kind
-from rbfrag.fragility.fit.model_check import check_models
+from rbfrag.fragility.fit.check import check_models
+from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.predict import predict
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.critical import critical
@@ -267,10 +267,10 @@ def test_models_are_fitted_stored_and_asked(tmp_path: Path) -> None:
         for kind, rotation_deg in (("sliding", None), ("slumping", 1.0)):
             for term in ("pgv_pga", "pgv"):
                 with engine.connect() as connection:
-                    fitted = fit_kind(connection, kind=kind, term=term, rotation_deg=rotation_deg)
+                    fitted = fit(connection, kind=kind, term=term, rotation_deg=rotation_deg)
                 with engine.begin() as connection:
-                    row = save_model(connection, fitted.row)
-                assert row.coefficients == fitted.row.coefficients
+                    row = save_model(connection, fitted.model.row)
+                assert row.coefficients == fitted.coefficients
                 assert row.is_default == (term == "pgv_pga")
         with engine.connect() as connection:
             checks = check_models(connection, model_rows(connection))

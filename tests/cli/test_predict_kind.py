@@ -116,5 +116,5 @@ def test_options_of_one_kind_do_not_go_with_another(refuses: Refuses) -> None:
     assert "--p2 goes with --kind toppling" in refuses("simulate", "--kind", "sliding", "--p2", "1")
     assert "campaigns are of" in refuses("simulate", "--kind", "falling")
     message = refuses("fit", "--kind", "sliding", "--term", "pgv", "--method", "wls")
-    assert "--method goes with --kind toppling" in message
-    assert "--rotation goes with" in refuses("fit", "--term", "pgv", "--rotation", "2")
+    assert "method wls fits blocks known by p2 and kr, not those of kind sliding" in message
+    assert "(--rotation)" in refuses("fit", "--term", "pgv", "--rotation", "2")

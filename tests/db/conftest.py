@@ -14,12 +14,13 @@ import pytest
 from sqlalchemy import Engine
 
 from rbfrag.db.campaigns import (
-    combination_key,
+    CombinationRecord,
     finish_campaign,
-    insert_combination,
+    insert_combinations,
     start_campaign,
 )
 from rbfrag.db.engine import open_database
+from rbfrag.db.keys import combination_key
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo
@@ -133,16 +134,18 @@ def store_result() -> Callable[..., str]:
             numerics_version=version,
             linear=result.linear,
         )
-        insert_combination(
-            connection,
-            campaign_id=campaign_id,
+        record = CombinationRecord(
             natural_key=key,
             motion_id=motion_id,
             vertical_motion_id=None if vertical is None else vertical[0],
-            result=result,
+            polarity=result.polarity,
+            kind="toppling",
+            p2=result.p2,
             settings=settings,
+            result=result,
             numerics_version=version,
         )
+        insert_combinations(connection, campaign_id, [record])
         return key
 
     return store

@@ -15,7 +15,7 @@ from rbfrag.db.outcome_maps import OutcomeMaps, outcome_maps
 from rbfrag.db.queries import combination_table
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError
-from rbfrag.solver.results import OutcomeIntervals
+from rbfrag.solver.results import CriticalResult, OutcomeIntervals
 
 QUAKE = EarthquakeInfo("chi-chi-1999", guessed=False)
 
@@ -25,6 +25,10 @@ MAP = OutcomeIntervals(
     outcome=("safe", "undecided", "topples", "undecided", "safe"),
 )
 NAN = float("nan")
+
+
+def _record(key: str, motion_id: int, result: CriticalResult) -> CombinationRecord:
+    return CombinationRecord(key, motion_id, None, "forward", "toppling", result.p2, {}, result)
 
 
 def _filled(engine: Engine, make_motion: Any, make_result: Any) -> dict[str, int]:
@@ -39,7 +43,7 @@ def _filled(engine: Engine, make_motion: Any, make_result: Any) -> dict[str, int
     with engine.begin() as connection:
         motion_id, _ = add_motion(connection, motion, earthquake=QUAKE, is_vertical=False)
         records = [
-            CombinationRecord(f"{n:064d}", motion_id, None, make_result(motion.pga_g, **kind), {})
+            _record(f"{n:064d}", motion_id, make_result(motion.pga_g, **kind))
             for n, kind in enumerate(kinds.values())
         ]
         campaign = start_campaign(connection, {})
@@ -113,9 +117,7 @@ def test_what_lies_between_decided_intervals_is_not_known(
     motion = make_motion()
     with engine.begin() as connection:
         motion_id, _ = add_motion(connection, motion, earthquake=QUAKE, is_vertical=False)
-        record = CombinationRecord(
-            "0" * 64, motion_id, None, make_result(motion.pga_g, intervals=alone), {}
-        )
+        record = _record("0" * 64, motion_id, make_result(motion.pga_g, intervals=alone))
         insert_combinations(connection, start_campaign(connection, {}), [record])
         (row_id,) = connection.scalars(select(schema.combination.c.id))
     k = [0.005, 0.01, 0.2, 0.2000005, 0.200001, 0.4, 0.4000005, 0.400001, 1.0, 7.0]

@@ -13,7 +13,6 @@ from sqlalchemy import Engine, delete, exc, func, select, update
 
 from rbfrag.db import schema
 from rbfrag.db.campaigns import (
-    combination_key,
     finish_campaign,
     known_combinations,
     known_keys,
@@ -21,6 +20,7 @@ from rbfrag.db.campaigns import (
 )
 from rbfrag.db.content import CONTENT_TABLES, content_digest, table_rows_by_natural_key
 from rbfrag.db.engine import opened_database
+from rbfrag.db.keys import combination_key
 from rbfrag.db.motions import add_motion
 from rbfrag.db.queries import combination_table, database_info, simulation_points
 from rbfrag.db.rows import EarthquakeInfo

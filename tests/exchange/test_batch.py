@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from rbfrag.db.engine import opened_database
+from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange import batch_table
@@ -170,3 +171,29 @@ def test_parquet(answer: Answer, tmp_path: Path) -> None:
     )
     answer(source, tmp_path / "c.csv")
     assert len(rows_of(tmp_path / "c.csv")) == 50
+
+
+def test_tables_of_blocks_that_slide_or_slump(tmp_path: Path) -> None:
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    source.write_text(
+        "block_id,ky,beta_deg,mode\na,0.1,10,slide\nb,-0.1,10,slide\nc,0.1,10,topple\n"
+    )
+    given = {"displacement_m": 0.05, "pgv_m_s": 0.4, "pga_g": 0.5}
+    told = predict_table(source, target, given=given, model=None, level=0.95, db=str(REFERENCE))
+    assert (told["kind"], told["rows"], told["answered"]) == ("sliding", 3, 2)
+    first, second, third = rows_of(target)
+    expected = predict(ky=0.1, beta_deg=10.0, **given, db=str(REFERENCE))
+    assert float(first["probability"]) == pytest.approx(expected.probability, rel=1e-12)
+    assert (second["probability"], second["reason"]) == ("1", "unstable")
+    assert "mode is topple: the sliding model" in third["reason"]
+    source.write_text("ks,ps2_1_s2,pgv_m_s\n0.1,3,0.5\n")
+    told = predict_table(
+        source, target, given={}, model=None, level=0.95, db=str(REFERENCE), rotation_deg=2.0
+    )
+    assert told["model"] == "slumping-2deg-pgv"
+    expected = predict(ks=0.1, ps2=3.0, rotation_deg=2.0, pgv_m_s=0.5, db=str(REFERENCE))
+    (row,) = rows_of(target)
+    assert float(row["probability"]) == pytest.approx(expected.probability, rel=1e-12)
+    source.write_text("ky,pgv_m_s\n0.1,0.5\n")
+    with pytest.raises(InputError, match="no column displacement_m"):
+        predict_table(source, target, given={}, model=None, level=0.95, db=str(REFERENCE))

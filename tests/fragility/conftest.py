@@ -63,6 +63,7 @@ def critical_values(
         pgd_m=pgd,
         tm_s=tm,
         natural_key=np.array([f"key-{i:06d}" for i in range(n)], dtype=object),
+        block=np.full(n, None, dtype=object),
     )
 
 

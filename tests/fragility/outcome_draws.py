@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rbfrag.db.rows import CombinationTable
-from rbfrag.fragility import formulas
-from rbfrag.fragility.compiled_formulas import probabilities
-from rbfrag.fragility.fit.scores import GRID_OF_Y0_OVER_PGV
-from rbfrag.fragility.fit.source import FitSource
+from rbfrag.fragility.fit.data import Y0_OVER_PGV, FitSource, kr_over_pga_of_grid
+from rbfrag.fragility.methods import arrays, method_named
 
 G = 9.80665
 P2 = (30.0, 3.0, 0.3)
@@ -50,12 +48,17 @@ def drawn_outcomes(
     xp = pgv * np.exp(random.normal(-0.2, 0.2, motion.size))
     xp = xp / (1.0 + p * xp / (pga * G))
     x = {"pgv": pgv, "pgv_pga": pgv, "pgv_pga_tm": pgv, "xp": xp}[term]
-    shape, link = formulas.SHAPES[method, term], formulas.LINKS[method]
-    b = np.array(parameters + (0.0,) * (formulas.MOST_PARAMETERS - len(parameters)))
-    y0 = pgv[:, None] * GRID_OF_Y0_OVER_PGV
-    probability = np.empty(y0.shape)
-    each = [np.repeat(column, y0.shape[1]) for column in (p, x, pga, tm)]
-    probabilities(shape, link, b, y0.ravel(), *each, probability.reshape(-1))  # type: ignore[call-arg]
+    y0 = pgv[:, None] * Y0_OVER_PGV
+    fitted = method_named(method)
+    columns = {"p": p, "intensity_m_s": x, "pga_g": pga, "tm_s": tm}
+    values = {name: column[:, None] for name, column in columns.items()}
+    values |= {"y_m_s": y0, "kr": y0 * p[:, None] / G}
+    form = fitted.forms[term]
+    with np.errstate(all="ignore"):
+        eta = np.asarray(form.eta(parameters, values, arrays()).eta)
+        probability = np.asarray(fitted.link.probability(eta, arrays()))
+    for bound in form.bounds:
+        probability = np.where(bound.holds(values), 0.0, probability)
     from scipy.special import ndtr
 
     common = random.normal(size=events)[event][:, None]
@@ -82,8 +85,9 @@ def drawn_outcomes(
         pgd_m=pgv * tm / (2.0 * np.pi),
         tm_s=tm,
         natural_key=np.array([f"key-{i:06d}" for i in range(n)], dtype=object),
+        block=np.full(n, None, dtype=object),
     )
-    return FitSource(table, xp, topples)
+    return FitSource(table, xp, kr_over_pga_of_grid(p2, pgv, pga), topples)
 
 
 TRUTH = {

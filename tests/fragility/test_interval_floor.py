@@ -10,6 +10,7 @@ import pytest
 from rbfrag.fragility.fit.fitting import fit, fit_source
 from rbfrag.fragility.interval_floor import Sample, interval_floor, of_motions
 from rbfrag.fragility.measures import TERMS
+from rbfrag.fragility.methods import method_named
 from tests.fragility.outcome_draws import drawn_outcomes
 
 
@@ -25,8 +26,10 @@ def test_what_is_not_known_of_a_motion_widens_nothing(unknown) -> None:
         * np.exp(random.normal(0.0, 0.5, 47 * 3))[table.motion_id - 1]
     )
     source = replace(source, table=replace(table, pgd_m=pgd))
-    model = fit_source(source, TERMS["pgd_tm"], "logistic", compared=False).report.model
-    richer = fit_source(source, TERMS["xp"], "record", compared=False).report.model
+    model = fit_source(
+        source, TERMS["pgd_tm"], method_named("logistic"), compared=False
+    ).report.model
+    richer = fit_source(source, TERMS["xp"], method_named("record"), compared=False).report.model
     whole = of_motions(source)
     # doubtful records drift: their blocks would stand at the far end of the tables
     lost = np.isin(np.arange(whole.y.size) // (whole.y.size // table.p2.size), np.arange(30))

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import FitError, InputError
-from rbfrag.fragility import formulas
 from rbfrag.fragility.fit import outcomes as outcome_method
-from rbfrag.fragility.fit.binomial import jackknife_covariance
-from rbfrag.fragility.fit.data import fit_data
+from rbfrag.fragility.fit.clusters import cr3, jackknife_steps
+from rbfrag.fragility.fit.data import FitSource, fit_data
 from rbfrag.fragility.fit.fitting import fit, fit_source
-from rbfrag.fragility.fit.outcomes import fit_parameters
+from rbfrag.fragility.fit.likelihood import most_likely
+from rbfrag.fragility.fit.outcomes import fit_parameters, outcome_rows, parameter_names
 from rbfrag.fragility.fit.report import FitReport
-from rbfrag.fragility.fit.source import FitSource
 from rbfrag.fragility.measures import TERMS
+from rbfrag.fragility.methods import SINGLE, method_named
 from rbfrag.fragility.model import FragilityModel
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
 
@@ -23,6 +23,11 @@ from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
 @pytest.fixture(autouse=True)
 def few_replicates(monkeypatch):
     monkeypatch.setattr(outcome_method, "REPLICATES", 20)
+
+
+def rows_of(source, method, term):
+    how, of = method_named(method), TERMS[term]
+    return outcome_rows(fit_data(source, how, of), how, of, parameter_names(how, of))
 
 
 @pytest.mark.parametrize(("method", "term"), TRUTH)
@@ -41,11 +46,9 @@ def test_the_intervals_cover_as_often_as_they_say():
     hits = np.zeros(2)
     for seed in range(40):
         source = drawn_outcomes("logistic", "pgv", truth, shared=0.15, motions=1, seed=seed)
-        data = fit_data(source, TERMS["pgv"])
-        # b_ln_p is not in the truth: the two-parameter form is what `logistic` fits by default
-        rows = outcome_method.outcome_rows(data, formulas.RATIO, 2)
-        b = outcome_method.maximum_likelihood(rows.data, outcome_method.LOGIT)
-        covariance = jackknife_covariance(rows.data, outcome_method.LOGIT, b)
+        rows = rows_of(source, "logistic", "pgv").data
+        b = most_likely(rows)
+        covariance = cr3(jackknife_steps(rows, b))
         hits += np.abs(b - truth) <= 2.013 * np.sqrt(np.diag(covariance))
     assert np.all(hits >= 34)
 
@@ -83,51 +86,65 @@ def test_errors_grow_with_what_earthquakes_share():
 
 def test_held_out_probabilities_are_those_of_separate_fits():
     source = drawn_outcomes("record", "xp", TRUTH["record", "xp"], events=8)
-    fitted = fit_source(source, TERMS["xp"], "record")
-    own = fitted.data.event == 3
-    names = [fitted.data.event_names[i] for i in fitted.data.event]
-    rest = fit_data(source.only(source.table.event_id != names[int(np.argmax(own))]), TERMS["xp"])
-    _, b, _, _ = fit_parameters(rest, TERMS["xp"], "record")
+    record = method_named("record")
+    fitted = fit_source(source, TERMS["xp"], record)
     data = fitted.data
+    own = data.event == 3
+    names = [data.event_names[i] for i in data.event]
+    others = source.only(source.table.event_id != names[int(np.argmax(own))])
+    _, b, _, _ = fit_parameters(fit_data(others, record, TERMS["xp"]), record, TERMS["xp"])
     i = int(np.flatnonzero(own)[0])
     for j in (0, 8, 15):
-        known = (data.y0_m_s[i, j], math.sqrt(data.p2[i]), data.x[i], data.pga_g[i])
-        if formulas.bound(formulas.RECORD, *known):
+        values = {name: float(data.grid(name)[i, j]) for name in data.blocks}
+        form = record.forms["xp"]
+        if any(bound.holds(values) for bound in form.bounds):
             assert fitted.result.held_out[i, j] == 0.0
             continue
-        eta = formulas.score(formulas.RECORD, (*b, 0, 0, 0), *known, 1.0)[0]
-        expected = formulas.interval(formulas.LOGIT, eta, 0.0)[0]
+        eta = form.eta(b.tolist(), values, SINGLE).eta
+        expected = record.link.probability(eta, SINGLE)
         assert fitted.result.held_out[i, j] == pytest.approx(expected, rel=1e-5)
 
 
 def test_unknown_outcomes_leave_each_combination_its_weight():
     source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"])
-    topples = source.topples.copy()
-    topples[::2, :5] = np.nan
-    rows = outcome_method.outcome_rows(
-        fit_data(replace(source, topples=topples), TERMS["pgv"]), formulas.RATIO, 2
-    )
+    failed = source.failed.copy()
+    failed[::2, :5] = np.nan
+    rows = rows_of(replace(source, failed=failed), "logistic", "pgv")
     per_combination = np.bincount(rows.place // 25, rows.data.weights)
     assert per_combination == pytest.approx(25.0)
 
 
+def test_weaker_blocks_of_the_stored_grid_are_left_to_models_without_pgv():
+    source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"])
+    expected = fit(source, term="pgv", method="logistic")
+    weaker = source.k_over_pga[:, :1] * np.geomspace(0.0215, 0.1, 11)[:-1] / 0.1
+    wider = replace(
+        source,
+        k_over_pga=np.column_stack([weaker, source.k_over_pga]),
+        failed=np.column_stack([np.ones(weaker.shape), source.failed]),
+    )
+    report = fit(wider, term="pgv", method="logistic")
+    assert report.coefficients == expected.coefficients
+    assert report.scores == expected.scores
+
+
 def broken(source: FitSource, kind: str) -> FitSource:
     if kind == "none":
-        return replace(source, topples=np.full_like(source.topples, np.nan))
+        return replace(source, failed=np.full_like(source.failed, np.nan))
     if kind == "all alike":
-        return replace(source, topples=np.zeros_like(source.topples))
+        return replace(source, failed=np.zeros_like(source.failed))
     if kind == "separated":
-        grid = np.broadcast_to(np.arange(25) < 12, source.topples.shape)
-        return replace(source, topples=grid.astype(float))
-    few = np.zeros_like(source.topples)
+        grid = np.broadcast_to(np.arange(25) < 12, source.failed.shape)
+        return replace(source, failed=grid.astype(float))
+    few = np.zeros_like(source.failed)
     few[:7, 0] = 1.0
-    return replace(source, topples=few)
+    return replace(source, failed=few)
 
 
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        ("none", "no outcomes are stored: run  rbfrag simulate"),
+        ("none", "no outcomes are stored: run  rbfrag simulate --kind toppling"),
         ("all alike", "0 toppled.*all alike"),
         ("separated", "separated without error"),
         ("few", "7 outcomes on the grid toppled; a fit needs 20"),
@@ -143,7 +160,7 @@ def test_what_does_not_go_together_is_refused():
     source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"], events=5)
     with pytest.raises(InputError, match=r"record does not go with the term pgv: it fits xp"):
         fit(source, term="pgv", method="record")
-    with pytest.raises(InputError, match=r"weibull keeps M = 1.*lognormal, logistic"):
+    with pytest.raises(InputError, match=r"weibull keeps M = 1.*logistic, lognormal"):
         fit(source, term="pgv", method="weibull", estimate_m=True)
     no_spectrum = replace(source, xp_m_s=np.full(source.xp_m_s.size, np.nan))
     with pytest.raises(FitError, match=r"needs the toppling spectrum X\(p\).*rbfrag simulate"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.fit.calibration_bins import CalibrationBins
+from rbfrag.fragility.fit.scores import CalibrationBins
 from rbfrag.plots import calibration as calibration_module
 from rbfrag.plots import critical_strength as vertical_module
 from rbfrag.plots.calibration import plot_calibration

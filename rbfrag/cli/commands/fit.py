@@ -8,7 +8,6 @@ import typer
 
 from rbfrag.cli.output import cell, print_json, print_pairs, print_table, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.errors import InputError
 
 if TYPE_CHECKING:
     from rbfrag.fragility.fit.report import FitReport
@@ -30,7 +29,8 @@ def fit(
         str,
         typer.Option(
             "--kind",
-            help="What the blocks do: toppling; slumping or sliding, on the terms pgv and pgv_pga.",
+            help="What the blocks do: toppling; slumping or sliding, on the terms pgv and pgv_pga; "
+            "or another kind that campaigns store.",
         ),
     ] = "toppling",
     rotation: Annotated[
@@ -46,9 +46,10 @@ def fit(
         typer.Option(
             "--method",
             show_default=False,
-            help="Toppling. Of critical values: wls (weighted least squares, the dissertation's), "
-            "lognormal (with censored motions). Of outcomes: logistic, weibull, bounded; of "
-            "outcomes on xp: record, power. Default: wls.",
+            help="Blocks known by p² and kr. Of critical values: wls (weighted least squares, the "
+            "dissertation's), lognormal (with censored motions). Of outcomes: logistic, weibull, "
+            "bounded; of outcomes on xp: record, power. Default: wls. Sliding: displacement; "
+            "slumping: capacity.",
         ),
     ] = None,
     suite: options.Suite = None,
@@ -86,53 +87,28 @@ def fit(
 
     The first model of a kind becomes its default (rbfrag models default NAME changes it).
     """
-    if kind != "toppling":
-        _refuse_options_of_toppling(
-            kind,
-            {
-                "--method": method is not None,
-                "--free-m": free_m,
-                "--doubtful-pgd": doubtful_pgd,
-                "--seed": seed != 0,
-            },
-        )
-        from rbfrag.cli.commands.fit_kind import fit_kind
-
-        fit_kind(
-            kind, term=term, rotation_deg=rotation, suite=suite, vertical=vertical, name=name,
-            replace=replace, db=db, json=json,
-        )  # fmt: skip
-        return
-    if rotation is not None:
-        raise InputError("--rotation goes with --kind slumping, not with toppling")
     from rbfrag.db.engine import opened_database
     from rbfrag.db.models import save_model
     from rbfrag.fragility.fit.fitting import fit as run
     from rbfrag.fragility.fit.report import FitReport
     from rbfrag.fragility.model import FragilityModel
 
-    # reading takes no lock, so that a campaign may go on meanwhile
-    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        report = run(
-            connection,
-            term=term,
-            method=method or "wls",
-            suite=suite,
-            vertical=vertical,  # type: ignore[arg-type]
-            name=name,
-            seed=seed,
-            estimate_m=free_m,
-            doubtful_pgd=doubtful_pgd,
-        )
+    report = run(
+        db,
+        kind=kind,
+        term=term,
+        method=method,
+        suite=suite,
+        vertical=vertical,  # type: ignore[arg-type]
+        name=name,
+        seed=seed,
+        estimate_m=free_m,
+        doubtful_pgd=doubtful_pgd,
+        rotation_deg=rotation,
+    )
     with opened_database(db) as engine, engine.begin() as connection:
         row = save_model(connection, report.model.row, replace=replace)
     print_report(FitReport.from_model(FragilityModel.from_row(row)), json=json)
-
-
-def _refuse_options_of_toppling(kind: str, given: dict[str, bool]) -> None:
-    for option, is_given in given.items():
-        if is_given:
-            raise InputError(f"{option} goes with --kind toppling, not with {kind}")
 
 
 def print_report(report: FitReport, *, json: bool) -> None:
@@ -141,7 +117,7 @@ def print_report(report: FitReport, *, json: bool) -> None:
         print_json(report.as_dict())
         return
     details: dict[str, Any] = dict(report.details)
-    default = ", the default" if report.model.row.is_default else ""
+    default = f", the default of {report.kind}" if report.model.row.is_default else ""
     print(f"model {report.name}: {report.method} on {report.term}{default}")
     print(f"says: {report.model.meaning}")
     kinds = details.get("standard_error_kinds") or {}
@@ -166,6 +142,8 @@ def print_report(report: FitReport, *, json: bool) -> None:
         "outside the model": details.get("n_outside_model"),
         "earthquakes": report.events,
     }
+    if details.get("rotation_deg") is not None:
+        counts["rotation that counts as failure [deg]"] = details["rotation_deg"]
     if "n_outcomes" in details:
         counts["outcomes fitted (toppled)"] = f"{details['n_outcomes']} ({details['n_toppled']})"
         counts["outcomes certain by mechanics"] = details["n_bounded"]

@@ -42,7 +42,6 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
 def show_model(name: Name, db: options.Db = None, json: options.Json = False) -> None:
     """Print the report of a fitted model from its stored row."""
     from rbfrag.cli.commands.fit import print_report
-    from rbfrag.cli.commands.fit_kind import print_kind_report
     from rbfrag.db.engine import opened_database
     from rbfrag.db.models import load_model
     from rbfrag.fragility.fit.report import FitReport
@@ -50,9 +49,6 @@ def show_model(name: Name, db: options.Db = None, json: options.Json = False) ->
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         row = load_model(connection, name)
-    if row.kind != "toppling":
-        print_kind_report(row, json=json)
-        return
     print_report(FitReport.from_model(FragilityModel.from_row(row)), json=json)
 
 
@@ -75,7 +71,7 @@ def check(db: options.Db = None, json: options.Json = False) -> None:
     """
     from rbfrag.db.engine import opened_database
     from rbfrag.db.models import model_rows
-    from rbfrag.fragility.fit.model_check import check_models
+    from rbfrag.fragility.fit.check import check_models
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         found = check_models(connection, model_rows(connection))

@@ -33,22 +33,19 @@ def plot_fit(
     """Draw the data of a fit with its 2.5 %, 50 % and 97.5 % failure lines and histograms."""
     from rbfrag.db.engine import opened_database
     from rbfrag.db.models import load_model
+    from rbfrag.fragility.fit.check import source_of
     from rbfrag.fragility.fit.data import fit_data
-    from rbfrag.fragility.fit.source import read_source
+    from rbfrag.fragility.methods import method_named
     from rbfrag.fragility.model import FragilityModel
     from rbfrag.plots.fit import plot_fit as draw
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        fitted = FragilityModel.from_row(load_model(connection, model))
-        suite = fitted.row.diagnostics.get("suite")
-        source = read_source(
-            connection,
-            suite=None if suite is None else str(suite),
-            doubtful_pgd=bool(fitted.row.diagnostics.get("doubtful_pgd")),
-        )
+        row = load_model(connection, model)
+        fitted, source = FragilityModel.from_row(row), source_of(connection, row)
     draw(source.table, fitted, out, log=log, xp_m_s=source.xp_m_s)
     print(out)
-    if fit_data(source, fitted.term).fingerprint != fitted.row.data_fingerprint:
+    today = fit_data(source, method_named(row.method), fitted.term, kind=row.kind)
+    if today.fingerprint != row.data_fingerprint:
         print_warnings(
             [
                 f"the data have changed since {fitted.name} was fitted: the points are those of "
@@ -164,7 +161,7 @@ def plot_calibration(
     Each model is fitted again, once without each earthquake.
     """
     from rbfrag.db.engine import opened_database
-    from rbfrag.fragility.fit.held_out import held_out_of
+    from rbfrag.fragility.fit.check import held_out_of
     from rbfrag.plots.calibration import plot_calibration as draw
     from rbfrag.plots.canvas import plot_path
 
@@ -176,7 +173,7 @@ def plot_calibration(
         {each.name: each.bins for each in answers},
         out,
         scores={each.name: each.scores for each in answers},
-        data=answers[0].kind,
+        data=answers[0].outcomes,
     )
     print(out)
 

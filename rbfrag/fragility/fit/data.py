@@ -1,18 +1,33 @@
-"""What a fit reads from the critical values: which points count, and which are left out."""
+"""What fits read: critical values and outcomes of one kind, as rows of a fit.
+
+The same three steps serve every kind: the database's columns are a :class:`FitSource`; what
+describes the block says how they become the points at which blocks just fail and the grid of blocks
+whose outcome is known; both are a :class:`FitData`.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from rbfrag.errors import FitError
-from rbfrag.fragility.fit.scores import GRID_OF_Y0_OVER_PGV
-from rbfrag.fragility.fit.source import FitSource
+from rbfrag.db.rows import CombinationTable
+from rbfrag.errors import FitError, InputError
+from rbfrag.fragility.fit.scores import Judged, critical_outcomes
 from rbfrag.fragility.measures import Term
+from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, Method
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection
+
+    from rbfrag.db.queries import Vertical
 
 FloatArray = NDArray[np.float64]
 
@@ -20,26 +35,182 @@ FEWEST_EVENTS = 3
 FEWEST_FOUND = 10
 FEW_EVENTS = 10
 
+LEAST_Y0_OVER_PGV = 0.1
+"""Weaker blocks of the stored grid are left to models that do not read PGV."""
+
+Y0_OVER_PGV = np.geomspace(LEAST_Y0_OVER_PGV, 4.0, 25)
+"""Blocks that are judged by critical values where no outcomes are stored, as y0/PGV."""
+
+K_OVER_PGA = np.geomspace(0.02, 0.95, 25)
+"""The same of blocks that the record is scaled to."""
+
+LEAST_DISPLACEMENT_M = 1e-4
+"""Displacements below this count as less than it, whether zero or not."""
+
 _CENSORED = ("below_limit", "no_motion")
 
 
 @dataclass(frozen=True, eq=False)
-class FitData:
-    """Points of one fit, found and censored, with rising intensity.
+class FitSource:
+    """Combinations with all that the methods of fitting read, columns of equal length.
 
     Args:
-        x: intensity [m/s], shape (n,).
-        y: critical toppling velocity [m/s]; for censored points the value it lies below.
-        found: True for critical values that were found, False for censored ones.
-        event: number of the point's earthquake, shape (n,).
-        event_names: the earthquakes by that number.
-        motion: number of the point's motion, shape (n,).
-        pgv_m_s: peak ground velocity [m/s], shape (n,).
-        pga_g: peak ground acceleration [g], shape (n,).
+        table: critical values and intensities.
+        xp_m_s: toppling spectrum at each combination's p² and polarity [m/s], shape (n,); NaN
+            where it is not stored.
+        k_over_pga: strengths of the blocks of the outcome grid, shape (n, m).
+        failed: what they do, same shape: 1 fails, 0 does not, NaN not known.
+        displacement_m: how far they slide [m], same shape; None where they do not.
+        strength_g: yield acceleration of the stored block [g], shape (n,); None where the
+            combination is about blocks of any strength.
+    """
+
+    table: CombinationTable
+    xp_m_s: FloatArray
+    k_over_pga: FloatArray
+    failed: FloatArray
+    displacement_m: FloatArray | None = None
+    strength_g: FloatArray | None = None
+
+    @classmethod
+    def of_table(cls, table: CombinationTable) -> FitSource:
+        """Return a source of critical values alone."""
+        k = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
+        return cls(table, np.full(table.p2.size, np.nan), k, np.full(k.shape, np.nan))
+
+    def only(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> FitSource:
+        """Return some of the combinations."""
+        part = {f.name: getattr(self.table, f.name)[chosen] for f in fields(self.table)}
+        slid, strength = self.displacement_m, self.strength_g
+        return FitSource(
+            CombinationTable(**part),
+            self.xp_m_s[chosen],
+            self.k_over_pga[chosen],
+            self.failed[chosen],
+            None if slid is None else slid[chosen],
+            None if strength is None else strength[chosen],
+        )
+
+    def judged_outcomes(self, strength: FloatArray, critical: FloatArray) -> tuple[FloatArray, str]:
+        """Return what blocks do, 1, 0 or NaN, and in words where that comes from.
+
+        Args:
+            strength: of the blocks, shape (n, m).
+            critical: critical strength, for censored combinations its upper limit, shape (n,).
+        """
+        if np.isfinite(self.failed).any():
+            return self.failed, "simulated outcomes"
+        failed, known = critical_outcomes(critical, self.table.status == "found", strength)
+        return np.where(known, failed, np.nan), "critical values (safe islands are not seen)"
+
+
+def kr_over_pga_of_grid(p2: ArrayLike, pgv_m_s: ArrayLike, pga_g: ArrayLike) -> FloatArray:
+    """Return k_r/PGA of the blocks of `Y0_OVER_PGV`, shape (n, 25); not finite where PGA is 0.
+
+    Args:
         p2: frequency parameter p² [1/s²], shape (n,).
-        tm_s: mean period [s], NaN where not defined, shape (n,).
-        topples: outcomes of the blocks of :attr:`y0_m_s`, shape (n, 25): 1 topples, 0 safe, NaN
-            not known.
+        pgv_m_s: PGV [m/s], shape (n,).
+        pga_g: PGA [g], shape (n,).
+    """
+    pgv, ground = np.asarray(pgv_m_s), np.asarray(pga_g) * STANDARD_GRAVITY_M_S2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        z = np.sqrt(np.asarray(p2)) * pgv / ground
+    return np.asarray(z[..., None] * Y0_OVER_PGV)
+
+
+def read_source(
+    connection: Connection,
+    block: BlockParameters = TOPPLING_BLOCK,
+    *,
+    kind: str | None = None,
+    rotation_deg: float | None = None,
+    suite: str | None = None,
+    vertical: Vertical = "without",
+    doubtful_pgd: bool = False,
+) -> FitSource:
+    """Read critical values, spectra and outcomes of one kind from the database.
+
+    Args:
+        connection: the database.
+        block: what describes the kind's block.
+        kind: response kind; None for the one that `block` stands for.
+        rotation_deg: the rotation that counts as failure [deg], of kinds that have one; None for
+            failure past recovery.
+        suite: only motions of this suite.
+        vertical: ``without`` vertical motion, ``with`` it, or ``both``.
+        doubtful_pgd: read the PGD of records with a doubtful baseline too.
+    """
+    from rbfrag.db.queries import combination_table, outcome_grid
+    from rbfrag.db.spectra import spectrum_values
+
+    asked = kind or block.kind
+    table = combination_table(
+        connection,
+        kind=asked,
+        rotation_deg=rotation_deg,
+        suite=suite,
+        vertical=vertical,
+        doubtful_pgd=doubtful_pgd,
+    )
+    spectra = spectrum_values(connection)
+    keys = zip(table.motion_id.tolist(), table.polarity, table.p2.tolist(), strict=True)
+    grid = outcome_grid(connection, table.combination_id)
+    source = FitSource(
+        table,
+        np.array([spectra.get(key, np.nan) for key in keys], dtype=np.float64),
+        grid.k_over_pga,
+        grid.outcome,
+        grid.displacement_m,
+        np.array([_yield_g(asked, block or "{}") for block in table.block], dtype=np.float64),
+    )
+    if grid.outcome.shape[1] == 0 and block.strength == "kr":
+        return FitSource(table, source.xp_m_s, *_nothing_known(table))
+    return source
+
+
+def _nothing_known(table: CombinationTable) -> tuple[FloatArray, FloatArray]:
+    k = kr_over_pga_of_grid(table.p2, table.pgv_m_s, table.pga_g)
+    return k, np.full(k.shape, np.nan)
+
+
+@cache
+def _yield_g(kind: str, block: str) -> float:
+    """Return k of a stored block at rest [g]; NaN where it stands for blocks of any strength."""
+    from rbfrag.solver.block.geometry import Block
+    from rbfrag.solver.mechanism import shaken_mechanism
+
+    try:
+        stated = json.loads(block)
+        if "s1_m" not in stated:
+            return float("nan")
+        shape = Block.from_fractures(stated["s1_m"], stated["s2_m"], stated["gamma_deg"])
+        return shaken_mechanism(
+            shape, kind=kind, beta_deg=stated["beta_deg"], phi_deg=stated["phi_deg"]
+        ).yield_g
+    except (ValueError, KeyError, InputError) as error:
+        raise FitError(
+            f"a stored block is none of kind {kind} ({error}): run  rbfrag db check"
+        ) from None
+
+
+@dataclass(frozen=True, eq=False)
+class FitData:
+    """Rows of one fit: the points at which blocks just fail, and the blocks of the grid.
+
+    Args:
+        kind: response kind.
+        values: what formulas read at the point of failure, by name, shape (n,): measures of the
+            shaking, the block's parameters, the intensity. For censored rows at the limit beyond
+            which the block fails; NaN where nothing was searched.
+        found: False for censored rows.
+        event: number of the earthquake, shape (n,).
+        event_names: the earthquakes by that number.
+        motion: number of the motion, shape (n,).
+        blocks: what formulas read of the blocks of the grid, shape (n, m) or (n, 1).
+        failed: what they do: 1 fails, 0 does not, NaN not known, shape (n, m).
+        read: which of them this fit may read, same shape.
+        outcomes: where the outcomes come from, in words.
+        domain: range of each variable that the fit covers.
         n_total: number of combinations read.
         n_excluded: found combinations left out because the term is not defined.
         n_outside_model: combinations for which the block model does not apply.
@@ -47,130 +218,343 @@ class FitData:
         fingerprint: hash of natural keys and fitted values.
     """
 
-    x: FloatArray
-    y: FloatArray
+    kind: str
+    values: dict[str, FloatArray]
     found: NDArray[np.bool_]
     event: NDArray[np.intp]
     event_names: tuple[str, ...]
     motion: NDArray[np.int64]
-    pgv_m_s: FloatArray
-    pga_g: FloatArray
-    p2: FloatArray
-    tm_s: FloatArray
-    topples: FloatArray
-    n_total: int
-    n_excluded: int
-    n_outside_model: int
-    guessed_events: int
-    fingerprint: str
+    blocks: dict[str, FloatArray]
+    failed: FloatArray
+    read: NDArray[np.bool_]
+    outcomes: str
+    domain: dict[str, tuple[float, float]]
+    n_total: int = 0
+    n_excluded: int = 0
+    n_outside_model: int = 0
+    guessed_events: int = 0
+    fingerprint: str = ""
+
+    @property
+    def x(self) -> FloatArray:
+        """Intensity [m/s], shape (n,)."""
+        return self.values["intensity_m_s"]
+
+    @property
+    def y(self) -> FloatArray:
+        """Critical toppling velocity [m/s]; for censored points the value it lies below."""
+        return self.values["y_m_s"]
 
     @property
     def y0_m_s(self) -> FloatArray:
-        """Toppling velocities of the blocks whose outcomes are known [m/s], shape (n, 25)."""
-        return self.pgv_m_s[:, None] * GRID_OF_Y0_OVER_PGV
+        """Toppling velocities of the blocks of the grid [m/s], shape (n, m)."""
+        return self.blocks["y_m_s"]
 
     @property
-    def has_outcomes(self) -> bool:
-        """Whether any outcome is known."""
-        return bool(np.isfinite(self.topples).any())
+    def censored(self) -> NDArray[np.bool_]:
+        """Rows of which a limit is known alone, shape (n,)."""
+        return np.asarray(~self.found & np.isfinite(self.values.get("y_m_s", self.x)))
+
+    @property
+    def events(self) -> int:
+        """Number of earthquakes."""
+        return len(self.event_names)
+
+    @property
+    def judged(self) -> Judged:
+        """What the fit is judged on."""
+        known = np.isfinite(self.failed) & self.read
+        return Judged(np.where(known, self.failed, 0.0), known, self.event, self.outcomes)
+
+    def grid(self, name: str) -> FloatArray:
+        """Return a value of the blocks of the grid, shape (n, m)."""
+        return np.asarray(np.broadcast_to(self.blocks[name], self.failed.shape))
 
 
-def fit_data(source: FitSource, term: Term) -> FitData:
-    """Select the points of a fit.
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """Points and grid as one description of blocks gives them, before rows are chosen."""
+
+    values: dict[str, FloatArray]
+    found: NDArray[np.bool_]
+    usable: NDArray[np.bool_]
+    combination: NDArray[np.intp]
+    order: FloatArray
+    blocks: dict[str, FloatArray]
+    failed: FloatArray
+    read: NDArray[np.bool_]
+    outcomes: str
+    ranges: dict[str, FloatArray]
+
+
+def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None = None) -> FitData:
+    """Select the rows of a fit.
 
     Args:
         source: critical values, spectra and outcomes as the database returns them.
+        method: the method of fitting.
         term: the intensity term.
+        kind: response kind; None for the one that the method's block stands for.
 
     Raises:
         FitError: the data cannot carry the fit; the message says why and what to do.
     """
-    table = source.table
-    n_total = int(table.p2.size)
-    if n_total == 0:
+    table, named = source.table, kind or method.block.kind
+    if table.p2.size == 0:
         raise FitError(
-            "no critical values to fit: add motions with  rbfrag motions add  and run  "
-            "rbfrag simulate"
+            "no critical values to fit: add motions with  rbfrag motions add  and run  rbfrag "
+            f"simulate --kind {named}"
         )
-    measures = {
-        name: source.xp_m_s if name == "xp_m_s" else getattr(table, name) for name in term.inputs
-    }
-    x = np.asarray(term.intensity_m_s(measures), dtype=np.float64)
-    for values in measures.values():
-        x = np.where(np.isfinite(values), x, np.nan)
-    is_found = table.status == "found"
-    is_censored = np.isin(table.status.astype(str), _CENSORED)
-    usable = np.isfinite(x)
-    if not usable.any() and "tm_s" in term.inputs:
+    of_outcomes = method.reads == "outcomes"
+    if of_outcomes and not np.isfinite(source.failed).any():
         raise FitError(
-            f"the term {term.name} needs the mean period Tm, which none of the {n_total} "
-            "combinations has: add the motions again with their samples, or fit --term pgv"
+            f"method {method.name} fits what blocks did, and no outcomes are stored: run  rbfrag "
+            f"simulate --kind {named}  again, which adds those of the grid, or fit critical "
+            "values (--method wls or lognormal)"
         )
-    if not usable.any() and "xp_m_s" in term.inputs:
-        raise FitError(
-            "the term xp needs the toppling spectrum X(p), which is stored for none of the "
-            f"{n_total} combinations: run  rbfrag simulate  again, which adds it"
-        )
-    limit = table.search_limit * table.pga_g * STANDARD_GRAVITY_M_S2 / np.sqrt(table.p2)
-    y = np.where(is_found, table.y_m_s, limit)
-    chosen = np.flatnonzero(usable & (is_found | is_censored))
-    # A second key makes the order, and so every sum, independent of the order of the rows.
-    keys = table.natural_key[chosen].astype(str)
-    chosen = chosen[np.lexsort((keys, x[chosen]))]
-    names, event = np.unique(table.event_id[chosen].astype(str), return_inverse=True)
-    found = is_found[chosen]
+    points = _READERS[method.block.names](source, method, term)
+    own = points.combination
+    keys = table.natural_key[own].astype(str)
+    # further keys make the order, and so every sum, independent of the order of the rows
+    order = np.lexsort((points.order, keys, points.values["intensity_m_s"]))
+    chosen = order[points.usable[order]]
+    own = own[chosen]
+    names, event = np.unique(table.event_id[own].astype(str), return_inverse=True)
+    found = points.found[chosen]
+    values = {name: np.ascontiguousarray(v[chosen]) for name, v in points.values.items()}
+    failed = np.ascontiguousarray(points.failed[chosen])
     data = FitData(
-        x=x[chosen],
-        y=y[chosen],
+        kind=named,
+        values=values,
         found=found,
         event=event.astype(np.intp),
         event_names=tuple(names.tolist()),
-        motion=np.unique(table.motion_id[chosen], return_inverse=True)[1].astype(np.int64),
-        pgv_m_s=table.pgv_m_s[chosen],
-        pga_g=table.pga_g[chosen],
-        p2=table.p2[chosen],
-        tm_s=table.tm_s[chosen],
-        topples=source.topples[chosen],
-        n_total=n_total,
-        n_excluded=int((is_found & ~usable).sum()),
+        motion=np.unique(table.motion_id[own], return_inverse=True)[1].astype(np.int64),
+        blocks={name: v[chosen] for name, v in points.blocks.items()},
+        failed=failed,
+        read=points.read[chosen],
+        outcomes=points.outcomes,
+        domain=_domain({name: v[chosen] for name, v in points.ranges.items()}),
+        n_total=int(table.p2.size),
+        n_excluded=int((points.found & ~np.isfinite(points.values["intensity_m_s"])).sum()),
         n_outside_model=int((table.status == "outside_model").sum()),
-        guessed_events=len(set(table.event_id[chosen][table.event_guessed[chosen]].tolist())),
-        fingerprint=_fingerprint(
-            table.natural_key[chosen] + " " + table.event_id[chosen].astype(str).astype(object),
-            x[chosen],
-            np.where(found, y[chosen], 0.0),
-        ),
+        guessed_events=len(set(table.event_id[own][table.event_guessed[own]].tolist())),
+        fingerprint=_fingerprint(keys[chosen], names[event], values, found, failed, of_outcomes),
     )
-    _refuse_thin(data, term)
+    _refuse_thin(data, method, term)
     return data
 
 
-def _fingerprint(keys: NDArray[np.object_], x: FloatArray, y: FloatArray) -> str:
-    lines = sorted(
-        f"{key}\t{a.hex()}\t{b.hex()}\n"
-        for key, a, b in zip(keys, x.tolist(), y.tolist(), strict=True)
-    )
-    return hashlib.sha256("".join(lines).encode()).hexdigest()
+def _domain(ranges: Mapping[str, FloatArray]) -> dict[str, tuple[float, float]]:
+    finite = {name: values[np.isfinite(values)] for name, values in ranges.items()}
+    return {name: (float(v.min()), float(v.max())) for name, v in finite.items() if v.size}
 
 
-def _refuse_thin(data: FitData, term: Term) -> None:
-    n_found = int(data.found.sum())
-    if n_found < FEWEST_FOUND:
+def _fingerprint(
+    keys: NDArray[np.str_],
+    events: NDArray[np.str_],
+    values: Mapping[str, FloatArray],
+    found: NDArray[np.bool_],
+    failed: FloatArray,
+    of_outcomes: bool,
+) -> str:
+    columns = np.column_stack([*values.values(), found]) + 0.0
+    lines = [
+        f"{key} {event}\t".encode() + row.tobytes()
+        for key, event, row in zip(keys.tolist(), events.tolist(), columns, strict=True)
+    ]
+    if of_outcomes:
+        codes = np.where(np.isfinite(failed), failed, 2.0).astype(np.uint8)
+        lines = [line + row.tobytes() for line, row in zip(lines, codes, strict=True)]
+    return hashlib.sha256(b"\n".join(sorted(lines))).hexdigest()
+
+
+def _refuse_thin(data: FitData, method: Method, term: Term) -> None:
+    of_outcomes = method.reads == "outcomes"
+    tells = (np.isfinite(data.failed) & data.read).any(axis=1) if of_outcomes else data.found
+    n = int(tells.sum())
+    if n < FEWEST_FOUND:
         raise FitError(
-            f"{n_found} critical values were found among {data.n_total} combinations with the "
-            f"term {term.name}; a fit needs {FEWEST_FOUND}: simulate more motions or more p²"
+            f"{n} critical values were found among {data.n_total} combinations with the "
+            f"term {term.name}; a fit needs {FEWEST_FOUND}: simulate more motions or more blocks "
+            f"(rbfrag simulate --kind {data.kind})"
         )
-    events = np.unique(data.event[data.found]).size
+    events = np.unique(data.event[tells]).size
     if events < FEWEST_EVENTS:
         raise FitError(
             f"the critical values come from {events} earthquake(s); a fit needs "
             f"{FEWEST_EVENTS}, because points of one earthquake are not independent: add "
             "motions of other earthquakes, and name the events by  motions add --metadata"
         )
-    if not np.all(np.isfinite(data.y[data.found])):
+    if any(not np.all(np.isfinite(v[data.found])) for n, v in data.values.items() if n == "y_m_s"):
         raise FitError("a critical value is not finite: run  rbfrag db check")
-    if np.ptp(data.x[data.found]) == 0.0:
+    if np.ptp(data.x[tells]) == 0.0:
         raise FitError(
-            f"all motions have the same {term.title}, {data.x[data.found][0]:.4g} m/s: a line "
+            f"all motions have the same {term.title}, {data.x[tells][0]:.4g} m/s: a line "
             "needs motions of different strength"
         )
+
+
+def _measures(source: FitSource) -> dict[str, FloatArray]:
+    table = source.table
+    names = ("pgv_m_s", "pga_g", "pgd_m", "tm_s")
+    return {"xp_m_s": source.xp_m_s, **{name: getattr(table, name) for name in names}}
+
+
+def _column(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    return {name: value[:, None] for name, value in values.items()}
+
+
+def _pulse_s(source: FitSource) -> FloatArray:
+    """Return PGV/(PGA g) of the records as they are [s]."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(
+            source.table.pgv_m_s / (source.table.pga_g * STANDARD_GRAVITY_M_S2), dtype=np.float64
+        )
+
+
+def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
+    """Return the points of blocks of any strength k_r and some size p²."""
+    table = source.table
+    given = _measures(source)
+    x = np.asarray(term.intensity_m_s(given), dtype=np.float64)
+    for name in term.inputs:
+        x = np.where(np.isfinite(given[name]), x, np.nan)
+    defined = np.isfinite(x)
+    if not defined.any() and "tm_s" in term.inputs:
+        raise FitError(
+            f"the term {term.name} needs the mean period Tm, which none of the {x.size} "
+            "combinations has: add the motions again with their samples, or fit --term pgv"
+        )
+    if not defined.any() and "xp_m_s" in term.inputs:
+        raise FitError(
+            "the term xp needs the toppling spectrum X(p), which is stored for none of the "
+            f"{x.size} combinations: run  rbfrag simulate  again, which adds it"
+        )
+    p, ground = np.sqrt(table.p2), table.pga_g * STANDARD_GRAVITY_M_S2
+    found = table.status == "found"
+    status = table.status.astype(str)
+    limit = np.where(np.isin(status, _CENSORED), table.search_limit * ground / p, np.nan)
+    y = np.where(found, table.y_m_s, limit)
+    readable = np.isin(status, ("found", *_CENSORED, "not_searched"))
+    of_motion = {name: given[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *term.inputs))}
+    of_motion |= {"tm_s": table.tm_s, "p2": table.p2, "p": p, "intensity_m_s": x}
+    kr = source.k_over_pga * table.pga_g[:, None]
+    y0 = source.k_over_pga * (ground / p)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        read = y0 >= LEAST_Y0_OVER_PGV * (1.0 - 1e-9) * table.pgv_m_s[:, None]
+    read &= (y0 > 0.0) & np.isfinite(y0)
+    failed, words = source.judged_outcomes(y0, y)
+    some = read.any(axis=0)
+    of_outcomes = method.reads == "outcomes"
+    ranges = {
+        "p2": table.p2,
+        "intensity_m_s": x,
+        "y_m_s": np.where(read, y0, np.nan)[:, some] if of_outcomes else y,
+        "tm_s": table.tm_s,
+    }
+    if "pgv_m_s" in term.inputs and "pga_g" in term.inputs:
+        ranges["pgv_over_pga_s"] = _pulse_s(source)
+    if not of_outcomes:
+        ranges = {name: np.where(found, v, np.nan) for name, v in ranges.items()}
+    return _Points(
+        values={**of_motion, "kr": y * p / STANDARD_GRAVITY_M_S2, "y_m_s": y},
+        found=found,
+        usable=defined & readable,
+        combination=np.arange(x.size),
+        order=np.zeros(x.size),
+        blocks={**_column(of_motion), "kr": kr[:, some], "y_m_s": y0[:, some]},
+        failed=failed[:, some],
+        read=read[:, some],
+        outcomes=words,
+        ranges=ranges,
+    )
+
+
+def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
+    """Return the points of blocks of known strength and size under scaled records."""
+    table = source.table
+    assert source.strength_g is not None
+    strength = source.strength_g
+    found = table.status == "found"
+    known = (found | (table.status == "below_limit")) & (table.pgv_m_s > 0.0)
+    ratio = np.where(found, table.kr_over_pga, table.search_limit)
+    per_pga = np.where(table.pga_g > 0.0, table.pgv_m_s, np.nan) / table.pga_g
+    size = np.sqrt(table.p2)
+    block = {method.block.strength: strength, str(method.block.size): table.p2, "p": size}
+    block["y_m_s"] = strength * STANDARD_GRAVITY_M_S2 / size
+    k = source.k_over_pga if source.k_over_pga.shape[1] else np.tile(K_OVER_PGA, (ratio.size, 1))
+
+    def shaking(k: FloatArray, strength: FloatArray, per_pga: FloatArray) -> dict[str, FloatArray]:
+        # the scaled record: its PGA is k over the ratio, and PGV goes with it
+        of_record = {"pga_g": strength / k, "pgv_m_s": strength / k * per_pga}
+        return {**of_record, "intensity_m_s": term.intensity_m_s(of_record)}
+
+    if not source.k_over_pga.shape[1]:
+        source = FitSource(table, source.xp_m_s, k, np.full(k.shape, np.nan))
+    failed, words = source.judged_outcomes(k, ratio)
+    return _Points(
+        values={**shaking(ratio, strength, per_pga), **block},
+        found=found,
+        usable=known & (ratio < 1.0),
+        combination=np.arange(ratio.size),
+        order=np.zeros(ratio.size),
+        blocks={**shaking(k, strength[:, None], per_pga[:, None]), **_column(block)},
+        failed=failed,
+        read=np.isfinite(k),
+        outcomes=words,
+        ranges={
+            "pgv_over_pga_s": _pulse_s(source),
+            str(method.block.size): table.p2,
+            "y_m_s": block["y_m_s"],
+            "k_over_pga": np.column_stack([ratio, np.ones(ratio.size)]),
+        },
+    )
+
+
+def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
+    """Return the points of blocks of every stored strength: how far each slides."""
+    from rbfrag.solver.models.sliding import THRESHOLDS_M
+
+    n, m = source.k_over_pga.shape
+    own, k = np.repeat(np.arange(n), m), source.k_over_pga.ravel()
+    given = source.displacement_m
+    slid = np.full(n * m, np.nan) if given is None else given.ravel()
+    measures = {name: value[own] for name, value in _measures(source).items()}
+    beyond = np.maximum(slid, LEAST_DISPLACEMENT_M)
+    values = {name: measures[name] for name in ("pgv_m_s", "pga_g")}
+    values |= {
+        method.block.strength: k * values["pga_g"],
+        "intensity_m_s": term.intensity_m_s(values),
+    }
+    distances = np.broadcast_to(np.array(THRESHOLDS_M), (k.size, len(THRESHOLDS_M)))
+    with np.errstate(invalid="ignore"):
+        usable = (k < 1.0) & (values["pgv_m_s"] > 0.0) & np.isfinite(slid)
+        found = slid >= LEAST_DISPLACEMENT_M
+        failed = (beyond[:, None] > distances).astype(np.float64)
+    return _Points(
+        values={**values, "displacement_m": beyond},
+        found=found,
+        usable=usable,
+        combination=own,
+        order=k,
+        blocks={**_column(values), "displacement_m": distances},
+        failed=failed,
+        read=np.ones(failed.shape, dtype=np.bool_),
+        outcomes="simulated outcomes",
+        ranges={
+            "pgv_over_pga_s": _pulse_s(source)[own],
+            "pgv_m_s": values["pgv_m_s"],
+            "pga_g": values["pga_g"],
+            "displacement_m": np.where(found, beyond, np.nan),
+            "k_over_pga": np.column_stack([k, np.ones(k.size)]),
+        },
+    )
+
+
+_READERS: Mapping[tuple[str, ...], Callable[[FitSource, Method, Term], _Points]] = {
+    ("p2", "kr"): _strengths,
+    ("ks", "ps2"): _scaled_records,
+    ("ky", "displacement_m"): _displacements,
+}
+"""How the columns of the database become points, by what describes the block."""

@@ -2,48 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
-from functools import partial
-from typing import TYPE_CHECKING
+from os import PathLike
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
-from rbfrag.fragility import formulas
-from rbfrag.fragility.fit.data import FitData, fit_data
-from rbfrag.fragility.fit.line import fit_wls
-from rbfrag.fragility.fit.log_relations import log_correlations, power_law
-from rbfrag.fragility.fit.lognormal import fit_lognormal
-from rbfrag.fragility.fit.method_result import MethodResult
-from rbfrag.fragility.fit.outcomes import fit_outcomes
-from rbfrag.fragility.fit.report import FitReport
-from rbfrag.fragility.fit.source import FitSource, read_source
+from rbfrag.fragility.fit.data import FitData, FitSource, fit_data, read_source
+from rbfrag.fragility.fit.report import FitReport, log_correlations, power_law
+from rbfrag.fragility.fit.result import MethodResult
 from rbfrag.fragility.interval_floor import interval_floor, of_motions, of_sizes
 from rbfrag.fragility.measures import TERMS, Term, intensity_term
+from rbfrag.fragility.methods import Method, method_named, methods
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
 
     from rbfrag.db.queries import Vertical
-
-METHODS: Mapping[str, Callable[..., MethodResult]] = {
-    "wls": fit_wls,
-    "lognormal": fit_lognormal,
-    **{
-        name: partial(fit_outcomes, method=name)
-        for name in ("logistic", "weibull", "bounded", "record", "power")
-    },
-}
-"""The methods of fitting: ``method(data, term, seed=…)``."""
-
-WITH_EXPONENT = ("lognormal", "logistic")
-"""Methods that can estimate the exponent M."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +33,7 @@ class Fitted:
 
     Args:
         report: the report.
-        data: the points.
+        data: the rows.
         result: what the method handed back, with its held-out probabilities.
     """
 
@@ -62,64 +43,124 @@ class Fitted:
 
 
 def fit(
-    source: Connection | CombinationTable | FitSource,
+    source: str | PathLike[str] | Connection | CombinationTable | FitSource | None = None,
     *,
+    kind: str = "toppling",
     term: str,
-    method: str = "wls",
+    method: str | None = None,
     suite: str | None = None,
     name: str | None = None,
     vertical: Vertical = "without",
     seed: int = 0,
     estimate_m: bool = False,
     doubtful_pgd: bool = False,
+    rotation_deg: float | None = None,
 ) -> FitReport:
     """Fit a fragility model; nothing is stored.
 
     Args:
-        source: a connection to the database, or the data themselves (critical values alone
-            carry ``wls`` and ``lognormal``).
+        source: the database (a path, URL or connection; None for ``RBFRAG_DB`` or ``rbfrag.db`` in
+            the current folder), or the data themselves (critical values alone carry ``wls`` and
+            ``lognormal``).
+        kind: what the blocks do: any kind that campaigns store.
         term: intensity term: ``pgv``, ``pga_tm``, ``pgd_tm``, ``pgv_pga``, ``pgv_pga_tm`` or
             ``xp``.
-        method: method of fitting: ``wls`` and ``lognormal`` (of critical values, for a term that
-            is one number), ``logistic`` (of outcomes, the same terms), ``weibull`` and
-            ``bounded`` (of outcomes, the terms with PGV), ``record`` and ``power`` (``xp``).
+        method: method of fitting. Blocks known by p² and k_r: ``wls`` and ``lognormal`` (of
+            critical values, for a term that is one number), ``logistic`` (of outcomes, the same
+            terms), ``weibull`` and ``bounded`` (of outcomes, the terms with PGV), ``record`` and
+            ``power`` (``xp``). Sliding: ``displacement``; slumping: ``capacity`` (``pgv`` and
+            ``pgv_pga``). None: ``wls``, or the only one that there is for the kind.
         suite: suite of motions to fit (connection only); None for all motions.
-        name: name of the model; None for method and term, such as ``wls-pgv``.
+        name: name of the model; None for method and term, such as ``wls-pgv``, of another kind
+            such as ``sliding-pgv``.
         vertical: ``without`` or ``with`` vertical motion, or ``both`` (connection only).
         seed: seed of the bootstrap by earthquake.
         estimate_m: estimate the exponent M of y = k_r g/p^M instead of M = 1 (``lognormal`` and
             ``logistic``).
         doubtful_pgd: True to let ``pgd_tm`` read the PGD of records that are flagged for an
             implausible final velocity or displacement (connection only).
+        rotation_deg: slumping: the rotation that counts as failure [deg]; None past recovery.
 
     Returns:
         The report; ``report.model.row`` is what the database stores.
 
     Raises:
-        InputError: unknown term or method, or two that do not go together.
+        InputError: unknown kind, term or method, or some that do not go together.
         FitError: the data cannot carry the fit; the message says why and what to do.
     """
-    chosen = _checked(term, method, seed=seed, name=name, estimate_m=estimate_m)
+    chosen, of_term = method_of_kind(kind, method), intensity_term(term)
+    _refuse_unfit(chosen, of_term, kind, estimate_m, rotation_deg)
+    if seed < 0:
+        raise InputError(f"seed = {seed}: give a whole number from 0 up")
+    if name is not None and not name.strip():
+        raise InputError("the name of the model is empty: give a name or leave it out")
+    asked: dict[str, Any] = {
+        "suite": suite,
+        "vertical": vertical,
+        "doubtful_pgd": doubtful_pgd,
+        "rotation_deg": rotation_deg,
+    }
     if isinstance(source, CombinationTable):
         source = FitSource.of_table(source)
+    elif source is None or isinstance(source, str | PathLike):
+        from rbfrag.db.engine import opened_database
+
+        # reading takes no lock, so that a campaign may go on meanwhile
+        with opened_database(source, read_only=True) as engine, engine.connect() as connection:
+            source = read_source(connection, chosen.block, kind=kind, **asked)
     elif not isinstance(source, FitSource):
-        source = read_source(source, suite=suite, vertical=vertical, doubtful_pgd=doubtful_pgd)
+        source = read_source(source, chosen.block, kind=kind, **asked)
     return fit_source(
         source,
+        of_term,
         chosen,
-        method,
+        kind=kind,
         name=name,
         seed=seed,
         estimate_m=estimate_m,
-        selection={"suite": suite, "vertical": vertical, "doubtful_pgd": doubtful_pgd},
+        selection=asked,
     ).report
+
+
+def methods_of_kind(kind: str) -> tuple[Method, ...]:
+    """Return the methods that read what describes the block of a kind.
+
+    Raises:
+        InputError: an unknown kind, or one that no method goes with.
+    """
+    from rbfrag.solver.kinds import model_of_kind
+
+    names = model_of_kind(kind).parameters
+    found = tuple(method for method in methods() if names and method.block.names == names)
+    if not found:
+        raise InputError(f"there is no fragility model of kind {kind}: no method reads its block")
+    return found
+
+
+def method_of_kind(kind: str, name: str | None) -> Method:
+    """Return the named method, or the one that a kind is fitted by where none is named.
+
+    Raises:
+        InputError: an unknown kind or method, or two that do not go together.
+    """
+    known = methods_of_kind(kind)
+    if name is None:
+        return known[0] if len(known) == 1 else method_named("wls")
+    chosen = method_named(name)
+    if chosen not in known:
+        raise InputError(
+            f"method {name} fits blocks known by {' and '.join(chosen.block.names)}, not those of "
+            f"kind {kind}, which are fitted by {', '.join(each.name for each in known)}"
+        )
+    return chosen
 
 
 def fit_source(
     source: FitSource,
     term: Term,
-    method: str,
+    method: Method,
     *,
+    kind: str | None = None,
     name: str | None = None,
     seed: int = 0,
     estimate_m: bool = False,
@@ -131,28 +172,27 @@ def fit_source(
     Arguments as for :func:`fit`; `compared` says whether the model gets its table of least widths,
     for which those that know more are fitted too: a study of scores has no use for it.
     """
-    table = source.table
-    data = fit_data(source, term)
+    table, asked = source.table, dict(selection or {})
+    data = fit_data(source, method, term, kind=kind)
     options = {"estimate_m": True} if estimate_m else {}
-    result = METHODS[method](data, term, seed=seed, **options)
-    law = power_law(table)
-    correlations = log_correlations(table)
-    events = int(np.unique(data.event[data.found]).size)
-    with_vertical = (selection or {}).get("vertical", "without")
+    result: MethodResult = method.fitter()(data, method, term, seed=seed, **options)
+    law, correlations = power_law(table), log_correlations(table)
+    of_outcomes = method.reads == "outcomes"
     row = ModelRow(
-        name=name or f"{method}-{term.name}",
+        name=name or _name(method, term, data.kind, asked),
+        kind=data.kind,
         term=term.name,
-        method=method,
+        method=method.name,
         coefficients=result.coefficients,
         covariance=result.covariance,
-        domain=_domain(data, method, term),
+        domain=data.domain,
         data_fingerprint=data.fingerprint,
         diagnostics={
             "standard_errors": result.standard_errors,
             "n": int(data.found.sum()),
-            "n_censored": int((~data.found).sum()),
-            "events": events,
-            "degrees_of_freedom": events - 1,
+            "n_censored": int(data.censored.sum()),
+            "events": _events(data, of_outcomes),
+            "degrees_of_freedom": _events(data, of_outcomes) - 1,
             "scores": result.scores,
             "warnings": [*_data_warnings(data), *result.warnings],
             "n_total": data.n_total,
@@ -165,108 +205,105 @@ def fit_source(
             "power_law": asdict(law) if law is not None else None,
             "log_correlations": correlations,
             "term_rank": list(correlations),
-            "suite": (selection or {}).get("suite"),
-            "doubtful_pgd": (selection or {}).get("doubtful_pgd", False),
-            "vertical": with_vertical,
+            "suite": asked.get("suite"),
+            "doubtful_pgd": asked.get("doubtful_pgd", False),
+            "vertical": asked.get("vertical", "without"),
+            "rotation_deg": asked.get("rotation_deg"),
             **result.details,
         },
         created=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     if compared:
-        row = _with_floor(row, source, str(with_vertical))
+        row = _with_floor(row, source)
     return Fitted(FitReport.from_model(FragilityModel.from_row(row)), data, result)
 
 
-def _checked(term: str, method: str, *, seed: int, name: str | None, estimate_m: bool) -> Term:
-    chosen = intensity_term(term)
-    if method not in METHODS:
-        raise InputError(f"unknown method {method!r}: use one of {', '.join(METHODS)}")
-    if (method, term) not in formulas.SHAPES:
-        terms = ", ".join(of for by, of in formulas.SHAPES if by == method)
-        methods = ", ".join(by for by, of in formulas.SHAPES if of == term)
+def _refuse_unfit(
+    method: Method, term: Term, kind: str, estimate_m: bool, rotation_deg: float | None
+) -> None:
+    if term.name not in method.forms:
+        known = (each.name for each in methods_of_kind(kind) if term.name in each.forms)
         raise InputError(
-            f"method {method} does not go with the term {term}: it fits {terms}; the term {term} "
-            f"is fitted by {methods}"
+            f"method {method.name} does not go with the term {term.name}: it fits "
+            f"{', '.join(method.forms)}; the term {term.name} of kind {kind} is fitted by "
+            f"{', '.join(known) or 'none'}"
         )
-    if estimate_m and method not in WITH_EXPONENT:
+    if estimate_m and method.exponent is None:
+        known = (each.name for each in methods() if each.exponent is not None)
         raise InputError(
-            f"method {method} keeps M = 1: the exponent is estimated by {', '.join(WITH_EXPONENT)}"
+            f"method {method.name} keeps M = 1: the exponent is estimated by {', '.join(known)}"
         )
-    if seed < 0:
-        raise InputError(f"seed = {seed}: give a whole number from 0 up")
-    if name is not None and not name.strip():
-        raise InputError("the name of the model is empty: give a name or leave it out")
-    return chosen
+    if rotation_deg is not None and method.block.criterion is None:
+        raise InputError(
+            f"a rotation is no failure of blocks of kind {kind}: leave rotation_deg (--rotation) "
+            "out"
+        )
 
 
-def _with_floor(row: ModelRow, source: FitSource, vertical: str) -> ModelRow:
+def _name(method: Method, term: Term, kind: str, selection: Mapping[str, object]) -> str:
+    several = len(methods_of_kind(kind)) > 1
+    parts = [] if several and kind == method.block.kind else [kind]
+    if method.block.criterion is not None:
+        rotation = selection.get(method.block.criterion)
+        parts.append("recovery" if rotation is None else f"{rotation:g}deg")
+    return "-".join([*parts, *([method.name] if several else []), term.name])
+
+
+def _events(data: FitData, of_outcomes: bool) -> int:
+    """Return the number of earthquakes with a critical value, or else with outcomes."""
+    told = data.found if data.found.any() or not of_outcomes else np.ones_like(data.found)
+    return int(np.unique(data.event[told]).size)
+
+
+def _with_floor(row: ModelRow, source: FitSource) -> ModelRow:
     """Return the model with its table of least widths, where models that know more exist."""
     table: list[float] = []
-    if TERMS[row.term].richer:
-        model = FragilityModel.from_row(row)
-        others = [_richer_model(name, source, vertical) for name in TERMS[row.term].richer]
+    term = TERMS[row.term]
+    if term.richer and method_named(row.method).block.size == "p2":
+        others = [_richer_model(TERMS[name], source, row) for name in term.richer]
         known = [other for other in others if other is not None]
         if known:
-            sample = of_motions(source) if TERMS[row.term].richer == ("xp",) else of_sizes(source)
-            table = interval_floor(model, known, sample)
+            sample = of_motions(source) if term.richer == ("xp",) else of_sizes(source)
+            table = interval_floor(FragilityModel.from_row(row), known, sample)
     return replace(row, diagnostics={**row.diagnostics, "interval_floor": table})
 
 
-def _richer_model(name: str, source: FitSource, vertical: str) -> FragilityModel | None:
+def _richer_model(term: Term, source: FitSource, of: ModelRow) -> FragilityModel | None:
     """Return the best model of a term, with clustered covariance and its own table, only that."""
     from rbfrag.fragility.fit.outcomes import fit_parameters
 
-    term = TERMS[name]
-    method = "record" if name == "xp" else "bounded"
+    method = min(
+        (each for each in methods_of_kind(of.kind) if term.name in each.forms),
+        key=lambda each: each.forms[term.name].rank,
+    )
     try:
-        data = fit_data(source, term)
-        names, parameters, covariance, freedom = fit_parameters(data, term, method)
+        data = fit_data(source, method, term, kind=of.kind)
+        names, parameters, covariance, freedom = fit_parameters(data, method, term)
     except FitError:
         return None
     row = ModelRow(
-        name=name,
-        term=name,
-        method=method,
+        name=term.name,
+        kind=of.kind,
+        term=term.name,
+        method=method.name,
         coefficients=dict(zip(names, parameters.tolist(), strict=True)),
         covariance=tuple(tuple(line) for line in covariance.tolist()),
         domain={},
         data_fingerprint="",
         diagnostics={
             "degrees_of_freedom": freedom,
-            "events": int(np.unique(data.event[data.found]).size),
-            "vertical": vertical,
+            "events": _events(data, True),
+            "vertical": of.diagnostics["vertical"],
         },
     )
-    return FragilityModel.from_row(_with_floor(row, source, vertical))
-
-
-def _domain(data: FitData, method: str, term: Term) -> dict[str, tuple[float, float]]:
-    of_outcomes = method not in ("wls", "lognormal")
-    used = data.found | of_outcomes
-    with np.errstate(divide="ignore", invalid="ignore"):
-        columns = {
-            "p2": data.p2,
-            "intensity_m_s": data.x,
-            "y_m_s": data.y0_m_s if of_outcomes else data.y,
-            "tm_s": data.tm_s,
-            "pgv_over_pga_s": data.pgv_m_s / (data.pga_g * STANDARD_GRAVITY_M_S2),
-        }
-    if "pgv_m_s" not in term.inputs or "pga_g" not in term.inputs:
-        del columns["pgv_over_pga_s"]
-    result = {}
-    for name, values in columns.items():
-        chosen = values[used]
-        chosen = chosen[np.isfinite(chosen)]
-        if chosen.size:
-            result[name] = (float(chosen.min()), float(chosen.max()))
-    return result
+    return FragilityModel.from_row(_with_floor(row, source))
 
 
 def _data_warnings(data: FitData) -> list[str]:
     result = []
     if data.guessed_events:
         result.append(
-            f"{data.guessed_events} of {len(data.event_names)} earthquakes are guessed from file "
+            f"{data.guessed_events} of {data.events} earthquakes are guessed from file "
             "headers: one earthquake may be counted as several, which makes standard errors too "
             "small; name them by  motions add --metadata"
         )

@@ -1,38 +1,223 @@
-"""The method ``wls``: the dissertation's fragility model with its uncertainty and scores."""
+"""Iterated weighted least squares with a variance that depends on intensity.
+
+The method of the dissertation (section 4.5.3): ordinary least squares, bin variances of the
+residuals, a fitted variance v(x), least squares with the weights 1/v, and again until stable.
+
+    s_j² = Σ w r² / Σ w  over bin j,    v(x) = v0 + v1 x (+ v2 x²),    all v_i >= 0
+
+v0 has a floor, so that v(x) > 0 for every x >= 0.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import FitError
-from rbfrag.fragility.fit import scores
-from rbfrag.fragility.fit.data import FEW_EVENTS, FitData
-from rbfrag.fragility.fit.judgement import Outcomes, outcomes_of, score_intervals, scores_of
-from rbfrag.fragility.fit.method_result import MethodResult
-from rbfrag.fragility.fit.scatter import nested_scatter
-from rbfrag.fragility.fit.straight_line import mean_m_s, negative_share, score, variance_m2_s2
-from rbfrag.fragility.fit.variance import FLOOR_SHARE, Bins
-from rbfrag.fragility.fit.wls import (
-    TOLERANCE,
-    LineFit,
-    clustered_line,
-    event_bootstrap,
-    iterate,
-    naive_line_errors,
-)
-from rbfrag.fragility.functions import array_functions
+from rbfrag.fragility.fit.clusters import bootstrap, left_out
+from rbfrag.fragility.fit.critical import probabilities
+from rbfrag.fragility.fit.data import FitData
+from rbfrag.fragility.fit.result import MethodResult, few_events, scatter_of
+from rbfrag.fragility.fit.scores import score_intervals, scores_of
 from rbfrag.fragility.measures import Term
-from rbfrag.fragility.methods.wls import NEGATIVE_SHARE_LIMIT
+from rbfrag.fragility.methods import Method, arrays
+from rbfrag.fragility.methods.wls import (
+    NEGATIVE_SHARE_LIMIT,
+    mean_m_s,
+    negative_share,
+    variance_m2_s2,
+)
 
 FloatArray = NDArray[np.float64]
 
 REPLICATES = 400
 
+TOLERANCE = 1e-8
+"""The fit is stable when mean (over the scatter) and variance (relative) change by less."""
 
-def fit_wls(data: FitData, term: Term, *, seed: int) -> MethodResult:
+MOST_ITERATIONS = 200
+
+FEWEST_POINTS = 6
+"""A line with a variance of three parameters needs more than five points."""
+
+FLOOR_SHARE = 1e-4
+"""Floor of v0 as a share of the smallest non-zero bin variance (1 % in standard deviation)."""
+
+POINTS_PER_BIN = 20
+MOST_BINS = 20
+FEWEST_BINS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Bins:
+    """Bins of equal count over sorted intensities.
+
+    Args:
+        x: intensities [m/s], rising, shape (n,).
+        starts: first index of each bin.
+    """
+
+    x: FloatArray
+    starts: NDArray[np.intp]
+
+    @classmethod
+    def equal_count(cls, x: FloatArray) -> Bins:
+        """Cut rising intensities into bins of equal count, about 20 points each."""
+        count = max(FEWEST_BINS, min(MOST_BINS, x.size // POINTS_PER_BIN))
+        count = min(count, x.size)
+        return cls(x, np.arange(count, dtype=np.intp) * x.size // count)
+
+    def sums(self, values: FloatArray) -> FloatArray:
+        """Return the sum of the values in each bin."""
+        result: FloatArray = np.add.reduceat(values, self.starts)
+        return result
+
+
+def powers(x: FloatArray, degree: int) -> FloatArray:
+    """Return the columns 1, x, …, x^degree, shape (n, degree + 1)."""
+    return np.vander(x, degree + 1, increasing=True)
+
+
+def fit_variance(
+    bins: Bins,
+    squared_residuals: FloatArray,
+    multiplicity: FloatArray,
+    degree: int,
+    previous: FloatArray | None,
+) -> FloatArray:
+    """Return v0, v1[, v2] [m²/s²] from the bin variances of the residuals.
+
+    Non-negative least squares with weights n_j/v(x_j)², the inverse variance of a bin
+    variance of normal residuals, so that bins of weak motions count as much as strong ones.
+
+    Args:
+        bins: the bins.
+        squared_residuals: r² [m²/s²] of each point, in the order of ``bins.x``.
+        multiplicity: how many times each point counts (a resampled earthquake counts
+            several times or not at all).
+        degree: degree of v(x).
+        previous: v0, v1[, v2] of the iteration before; None for equal relative weights.
+    """
+    from scipy.optimize import nnls
+
+    counts = bins.sums(multiplicity)
+    used = counts > 0.0
+    counts = counts[used]
+    centres = bins.sums(multiplicity * bins.x)[used] / counts
+    spread = bins.sums(multiplicity * squared_residuals)[used] / counts
+    # Least squares takes two parameters from the residuals.
+    spread = spread * (counts.sum() / max(counts.sum() - 2.0, 1.0))
+    columns = powers(centres, degree)
+    floor = FLOOR_SHARE * spread[spread > 0.0].min()
+    scale = spread if previous is None else columns @ previous
+    scale = np.maximum(scale, floor) / np.sqrt(counts)
+    # Columns of like size keep the active set free of rounding.
+    size = np.abs(columns).max(axis=0)
+    solution, _ = nnls(columns / (scale[:, None] * size), (spread - floor) / scale)
+    coefficients: FloatArray = solution / size
+    coefficients[0] += floor
+    return coefficients
+
+
+@dataclass(frozen=True, eq=False)
+class LineFit:
+    """A straight line with its variance.
+
+    Args:
+        parameters: c0 [m/s], c1, v0, v1[, v2].
+        iterations: how many times line and variance were fitted.
+        converged: whether they became stable.
+    """
+
+    parameters: FloatArray
+    iterations: int
+    converged: bool
+
+
+def weighted_line(x: FloatArray, y: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return intercept and slope of the weighted least-squares line; weight 0 leaves out."""
+    total = weights.sum()
+    x_mean, y_mean = weights @ x / total, weights @ y / total
+    dx = x - x_mean
+    wdx = weights * dx
+    slope = wdx @ (y - y_mean) / (wdx @ dx)
+    return np.array([y_mean - slope * x_mean, slope])
+
+
+def iterate(
+    bins: Bins,
+    y: FloatArray,
+    multiplicity: FloatArray,
+    degree: int,
+    start: FloatArray | None = None,
+) -> LineFit:
+    """Fit line and variance in turn until both are stable.
+
+    Args:
+        bins: bins over the rising intensities.
+        y: critical toppling velocities [m/s], in the order of ``bins.x``.
+        multiplicity: how many times each point counts.
+        degree: degree of the variance polynomial.
+        start: parameters to start from; None starts with ordinary least squares.
+    """
+    x = bins.x
+    columns = powers(x, degree)
+    if start is None:
+        line, variance = weighted_line(x, y, multiplicity), None
+    else:
+        line, variance = start[:2], start[2:]
+    ends = np.array([[1.0, x[0]], [1.0, x[-1]]])
+    iterations, stable = 0, False
+    while not stable and iterations < MOST_ITERATIONS:
+        iterations += 1
+        residuals = y - line[0] - line[1] * x
+        fitted = fit_variance(bins, residuals * residuals, multiplicity, degree, variance)
+        values = columns @ fitted
+        new_line = weighted_line(x, y, multiplicity / values)
+        stable = variance is not None and bool(
+            np.all(np.abs(ends @ (new_line - line)) <= TOLERANCE * np.sqrt(values[[0, -1]]))
+            and np.all(np.abs(values - columns @ variance) <= TOLERANCE * values)
+        )
+        line, variance = new_line, fitted
+    assert variance is not None
+    return LineFit(np.concatenate([line, variance]), iterations, stable)
+
+
+def clustered_line(
+    x: FloatArray, y: FloatArray, weights: FloatArray, events: NDArray[np.intp]
+) -> tuple[FloatArray, FloatArray, float]:
+    """Fit the line by statsmodels with a covariance clustered by earthquake.
+
+    Args:
+        x: intensities [m/s], shape (n,).
+        y: responses [m/s], shape (n,).
+        weights: weights 1/v, shape (n,).
+        events: number of each point's earthquake, shape (n,).
+
+    Returns:
+        Intercept and slope; their clustered covariance (with the usual correction
+        G/(G-1)·(n-1)/(n-2) for G earthquakes); and the weighted R².
+    """
+    import statsmodels.api as sm
+
+    result = sm.WLS(y, sm.add_constant(x, has_constant="add"), weights=weights).fit(
+        cov_type="cluster", cov_kwds={"groups": events}
+    )
+    return np.asarray(result.params), np.asarray(result.cov_params()), float(result.rsquared)
+
+
+def naive_line_errors(x: FloatArray, weights: FloatArray, residuals: FloatArray) -> FloatArray:
+    """Return the standard errors of the line that take all points for independent, shape (2,)."""
+    columns = np.column_stack([np.ones(x.size), x])
+    bread = np.linalg.inv((columns * weights[:, None]).T @ columns)
+    scale = float(weights @ residuals**2) / (x.size - 2)
+    return np.sqrt(np.diag(bread) * scale)
+
+
+def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodResult:
     """Fit y* = c0 + c1 x with variance v(x), as the dissertation does.
 
     Censored points are left out of the fit (and bias it upwards); standard errors of the
@@ -40,42 +225,54 @@ def fit_wls(data: FitData, term: Term, *, seed: int) -> MethodResult:
     bootstrap by earthquake.
 
     Args:
-        data: the points.
+        data: the rows.
+        method: the method.
         term: the intensity term, which sets the degree of v(x).
         seed: seed of the bootstrap.
 
     Raises:
         FitError: the line does not rise with intensity, or there is no scatter.
     """
-    found = data.found
-    x, y = data.x[found], data.y[found]
-    names, events = np.unique(data.event[found], return_inverse=True)
-    events = events.astype(np.intp)
+    form, degree = method.forms[term.name], term.variance_degree
+    x, y, events = data.x[data.found], data.y[data.found], data.event[data.found]
     bins = Bins.equal_count(x)
-    ones = np.ones(x.size)
     _refuse_without_scatter(x, y)
-    fit = iterate(bins, y, ones, term.variance_degree)
+    fit = iterate(bins, y, np.ones(x.size), degree)
     if fit.parameters[1] <= 0.0:
         raise FitError(
             f"the fitted critical velocity does not rise with {term.title} (slope "
             f"{fit.parameters[1]:.4g}): these motions cannot carry a fragility model in "
             f"{term.symbol}; use another term or more motions"
         )
-    parameters = tuple(fit.parameters.tolist())
+    parameters = fit.parameters.tolist()
     variance = variance_m2_s2(parameters, x)
+    residuals = y - mean_m_s(parameters, x)
     line, clustered, r_squared = clustered_line(x, y, 1.0 / variance, events)
-    naive = naive_line_errors(x, 1.0 / variance, y - mean_m_s(parameters, x))
+    naive = naive_line_errors(x, 1.0 / variance, residuals)
     samples, unstable = event_bootstrap(
-        bins, y, events, term.variance_degree, fit.parameters, replicates=REPLICATES, seed=seed
+        bins, y, events, degree, fit.parameters, replicates=REPLICATES, seed=seed
     )
     covariance = np.cov(samples, rowvar=False)
-    labels = ["c0", "c1", *(f"v{i}" for i in range(term.variance_degree + 1))]
-    spread = dict(zip(labels, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-    residuals = y - mean_m_s(parameters, x)
-    seen = outcomes_of(data)
-    in_sample, held_out, density = _judged(data, seen, bins, y, events, names, fit, term)
+    names = form.parameters
+    spread = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    judged = data.judged
+    in_sample = probabilities(method, form, data, fit.parameters)
+    # An earthquake with censored points only has no share in the fit: it is left out already.
+    held_out, density = in_sample.copy(), np.empty(y.size)
+    others = left_out(
+        events,
+        lambda rest: iterate(bins, y, rest.astype(float), degree, fit.parameters).parameters,
+    )
+    for event, part in others.items():
+        here, own = data.event == event, events == event
+        held_out[here] = probabilities(method, form, data, part)[here]
+        density[own] = _log_density(part, x[own], y[own])
+    mean = mean_m_s(parameters, data.x)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ln_residual = np.where(data.found & (mean > 0.0) & (data.y > 0.0),
+                               np.log(data.y / mean), np.nan)  # fmt: skip
     return MethodResult(
-        coefficients=dict(zip(labels, parameters, strict=True)),
+        coefficients=dict(zip(names, fit.parameters.tolist(), strict=True)),
         covariance=tuple(tuple(row) for row in covariance.tolist()),
         standard_errors={
             **spread,
@@ -83,20 +280,21 @@ def fit_wls(data: FitData, term: Term, *, seed: int) -> MethodResult:
             "c1": math.sqrt(clustered[1, 1]),
         },
         scores={
-            "log_density_in_sample": float(_log_density(fit.parameters, bins.x, y).mean()),
+            "log_density_in_sample": float(_log_density(fit.parameters, x, y).mean()),
             "log_density_held_out": float(density.mean()),
-            **scores_of(seen, in_sample, held_out),
+            **scores_of(judged, in_sample, held_out),
         },
         details={
-            "judged_on": seen.kind,
-            "score_intervals": score_intervals(data, seen, held_out, seed=seed),
-            "scatter_ln_y": _scatter(data, parameters),
+            "judged_on": judged.words,
+            "judged_outcomes": int(judged.known.sum()),
+            "score_intervals": score_intervals(judged, held_out, seed=seed),
+            "scatter_ln_y": scatter_of(data, ln_residual),
             "naive_standard_errors": dict(zip(("c0", "c1"), naive.tolist(), strict=True)),
             "intercept_m_s": float(line[0]),
             "slope": float(line[1]),
             "standard_error_kinds": {
                 name: "clustered by earthquake" if name in ("c0", "c1") else "bootstrap"
-                for name in labels
+                for name in names
             },
             "bootstrap": {
                 "standard_errors": spread,
@@ -113,9 +311,51 @@ def fit_wls(data: FitData, term: Term, *, seed: int) -> MethodResult:
             "variance_bins": int(bins.starts.size),
             "variance_floor_share": FLOOR_SHARE,
         },
-        warnings=tuple(_warnings(data, fit, x, names.size, unstable)),
+        warnings=tuple(_warnings(data, fit, x, len(others), unstable)),
         held_out=held_out,
     )
+
+
+def event_bootstrap(
+    bins: Bins,
+    y: FloatArray,
+    events: NDArray[np.intp],
+    degree: int,
+    start: FloatArray,
+    *,
+    replicates: int,
+    seed: int,
+) -> tuple[FloatArray, int]:
+    """Return parameters fitted to resampled earthquakes, shape (replicates, parameters).
+
+    A draw with fewer than six points, or with equal intensities, tells nothing about scatter and
+    is drawn again. The bins are kept.
+
+    Args:
+        bins: bins over the rising intensities.
+        y: critical toppling velocities [m/s].
+        events: number of each point's earthquake.
+        degree: degree of the variance polynomial.
+        start: parameters of the fit to all data.
+        replicates: how many resamples.
+        seed: seed of the random numbers.
+
+    Returns:
+        The parameters, and how many replicates did not become stable.
+    """
+    stable = []
+
+    def fit(times: FloatArray) -> FloatArray:
+        found = iterate(bins, y, times, degree, start)
+        stable.append(found.converged)
+        return found.parameters
+
+    def enough(times: FloatArray) -> bool:
+        drawn = bins.x[times > 0.0]
+        return drawn.size >= FEWEST_POINTS and float(np.ptp(drawn)) > 0.0
+
+    samples = bootstrap(events, fit, replicates=replicates, seed=seed, enough=enough)
+    return samples, stable.count(False)
 
 
 def _refuse_without_scatter(x: FloatArray, y: FloatArray) -> None:
@@ -127,57 +367,18 @@ def _refuse_without_scatter(x: FloatArray, y: FloatArray) -> None:
         )
 
 
-def _judged(
-    data: FitData,
-    seen: Outcomes,
-    bins: Bins,
-    y: FloatArray,
-    events: NDArray[np.intp],
-    names: NDArray[np.intp],
-    fit: LineFit,
-    term: Term,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    inside = _probability(fit.parameters, data.x, seen.y0_m_s)
-    held_out = inside.copy()
-    # An earthquake with censored points only has no share in the fit: it is held out already.
-    density = np.empty(y.size)
-    for number, name in enumerate(names.tolist()):
-        left_out = events == number
-        rest = (~left_out).astype(np.float64)
-        part = iterate(bins, y, rest, term.variance_degree, fit.parameters)
-        judged = data.event == name
-        held_out[judged] = _probability(part.parameters, data.x[judged], seen.y0_m_s[judged])
-        density[left_out] = _log_density(part.parameters, bins.x[left_out], y[left_out])
-    return inside, held_out, density
-
-
-def _scatter(data: FitData, parameters: tuple[float, ...]) -> dict[str, float] | None:
-    mean = mean_m_s(parameters, data.x)
-    used = data.found & (mean > 0.0) & (data.y > 0.0)
-    residual = np.log(data.y[used] / mean[used])
-    scatter = nested_scatter(residual, data.event[used], data.motion[used])
-    return None if scatter is None else vars(scatter)
-
-
-def _probability(parameters: FloatArray, x: FloatArray, y0: FloatArray) -> FloatArray:
-    from scipy.special import ndtr
-
-    z, _ = score(
-        tuple(parameters.tolist()), np.broadcast_to(x[:, None], y0.shape), y0, array_functions()
-    )
-    return np.asarray(ndtr(z), dtype=np.float64)
-
-
-def _log_density(parameters: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    values = tuple(parameters.tolist())
-    return scores.normal_log_density(y, mean_m_s(values, x), variance_m2_s2(values, x))
+def _log_density(b: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    parameters = b.tolist()
+    variance = variance_m2_s2(parameters, x)
+    squares = (y - mean_m_s(parameters, x)) ** 2 / variance
+    return np.asarray(-0.5 * (np.log(2.0 * np.pi * variance) + squares), dtype=np.float64)
 
 
 def _warnings(
     data: FitData, fit: LineFit, x: FloatArray, n_events: int, unstable: int
 ) -> list[str]:
     result = []
-    n_censored = int((~data.found).sum())
+    n_censored = int(data.censored.sum())
     if n_censored:
         result.append(
             f"{n_censored} combinations without a critical value above the search limit are left "
@@ -190,14 +391,11 @@ def _warnings(
             f"{unstable} of {REPLICATES} bootstrap fits did not become stable: the confidence "
             "intervals are rough"
         )
-    if n_events < FEW_EVENTS:
-        result.append(
-            f"only {n_events} earthquakes: standard errors clustered by earthquake are too small"
-        )
-    doubtful = negative_share(tuple(fit.parameters.tolist()), x, array_functions())
-    share = float(np.mean(doubtful > NEGATIVE_SHARE_LIMIT))
+    result += few_events(n_events)
+    doubtful = negative_share(fit.parameters.tolist(), x, arrays()) > NEGATIVE_SHARE_LIMIT
+    share = float(np.mean(doubtful))
     if share > 0.0:
-        low, high = x[doubtful > NEGATIVE_SHARE_LIMIT][[0, -1]]
+        low, high = x[doubtful][[0, -1]]
         result.append(
             f"for intensities of {low:.3g} to {high:.3g} m/s ({100 * share:.0f} % of the points) "
             f"the straight-line normal model gives more than {100 * NEGATIVE_SHARE_LIMIT:g} % "

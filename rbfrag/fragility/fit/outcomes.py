@@ -1,8 +1,8 @@
-"""The methods that fit what blocks did: `logistic`, `weibull`, `bounded`, `record`, `power`.
+"""Fits of what blocks did: the methods that read outcomes.
 
-A generalised linear model of binary outcomes on the grid of y0/PGV, which does not depend on
-the outcome. Every combination weighs the same, however many of its outcomes are known. Blocks
-that mechanics says cannot topple (k_r >= PGA, y >= 2 PGV, y >= X(p)) are not fitted: P is 0.
+A generalised linear model of binary outcomes on a grid that does not depend on the outcome. Every
+combination weighs the same, however many of its outcomes are known. Blocks that mechanics says
+cannot fail are not fitted: P is 0.
 """
 
 from __future__ import annotations
@@ -14,29 +14,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import FitError
-from rbfrag.fragility import formulas
-from rbfrag.fragility.fit.binomial import (
-    BinomialData,
+from rbfrag.fragility.fit.clusters import (
+    bootstrap,
     cr3,
     effective_freedom,
-    fit_by_statsmodels,
     jackknife_steps,
-    maximum_likelihood,
-    newton,
+    left_out,
 )
-from rbfrag.fragility.fit.data import FEW_EVENTS, FitData
-from rbfrag.fragility.fit.judgement import outcomes_of, score_intervals, scores_of
-from rbfrag.fragility.fit.links import COMPLEMENT, LOGIT, LOGLOG, Link
-from rbfrag.fragility.fit.method_result import MethodResult
-from rbfrag.fragility.fit.scatter import nested_scatter
+from rbfrag.fragility.fit.data import FitData
+from rbfrag.fragility.fit.likelihood import Binomial, fit_by_statsmodels, maximise, most_likely
+from rbfrag.fragility.fit.result import Estimates, MethodResult, method_result
 from rbfrag.fragility.measures import Term
+from rbfrag.fragility.methods import LOGLOG, Form, Method, arrays
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]
 
 REPLICATES = 200
 FEWEST_FAILURES = 20
-LINKS_BY_CODE = {link.code: link for link in (LOGIT, LOGLOG, COMPLEMENT)}
-"""The links by their numbers in the formulas."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,181 +40,170 @@ class OutcomeRows:
 
     Args:
         data: features, outcomes, weights and earthquakes.
-        place: flat index on the grid (n, 25) of each row.
+        place: flat index on the grid (n, m) of each row.
         bounded: whether mechanics forbids the block, on the grid.
-        bounded_toppled: known outcomes that toppled although mechanics forbids it (vertical
-            motion, which the bounds leave out).
+        bounded_failed: known outcomes that failed although mechanics forbids it (vertical motion,
+            which the bounds leave out).
     """
 
-    data: BinomialData
+    data: Binomial
     place: NDArray[np.intp]
     bounded: NDArray[np.bool_]
-    bounded_toppled: int
+    bounded_failed: int
+
+    def on_grid(self, b: FloatArray) -> FloatArray:
+        """Return P of every block of the grid, 0 where it is not among the rows."""
+        grid = np.zeros(self.bounded.shape)
+        grid.flat[self.place] = self.data.probability(b)
+        return grid
+
+    def held_out(self, b: FloatArray) -> FloatArray:
+        """Return the same, each earthquake predicted by the fit to the others."""
+        rows, grid = self.data, np.zeros(self.bounded.shape)
+        parameters = left_out(
+            rows.event, lambda rest: maximise(rows.only(rest), b, tolerance=1e-9)[0]
+        )
+        for event, others in parameters.items():
+            own = rows.event == event
+            grid.flat[self.place[own]] = rows.only(own).probability(others)
+        return grid
 
 
 def fit_outcomes(
-    data: FitData, term: Term, *, method: str, seed: int, estimate_m: bool = False
+    data: FitData, method: Method, term: Term, *, seed: int, estimate_m: bool = False
 ) -> MethodResult:
-    """Fit one of the methods above.
+    """Fit a method that reads outcomes.
 
     Args:
-        data: the points with their outcomes.
+        data: the rows.
+        method: the method.
         term: the intensity term.
-        method: name of the method.
         seed: seed of the bootstrap by earthquake.
-        estimate_m: give ln p a coefficient of its own (`logistic` only).
+        estimate_m: fit the method's exponent too.
 
     Raises:
-        FitError: no outcomes, outcomes all alike or separated, or too few failures.
+        FitError: outcomes all alike or separated, or too few failures.
     """
-    if not data.has_outcomes:
+    form, names = method.forms[term.name], parameter_names(method, term, estimate_m=estimate_m)
+    rows = outcome_rows(data, method, term, names)
+    failures = int((rows.data.outcome > 0.5).sum())
+    if 0 < failures < FEWEST_FAILURES:
         raise FitError(
-            f"method {method} fits what blocks did, and no outcomes are stored: run  rbfrag "
-            "simulate  again, which adds the maps of outcomes, or fit --method wls or lognormal"
-        )
-    shape, link = formulas.SHAPES[method, term.name], LINKS_BY_CODE[formulas.LINKS[method]]
-    names = formulas.PARAMETERS[shape][: None if shape != formulas.RATIO or estimate_m else 2]
-    rows = outcome_rows(data, shape, len(names))
-    toppled = int((rows.data.outcome > 0.5).sum())
-    if 0 < toppled < FEWEST_FAILURES:
-        raise FitError(
-            f"{toppled} outcomes on the grid toppled; a fit needs {FEWEST_FAILURES}: add stronger "
+            f"{failures} outcomes on the grid toppled; a fit needs {FEWEST_FAILURES}: add stronger "
             "motions or more block sizes (p²)"
         )
-    parameters, cr1, naive = fit_by_statsmodels(rows.data, link)
-    steps = jackknife_steps(rows.data, link, parameters)
-    covariance = cr3(steps)
-    in_sample = _on_grid(rows, link, parameters, data.topples.shape)
-    held_out = _held_out(rows, link, parameters, data.topples.shape)
-    samples = _bootstrap(rows.data, link, parameters, seed)
-    seen = outcomes_of(data)
-    errors = np.sqrt(np.diag(covariance))
-    median = median_y_m_s(shape, parameters, data)
-    residual = np.log(data.y[data.found]) - np.log(median[data.found])
-    usable = np.isfinite(residual)
-    scatter = nested_scatter(
-        residual[usable], data.event[data.found][usable], data.motion[data.found][usable]
-    )
-    return MethodResult(
-        coefficients=dict(zip(names, parameters.tolist(), strict=True)),
-        covariance=tuple(tuple(line) for line in covariance.tolist()),
-        standard_errors=dict(zip(names, errors.tolist(), strict=True)),
-        scores=scores_of(seen, in_sample, held_out),
+    b, cr1, naive = fit_by_statsmodels(rows.data)
+    steps = jackknife_steps(rows.data, b)
+
+    def resampled(times: FloatArray) -> FloatArray:
+        drawn = times > 0.0
+        return maximise(rows.data.only(drawn), b, times=times[drawn], tolerance=1e-7)[0]
+
+    samples = bootstrap(rows.data.event, resampled, replicates=REPLICATES, seed=seed)
+    estimates = Estimates(
+        names, b, cr3(steps), effective_freedom(steps), samples, seed,
+        {"cr1_standard_errors": np.sqrt(np.diag(cr1)),
+         "naive_standard_errors": np.sqrt(np.diag(naive))},
+    )  # fmt: skip
+    with np.errstate(invalid="ignore", divide="ignore"):
+        median = median_y_m_s(form, method, b, data)
+        residual = np.where(data.found, np.log(data.y) - np.log(median), np.nan)
+    return method_result(
+        data,
+        estimates,
+        rows.on_grid(b),
+        rows.held_out(b),
+        ln_residual=residual,
         details={
-            "link": link.name,
-            "degrees_of_freedom": effective_freedom(steps),
-            "judged_on": seen.kind,
-            "score_intervals": score_intervals(data, seen, held_out, seed=seed),
+            "link": method.link.name,
             "n_outcomes": int(rows.data.outcome.size),
-            "n_toppled": toppled,
+            "n_toppled": failures,
             "n_bounded": int(rows.bounded.sum()),
-            "n_bounded_toppled": rows.bounded_toppled,
-            "standard_error_kinds": dict.fromkeys(
-                names, "clustered by earthquake, CR3 (each earthquake left out in turn)"
-            ),
-            "cr1_standard_errors": dict(zip(names, np.sqrt(np.diag(cr1)).tolist(), strict=True)),
-            "naive_standard_errors": dict(
-                zip(names, np.sqrt(np.diag(naive)).tolist(), strict=True)
-            ),
-            "bootstrap": {
-                "standard_errors": dict(
-                    zip(names, samples.std(axis=0, ddof=1).tolist(), strict=True)
-                ),
-                "replicates": REPLICATES,
-                "seed": seed,
-            },
-            "natural": natural_parameters(shape, parameters, covariance),
-            "scatter_ln_y": None if scatter is None else vars(scatter),
+            "n_bounded_toppled": rows.bounded_failed,
+            "natural": natural_parameters(names, method, b, estimates.covariance),
         },
-        warnings=tuple(_warnings(data, rows, errors, samples)),
-        held_out=held_out,
+        warnings=_warnings(data, rows, estimates),
     )
 
 
 def fit_parameters(
-    data: FitData, term: Term, method: str
+    data: FitData, method: Method, term: Term
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray, int]:
     """Return names and values of the parameters, their covariance and its degrees of freedom.
 
     Raises:
         FitError: as for :func:`fit_outcomes`.
     """
-    if not data.has_outcomes:
-        raise FitError("no outcomes are stored")
-    shape, link = formulas.SHAPES[method, term.name], LINKS_BY_CODE[formulas.LINKS[method]]
-    names = formulas.PARAMETERS[shape]
-    rows = outcome_rows(data, shape, len(names))
-    parameters = maximum_likelihood(rows.data, link)
-    steps = jackknife_steps(rows.data, link, parameters)
-    return names, parameters, cr3(steps), effective_freedom(steps)
+    names = parameter_names(method, term)
+    rows = outcome_rows(data, method, term, names).data
+    b = most_likely(rows)
+    steps = jackknife_steps(rows, b)
+    return names, b, cr3(steps), effective_freedom(steps)
 
 
-def outcome_rows(data: FitData, shape: int, k: int) -> OutcomeRows:
+def parameter_names(method: Method, term: Term, *, estimate_m: bool = False) -> tuple[str, ...]:
+    """Return the names of the parameters that are fitted, in the order of the formula."""
+    names = method.forms[term.name].parameters
+    return tuple(name for name in names if estimate_m or name != method.exponent)
+
+
+def outcome_rows(data: FitData, method: Method, term: Term, names: tuple[str, ...]) -> OutcomeRows:
     """Return the known outcomes with their features.
 
     Args:
-        data: the points.
-        shape: formula of the model.
-        k: number of parameters.
+        data: the rows of the fit.
+        method: the method.
+        term: the intensity term.
+        names: names of the parameters that are fitted.
     """
-    from rbfrag.fragility.compiled_formulas import feature_rows
-
-    n, m = data.topples.shape
-    columns = [np.repeat(c, m) for c in (np.sqrt(data.p2), data.x, data.pga_g, data.tm_s)]
-    y = data.y0_m_s.ravel()
-    features, codes = np.empty((n * m, formulas.MOST_PARAMETERS)), np.empty(n * m, dtype=np.int64)
-    positive = (y > 0.0) & (columns[1] > 0.0) & (columns[2] > 0.0)
-    y = np.where(positive, y, 1.0)
-    columns[1], columns[2] = (np.where(positive, c, 1.0) for c in columns[1:3])
-    feature_rows(shape, y, *columns, features, codes)  # type: ignore[call-arg]
-    topples = data.topples.ravel()
-    known = np.isfinite(topples) & positive
-    used = np.flatnonzero(known & (codes == formulas.FREE) & np.isfinite(features).all(axis=1))
-    per_combination = known.reshape(n, m).sum(axis=1)
-    weights = np.repeat(m / np.maximum(per_combination, 1), m)
-    bounded = known & (codes != formulas.FREE)
-    return OutcomeRows(
-        BinomialData(
-            np.ascontiguousarray(features[used, :k]),
-            topples[used],
-            weights[used],
-            np.repeat(data.event, m)[used],
-        ),
-        used,
-        bounded.reshape(n, m),
-        int((topples[bounded] > 0.5).sum()),
+    form, shape = method.forms[term.name], data.failed.shape
+    positive = data.read & (data.grid("intensity_m_s") > 0.0) & (data.grid("pga_g") > 0.0)
+    known = positive & np.isfinite(data.failed)
+    bounded = np.zeros(shape, dtype=np.bool_)
+    for bound in form.bounds:
+        bounded |= np.broadcast_to(bound.holds(data.blocks), shape)
+    bounded &= known
+    place = np.flatnonzero(known & ~bounded)
+    values = {name: data.grid(name).ravel()[place] for name in data.blocks}
+    features = form.eta([0.0] * len(names), values, arrays()).slopes
+    columns = np.column_stack([np.broadcast_to(f, place.size) for f in features])
+    finite = np.isfinite(columns).all(axis=1)
+    place, columns = place[finite], columns[finite]
+    row = place // shape[1]
+    weights = data.read.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    failed = data.failed.ravel()[place]
+    rows = Binomial(
+        method.link, np.ascontiguousarray(columns), failed, weights[row], data.event[row]
     )
+    return OutcomeRows(rows, place, bounded, int((data.failed[bounded] > 0.5).sum()))
 
 
-def median_y_m_s(shape: int, parameters: FloatArray, data: FitData) -> FloatArray:
-    """Return the toppling velocity at which P = 1/2 for each point [m/s], by bisection."""
-    from rbfrag.fragility.compiled_formulas import probabilities
-
-    b = np.zeros(formulas.MOST_PARAMETERS)
-    b[: parameters.size] = parameters
-    link = next(v for key, v in formulas.LINKS.items() if (key, shape) in _METHOD_SHAPES)
-    p, out = np.sqrt(data.p2), np.empty(data.x.size)
-    low, high = np.full(out.size, -30.0), np.full(out.size, 10.0)
+def median_y_m_s(form: Form, method: Method, b: FloatArray, data: FitData) -> FloatArray:
+    """Return the toppling velocity at which P = 1/2 for each row [m/s], by bisection."""
+    ns, parameters = arrays(), b.tolist()
+    low, high = np.full(data.x.size, -30.0), np.full(data.x.size, 10.0)
     for _ in range(60):
         middle = 0.5 * (low + high)
-        probabilities(shape, link, b, np.exp(middle), p, data.x, data.pga_g, data.tm_s, out)
-        low, high = np.where(out >= 0.5, middle, low), np.where(out >= 0.5, high, middle)
+        y = np.exp(middle)
+        values = {**data.values, "y_m_s": y, "kr": y * data.values["p"] / STANDARD_GRAVITY_M_S2}
+        eta = form.eta(parameters, values, ns).eta
+        p = method.link.probability(np.clip(eta, -700.0, 700.0), ns)
+        for bound in form.bounds:
+            p = np.where(bound.holds(values), 0.0, p)
+        low, high = np.where(p >= 0.5, middle, low), np.where(p >= 0.5, high, middle)
     return np.asarray(np.exp(0.5 * (low + high)))
 
 
-_METHOD_SHAPES = {(method, shape) for (method, _), shape in formulas.SHAPES.items()}
-
-
 def natural_parameters(
-    shape: int, parameters: FloatArray, covariance: FloatArray
+    names: tuple[str, ...], method: Method, b: FloatArray, covariance: FloatArray
 ) -> dict[str, list[float]] | None:
     """Return median, exponents and shape of the Weibull forms as [value, standard error].
 
     P = exp(-ln 2 [odds/(median z^e zT^f)]^shape), odds = r/(1-r) (or y/2PGV for r).
     """
-    if shape not in (formulas.ODDS_PGV, formulas.ODDS_PGA, formulas.ODDS_TM):
+    if method.link != LOGLOG or not names[1].startswith("b_logit"):
         return None
-    b, k = parameters, parameters[1]
+    k = b[1]
     lift = b[0] + math.log(math.log(2.0))
     values = {
         "median": math.exp(lift / k),
@@ -239,61 +223,21 @@ def natural_parameters(
     }
 
 
-def _on_grid(
-    rows: OutcomeRows, link: Link, parameters: FloatArray, shape: tuple[int, ...]
-) -> FloatArray:
-    grid = np.zeros(shape)
-    grid.flat[rows.place] = link.probability(rows.data.columns @ parameters)
-    return grid
-
-
-def _held_out(
-    rows: OutcomeRows, link: Link, parameters: FloatArray, shape: tuple[int, ...]
-) -> FloatArray:
-    grid = np.zeros(shape)
-    for event in np.unique(rows.data.event):
-        own = rows.data.event == event
-        b, _ = newton(rows.data.only(~own), link, parameters, tolerance=1e-9)
-        grid.flat[rows.place[own]] = link.probability(rows.data.columns[own] @ b)
-    return grid
-
-
-def _bootstrap(data: BinomialData, link: Link, parameters: FloatArray, seed: int) -> FloatArray:
-    random = np.random.default_rng(seed)
-    events, number = np.unique(data.event, return_inverse=True)
-    samples = np.empty((REPLICATES, parameters.size))
-    for i in range(REPLICATES):
-        drawn = np.bincount(random.integers(events.size, size=events.size), minlength=events.size)
-        times = drawn[number]
-        chosen = times > 0
-        part = data.only(chosen)
-        samples[i], _ = newton(
-            part, link, parameters, weights=part.weights * times[chosen], tolerance=1e-7
-        )
-    return samples
-
-
-def _warnings(
-    data: FitData, rows: OutcomeRows, errors: FloatArray, samples: FloatArray
-) -> list[str]:
+def _warnings(data: FitData, rows: OutcomeRows, estimates: Estimates) -> list[str]:
     result = []
-    n_events = int(np.unique(rows.data.event).size)
-    if n_events < FEW_EVENTS:
+    if rows.bounded_failed:
         result.append(
-            f"only {n_events} earthquakes: standard errors clustered by earthquake are too small"
-        )
-    if rows.bounded_toppled:
-        result.append(
-            f"{rows.bounded_toppled} of {int(rows.bounded.sum())} blocks that cannot topple "
+            f"{rows.bounded_failed} of {int(rows.bounded.sum())} blocks that cannot topple "
             "without vertical motion did: the model gives them P = 0"
         )
-    unknown = ~np.isfinite(data.topples)
-    if unknown.any():
+    unknown = int((data.read & ~np.isfinite(data.failed)).sum())
+    if unknown:
         result.append(
-            f"{int(unknown.sum())} of {unknown.size} blocks of the grid lie below the search limit "
-            "or are undecided: they are left out, and each combination keeps its weight"
+            f"{unknown} of {int(data.read.sum())} blocks of the grid have no outcome (not stored, "
+            "or closer to critical than the error of a run): they are left out, and each "
+            "combination keeps its weight"
         )
-    if (samples.std(axis=0, ddof=1) > 2.0 * errors).any():
+    if (estimates.samples.std(axis=0, ddof=1) > 2.0 * estimates.errors).any():
         result.append(
             "the bootstrap by earthquake scatters more than twice as much as the clustered errors "
             "say: a few earthquakes decide this fit"

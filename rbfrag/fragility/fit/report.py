@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
+import numpy as np
+
+from rbfrag.db.rows import CombinationTable
+from rbfrag.fragility.fit.line import clustered_line
+from rbfrag.fragility.measures import SINGLE_TERMS, TERMS
 from rbfrag.fragility.model import FragilityModel
 
 _FIELDS = ("standard_errors", "n", "n_censored", "events", "scores", "warnings")
@@ -17,13 +23,13 @@ class FitReport:
 
     Args:
         name: unique name of the model.
+        kind: response kind.
         term: intensity term.
         method: how it was fitted.
         coefficients: value of each parameter by name.
         standard_errors: standard error of each parameter by name.
         n: number of critical values that were fitted.
-        n_censored: number of combinations left out because their critical value lies below
-            the search limit.
+        n_censored: number of combinations whose critical value lies below the search limit.
         events: number of earthquakes.
         scores: how well the model predicts; ``held_out`` leaves whole earthquakes out.
         warnings: sentences for people.
@@ -32,6 +38,7 @@ class FitReport:
     """
 
     name: str
+    kind: str
     term: str
     method: str
     coefficients: Mapping[str, float]
@@ -51,6 +58,7 @@ class FitReport:
         told = cast("Mapping[str, Any]", row.diagnostics)
         return cls(
             name=row.name,
+            kind=row.kind,
             term=row.term,
             method=row.method,
             coefficients=dict(row.coefficients),
@@ -69,6 +77,7 @@ class FitReport:
         row = self.model.row
         return {
             "name": self.name,
+            "kind": self.kind,
             "term": self.term,
             "method": self.method,
             "meaning": self.model.meaning,
@@ -86,3 +95,76 @@ class FitReport:
             "is_default": row.is_default,
             "created": row.created,
         }
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """k_r/PGA = C (ω_m/p)^(-M), fitted by least squares of the logarithms.
+
+    Args:
+        exponent_m: M.
+        exponent_m_se: its standard error, clustered by earthquake.
+        constant_c: C.
+        n: number of critical values.
+    """
+
+    exponent_m: float
+    exponent_m_se: float
+    constant_c: float
+    n: int
+
+
+def power_law(table: CombinationTable) -> PowerLaw | None:
+    """Fit equation (4.28): M is the slope of ln(k_r/PGA) on -ln(ω_m/p).
+
+    Args:
+        table: critical values; all that were found and have a mean period are used.
+
+    Returns:
+        None when there are too few points or earthquakes, or all ω_m/p are equal.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x = -np.log(2.0 * math.pi / table.tm_s / np.sqrt(table.p2))
+        y = np.log(table.kr_over_pga)
+    used = (table.status == "found") & np.isfinite(x) & np.isfinite(y)
+    _, events = np.unique(table.event_id[used].astype(str), return_inverse=True)
+    if used.sum() < 3 or events.max() < 1 or np.ptp(x[used]) == 0.0:
+        return None
+    line, covariance, _ = clustered_line(
+        x[used], y[used], np.ones(int(used.sum())), events.astype(np.intp)
+    )
+    return PowerLaw(
+        exponent_m=float(line[1]),
+        exponent_m_se=math.sqrt(covariance[1, 1]),
+        constant_c=math.exp(line[0]),
+        n=int(used.sum()),
+    )
+
+
+def log_correlations(table: CombinationTable) -> dict[str, float]:
+    """Return the correlation of ln y with ln x for each single term, the strongest first.
+
+    All terms are judged on the same points: those for which every term is defined. A term
+    without variation is left out.
+    """
+    found = table.status == "found"
+    columns = {
+        name: np.asarray(
+            TERMS[name].intensity_m_s({key: getattr(table, key) for key in TERMS[name].inputs}),
+            dtype=np.float64,
+        )
+        for name in SINGLE_TERMS
+    }
+    with np.errstate(invalid="ignore"):
+        used = found & (table.y_m_s > 0.0)
+        for values in columns.values():
+            used &= np.isfinite(values) & (values > 0.0)
+    ln_y = np.log(table.y_m_s[used])
+    if ln_y.size < 3 or np.ptp(ln_y) == 0.0:
+        return {}
+    result = {}
+    for name, values in columns.items():
+        ln_x = np.log(values[used])
+        if np.ptp(ln_x) > 0.0:
+            result[name] = float(np.corrcoef(ln_x, ln_y)[0, 1])
+    return dict(sorted(result.items(), key=lambda item: -item[1]))

@@ -1,55 +1,74 @@
-"""How well a model predicts the outcomes of blocks on a fixed grid of y0/PGV.
+"""How well a model predicts what blocks did, on a grid that does not depend on the outcome.
 
-Where the certified maps of outcomes are stored, the outcome is what the block at y0 does.
-Otherwise it is "the critical velocity is at least y0", which does not see the safe islands
-below the critical value; a censored combination then counts where its limit decides.
+Where outcomes are stored, they are what it is judged on. Otherwise the outcome is "the critical
+value is at least the block's", which does not see the safe islands below the critical value; a
+censored combination then counts where its limit decides.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-
-GRID_OF_Y0_OVER_PGV = np.geomspace(0.1, 4.0, 25)
-"""Blocks that a prediction is judged on, as y0/PGV."""
+Known = NDArray[np.bool_]
 
 CLIP = 1e-4
 """Probabilities are clipped to this distance from 0 and 1 before the logarithm."""
 
+RESAMPLES = 1000
 
-def critical_outcomes(
-    y: FloatArray, found: NDArray[np.bool_], pgv_m_s: FloatArray
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """Return the grid of y0 [m/s], the outcomes 0 or 1, and where they are known.
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """The blocks that a fit is judged on.
 
     Args:
-        y: critical velocity [m/s], for censored points the value it lies below, shape (n,).
-        found: False for censored points, shape (n,).
-        pgv_m_s: peak ground velocity [m/s], shape (n,).
-
-    Returns:
-        Three arrays of shape (n, 25).
+        failed: 0 or 1, shape (n, m).
+        known: where the outcome is known.
+        event: number of each row's earthquake, shape (n,).
+        words: where the outcomes come from.
     """
-    y0 = pgv_m_s[:, None] * GRID_OF_Y0_OVER_PGV
-    reached = y[:, None] >= y0
-    known = (found[:, None] | ~reached) & (y0 > 0.0)
-    return y0, (reached & found[:, None]).astype(np.float64), known
+
+    failed: FloatArray
+    known: Known
+    event: NDArray[np.intp]
+    words: str
 
 
-def log_loss(probability: FloatArray, outcome: FloatArray, known: NDArray[np.bool_]) -> float:
+def critical_outcomes(
+    critical: FloatArray, found: Known, strength: FloatArray
+) -> tuple[FloatArray, Known]:
+    """Return the outcomes that critical values give, 0 or 1, and where they are known.
+
+    Args:
+        critical: critical strength, for censored points the value it lies below, shape (n,).
+        found: False for censored points, shape (n,).
+        strength: of the blocks, shape (n, m).
+    """
+    reached = critical[:, None] >= strength
+    known = (found[:, None] | ~reached) & (strength > 0.0)
+    return (reached & found[:, None]).astype(np.float64), known
+
+
+def log_loss(probability: FloatArray, outcome: FloatArray, known: Known) -> float:
     """Return the mean log loss of the known outcomes."""
     p = np.clip(probability[known], CLIP, 1.0 - CLIP)
     hit = outcome[known] > 0.0
     return float(-np.mean(np.log(np.where(hit, p, 1.0 - p))))
 
 
-def brier(probability: FloatArray, outcome: FloatArray, known: NDArray[np.bool_]) -> float:
+def brier(probability: FloatArray, outcome: FloatArray, known: Known) -> float:
     """Return the Brier score, the mean squared error of the probability."""
     return float(np.mean((probability[known] - outcome[known]) ** 2))
+
+
+def sharpness(probability: FloatArray, known: Known) -> float:
+    """Return the mean of P (1 - P): what the Brier score would be of a calibrated model."""
+    return float(np.mean(probability[known] * (1.0 - probability[known])))
 
 
 @dataclass(frozen=True)
@@ -68,7 +87,7 @@ class Calibration:
 def calibration(
     probability: FloatArray,
     outcome: FloatArray,
-    known: NDArray[np.bool_],
+    known: Known,
     weights: FloatArray | None = None,
 ) -> Calibration:
     """Return intercept and slope of the outcomes on the clipped logit of the probability.
@@ -79,56 +98,196 @@ def calibration(
         known: where the outcome is known.
         weights: weight of each element, same shape; None for equal ones.
     """
+    from rbfrag.fragility.fit.likelihood import Binomial, maximise
+    from rbfrag.fragility.methods import LOGIT
+
     p = np.clip(probability[known], CLIP, 1.0 - CLIP)
     x, t = np.log(p / (1.0 - p)), outcome[known]
     w = np.ones(x.size) if weights is None else weights[known]
     if not 0.0 < w @ t < w.sum() or np.ptp(x) == 0.0:
         return Calibration(np.nan, np.nan)
-    b = np.array([0.0, 1.0])
-    loss = _logistic_loss(b, x, t, w)
-    for _ in range(50):
-        fitted = 0.5 * (1.0 + np.tanh(0.5 * (b[0] + b[1] * x)))
-        v = w * fitted * (1.0 - fitted)
-        r = w * (t - fitted)
-        information = np.array([[v.sum(), v @ x], [v @ x, v @ (x * x)]])
-        step = np.linalg.lstsq(information, np.array([r.sum(), r @ x]), rcond=None)[0]
-        # where most probabilities are clipped a whole step may go too far and never come back
-        for _ in range(30):
-            reached = _logistic_loss(b + step, x, t, w)
-            if reached <= loss * (1.0 + 1e-14):
-                break
-            step = 0.5 * step
-        b, loss = b + step, reached
-        if np.abs(step).max() < 1e-12:
-            break
+    columns = np.column_stack([np.ones(x.size), x])
+    rows = Binomial(LOGIT, columns, t, w, np.zeros(x.size, dtype=np.intp))
+    b, _ = maximise(rows, np.array([0.0, 1.0]), tolerance=1e-15)
     return Calibration(float(b[0]), float(b[1]))
 
 
-def _logistic_loss(b: FloatArray, x: FloatArray, t: FloatArray, w: FloatArray) -> float:
-    eta = b[0] + b[1] * x
-    return float(w @ (np.logaddexp(0.0, eta) - t * eta))
+def scores_of(judged: Judged, in_sample: FloatArray, held_out: FloatArray) -> dict[str, float]:
+    """Return the scores of a report.
+
+    Args:
+        judged: the outcomes.
+        in_sample: probabilities by the fit to all data, shape (n, m).
+        held_out: probabilities by fits without the earthquake concerned.
+    """
+    failed, known = judged.failed, judged.known
+    line = calibration(held_out, failed, known)
+    result = {
+        "log_loss_in_sample": log_loss(in_sample, failed, known),
+        "log_loss_held_out": log_loss(held_out, failed, known),
+        "brier_in_sample": brier(in_sample, failed, known),
+        "brier_held_out": brier(held_out, failed, known),
+        "calibration_slope_held_out": line.slope,
+        "calibration_intercept_held_out": line.intercept,
+        "sharpness_held_out": sharpness(held_out, known),
+    }
+    return {name: value for name, value in result.items() if np.isfinite(value)}
 
 
-def sharpness(probability: FloatArray, known: NDArray[np.bool_]) -> float:
-    """Return the mean of P (1 - P): what the Brier score would be of a calibrated model."""
-    return float(np.mean(probability[known] * (1.0 - probability[known])))
+def score_intervals(judged: Judged, held_out: FloatArray, *, seed: int) -> dict[str, list[float]]:
+    """Return 95 % intervals of the mean held-out scores, by resampling whole earthquakes."""
+    random = np.random.default_rng(seed)
+    g = int(judged.event.max()) + 1
+    drawn = random.multinomial(g, np.full(g, 1.0 / g), size=RESAMPLES).astype(np.float64)
+    count = np.bincount(judged.event, judged.known.sum(axis=1), minlength=g)
+    p = np.clip(held_out, CLIP, 1.0 - CLIP)
+    losses = {
+        "log_loss_held_out": -np.where(judged.failed > 0.5, np.log(p), np.log1p(-p)),
+        "brier_held_out": (held_out - judged.failed) ** 2,
+    }
+    result = {}
+    for name, loss in losses.items():
+        lost = np.where(judged.known, loss, 0.0).sum(axis=1)
+        means = (drawn @ np.bincount(judged.event, lost, minlength=g)) / np.maximum(
+            drawn @ count, 1.0
+        )
+        result[name] = [float(v) for v in np.quantile(means, [0.025, 0.975])]
+    return result
 
 
-def calibration_curve(
-    probability: FloatArray, outcome: FloatArray, known: NDArray[np.bool_]
-) -> list[tuple[float, float, int]]:
-    """Return mean probability, share that toppled and count in ten classes of probability."""
-    p, t = probability[known], outcome[known]
-    number = np.minimum((p * 10.0).astype(np.intp), 9)
-    return [
-        (float(p[number == i].mean()), float(t[number == i].mean()), int((number == i).sum()))
-        for i in range(10)
-        if (number == i).any()
-    ]
+EDGES = np.array([0.0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0])
+"""Edges of the bins of predicted probability."""
+
+REPLICATIONS = 500
+FEWEST_BLOCKS = 20
 
 
-def normal_log_density(y: FloatArray, mean: FloatArray, variance: FloatArray) -> FloatArray:
-    """Return the logarithm of the normal density of each y."""
-    return np.asarray(
-        -0.5 * (np.log(2.0 * np.pi * variance) + (y - mean) ** 2 / variance), dtype=np.float64
+@dataclass(frozen=True, eq=False)
+class CalibrationBins:
+    """What a model predicted for earthquakes it had not seen, and what happened.
+
+    Args:
+        predicted: mean predicted probability of each bin, shape (m,).
+        observed: share that failed, shape (m,).
+        low: lower end of its 95 % interval, whole earthquakes drawn with replacement.
+        high: upper end of it.
+        blocks: number of blocks in the bin.
+        events: number of earthquakes they are from.
+    """
+
+    predicted: FloatArray
+    observed: FloatArray
+    low: FloatArray
+    high: FloatArray
+    blocks: NDArray[np.intp]
+    events: int
+
+
+def calibration_bins(judged: Judged, held_out: FloatArray, *, seed: int = 0) -> CalibrationBins:
+    """Sort the blocks of known outcome by the probability that held-out fits gave them.
+
+    Args:
+        judged: outcomes of the blocks.
+        held_out: probabilities by fits without the earthquake concerned, shape (n, m).
+        seed: of the draws.
+
+    Bins with fewer than 20 blocks are left out.
+    """
+    used = judged.known & np.isfinite(held_out)
+    event = np.broadcast_to(judged.event[:, None], held_out.shape)[used]
+    p, failed = held_out[used], judged.failed[used]
+    number = np.clip(np.searchsorted(EDGES, p, side="right") - 1, 0, EDGES.size - 2)
+    events, which = np.unique(event, return_inverse=True)
+    shape = (events.size, EDGES.size - 1)
+    cell = which * shape[1] + number
+
+    def table(weights: FloatArray | None) -> FloatArray:
+        counted = np.bincount(cell, weights, minlength=shape[0] * shape[1])
+        return counted.reshape(shape).astype(np.float64)
+
+    count, failures, expected = table(None), table(failed), table(p)
+
+    def share(chosen: NDArray[np.int64]) -> FloatArray:
+        total = count[chosen].sum(axis=0)
+        none = np.full(total.shape, np.nan)
+        found: FloatArray = np.divide(
+            failures[chosen].sum(axis=0), total, out=none, where=total > 0
+        )
+        return found
+
+    rng = np.random.default_rng(seed)
+    draws = [share(rng.integers(events.size, size=events.size)) for _ in range(REPLICATIONS)]
+    total = count.sum(axis=0)
+    kept = total >= FEWEST_BLOCKS
+    low, high = np.nanquantile(np.array(draws)[:, kept], (0.025, 0.975), axis=0)
+    return CalibrationBins(
+        predicted=expected.sum(axis=0)[kept] / total[kept],
+        observed=failures.sum(axis=0)[kept] / total[kept],
+        low=low,
+        high=high,
+        blocks=total[kept].astype(np.intp),
+        events=int(events.size),
+    )
+
+
+@dataclass(frozen=True)
+class NestedScatter:
+    """Standard deviations of ln y about a model's median.
+
+    Args:
+        total: of all residuals.
+        between_events: of the part that an earthquake's points share.
+        between_motions: of the part that a motion's points share, beyond the earthquake.
+        within_motion: of the rest: polarity and block size.
+    """
+
+    total: float
+    between_events: float
+    between_motions: float
+    within_motion: float
+
+
+def nested_scatter(
+    residual: FloatArray, event: NDArray[np.intp], motion: NDArray[np.int64]
+) -> NestedScatter | None:
+    """Split residuals by the analysis of variance of unbalanced nested classes.
+
+    Mean squares are equated to their expectations (Searle, Casella and McCulloch 1992,
+    section 3.6); a negative component is zero.
+
+    Args:
+        residual: ln y less its median, shape (n,).
+        event: number of the earthquake, shape (n,).
+        motion: number of the motion, each in one earthquake, shape (n,).
+
+    Returns:
+        None without two earthquakes, a second motion in one, and a second point in a motion.
+    """
+    n = residual.size
+    motions, inverse = np.unique(motion, return_inverse=True)
+    owner = np.zeros(motions.size, dtype=np.intp)
+    owner[inverse] = event
+    events, owner = np.unique(owner, return_inverse=True)
+    per_motion = np.bincount(inverse).astype(np.float64)
+    per_event = np.bincount(owner, per_motion)
+    a, m = events.size, motions.size
+    if a < 2 or m <= a or n <= m:
+        return None
+    sum_motion = np.bincount(inverse, residual)
+    sum_event = np.bincount(owner, sum_motion)
+    of_all = residual.sum() ** 2 / n
+    of_events = (sum_event**2 / per_event).sum()
+    of_motions = (sum_motion**2 / per_motion).sum()
+    within = ((residual**2).sum() - of_motions) / (n - m)
+    squares_by_event = np.bincount(owner, per_motion**2) / per_event
+    k1 = (n - squares_by_event.sum()) / (m - a)
+    k2 = (squares_by_event.sum() - (per_motion**2).sum() / n) / (a - 1)
+    k3 = (n - (per_event**2).sum() / n) / (a - 1)
+    of_motion = max(((of_motions - of_events) / (m - a) - within) / k1, 0.0)
+    of_event = max(((of_events - of_all) / (a - 1) - within - k2 * of_motion) / k3, 0.0)
+    return NestedScatter(
+        total=float(residual.std(ddof=1)),
+        between_events=math.sqrt(of_event),
+        between_motions=math.sqrt(of_motion),
+        within_motion=math.sqrt(max(within, 0.0)),
     )

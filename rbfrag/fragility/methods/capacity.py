@@ -80,6 +80,6 @@ METHOD = Method(
     },
     reads="critical",
     meaning="probability that the block slumps past recovery, or by the rotation asked for",
-    fit="rbfrag.fragility.fit.kind_fitting:fit_kind",
+    fit="rbfrag.fragility.fit.critical:fit_censored",
     failure=_failure,
 )

@@ -109,7 +109,7 @@ METHOD = Method(
     },
     reads="critical",
     meaning="probability that the block slides further than the displacement",
-    fit="rbfrag.fragility.fit.kind_fitting:fit_kind",
+    fit="rbfrag.fragility.fit.critical:fit_censored",
     failure=lambda asked, _: f"permanent displacement above {asked['displacement_m']:g} m",
     median_of="displacement_m",
 )  # fmt: skip

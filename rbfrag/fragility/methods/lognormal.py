@@ -42,6 +42,6 @@ METHOD = Method(
     forms=dict.fromkeys(("pgv", "pga_tm", "pgd_tm", "xp"), _FORM),
     reads="critical",
     meaning=OF_CRITICAL,
-    fit="rbfrag.fragility.fit.lognormal:fit_lognormal",
+    fit="rbfrag.fragility.fit.critical:fit_lognormal",
     exponent="m_minus_1",
 )

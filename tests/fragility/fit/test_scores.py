@@ -1,3 +1,7 @@
+"""Scores by hand, bins of calibration that add up, scatter against drawn data."""
+
+from __future__ import annotations
+
 import math
 
 import numpy as np
@@ -5,19 +9,22 @@ import pytest
 
 from rbfrag.fragility.fit.scores import (
     CLIP,
+    EDGES,
+    Judged,
     brier,
     calibration,
+    calibration_bins,
     critical_outcomes,
     log_loss,
-    normal_log_density,
+    nested_scatter,
 )
 
 
 def test_outcomes_of_found_and_censored_points():
     y = np.array([0.5, 0.05, np.nan])
     found = np.array([True, False, True])
-    y0, outcome, known = critical_outcomes(y, found, np.array([1.0, 0.2, np.nan]))
-    assert y0.shape == (3, 25)
+    y0 = np.array([[1.0], [0.2], [np.nan]]) * np.geomspace(0.1, 4.0, 25)
+    outcome, known = critical_outcomes(y, found, y0)
     assert np.array_equal(outcome[0], (y0[0] <= 0.5).astype(float))
     assert known[0].all()
     # The censored value lies below 0.05: blocks above are safe, of those below nothing is known.
@@ -38,12 +45,6 @@ def test_scores_by_hand():
     )
 
 
-def test_normal_density():
-    density = np.exp(normal_log_density(np.linspace(-4, 6, 2001), np.array(1.0), np.array(0.25)))
-    assert density.sum() * 0.005 == pytest.approx(1.0, abs=1e-9)
-    assert density.max() == pytest.approx(1 / math.sqrt(2 * math.pi * 0.25))
-
-
 @pytest.mark.parametrize("between", [0, 5, 50])
 def test_calibration_of_a_model_that_is_far_too_sure(between):
     from scipy.optimize import minimize
@@ -62,3 +63,91 @@ def test_calibration_of_a_model_that_is_far_too_sure(between):
     best = minimize(loss, [0.0, 0.3], method="BFGS", tol=1e-10)
     assert loss([found.intercept, found.slope]) <= best.fun + 1e-9
     assert (found.intercept, found.slope) == pytest.approx(best.x, abs=1e-4)
+
+
+def blocks(seed: int = 0, n: int = 2000, events: int = 40) -> tuple[Judged, np.ndarray]:
+    """Blocks that topple with exactly the probability that was predicted."""
+    rng = np.random.default_rng(seed)
+    p = rng.uniform(size=(n, 25))
+    toppled = (rng.uniform(size=p.shape) < p).astype(float)
+    return Judged(toppled, np.ones(p.shape, dtype=bool), np.arange(n) % events, "made up"), p
+
+
+def test_a_calibrated_model_lies_on_the_diagonal() -> None:
+    seen, p = blocks()
+    bins = calibration_bins(seen, p)
+    assert bins.blocks.sum() == p.size
+    assert bins.events == 40
+    assert bins.predicted.size == EDGES.size - 1
+    assert (np.diff(bins.predicted) > 0.0).all()
+    np.testing.assert_allclose(bins.observed, bins.predicted, atol=0.02)
+    assert ((bins.low <= bins.observed) & (bins.observed <= bins.high)).all()
+    inside = (bins.low <= bins.predicted) & (bins.predicted <= bins.high)
+    assert inside.mean() > 0.7
+
+
+def test_an_over_confident_model_does_not() -> None:
+    seen, p = blocks()
+    logit = np.log(p / (1.0 - p))
+    bins = calibration_bins(seen, 1.0 / (1.0 + np.exp(-3.0 * logit)))
+    low = bins.predicted < 0.3
+    assert (bins.observed[low] > bins.predicted[low]).all()
+
+
+def test_unknown_outcomes_do_not_count() -> None:
+    seen, p = blocks(n=400)
+    known = np.zeros(p.shape, dtype=bool)
+    known[:, 3] = True
+    bins = calibration_bins(Judged(seen.failed, known, seen.event, ""), p)
+    held = np.histogram(p[:, 3], EDGES)[0]
+    assert bins.blocks.sum() == held[held >= 20].sum()
+
+
+def test_intervals_are_wider_where_earthquakes_differ() -> None:
+    seen, p = blocks()
+    same = calibration_bins(seen, p)
+    rng = np.random.default_rng(1)
+    shift = rng.normal(size=40)[np.arange(2000) % 40][:, None]
+    real = 1.0 / (1.0 + np.exp(-(np.log(p / (1.0 - p)) + shift)))
+    toppled = (rng.uniform(size=p.shape) < real).astype(float)
+    apart = calibration_bins(Judged(toppled, seen.known, seen.event, ""), p)
+    middle = slice(4, 9)
+    assert ((apart.high - apart.low) > 2.0 * (same.high - same.low))[middle].all()
+    assert calibration_bins(seen, p).low == pytest.approx(same.low)
+
+
+def residuals(events, motions, points, sd, seed=1):
+    random = np.random.default_rng(seed)
+    motion = np.repeat(np.arange(events * motions), points)
+    event = motion // motions
+    residual = (
+        sd[0] * random.normal(size=events)[event]
+        + sd[1] * random.normal(size=events * motions)[motion]
+        + sd[2] * random.normal(size=motion.size)
+    )
+    return residual, event, motion
+
+
+def test_known_parts_come_back():
+    found = nested_scatter(*residuals(400, 4, 6, (0.08, 0.11, 0.25)))
+    assert found.between_events == pytest.approx(0.08, rel=0.2)
+    assert found.between_motions == pytest.approx(0.11, rel=0.1)
+    assert found.within_motion == pytest.approx(0.25, rel=0.02)
+    assert found.total == pytest.approx(np.hypot(np.hypot(0.08, 0.11), 0.25), rel=0.05)
+
+
+def test_balanced_data_agree_with_the_textbook_table():
+    residual, event, motion = residuals(6, 3, 4, (0.5, 0.3, 0.2))
+    y = residual.reshape(6, 3, 4)
+    within = y.var(axis=2, ddof=1).mean()
+    of_motions = 4 * y.mean(axis=2).var(axis=1, ddof=1).mean()
+    of_events = 12 * y.mean(axis=(1, 2)).var(ddof=1)
+    found = nested_scatter(residual, event, motion)
+    assert found.within_motion**2 == pytest.approx(within)
+    assert found.between_motions**2 == pytest.approx(max((of_motions - within) / 4, 0))
+    assert found.between_events**2 == pytest.approx(max((of_events - of_motions) / 12, 0))
+
+
+def test_data_without_nesting_have_no_split():
+    assert nested_scatter(np.ones(4), np.arange(4), np.arange(4)) is None
+    assert nested_scatter(np.ones(4), np.zeros(4, int), np.arange(4)) is None

@@ -6,17 +6,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from rbfrag.fragility.fit.binomial import (
-    BinomialData,
-    effective_freedom,
+from rbfrag.fragility.fit.clusters import cr3, effective_freedom, jackknife_steps, sandwich
+from rbfrag.fragility.fit.likelihood import (
+    LINKS,
+    Binomial,
     fit_by_statsmodels,
-    jackknife_covariance,
-    maximum_likelihood,
-    newton,
+    maximise,
+    most_likely,
 )
-from rbfrag.fragility.fit.links import COMPLEMENT, LOGIT, LOGLOG
+from rbfrag.fragility.methods import COMPLEMENT, LOGIT, LOGLOG, arrays
 
-LINKS = [LOGIT, LOGLOG, COMPLEMENT]
+ALL = [LOGIT, LOGLOG, COMPLEMENT]
 
 
 def drawn(link, seed=1, events=20, each=30):
@@ -24,12 +24,12 @@ def drawn(link, seed=1, events=20, each=30):
     event = np.repeat(np.arange(events), each)
     x = np.column_stack([np.ones(event.size), random.uniform(0.0, 1.0, (event.size, 2))])
     eta = x @ [0.3, 1.1, 0.5] + (0.3 * random.normal(size=events)[event] if link is LOGIT else 0.0)
-    outcome = (random.random(event.size) < link.probability(eta)).astype(float)
-    return BinomialData(x, outcome, random.uniform(0.5, 2.0, event.size), event)
+    outcome = (random.random(event.size) < link.probability(eta, arrays())).astype(float)
+    return Binomial(link, x, outcome, random.uniform(0.5, 2.0, event.size), event)
 
 
 def loss(b, data, link):
-    p = link.probability(data.columns @ b)
+    p = link.probability(data.columns @ b, arrays())
     if not np.all((p > 0) & (p < 1)):
         return np.inf
     return -(data.weights * np.where(data.outcome > 0.5, np.log(p), np.log(1 - p))).sum()
@@ -43,7 +43,7 @@ def numeric_scores(b, data, link, step=1e-5):
         for sign in (1, -1):
             moved = b.copy()
             moved[j] += sign * step
-            p = link.probability(data.columns @ moved)
+            p = link.probability(data.columns @ moved, arrays())
             ends.append(data.weights * np.where(data.outcome > 0.5, np.log(p), np.log(1 - p)))
         result[:, j] = (ends[0] - ends[1]) / (2 * step)
     return result
@@ -62,14 +62,14 @@ def observed_information(b, data, link, step=1e-4):
     ])  # fmt: skip
 
 
-@pytest.mark.parametrize("link", LINKS, ids=lambda link: link.name)
+@pytest.mark.parametrize("link", ALL, ids=lambda link: link.name)
 def test_estimates_and_errors_equal_an_independent_computation(link):
     data = drawn(link)
-    b, covariance, naive = fit_by_statsmodels(data, link)
+    b, covariance, naive = fit_by_statsmodels(data)
     free = minimize(loss, b * 1.01, args=(data, link), method="Nelder-Mead",
                     options={"xatol": 1e-12, "fatol": 1e-14, "maxiter": 20000})  # fmt: skip
     assert b == pytest.approx(free.x, rel=2e-7)
-    own = maximum_likelihood(data, link)
+    own = most_likely(data)
     assert own == pytest.approx(b, rel=1e-8 if link is LOGIT else 2e-6)
     scores = numeric_scores(b, data, link)
     assert np.abs(scores.sum(axis=0)).max() < 1e-5 * np.abs(scores).sum()
@@ -87,7 +87,7 @@ def test_estimates_and_errors_equal_an_independent_computation(link):
 
 def test_clustered_errors_of_the_logit_in_matrices_to_eight_digits():
     data = drawn(LOGIT, seed=3)
-    b, covariance, _ = fit_by_statsmodels(data, LOGIT)
+    b, covariance, _ = fit_by_statsmodels(data)
     p = 1 / (1 + np.exp(-data.columns @ b))
     x, w = data.columns, data.weights
     bread = np.linalg.inv(x.T @ np.diag(w * p * (1 - p)) @ x)
@@ -99,17 +99,18 @@ def test_clustered_errors_of_the_logit_in_matrices_to_eight_digits():
         meat += np.outer(score, score)
     expected = bread @ meat @ bread * 20 / 19 * 599 / 597
     assert np.abs(covariance / expected - 1).max() < 1e-8
+    cr1, naive = sandwich(data, b)
+    assert cr1 == pytest.approx(expected, rel=1e-8)
+    assert naive == pytest.approx(bread, rel=1e-8)
 
 
-@pytest.mark.parametrize("link", LINKS, ids=lambda link: link.name)
+@pytest.mark.parametrize("link", ALL, ids=lambda link: link.name)
 def test_the_jackknife_is_that_of_left_out_earthquakes(link):
     data = drawn(link, events=30, each=60)
-    b = maximum_likelihood(data, link)
-    steps = np.array([newton(data.only(data.event != e), link, b)[0] - b for e in range(30)])
+    b = most_likely(data)
+    steps = np.array([maximise(data.only(data.event != e), b)[0] - b for e in range(30)])
     expected = 29 / 30 * steps.T @ steps
-    assert np.diag(jackknife_covariance(data, link, b)) == pytest.approx(
-        np.diag(expected), rel=0.15
-    )
+    assert np.diag(cr3(jackknife_steps(data, b))) == pytest.approx(np.diag(expected), rel=0.15)
 
 
 def test_a_published_logistic_regression():
@@ -120,10 +121,10 @@ def test_a_published_logistic_regression():
 
     loaded = spector.load_pandas()
     columns = np.column_stack([np.ones(32), loaded.exog.to_numpy()])
-    data = BinomialData(columns, loaded.endog.to_numpy(), np.ones(32), np.arange(32))
-    b = maximum_likelihood(data, LOGIT)
+    data = Binomial(LOGIT, columns, loaded.endog.to_numpy(), np.ones(32), np.arange(32))
+    b = most_likely(data)
     assert [round(v, 3) for v in b.tolist()] == [-13.021, 2.826, 0.095, 2.379]
-    _, _, naive = fit_by_statsmodels(data, LOGIT)
+    _, _, naive = fit_by_statsmodels(data)
     errors = [round(v, 3) for v in np.sqrt(np.diag(naive)).tolist()]
     assert errors == [4.931, 1.263, 0.142, 1.065]
 
@@ -131,14 +132,14 @@ def test_a_published_logistic_regression():
 @settings(max_examples=50, deadline=None)
 @given(st.floats(-6, 6))
 def test_slopes_and_inverses_of_the_links(eta):
-    for link in LINKS:
+    for link in ALL:
         at = np.array([abs(eta) + 0.01 if link is COMPLEMENT else eta])
-        p = link.probability(at)
+        p = link.probability(at, arrays())
         h = 1e-6
-        slope = (link.probability(at + h) - link.probability(at - h)) / (2 * h)
-        assert link.slope(at) == pytest.approx(slope, rel=1e-5, abs=1e-9)
+        slope = (link.probability(at + h, arrays()) - link.probability(at - h, arrays())) / (2 * h)
+        assert LINKS[link.name].slope(at) == pytest.approx(slope, rel=1e-5, abs=1e-9)
         if 1e-9 < p[0] < 1 - 1e-9:
-            assert link.eta(p) == pytest.approx(at, rel=1e-5, abs=1e-5)
+            assert LINKS[link.name].eta(p) == pytest.approx(at, rel=1e-5, abs=1e-5)
 
 
 def test_normal_steps_have_as_many_freedoms_as_earthquakes():

@@ -3,8 +3,14 @@ import math
 import numpy as np
 import pytest
 
-from rbfrag.fragility.fit.straight_line import mean_m_s, negative_share, rise, score, variance_m2_s2
-from rbfrag.fragility.functions import SCALAR
+from rbfrag.fragility.methods import SINGLE
+from rbfrag.fragility.methods.wls import METHOD, mean_m_s, negative_share, rise, variance_m2_s2
+
+
+def score(parameters, x, y):
+    found = METHOD.forms["pgv"].eta(parameters, {"intensity_m_s": x, "y_m_s": y}, SINGLE)
+    return found.eta, found.slopes
+
 
 CASES = [(0.002, 0.72, 4e-5, 3e-3), (-0.01, 0.6, 1e-4, 1e-3, 2e-2), (0.02, 0.5, 1e-3, 0.0, 0.04)]
 
@@ -19,7 +25,7 @@ def test_variance_is_the_polynomial(parameters):
 @pytest.mark.parametrize("parameters", CASES)
 @pytest.mark.parametrize(("x", "y"), [(0.05, 0.01), (0.5, 0.3), (1.2, 1.5)])
 def test_slopes_are_the_derivatives(parameters, x, y):
-    z, slopes = score(parameters, x, y, SCALAR)
+    z, slopes = score(parameters, x, y)
     assert z == pytest.approx(
         (mean_m_s(parameters, x) - y) / math.sqrt(variance_m2_s2(parameters, x)), rel=1e-15
     )
@@ -29,7 +35,7 @@ def test_slopes_are_the_derivatives(parameters, x, y):
         moved = [list(parameters), list(parameters)]
         moved[0][i] -= step
         moved[1][i] += step
-        low, high = (score(m, x, y, SCALAR)[0] for m in moved)
+        low, high = (score(m, x, y)[0] for m in moved)
         assert slope == pytest.approx((high - low) / (2 * step), rel=1e-6, abs=1e-9)
 
 
@@ -39,7 +45,7 @@ def test_rise_has_the_sign_of_the_slope_in_x(parameters):
     for x in np.linspace(0.01, 5.0, 60).tolist():
         for y in (0.001, 0.01, 0.1, 1.0):
             step = 1e-6 * x
-            low, high = (score(parameters, v, y, SCALAR)[0] for v in (x - step, x + step))
+            low, high = (score(parameters, v, y)[0] for v in (x - step, x + step))
             slope = (high - low) / (2 * step)
             expected = rise(parameters, x, y) / variance_m2_s2(parameters, x) ** 1.5
             assert slope == pytest.approx(expected, rel=1e-5, abs=1e-7)
@@ -52,5 +58,5 @@ def test_rise_has_the_sign_of_the_slope_in_x(parameters):
 
 
 def test_negative_share_is_the_mass_below_zero():
-    z, _ = score(CASES[0], 0.01, 0.0, SCALAR)
-    assert negative_share(CASES[0], 0.01, SCALAR) == pytest.approx(1.0 - SCALAR.normal_cdf(z))
+    z, _ = score(CASES[0], 0.01, 0.0)
+    assert negative_share(CASES[0], 0.01, SINGLE) == pytest.approx(1.0 - SINGLE.ndtr(z))

@@ -1,0 +1,134 @@
+"""Stored models against today's data: whether these changed, and what fits without each earthquake
+say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+from rbfrag.db.model_file import ModelRow
+from rbfrag.db.models import load_model
+from rbfrag.errors import FitError, InputError, ModelError
+from rbfrag.fragility.fit.data import FitSource, fit_data, read_source
+from rbfrag.fragility.fit.fitting import fit_source
+from rbfrag.fragility.fit.scores import CalibrationBins, calibration_bins
+from rbfrag.fragility.measures import intensity_term
+from rbfrag.fragility.methods import method_named
+from rbfrag.fragility.model import FragilityModel
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection
+
+State = Literal["unchanged", "changed", "no data", "unreadable"]
+
+
+@dataclass(frozen=True)
+class ModelCheck:
+    """What became of one model's data.
+
+    Args:
+        name: the model.
+        state: ``unchanged``; ``changed`` (fit it again); ``no data`` (the database holds models
+            without the data they came from, as a reference does); ``unreadable``.
+        remark: what changed or why it cannot be told; empty if unchanged.
+    """
+
+    name: str
+    state: State
+    remark: str
+
+    def as_dict(self) -> dict[str, str]:
+        """Return the fields by name."""
+        return {"name": self.name, "state": self.state, "remark": self.remark}
+
+
+def selection_of(row: ModelRow) -> dict[str, Any]:
+    """Return what a fit was asked to read: suite, vertical motion, doubtful PGD, rotation."""
+    told = cast("Mapping[str, Any]", row.diagnostics)
+    return {
+        "suite": told.get("suite"),
+        "vertical": told.get("vertical", "without"),
+        "doubtful_pgd": bool(told.get("doubtful_pgd", False)),
+        "rotation_deg": told.get("rotation_deg"),
+    }
+
+
+def source_of(connection: Connection, row: ModelRow) -> FitSource:
+    """Return what the fit of a stored model would read today."""
+    block = method_named(row.method).block
+    return read_source(connection, block, kind=row.kind, **selection_of(row))
+
+
+def check_models(connection: Connection, rows: list[ModelRow]) -> list[ModelCheck]:
+    """Compare the fingerprint of each model with that of the data its fit would read today."""
+    sources: dict[tuple[Any, ...], FitSource] = {}
+    return [_check(connection, row, sources) for row in rows]
+
+
+def _check(
+    connection: Connection, row: ModelRow, sources: dict[tuple[Any, ...], FitSource]
+) -> ModelCheck:
+    try:
+        model = FragilityModel.from_row(row)
+    except ModelError as error:
+        return ModelCheck(row.name, "unreadable", str(error))
+    key = (row.kind, *selection_of(row).values())
+    try:
+        if key not in sources:
+            sources[key] = source_of(connection, row)
+        data = fit_data(sources[key], method_named(row.method), model.term, kind=row.kind)
+    except (FitError, InputError) as error:
+        return ModelCheck(row.name, "no data", str(error))
+    if data.fingerprint == row.data_fingerprint:
+        return ModelCheck(row.name, "unchanged", "")
+    then, now = row.diagnostics.get("n"), int(data.found.sum())
+    counts = f"fitted to {then} critical values, {now} today" if then != now else "other values"
+    return ModelCheck(row.name, "changed", f"{counts}: fit it again with  rbfrag fit --replace")
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Calibration of one model on earthquakes left out.
+
+    Args:
+        name: the model.
+        bins: predicted and observed.
+        scores: its scores.
+        outcomes: what the outcomes are, in words.
+    """
+
+    name: str
+    bins: CalibrationBins
+    scores: Mapping[str, float]
+    outcomes: str
+
+
+def held_out_of(connection: Connection, name: str | None, *, seed: int = 0) -> HeldOut:
+    """Fit a stored model again, once without each earthquake.
+
+    Args:
+        connection: the database.
+        name: the model; None for the default.
+        seed: of the draws.
+
+    Raises:
+        UnknownModelError: no model of that name.
+        FitError: the data cannot carry the fit.
+    """
+    row = load_model(connection, name)
+    method = method_named(row.method)
+    fitted = fit_source(
+        source_of(connection, row),
+        intensity_term(row.term),
+        method,
+        kind=row.kind,
+        name=row.name,
+        seed=seed,
+        estimate_m=method.exponent in row.coefficients,
+        selection=selection_of(row),
+        compared=False,
+    )
+    judged = fitted.data.judged
+    bins = calibration_bins(judged, fitted.result.held_out, seed=seed)
+    return HeldOut(row.name, bins, fitted.result.scores, judged.words)

@@ -1,0 +1,223 @@
+"""Fits of critical values with normal scatter of a logarithm, some of them censored.
+
+One likelihood serves all: a block that just fails has eta = 0 on average, with the scatter that the
+method's formula states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import FitError
+from rbfrag.fragility.fit.clusters import (
+    bootstrap,
+    cr3,
+    effective_freedom,
+    jackknife_steps,
+    left_out,
+    sandwich,
+)
+from rbfrag.fragility.fit.data import FitData
+from rbfrag.fragility.fit.likelihood import (
+    CensoredNormal,
+    Standardised,
+    censored_line,
+    from_olsen,
+    maximise,
+)
+from rbfrag.fragility.fit.outcomes import parameter_names
+from rbfrag.fragility.fit.result import Estimates, MethodResult, method_result
+from rbfrag.fragility.measures import Term
+from rbfrag.fragility.methods import Form, Method, arrays
+
+FloatArray = NDArray[np.float64]
+
+REPLICATES = 400
+_LN_SIGMA = "ln_sigma"
+_SCORES = (
+    ("in_sample_log_loss", "log_loss_in_sample"),
+    ("held_out_log_loss", "log_loss_held_out"),
+    ("held_out_brier", "brier_held_out"),
+    ("calibration_slope", "calibration_slope_held_out"),
+)
+"""What reports of these models have called their scores, beside the names of all."""
+
+
+def fit_lognormal(
+    data: FitData, method: Method, term: Term, *, seed: int, estimate_m: bool = False
+) -> MethodResult:
+    """Fit ln y* = a + b ln x (+ (M-1) ln p) with normal scatter sigma.
+
+    Combinations without a critical value above the search limit count as "below the limit".
+    Covariance is clustered by earthquake; a bootstrap by earthquake is reported beside it.
+
+    Args:
+        data: the rows, found and censored.
+        method: the method.
+        term: the intensity term.
+        seed: seed of the bootstrap.
+        estimate_m: fit the method's exponent too.
+
+    Raises:
+        FitError: the median does not rise with intensity, or there is no scatter.
+    """
+    form, names = method.forms[term.name], parameter_names(method, term, estimate_m=estimate_m)
+    usable = (data.x > 0.0) & (data.y > 0.0)
+    rows, start = censored_line(*_line(form, names, _of(data, usable)), data.found[usable],
+                                data.event[usable])  # fmt: skip
+    theta, _ = maximise(rows, start)
+    # Olsen's parameters put the scatter last
+    place = names.index(_LN_SIGMA)
+    order = np.insert(np.arange(len(names) - 1), place, len(names) - 1)
+
+    def natural(theta: FloatArray) -> FloatArray:
+        return from_olsen(theta)[0][order]
+
+    b, jacobian = natural(theta), from_olsen(theta)[1][order]
+    if b[1] <= 0.0:
+        raise FitError(
+            f"the fitted critical velocity does not rise with {term.title} (exponent "
+            f"{b[1]:.4g}): these motions cannot carry a fragility model in "
+            f"{term.symbol}; use another term or more motions"
+        )
+    if b[place] < np.log(1e-9):
+        raise FitError(
+            "the critical values lie exactly on a power law: without scatter there is no "
+            "probability to fit; use recorded motions instead of scaled copies of one"
+        )
+    steps = jackknife_steps(rows, theta) @ jacobian.T
+    cr1, naive = (np.sqrt(np.diag(jacobian @ c @ jacobian.T)) for c in sandwich(rows, theta))
+    estimates = Estimates(
+        names, b, cr3(steps), effective_freedom(steps),
+        bootstrap(
+            rows.event, lambda times: natural(maximise(rows, theta, times=times)[0]),
+            replicates=REPLICATES, seed=seed,
+        ),
+        seed,
+        {"cr1_standard_errors": cr1, "naive_standard_errors": naive},
+    )  # fmt: skip
+    others = left_out(rows.event, lambda rest: maximise(rows.only(rest), theta)[0])
+    in_sample = probabilities(method, form, data, b)
+    held_out, density = in_sample.copy(), rows.log_likelihood(theta)
+    held_density = density.copy()
+    for event, part in others.items():
+        own = rows.event == event
+        held_density[own] = rows.only(own).log_likelihood(part)
+        here = data.event == event
+        held_out[here] = probabilities(method, form, data, natural(part))[here]
+    residual = np.full(data.x.size, np.nan)
+    line = rows.values["y"] - rows.values["columns"] @ (theta[:-1] / theta[-1])
+    residual[usable] = np.where(rows.found, line, np.nan)
+    return method_result(
+        data,
+        estimates,
+        in_sample,
+        held_out,
+        ln_residual=residual,
+        scores={
+            "log_density_in_sample": float(density.mean()),
+            "log_density_held_out": float(held_density.mean()),
+        },
+        details={"sigma_ln": float(np.exp(b[place])), "exponent_m_estimated": estimate_m},
+        warnings=[
+            "this is the probability that the critical value is at least the block's: safe islands "
+            "below it are not seen, and the model is over-confident about outcomes"
+        ],
+    )
+
+
+def fit_censored(data: FitData, method: Method, term: Term, *, seed: int) -> MethodResult:
+    """Fit a method whose formula states eta and scatter, to found and censored rows.
+
+    The covariance is that of the fits that each leave an earthquake out.
+
+    Args:
+        data: the rows.
+        method: the method.
+        term: the intensity term.
+        seed: seed of the bootstrap.
+
+    Raises:
+        FitError: there is no maximum of the likelihood.
+    """
+    form = method.forms[term.name]
+    rows = censored_rows(data, form)
+    b = most_likely(rows, np.array(form.start))
+    others = left_out(rows.event, lambda rest: most_likely(rows.only(rest), b))
+    parameters = np.array(list(others.values()))
+    cr1, naive = (np.sqrt(np.diag(c)) for c in sandwich(rows, b))
+    estimates = Estimates(
+        form.parameters, b, cr3(parameters - parameters.mean(axis=0)), len(others) - 1,
+        bootstrap(
+            rows.event, lambda times: maximise(rows, b, times=times, tolerance=1e-7)[0],
+            replicates=REPLICATES // 4, seed=seed,
+        ),
+        seed,
+        {"cr1_standard_errors": cr1, "naive_standard_errors": naive},
+    )  # fmt: skip
+    in_sample = probabilities(method, form, data, b)
+    held_out = in_sample.copy()
+    for event, part in others.items():
+        here = data.event == event
+        held_out[here] = probabilities(method, form, data, part)[here]
+    share = float(np.mean(~data.found))
+    warnings = [
+        f"{100 * share:.0f} % of the blocks leave their back plane, or stay, before they fail: "
+        "they count as failing under stronger motions than those"
+    ]
+    result = method_result(
+        data, estimates, in_sample, held_out,
+        warnings=warnings if method.block.criterion is not None else (),
+    )  # fmt: skip
+    known_as = {name: result.scores[score] for name, score in _SCORES if score in result.scores}
+    return replace(result, scores={**result.scores, **known_as})
+
+
+def censored_rows(data: FitData, form: Form) -> CensoredNormal:
+    """Return the likelihood of a formula over the rows of a fit."""
+
+    def formula(b: FloatArray, values: Mapping[str, FloatArray]) -> Standardised:
+        eta, slopes, log_sigma, sigma_slopes = form.eta(b.tolist(), values, arrays())
+        return eta, log_sigma, slopes, sigma_slopes
+
+    return CensoredNormal(formula, data.values, data.found, data.event)
+
+
+def most_likely(rows: CensoredNormal, start: FloatArray) -> FloatArray:
+    """Return the parameters under which the rows are likeliest.
+
+    Raises:
+        FitError: there is no maximum.
+    """
+    b, _ = maximise(rows, start, tolerance=1e-15)
+    if not np.all(np.isfinite(b)) or np.abs(rows.derivatives(b)[0]).max() > 1e-4 * rows.event.size:
+        raise FitError(
+            "the likelihood of this model has no maximum on these data: add motions, or fit "
+            "another term"
+        )
+    return b
+
+
+def probabilities(method: Method, form: Form, data: FitData, b: FloatArray) -> FloatArray:
+    """Return P of the blocks of the grid, 0 where there is no shaking, shape (n, m)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        eta = form.eta(b.tolist(), data.blocks, arrays()).eta
+        p = np.asarray(method.link.probability(eta, arrays()), dtype=np.float64)
+    return np.array(np.broadcast_to(np.nan_to_num(p, nan=0.0), data.failed.shape))
+
+
+def _of(data: FitData, chosen: NDArray[np.bool_]) -> dict[str, FloatArray]:
+    return {name: value[chosen] for name, value in data.values.items()}
+
+
+def _line(
+    form: Form, names: tuple[str, ...], values: Mapping[str, FloatArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Return regressors and response of a formula that is (columns · β - response)/σ."""
+    eta, slopes, _, _ = form.eta([0.0] * len(names), values, arrays())
+    columns = [s for name, s in zip(names, slopes, strict=True) if name != _LN_SIGMA]
+    return np.column_stack([np.broadcast_to(c, eta.size) for c in columns]), -eta

@@ -1,0 +1,334 @@
+"""Maximum likelihood: blocks that failed or not, and normal values of which some have a limit only.
+
+The fit of outcomes that is stored comes from statsmodels' GLM; the many fits of resamples and
+left-out earthquakes start from it and use the short iteration here, which the tests compare with
+statsmodels and with independent matrix computations.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import FitError
+from rbfrag.fragility.methods import Link, arrays
+
+FloatArray = NDArray[np.float64]
+Chosen = NDArray[np.bool_]
+
+TOLERANCE = 1e-10
+MOST_ITERATIONS = 200
+_EDGE = 1e-12
+_HALF_LN_2PI = 0.5 * math.log(2.0 * math.pi)
+
+
+class Likelihood(Protocol):
+    """A likelihood as a function of parameters, shape (k,), over rows of earthquakes."""
+
+    @property
+    def event(self) -> NDArray[np.intp]:
+        """Number of each row's earthquake, shape (n,)."""
+
+    def only(self, chosen: Chosen) -> Self:
+        """Return some of the rows."""
+
+    def log_likelihood(self, b: FloatArray) -> FloatArray:
+        """Return the log likelihood of each row, shape (n,)."""
+
+    def derivatives(
+        self, b: FloatArray, times: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return score, shape (k,), and information, shape (k, k), of rows that count `times`."""
+
+
+class FittedLink(NamedTuple):
+    """What fits need of a link beside F(eta).
+
+    Args:
+        slope: dF/deta.
+        eta: the inverse of F.
+        sign: +1, or -1 where statsmodels counts eta the other way.
+    """
+
+    slope: Callable[[FloatArray], FloatArray]
+    eta: Callable[[FloatArray], FloatArray]
+    sign: float = 1.0
+
+
+def _logistic_slope(eta: FloatArray) -> FloatArray:
+    return np.asarray(0.25 / np.cosh(np.clip(0.5 * eta, -300.0, 300.0)) ** 2)
+
+
+def _loglog_slope(eta: FloatArray) -> FloatArray:
+    decay = np.exp(-np.clip(eta, -30.0, 700.0))
+    return np.asarray(decay * np.exp(-decay))
+
+
+LINKS: Mapping[str, FittedLink] = {
+    "logit": FittedLink(_logistic_slope, lambda p: np.log(p / (1.0 - p))),
+    "loglog": FittedLink(_loglog_slope, lambda p: -np.log(-np.log(p))),
+    "complement": FittedLink(
+        lambda eta: np.exp(-np.clip(eta, 0.0, 700.0)), lambda p: -np.log1p(-p), sign=-1.0
+    ),
+}
+"""The links of outcomes by name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Binomial:
+    """Rows of a fit of outcomes, P = F(features · b).
+
+    Args:
+        link: F, one of `LINKS`.
+        columns: features, shape (n, k).
+        outcome: 1 failed, 0 not, shape (n,).
+        weights: weight of each row, shape (n,).
+        event: number of each row's earthquake, shape (n,).
+    """
+
+    link: Link
+    columns: FloatArray
+    outcome: FloatArray
+    weights: FloatArray
+    event: NDArray[np.intp]
+
+    def only(self, chosen: Chosen) -> Binomial:
+        """Return some of the rows."""
+        columns, outcome, weights = (
+            part[chosen] for part in (self.columns, self.outcome, self.weights)
+        )
+        return Binomial(self.link, columns, outcome, weights, self.event[chosen])
+
+    def probability(self, b: FloatArray) -> FloatArray:
+        """Return P of each row."""
+        eta = np.clip(self.columns @ b, -700.0, 700.0)
+        return np.asarray(self.link.probability(eta, arrays()), dtype=np.float64)
+
+    def log_likelihood(self, b: FloatArray) -> FloatArray:
+        """Return the weighted log likelihood of each row."""
+        p = np.clip(self.probability(b), 1e-300, 1.0 - 1e-16)
+        return self.weights * np.where(self.outcome > 0.5, np.log(p), np.log1p(-p))
+
+    def derivatives(
+        self, b: FloatArray, times: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return score and expected information."""
+        x, w = self.columns, self.weights if times is None else self.weights * times
+        p = np.clip(self.probability(b), _EDGE, 1.0 - _EDGE)
+        slope = LINKS[self.link.name].slope(x @ b)
+        per_eta = w * slope / (p * (1.0 - p))
+        return x.T @ (per_eta * (self.outcome - p)), (x * (per_eta * slope)[:, None]).T @ x
+
+    def start(self) -> FloatArray:
+        """Return parameters to start from: least squares of P = 0.9 and 0.1."""
+        middle = LINKS[self.link.name].eta(np.where(self.outcome > 0.5, 0.9, 0.1))
+        root = np.sqrt(self.weights)
+        return np.asarray(
+            np.linalg.lstsq(self.columns * root[:, None], middle * root, rcond=None)[0],
+            dtype=np.float64,
+        )
+
+
+Standardised = tuple[Any, Any, Sequence[Any], Sequence[Any]]
+"""eta, ln sigma, and the derivatives of each by the parameters."""
+
+
+@dataclass(frozen=True, eq=False)
+class CensoredNormal:
+    """Rows at which a block just fails, or beyond which it does, with P = Φ(eta) of failing.
+
+    A found row has the density φ(eta)/σ, a censored one the probability Φ(-eta) of failing beyond.
+
+    Args:
+        formula: of eta, from parameters and `values`.
+        values: what it reads, arrays with first axis n.
+        found: False for censored rows, shape (n,).
+        event: number of each row's earthquake, shape (n,).
+    """
+
+    formula: Callable[[FloatArray, Mapping[str, FloatArray]], Standardised]
+    values: Mapping[str, FloatArray]
+    found: Chosen
+    event: NDArray[np.intp]
+
+    def only(self, chosen: Chosen) -> CensoredNormal:
+        """Return some of the rows."""
+        values = {name: value[chosen] for name, value in self.values.items()}
+        return CensoredNormal(self.formula, values, self.found[chosen], self.event[chosen])
+
+    def log_likelihood(self, b: FloatArray) -> FloatArray:
+        """Return the log likelihood of each row; NaN where the scatter is not above zero."""
+        from scipy.special import log_ndtr
+
+        with np.errstate(invalid="ignore"):
+            eta, log_sigma, *_ = self.formula(b, self.values)
+            density = -0.5 * eta * eta - log_sigma - _HALF_LN_2PI
+        return np.asarray(np.where(self.found, density, log_ndtr(-eta)))
+
+    def derivatives(
+        self, b: FloatArray, times: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return score and information, exact where eta is linear in the parameters.
+
+        Elsewhere the information leaves out what is zero in the mean.
+        """
+        from scipy.special import log_ndtr
+
+        eta, _, *both = self.formula(b, self.values)
+        n, w = self.found.size, 1.0 if times is None else times
+        by, sigma_by = (np.column_stack([np.broadcast_to(c, n) for c in part]) for part in both)
+        hazard = np.exp(-0.5 * eta * eta - _HALF_LN_2PI - log_ndtr(-eta))
+        first = w * np.where(self.found, -eta, -hazard)
+        second = w * np.where(self.found, 1.0, hazard * (hazard - eta))
+        of_sigma = (w * self.found)[:, None] * sigma_by
+        score = first @ by - of_sigma.sum(axis=0)
+        return score, (by * second[:, None]).T @ by + of_sigma.T @ sigma_by
+
+
+def olsen(theta: FloatArray, values: Mapping[str, FloatArray]) -> Standardised:
+    """Return eta = columns · θ - h y, with θ = β/σ and h = 1/σ as last parameter.
+
+    In these parameters the likelihood of a censored line is concave (Olsen 1978, Econometrica
+    46(5), 1211-1215), so that the iteration finds the one maximum.
+    """
+    columns, y, h = values["columns"], values["y"], theta[-1]
+    slopes = [*columns.T, -y]
+    sigma_slopes = [0.0] * (len(slopes) - 1) + [-1.0 / h]
+    return columns @ theta[:-1] - h * y, -np.log(h), slopes, sigma_slopes
+
+
+def from_olsen(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return β and ln σ of Olsen's parameters, and their derivatives by them."""
+    jacobian = np.zeros((theta.size, theta.size))
+    jacobian[:-1, :-1] = np.eye(theta.size - 1) / theta[-1]
+    jacobian[:-1, -1] = -theta[:-1] / theta[-1] ** 2
+    jacobian[-1, -1] = -1.0 / theta[-1]
+    return np.append(theta[:-1] / theta[-1], -np.log(theta[-1])), jacobian
+
+
+def censored_line(
+    columns: FloatArray, y: FloatArray, found: Chosen, event: NDArray[np.intp]
+) -> tuple[CensoredNormal, FloatArray]:
+    """Return the likelihood of y = columns · β + σ·normal, and Olsen's parameters to start from.
+
+    Args:
+        columns: regressors, shape (n, k).
+        y: responses; for censored points the value they lie below, shape (n,).
+        found: False for censored points, shape (n,).
+        event: number of each point's earthquake, shape (n,).
+    """
+    beta = np.linalg.lstsq(columns[found], y[found], rcond=None)[0]
+    h = 1.0 / max(float((y[found] - columns[found] @ beta).std()), 1e-12)
+    rows = CensoredNormal(olsen, {"columns": columns, "y": y}, found, event)
+    return rows, np.append(beta * h, h)
+
+
+def maximise(
+    rows: Likelihood,
+    start: FloatArray,
+    *,
+    times: FloatArray | None = None,
+    tolerance: float = TOLERANCE,
+) -> tuple[FloatArray, bool]:
+    """Maximise a likelihood by Newton's steps, halved where they go too far.
+
+    Args:
+        rows: the likelihood.
+        start: parameters to start from, shape (k,).
+        times: how many times each row counts, shape (n,); None for once.
+        tolerance: relative change of the log likelihood that ends the iteration.
+
+    Returns:
+        The parameters, and whether the iteration came to rest.
+    """
+
+    def loss(b: FloatArray) -> float:
+        each = rows.log_likelihood(b)
+        return -float(each.sum() if times is None else times @ each)
+
+    b, value = start, loss(start)
+    for _ in range(MOST_ITERATIONS):
+        score, information = rows.derivatives(b, times)
+        step = np.linalg.lstsq(information, score, rcond=None)[0]
+        length, previous = 1.0, value
+        while True:
+            trial = b + length * step
+            value = loss(trial)
+            if value <= previous or length < 1e-8:
+                break
+            length *= 0.5
+        b = trial
+        if abs(previous - value) <= tolerance * (1.0 + abs(value)):
+            return b, True
+    return b, False
+
+
+def most_likely(rows: Binomial) -> FloatArray:
+    """Return the parameters of greatest likelihood of outcomes.
+
+    Raises:
+        FitError: the outcomes are all alike, or the features separate them.
+    """
+    failed = rows.outcome > 0.5
+    if int(failed.sum()) in (0, failed.size):
+        raise FitError(
+            f"of {failed.size} outcomes on the grid {int(failed.sum())} toppled: a probability "
+            "cannot be fitted to outcomes that are all alike; add motions or block sizes (p²)"
+        )
+    b, settled = maximise(rows, rows.start(), tolerance=1e-14)
+    eta = rows.columns @ b
+    if eta[failed].min() > eta[~failed].max() or not settled or np.abs(b).max() > 1e3:
+        raise FitError(
+            "the outcomes are separated without error by the intensity (toppled above, safe below, "
+            "nothing between): the slope of a fit has no finite value; use recorded motions "
+            "instead of scaled copies, or more of them"
+        )
+    return b
+
+
+def fit_by_statsmodels(rows: Binomial) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Fit outcomes by statsmodels' GLM.
+
+    Returns:
+        The parameters, their covariance clustered by earthquake, H⁻¹ (Σ_e s_e s_eᵀ) H⁻¹ ·
+        G/(G-1) · (n-1)/(n-k) with the observed information H and the score s_e of earthquake e
+        (the correction CR1 for G earthquakes, n rows, k parameters), and the naive covariance.
+
+    Raises:
+        FitError: the outcomes are all alike, or the features separate them.
+    """
+    import statsmodels.api as sm
+    from statsmodels.genmod.families import links
+    from statsmodels.tools.sm_exceptions import DomainWarning, SpecificationWarning
+
+    theirs: Any = {"logit": links.Logit, "loglog": links.LogLog, "complement": links.LogC}
+    start = most_likely(rows)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DomainWarning)
+        # That weights go with clusters is shown by the tests.
+        warnings.simplefilter("ignore", SpecificationWarning)
+        model = sm.GLM(
+            rows.outcome,
+            LINKS[rows.link.name].sign * rows.columns,
+            family=sm.families.Binomial(theirs[rows.link.name]()),
+            var_weights=rows.weights,
+        )
+        naive = model.fit(start_params=start, tol=1e-12, maxiter=100)
+        result = model.fit(
+            start_params=naive.params,
+            tol=1e-12,
+            maxiter=100,
+            cov_type="cluster",
+            cov_kwds={"groups": rows.event},
+        )
+    return (
+        np.asarray(result.params, dtype=np.float64),
+        np.asarray(result.cov_params(), dtype=np.float64),
+        np.asarray(naive.cov_params(), dtype=np.float64),
+    )

@@ -1,0 +1,135 @@
+"""What a method of fitting hands back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.fragility.fit.data import FEW_EVENTS, FitData
+from rbfrag.fragility.fit.scores import nested_scatter, score_intervals, scores_of
+
+FloatArray = NDArray[np.float64]
+
+CLUSTERED = "clustered by earthquake, CR3 (each earthquake left out in turn)"
+
+
+@dataclass(frozen=True, eq=False)
+class MethodResult:
+    """What a method of fitting hands back.
+
+    Args:
+        coefficients: value of each parameter by name, in the order of the formula.
+        covariance: covariance of the parameters in that order.
+        standard_errors: standard error of each parameter by name.
+        scores: how well the model predicts, by name.
+        details: everything else the report states, JSON-able.
+        warnings: sentences for people.
+        held_out: probability of each block of the grid by a fit without its earthquake,
+            shape (n, m).
+    """
+
+    coefficients: dict[str, float]
+    covariance: tuple[tuple[float, ...], ...]
+    standard_errors: dict[str, float]
+    scores: dict[str, float]
+    details: dict[str, object]
+    warnings: tuple[str, ...]
+    held_out: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Estimates:
+    """Parameters with what is known of their errors.
+
+    Args:
+        names: of the parameters.
+        values: shape (k,).
+        covariance: clustered by earthquake, shape (k, k).
+        degrees_of_freedom: of the covariance.
+        samples: of a bootstrap by earthquake, shape (replicates, k).
+        seed: seed of the bootstrap.
+        others: further standard errors by what the report calls them.
+    """
+
+    names: Sequence[str]
+    values: FloatArray
+    covariance: FloatArray
+    degrees_of_freedom: int
+    samples: FloatArray
+    seed: int
+    others: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    @property
+    def errors(self) -> FloatArray:
+        """Standard errors, shape (k,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def named(self, values: FloatArray) -> dict[str, float]:
+        """Return numbers by name of the parameter."""
+        return dict(zip(self.names, values.tolist(), strict=True))
+
+
+def method_result(
+    data: FitData,
+    estimates: Estimates,
+    in_sample: FloatArray,
+    held_out: FloatArray,
+    *,
+    ln_residual: FloatArray | None = None,
+    scores: Mapping[str, float] | None = None,
+    details: Mapping[str, object] | None = None,
+    warnings: Sequence[str] = (),
+) -> MethodResult:
+    """Return the result of a method whose errors are clustered by leaving out earthquakes.
+
+    Args:
+        data: the rows of the fit.
+        estimates: its parameters.
+        in_sample: probabilities of the blocks of the grid, shape (n, m).
+        held_out: the same by fits without the earthquake concerned.
+        ln_residual: ln y less its median where known, shape (n,), to be split by earthquakes.
+        scores: further scores.
+        details: what else the report states.
+        warnings: sentences for people.
+    """
+    judged, spread = data.judged, estimates.samples.std(axis=0, ddof=1)
+    return MethodResult(
+        coefficients=estimates.named(estimates.values),
+        covariance=tuple(tuple(line) for line in estimates.covariance.tolist()),
+        standard_errors=estimates.named(estimates.errors),
+        scores={**(scores or {}), **scores_of(judged, in_sample, held_out)},
+        details={
+            "degrees_of_freedom": estimates.degrees_of_freedom,
+            "judged_on": judged.words,
+            "judged_outcomes": int(judged.known.sum()),
+            "score_intervals": score_intervals(judged, held_out, seed=estimates.seed),
+            "standard_error_kinds": dict.fromkeys(estimates.names, CLUSTERED),
+            **{name: estimates.named(values) for name, values in estimates.others.items()},
+            "bootstrap": {
+                "standard_errors": estimates.named(spread),
+                "replicates": len(estimates.samples),
+                "seed": estimates.seed,
+            },
+            "scatter_ln_y": None if ln_residual is None else scatter_of(data, ln_residual),
+            **(details or {}),
+        },
+        warnings=(*few_events(data.events), *warnings),
+        held_out=held_out,
+    )
+
+
+def scatter_of(data: FitData, ln_residual: FloatArray) -> dict[str, float] | None:
+    """Return the scatter of ln y between and within earthquakes, of finite residuals."""
+    used = np.isfinite(ln_residual)
+    scatter = nested_scatter(ln_residual[used], data.event[used], data.motion[used])
+    return None if scatter is None else vars(scatter)
+
+
+def few_events(events: int) -> list[str]:
+    """Return what is to be said of few earthquakes."""
+    if events >= FEW_EVENTS:
+        return []
+    return [f"only {events} earthquakes: standard errors clustered by earthquake are too small"]

@@ -1,0 +1,114 @@
+"""The censored regression against an independent likelihood, and the known truth."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.stats import norm
+
+from rbfrag.fragility.fit.clusters import cr3, jackknife_steps, sandwich
+from rbfrag.fragility.fit.likelihood import CensoredNormal, censored_line, from_olsen, maximise
+
+
+def drawn(seed=1, events=40, each=20, cut=-0.3):
+    random = np.random.default_rng(seed)
+    event = np.repeat(np.arange(events), each)
+    x = random.normal(0.0, 1.0, event.size)
+    noise = np.sqrt(0.3) * random.normal(size=events)[event]
+    noise += np.sqrt(0.7) * random.normal(size=event.size)
+    y = 0.2 + 0.9 * x + 0.5 * noise
+    limit = 0.2 + 0.9 * x + cut
+    found = y > limit
+    columns = np.column_stack([np.ones(x.size), x])
+    return columns, np.where(found, y, limit), found, event
+
+
+def fitted(data):
+    """The likelihood, the parameters (beta, ln sigma), Olsen's, and the derivatives of the two."""
+    rows, start = censored_line(*data)
+    theta, settled = maximise(rows, start)
+    assert settled
+    b, jacobian = from_olsen(theta)
+    return rows, b, theta, jacobian
+
+
+def jackknife(rows, theta, jacobian):
+    return cr3(jackknife_steps(rows, theta) @ jacobian.T)
+
+
+def log_likelihood(b, data):
+    columns, y, found, _ = data
+    mean, sigma = columns @ b[:-1], np.exp(b[-1])
+    return np.where(found, norm.logpdf(y, mean, sigma), norm.logcdf(y, mean, sigma))
+
+
+def test_the_maximum_is_that_of_an_independent_likelihood():
+    data = drawn()
+    assert 0.1 < (~data[2]).mean() < 0.5
+    rows, b, theta, _ = fitted(data)
+    assert rows.log_likelihood(theta) == pytest.approx(log_likelihood(b, data), rel=1e-12)
+    free = minimize(lambda b: -log_likelihood(b, data).sum(), [0, 1, 0], method="Nelder-Mead",
+                    options={"xatol": 1e-10, "fatol": 1e-12, "maxiter": 9999})  # fmt: skip
+    assert b == pytest.approx(free.x, abs=2e-6)
+
+
+def test_errors_equal_an_independent_matrix_computation():
+    data = drawn()
+    rows, b, theta, jacobian = fitted(data)
+    h = 1e-4
+    steps = np.eye(3) * h
+    scores = np.column_stack(
+        [(log_likelihood(b + s, data) - log_likelihood(b - s, data)) / (2 * h) for s in steps]
+    )
+    hessian = np.array([
+        [
+            sum(
+                s1 * s2 * log_likelihood(b + s1 * a + s2 * c, data).sum()
+                for s1 in (1, -1) for s2 in (1, -1)
+            ) / (4 * h * h)
+            for c in steps
+        ]
+        for a in steps
+    ])  # fmt: skip
+    bread = np.linalg.inv(-hessian)
+    meat = sum(np.outer(*(2 * [scores[data[3] == e].sum(axis=0)])) for e in range(40))
+    expected = bread @ meat @ bread * 40 / 39 * 799 / 797
+    clustered, naive = (jacobian @ c @ jacobian.T for c in sandwich(rows, theta))
+    assert clustered == pytest.approx(expected, rel=1e-4)
+    assert naive == pytest.approx(bread, rel=1e-4)
+    larger = np.diag(jackknife(rows, theta, jacobian))
+    assert np.all(larger > np.diag(expected) * 0.95)
+    assert larger == pytest.approx(np.diag(expected), rel=0.15)
+
+
+def test_without_censored_points_it_is_least_squares():
+    data = drawn(cut=-1e3)
+    _, b, _, _ = fitted(data)
+    columns, y, _, _ = data
+    beta = np.linalg.lstsq(columns, y, rcond=None)[0]
+    assert b[:-1] == pytest.approx(beta, rel=1e-7)
+    assert np.exp(b[-1]) == pytest.approx((y - columns @ beta).std(), rel=1e-7)
+
+
+def test_the_truth_comes_back_where_leaving_out_would_bias_it():
+    data = drawn(events=200)
+    rows, b, theta, jacobian = fitted(data)
+    errors = np.sqrt(np.diag(jackknife(rows, theta, jacobian)))
+    assert np.all(np.abs(b - [0.2, 0.9, np.log(0.5)]) < 3 * errors)
+    columns, y, found, _ = data
+    biased = np.linalg.lstsq(columns[found], y[found], rcond=None)[0]
+    assert biased[0] - 0.2 > 5 * errors[0]
+
+
+def test_a_formula_in_its_own_parameters_has_the_same_maximum():
+    columns, y, found, event = data = drawn()
+    _, b, _, _ = fitted(data)
+
+    def formula(p, values):
+        eta = (values["columns"] @ p[:-1] - values["y"]) * np.exp(-p[-1])
+        slopes = [*(values["columns"].T * np.exp(-p[-1])), -eta]
+        return eta, p[-1], slopes, (0.0, 0.0, 1.0)
+
+    rows = CensoredNormal(formula, {"columns": columns, "y": y}, found, event)
+    other, settled = maximise(rows, np.array([0.0, 0.5, 0.0]), tolerance=1e-15)
+    assert settled
+    assert other == pytest.approx(b, rel=1e-6)

@@ -1,0 +1,145 @@
+"""Fits of every kind: formulas, known parameters, blocks that a new kind shares with another."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rbfrag.db.engine import opened_database
+from rbfrag.errors import FitError, InputError
+from rbfrag.fragility.fit import critical
+from rbfrag.fragility.fit.critical import censored_rows, most_likely
+from rbfrag.fragility.fit.data import fit_data
+from rbfrag.fragility.fit.fitting import fit, fit_source
+from rbfrag.fragility.fit.report import FitReport
+from rbfrag.fragility.measures import TERMS
+from rbfrag.fragility.methods import SINGLE, arrays, methods
+from rbfrag.fragility.model import FragilityModel
+from tests.fragility.kind_draws import METHOD_OF, TRUE, drawn
+from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
+
+
+@pytest.fixture(autouse=True)
+def few_replicates(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(critical, "REPLICATES", 40)
+
+
+@pytest.mark.parametrize(("kind", "term"), sorted(TRUE))
+def test_a_fit_finds_the_parameters_that_made_the_data(kind: str, term: str) -> None:
+    report = fit(drawn(kind, term), kind=kind, term=term)
+    for (name, value), true in zip(report.coefficients.items(), TRUE[kind, term], strict=True):
+        assert value == pytest.approx(true, abs=4.0 * report.standard_errors[name])
+        assert report.standard_errors[name] < 0.2
+    assert report.scores["calibration_slope"] == pytest.approx(1.0, abs=0.15)
+    assert report.details["bootstrap"]["standard_errors"][name] == pytest.approx(  # type: ignore[index]
+        report.standard_errors[name], rel=0.5
+    )
+    assert (report.kind, report.events) == (kind, 20)
+    again = FitReport.from_model(FragilityModel.from_row(report.model.row))
+    assert again.as_dict() == report.as_dict()
+    for key in ("kind", "n", "n_censored", "events", "judged_outcomes", "rotation_deg", "scores"):
+        assert key in report.as_dict()
+
+
+def test_leaving_the_censored_rows_out_would_be_wrong() -> None:
+    method, term = METHOD_OF["slumping"], TERMS["pgv_pga"]
+    data = fit_data(drawn("slumping", "pgv_pga"), method, term)
+    assert 0.05 < np.mean(~data.found) < 0.6
+    rows, start = censored_rows(data, method.forms["pgv_pga"]), np.array([0.0, 1.0, -1.0])
+    right, wrong = most_likely(rows, start), most_likely(rows.only(data.found), start)
+    true = np.array(TRUE["slumping", "pgv_pga"])
+    assert np.abs(right - true).max() < 0.5 * np.abs(wrong - true).max()
+
+
+@pytest.mark.parametrize(
+    ("method", "term"),
+    [(m, t) for m in methods() for t in m.forms],
+    ids=lambda each: getattr(each, "name", each),
+)
+def test_slopes_are_the_derivatives(method, term) -> None:
+    form = method.forms[term]
+    p = [v + 0.1 for v in form.start or (0.02, 0.7, 0.05, 0.04, 0.03, 0.02)][: len(form.parameters)]
+    values = {"ky": 0.1, "ks": 0.15, "kr": 0.12, "p2": 3.0, "ps2": 3.0, "p": 3.0**0.5}
+    values |= {"pgv_m_s": 0.4, "pga_g": 0.5, "tm_s": 0.5, "intensity_m_s": 0.9, "y_m_s": 0.3}
+    values["displacement_m"] = 0.05
+    here = form.eta(p, values, SINGLE)
+    step = 1e-6
+    for i in range(len(p)):
+        up, down = list(p), list(p)
+        up[i] += step
+        down[i] -= step
+        above, below = form.eta(up, values, SINGLE), form.eta(down, values, SINGLE)
+        slope = (above.eta - below.eta) / (2 * step)
+        assert here.slopes[i] == pytest.approx(slope, rel=1e-5, abs=1e-9)
+        if here.log_sigma is not None:
+            slope = (above.log_sigma - below.log_sigma) / (2 * step)
+            assert here.sigma_slopes[i] == pytest.approx(slope, rel=1e-6, abs=1e-9)
+    many = {name: np.array([value, value]) for name, value in values.items()}
+    assert form.eta(p, many, arrays()).eta[0] == pytest.approx(here.eta, rel=1e-12)
+
+
+def test_a_slump_is_judged_by_the_outcomes_that_are_stored() -> None:
+    source = drawn("slumping", "pgv_pga", n=600)
+    by_critical = fit(source, kind="slumping", term="pgv_pga")
+    assert by_critical.details["judged_on"] == "critical values (safe islands are not seen)"
+    k = np.tile(np.geomspace(0.02, 0.95, 25), (600, 1))
+    failed = (source.table.kr_over_pga[:, None] >= k).astype(float)
+    stored = fit(replace(source, k_over_pga=k, failed=failed), kind="slumping", term="pgv_pga")
+    assert stored.details["judged_on"] == "simulated outcomes"
+    assert stored.coefficients == by_critical.coefficients
+
+
+@pytest.mark.parametrize("kind", ["toppling", "sliding", "slumping"])
+def test_a_database_without_such_campaigns_is_refused(kind: str, tmp_path: Path) -> None:
+    place = tmp_path / "empty.db"
+    with (
+        opened_database(place, create=True) as engine,
+        engine.connect() as connection,
+        pytest.raises(FitError, match=f"rbfrag simulate --kind {kind}"),
+    ):
+        fit(connection, kind=kind, term="pgv")
+
+
+def test_what_does_not_go_together_is_refused() -> None:
+    source = drawn("sliding", "pgv_pga", n=100)
+    with pytest.raises(InputError, match="unknown kind 'falling'"):
+        fit(source, kind="falling", term="pgv")
+    with pytest.raises(InputError, match=r"no fragility model of kind rocking|unknown kind"):
+        fit(source, kind="rocking", term="pgv")
+    with pytest.raises(InputError, match=r"wls fits blocks known by p2 and kr.*by displacement"):
+        fit(source, kind="sliding", term="pgv", method="wls")
+    with pytest.raises(InputError, match=r"displacement does not go with the term xp"):
+        fit(source, kind="sliding", term="xp")
+    with pytest.raises(InputError, match="no failure of blocks of kind sliding"):
+        fit(source, kind="sliding", term="pgv", rotation_deg=2.0)
+    with pytest.raises(InputError, match="keeps M = 1"):
+        fit(source, kind="sliding", term="pgv", estimate_m=True)
+
+
+def test_another_kind_of_the_same_block_is_fitted_by_the_same_methods() -> None:
+    # no file knows this kind: what describes its block is enough
+    source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"], events=12)
+    logistic = next(m for m in methods() if m.name == "logistic")
+    toppling = fit_source(source, TERMS["pgv"], logistic, name="m", compared=False).report
+    falls = fit_source(
+        source, TERMS["pgv"], logistic, kind="falls", name="m", compared=False
+    ).report
+    assert falls.coefficients == toppling.coefficients
+    assert (falls.kind, falls.model.row.kind) == ("falls", "falls")
+    assert "falls" in falls.model.meaning
+
+
+def test_a_kind_without_a_search_is_fitted_to_its_outcomes() -> None:
+    source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"], events=12)
+    n = source.table.p2.size
+    none = {name: np.full(n, np.nan) for name in ("kr_over_pga", "kr", "y_m_s")}
+    table = replace(source.table, status=np.full(n, "not_searched", dtype=object), **none)
+    expected = fit(source, term="pgv", method="logistic")
+    report = fit(replace(source, table=table), term="pgv", method="logistic")
+    assert report.coefficients == pytest.approx(expected.coefficients, rel=1e-9)
+    assert (report.n, report.n_censored, report.events) == (0, 0, 12)
+    with pytest.raises(FitError, match="0 critical values were found"):
+        fit(replace(source, table=table), term="pgv", method="lognormal")

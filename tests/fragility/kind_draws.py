@@ -1,0 +1,93 @@
+"""Blocks that slide or slump exactly as a formula says, some of them censored."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.db.rows import CombinationTable
+from rbfrag.fragility.fit.data import LEAST_DISPLACEMENT_M, FitSource
+from rbfrag.fragility.methods import arrays, method_named
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+TRUE = {
+    ("sliding", "pgv_pga"): (0.3, 0.8, 3.5, -0.6, 1.0),
+    ("slumping", "pgv_pga"): (-0.2, 0.9, -0.9),
+    ("slumping", "pgv"): (0.3, 0.9, -0.9),
+}
+METHOD_OF = {"sliding": method_named("displacement"), "slumping": method_named("capacity")}
+
+
+def drawn(kind: str, term: str, n: int = 4000, seed: int = 1) -> FitSource:
+    """Return combinations, each with one block that slides or with its critical scale."""
+    rng = np.random.default_rng(seed)
+    event = np.sort(rng.integers(0, 20, n))
+    pulse = np.exp(rng.normal(-2.5, 0.5, n))
+    z = rng.standard_normal(n)
+    found = np.ones(n, dtype=bool)
+    if kind == "sliding":
+        pga = np.exp(rng.normal(-1.5, 0.6, n))
+        values = {
+            "ky": pga * rng.uniform(0.05, 0.95, n),
+            "pga_g": pga,
+            "pgv_m_s": pulse * pga * STANDARD_GRAVITY_M_S2,
+            "displacement_m": np.ones(n),
+        }
+        unit = METHOD_OF[kind].forms[term].eta(TRUE[kind, term], values, arrays())
+        slid = np.exp((unit.eta + z) * np.exp(unit.log_sigma))
+        assert (slid < LEAST_DISPLACEMENT_M).any()
+        k = values["ky"] / pga
+        return FitSource(
+            _table(event, pga, values["pgv_m_s"], found, k, np.full(n, np.nan)),
+            np.full(n, np.nan), k[:, None], np.full((n, 1), np.nan), slid[:, None],
+        )  # fmt: skip
+    c, b, s0 = TRUE[kind, term]
+    ks, ps2 = np.exp(rng.normal(-1.5, 0.4, n)), np.exp(rng.normal(1.0, 0.8, n))
+    if term == "pgv_pga":
+        excess = np.exp(c - b * np.log(np.sqrt(ps2) * pulse) + math.exp(s0) * z)
+        failing = ks * (1.0 + excess)
+    else:
+        y = ks * STANDARD_GRAVITY_M_S2 / np.sqrt(ps2)
+        pgv = np.exp(c + b * np.log(y) + math.exp(s0) * z)
+        failing = pgv / (pulse * STANDARD_GRAVITY_M_S2)
+    limit = rng.uniform(0.05, 0.2, n)
+    found = failing < ks / limit
+    pga = np.exp(rng.normal(-1.5, 0.6, n))
+    ratio = np.where(found, ks / failing, np.nan)
+    table = _table(event, pga, pulse * pga * STANDARD_GRAVITY_M_S2, found, ratio, ps2, limit)
+    nothing = np.empty((n, 0))
+    return FitSource(table, np.full(n, np.nan), nothing, nothing, strength_g=ks)
+
+
+def _table(
+    event: NDArray[np.int64],
+    pga: NDArray[np.float64],
+    pgv: NDArray[np.float64],
+    found: NDArray[np.bool_],
+    k_over_pga: NDArray[np.float64],
+    p2: NDArray[np.float64],
+    limit: NDArray[np.float64] | None = None,
+) -> CombinationTable:
+    n = event.size
+    none = np.full(n, np.nan)
+    return CombinationTable(
+        combination_id=np.arange(1, n + 1),
+        motion_id=np.arange(1, n + 1),
+        event_id=np.array([f"event-{i:02d}" for i in event], dtype=object),
+        event_guessed=np.zeros(n, dtype=bool),
+        polarity=np.full(n, "forward", dtype=object),
+        p2=p2,
+        status=np.where(found, "found", "below_limit").astype(object),
+        search_limit=np.full(n, 0.01) if limit is None else limit,
+        kr_over_pga=k_over_pga,
+        kr=k_over_pga * pga,
+        y_m_s=none,
+        pga_g=pga,
+        pgv_m_s=pgv,
+        pgd_m=none,
+        tm_s=none,
+        natural_key=np.array([f"key-{i:06d}" for i in range(n)], dtype=object),
+        block=np.full(n, None, dtype=object),
+    )
