@@ -9,14 +9,18 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from fastapi.testclient import TestClient
 
 import rbfrag
 import rbfrag.solver.models
 from rbfrag.db.engine import opened_database
+from rbfrag.db.models import save_model
 from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.service.app import make_app
+from rbfrag.service.settings import Settings
 from rbfrag.solver import kinds
 from tests.synthetic import shaking
 
@@ -110,7 +114,21 @@ def test_respond_answers() -> None:
 
 
 @pytest.mark.usefixtures("falls")
-def test_simulate_answers(database: Path) -> None:
+def test_what_is_simulated_is_fitted_and_predicts(database: Path) -> None:
     summary = rbfrag.simulate(database, kind="falls", jobs=1)
     assert summary.combinations == summary.not_searched == 12 * 2 * 2
     assert rbfrag.simulate(database, kind="falls", jobs=1).resumed == summary.combinations
+    model = rbfrag.fit(database, kind="falls", term="pgv", method="logistic").model.row
+    assert model.kind == "falls"
+    with opened_database(database) as engine, engine.begin() as connection:
+        save_model(connection, model)
+    weak = rbfrag.predict(3.0, 0.02, kind="falls", pgv_m_s=0.6, db=database)
+    strong = rbfrag.predict(3.0, 2.0, kind="falls", pgv_m_s=0.6, db=database)
+    assert (weak.kind, weak.model) == ("falls", model.name)
+    assert weak.probability > 0.5 > strong.probability
+    with TestClient(make_app(Settings(db=str(database)))) as client:
+        asked = {"kind": "falls", "p2": 3.0, "kr": 0.02, "pgv": 0.6}
+        answer = client.get("/v1/predict", params=asked)
+        assert answer.status_code == 200, answer.text
+        assert answer.json()["probability"] == weak.probability
+        assert answer.json()["kind"] == "falls"
