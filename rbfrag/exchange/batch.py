@@ -107,8 +107,8 @@ def predict_table(
                 for name in ANSWERS:
                     part.pop(name, None)
                 write(part, answer)
-                told = np.isfinite(answer["probability"])
-                counts += [told.size, int(told.sum()), int(answer["in_domain"].sum())]
+                finite = np.isfinite(answer["probability"])
+                counts += [finite.size, int(finite.sum()), int(answer["in_domain"].sum())]
     except csv.Error as error:
         raise InputError(f"{origin}: not a CSV file: {error}") from None
     rows, answered, inside = counts.tolist()

@@ -22,6 +22,14 @@ from rbfrag.solver.quantity import positive
 from rbfrag.solver.stability.arrays import slumping_p2
 from rbfrag.solver.stability.modes import MODES, SLIDE, SLUMP, STABLE, TOPPLE, UNSTABLE, ModeName
 
+FloatArray = NDArray[np.float64]
+
+MODELLED: tuple[ModeName, ...] = ("topple",)
+"""Modes that a fragility model answers for."""
+
+UNCOVERED = "no fragility model for this mode"
+LOCKED = "locked: no horizontal acceleration moves it in this mode"
+
 
 def other_modes(
     made: Realisations,
@@ -76,15 +84,6 @@ def other_modes(
         )
         assert isinstance(answers, PredictionArray)
         yield "slump", answers.model, slumps, answers
-
-
-FloatArray = NDArray[np.float64]
-
-MODELLED: tuple[ModeName, ...] = ("topple",)
-"""Modes that a fragility model answers for."""
-
-UNCOVERED = "no fragility model for this mode"
-LOCKED = "locked: no horizontal acceleration moves it in this mode"
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,6 @@ from rbfrag.errors import InputError
 EXAMPLE = "Example:  rbfrag predict --p2 3 --kr 0.1 --pgv 0.6 --json"
 
 
-def _number(name: str, text: str) -> Any:
-    return typer.Option(name, help=text, show_default=False)
-
-
 def predict(
     p2: options.P2OrFile = None,
     kr: options.KrOrFile = None,
@@ -28,7 +24,6 @@ def predict(
             metavar="FILE",
             help="Block file (.toml or .csv) with beta_deg and phi_deg, instead of numbers; "
             "refused unless its mode is that of the kind.",
-            show_default=False,
         ),
     ] = None,
     kind: Annotated[
@@ -37,30 +32,35 @@ def predict(
             "--kind",
             help="How the block fails: toppling, slumping or sliding. Default: what the block is "
             "given by, --p2, --ks or --ky.",
-            show_default=False,
         ),
     ] = None,
     ky: Annotated[
-        float | None, _number("--ky", "Sliding: yield acceleration coefficient tan(phi - beta).")
+        float | None,
+        typer.Option("--ky", help="Sliding: yield acceleration coefficient tan(phi - beta)."),
     ] = None,
     beta: Annotated[
         float | None,
-        _number("--beta", "Sliding, with --ky: dip of the base, out of the slope positive [deg]."),
+        typer.Option(
+            "--beta", help="Sliding, with --ky: dip of the base, out of the slope positive [deg]."
+        ),
     ] = None,
     displacement: Annotated[
-        float | None, _number("--displacement", "Sliding: the displacement that is too far [m].")
+        float | None,
+        typer.Option("--displacement", help="Sliding: the displacement that is too far [m]."),
     ] = None,
     ks: Annotated[
-        float | None, _number("--ks", "Slumping: yield acceleration coefficient k_s, with --ps2.")
+        float | None,
+        typer.Option("--ks", help="Slumping: yield acceleration coefficient k_s, with --ps2."),
     ] = None,
     ps2: Annotated[
-        float | None, _number("--ps2", "Slumping: frequency parameter p_s² at rest [1/s²].")
+        float | None,
+        typer.Option("--ps2", help="Slumping: frequency parameter p_s² at rest [1/s²]."),
     ] = None,
     rotation: Annotated[
         float | None,
-        _number(
+        typer.Option(
             "--rotation",
-            "Slumping: rotation that counts as failure [deg]; there must be a model of it. "
+            help="Slumping: rotation that counts as failure [deg]; there must be a model of it. "
             "Default: failure past recovery.",
         ),
     ] = None,
@@ -75,7 +75,6 @@ def predict(
             metavar="MOTION",
             help="The accelerogram itself, instead of its measures: a file, FILE#INDEX or a "
             "database id. Its toppling spectrum answers, for both polarities and their mean.",
-            show_default=False,
         ),
     ] = None,
     polarity: Annotated[
@@ -90,7 +89,6 @@ def predict(
             help="Block table (.csv or .parquet) with columns p2_1_s2 and kr (or ky and "
             "displacement_m; or ks and ps2_1_s2) and any of pgv_m_s, pga_g, tm_s, pgd_m; what is "
             "the same for all rows may be an option.",
-            show_default=False,
         ),
     ] = None,
     out: Annotated[
@@ -100,7 +98,6 @@ def predict(
             metavar="FILE",
             help="With --batch: table to write, the same columns with probability, ci_low, "
             "ci_high, in_domain and reason.",
-            show_default=False,
         ),
     ] = None,
     model: options.Model = None,
