@@ -217,10 +217,6 @@ def test_every_imported_library_is_declared() -> None:
     assert used - set(sys.stdlib_module_names) - {"rbfrag"} <= names
 
 
-# Names of kinds that are on their way out: this set only shrinks.
-KNOWN_KIND_NAMES: set[str] = set()
-
-
 def test_no_imports_run_in_a_circle() -> None:
     script = drawing()
     assert script.circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a"}}) == [["b", "c"]]
@@ -243,7 +239,7 @@ def test_kinds_are_named_in_their_files_only() -> None:
         if not (name := path.relative_to(PACKAGE).as_posix()).startswith(KIND_FILES)
         and kind_names(path.read_text(encoding="utf-8"))
     }
-    assert users <= KNOWN_KIND_NAMES
+    assert users == set()
 
 
 def test_no_folder_holds_more_than_a_page_of_files() -> None:

@@ -14,9 +14,6 @@ FloatArray = NDArray[np.float64]
 MEASURES = ("pga_g", "pgv_m_s", "sa_g")
 """What the levels of a curve may be, with the unit."""
 
-CERTAIN = 1.0 - 1e-9
-"""A probability of exceedance above this says nothing of the rate."""
-
 
 @dataclass(frozen=True, eq=False)
 class HazardCurve:

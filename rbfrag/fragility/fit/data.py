@@ -246,11 +246,6 @@ class FitData:
         return self.values["y_m_s"]
 
     @property
-    def y0_m_s(self) -> FloatArray:
-        """Toppling velocities of the blocks of the grid [m/s], shape (n, m)."""
-        return self.blocks["y_m_s"]
-
-    @property
     def censored(self) -> NDArray[np.bool_]:
         """Rows of which a limit is known alone, shape (n,)."""
         return np.asarray(~self.found & np.isfinite(self.values.get("y_m_s", self.x)))

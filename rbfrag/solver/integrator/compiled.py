@@ -35,15 +35,6 @@ def fused_kernel(function: Callable[P, R]) -> Callable[P, R]:
     return _compile(function, {"fastmath": {"contract"}})
 
 
-def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile like :func:`kernel`, as a part of every kernel that calls it.
-
-    For short functions without a branch: a loop that calls nothing takes several rows at a time.
-    Nothing of it is kept on disk but in those kernels.
-    """
-    return cast("Callable[P, R]", njit(**_OPTIONS, forceinline=True)(function))
-
-
 def within(function: Callable[P, R]) -> Callable[P, R]:
     """Put the operations of a function into every kernel that calls it.
 
