@@ -111,11 +111,7 @@ def encode_model(row: ModelRow) -> dict[str, Any]:
 
 
 def decode_model(values: Sequence[Any]) -> ModelRow:
-    """Return the model of one row, its values in the order of :data:`COLUMNS`.
-
-    Raises:
-        DatabaseError: the row does not read as a model.
-    """
+    """Return the model of one row, its values in the order of :data:`COLUMNS`."""
     by_name: Mapping[str, Any] = dict(zip(COLUMNS, values, strict=True))
     try:
         return ModelRow(
@@ -191,14 +187,7 @@ def read_model(
 
 
 def read_models(path: str | PathLike[str]) -> list[ModelRow]:
-    """Return all models of an SQLite database, sorted by name.
-
-    Args:
-        path: the database file.
-
-    Raises:
-        DatabaseError: one of its kinds, as for :func:`rbfrag.db.engine.open_database`.
-    """
+    """Return all models of an SQLite database, sorted by name."""
     with _opened(Path(path)) as connection:
         rows = [decode_model(row) for row in connection.execute(_SELECT)]
     return sorted(rows, key=lambda model: model.name)
