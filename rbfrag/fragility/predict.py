@@ -387,7 +387,7 @@ def _with_words(
     model: FragilityModel, given: dict[str, float], half_width: float
 ) -> tuple[float, float, float, Any, dict[str, Any], float, bool, list[str]]:
     # Kept apart: most questions need no words.
-    from rbfrag.fragility.checks import judged
+    from rbfrag.fragility.checks import answer_with_findings
 
     said: list[str] = []
 
@@ -399,7 +399,7 @@ def _with_words(
         if holds:
             raise InputError(finding.about(finding.value))
 
-    found = judged(
+    found = answer_with_findings(
         model, given, tuple(given), half_width, SINGLE,
         say=say, refuse=refuse, fails_at_rest=refuse, nothing=False,
     )  # fmt: skip
