@@ -10,15 +10,15 @@ from __future__ import annotations
 import json
 import math
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from rbfrag.db.sqlite_file import check_sqlite_database, connect_sqlite, sqlite_error_in_words
-from rbfrag.errors import DatabaseError, InputError, UnknownModelError
+from rbfrag.errors import DatabaseError, InputError
 
 
 @dataclass(frozen=True)
@@ -160,55 +160,22 @@ def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
     return f"there is no model {name!r} in {where}; it holds: {', '.join(known)}"
 
 
-def read_model(
-    path: str | PathLike[str], name: str | None = None, *, kind: str = "toppling"
-) -> ModelRow:
-    """Return one model of an SQLite database.
+def read_models(path: str | PathLike[str]) -> list[ModelRow]:
+    """Return all models of an SQLite database, sorted by name.
 
     Works while another process writes to it, and in a folder that cannot be written.
 
     Args:
         path: the database file.
-        name: the model's name; None for the default of a kind.
-        kind: the kind whose default is meant.
 
     Raises:
         DatabaseError: one of its kinds, as for :func:`rbfrag.db.engine.open_database`.
-        UnknownModelError: there is no such model; the message lists the names there are.
     """
     file = Path(path)
-    with _opened(file) as connection:
-        if name is None:
-            default = f"{_SELECT} WHERE is_default AND kind = ?"
-            row = connection.execute(default, (kind,)).fetchone()
-        else:
-            row = connection.execute(f"{_SELECT} WHERE name = ?", (name,)).fetchone()
-        if row is not None:
-            return decode_model(row)
-        names = connection.execute("SELECT name FROM fragility_model").fetchall()
-    known = sorted(found for (found,) in names)
-    raise UnknownModelError(unknown_model(name, known, str(file)))
-
-
-def read_models(path: str | PathLike[str]) -> list[ModelRow]:
-    """Return all models of an SQLite database, sorted by name.
-
-    Args:
-        path: the database file.
-
-    Raises:
-        DatabaseError: one of its kinds, as for :func:`rbfrag.db.engine.open_database`.
-    """
-    with _opened(Path(path)) as connection:
-        rows = [decode_model(row) for row in connection.execute(_SELECT)]
-    return sorted(rows, key=lambda model: model.name)
-
-
-@contextmanager
-def _opened(file: Path) -> Iterator[sqlite3.Connection]:
     with closing(connect_sqlite(file, read_only=True)) as connection:
         check_sqlite_database(connection, file)
         try:
-            yield connection
+            rows = [decode_model(row) for row in connection.execute(_SELECT)]
         except sqlite3.Error as error:
             raise sqlite_error_in_words(error, file) from error
+    return sorted(rows, key=lambda model: model.name)

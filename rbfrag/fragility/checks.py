@@ -128,7 +128,7 @@ class Judgement(NamedTuple):
     ruled: Any
 
 
-def judged(
+def answer_with_findings(
     model: FragilityModel,
     given: Mapping[str, Any],
     needed: Collection[str],

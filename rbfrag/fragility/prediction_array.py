@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.checks import Finding, judged
+from rbfrag.fragility.checks import Finding, answer_with_findings
 from rbfrag.fragility.methods import Numbers, arrays
 from rbfrag.fragility.model import FragilityModel
 
@@ -230,7 +230,7 @@ def _with_words(
 
     block = model.method.block
     needed = [*block.names, *model.term.inputs, *(o for o in block.options if o in given)]
-    found = judged(
+    found = answer_with_findings(
         model, given, needed, half_width, arrays(),
         say=say, refuse=refuse, fails_at_rest=fails_at_rest,
         nothing=np.zeros(place.size, dtype=np.bool_),

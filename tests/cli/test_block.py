@@ -148,7 +148,7 @@ def test_respond_and_predict_from_a_block_file(shell: Shell, tmp_path: Path) -> 
         (("phi_deg = 35", "phi_deg = 20"), ["slide", "0.267"]),
         (("alpha1_deg = -10", "alpha1_deg = -40"), ["confined topple"]),
         (("beta_deg = 5", "beta_deg = 26"), ["unstable"]),
-        (("beta_deg = 5", "beta_deg = 25"), ["k_r = 0 g"]),
+        (("beta_deg = 5", "beta_deg = 25"), ["yield 0 g"]),
         (("beta_deg = 5\n", ""), ["beta_deg is missing"]),
         (("phi_deg = 35", "phi_deg = 35\nkv = 0.2"), ["kv"]),
     ],
