@@ -51,11 +51,7 @@ def taylor_run(case: Case, order: int = ORDER, ph_max: float = PH_MAX) -> Answer
 
 
 def methods(*, quick: bool = False) -> tuple[Method, ...]:
-    """Return every method that can be run here.
-
-    Args:
-        quick: leave out the slowest settings.
-    """
+    """Return every method that can be run here."""
     splits = dict.fromkeys((UNSPLIT, PH_MAX, PH_MAX / 3.0))
     orders = dict.fromkeys((4, 5, 6, ORDER))
     found = [_taylor(order, ph_max) for ph_max in splits for order in orders]

@@ -238,9 +238,6 @@ def strengths_of(number: int) -> tuple[float, ...]:
 
     Args:
         number: how many values, from 0.99 down to the search limit 0.01; at least 2.
-
-    Raises:
-        InputError: fewer than 2, or absurdly many.
     """
     if not 2 <= number <= MOST_VALUES:
         raise InputError(f"--grid: the number of values must be 2 to {MOST_VALUES}, not {number}")
@@ -251,10 +248,6 @@ def strengths_of(number: int) -> tuple[float, ...]:
 
 def checked_ratios(values: Sequence[float], what: str) -> tuple[float, ...]:
     """Return k/PGA values as they are stored, falling, each once.
-
-    Args:
-        values: as the user gave them.
-        what: the option, for the message.
 
     Raises:
         InputError: a value that is not positive and finite, or one that repeats.

@@ -187,12 +187,7 @@ def ends_of(points: SearchPoints | None) -> dict[float, End]:
 
 
 def differences(stored: StoredCombination, again: ComputedAgain) -> Iterator[str]:
-    """Yield every value that is not the same bit for bit, and maps that contradict each other.
-
-    Args:
-        stored: what the database says.
-        again: the same computed again.
-    """
+    """Yield every value that is not the same bit for bit, and maps that contradict each other."""
     found = again.critical
     if found is not None:
         for name in _VALUES:
@@ -212,12 +207,7 @@ def differences(stored: StoredCombination, again: ComputedAgain) -> Iterator[str
 
 
 def deviations(stored: StoredCombination, again: ComputedAgain) -> Iterator[str]:
-    """Yield what differs by more than the error of the solver.
-
-    Args:
-        stored: what the database says.
-        again: the same computed again.
-    """
+    """Yield what differs by more than the error of the solver."""
     values, found = stored.values, again.critical
     borders: list[float] = []
     if found is not None:

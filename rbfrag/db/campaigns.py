@@ -155,13 +155,7 @@ def known_keys(connection: Connection, keys: Iterable[str]) -> set[str]:
 def combinations_with_points(
     connection: Connection, keys: Iterable[str], kr_over_pga: Sequence[float]
 ) -> set[str]:
-    """Return those natural keys whose combinations hold a simulation at each of some strengths.
-
-    Args:
-        connection: the database.
-        keys: natural keys.
-        kr_over_pga: block strengths over PGA, each once.
-    """
+    """Return those natural keys whose combinations hold a simulation at each of some strengths."""
     query = (
         select(combination.c.natural_key, simulation.c.kr_over_pga)
         .join(simulation)
@@ -224,9 +218,6 @@ def insert_points(connection: Connection, points: Mapping[str, SearchPoints]) ->
     Args:
         connection: inside the caller's transaction.
         points: the blocks, by the natural key of their combination.
-
-    Raises:
-        InputError: there is no such combination.
     """
     _insert_points(connection, _all_known(connection, points), points, {})
 
@@ -237,9 +228,6 @@ def add_grids(connection: Connection, grids: Mapping[str, SearchPoints]) -> None
     Args:
         connection: inside the caller's transaction.
         grids: the blocks by the natural key of their combination, number i of the grid at place i.
-
-    Raises:
-        InputError: there is no such combination.
     """
     known = _all_known(connection, grids)
     _insert_points(connection, known, {}, {k: v for k, v in grids.items() if not known[k].gridded})
@@ -251,9 +239,6 @@ def add_maps(connection: Connection, results: Mapping[str, CriticalResult]) -> N
     Args:
         connection: inside the caller's transaction.
         results: searches with their maps, by the natural key of their combination.
-
-    Raises:
-        InputError: there is no such combination.
     """
     known = _all_known(connection, results)
     new = {key: result for key, result in results.items() if not known[key].mapped}

@@ -29,11 +29,6 @@ _KEYS_AT_ONCE = 500
 def insert_if_new(connection: Connection, table: Table, values: Mapping[str, object]) -> bool:
     """Insert one row unless a unique key of the table holds it already.
 
-    Args:
-        connection: inside the caller's transaction.
-        table: the table.
-        values: column values by name.
-
     Returns:
         True when the row was inserted.
     """
@@ -45,13 +40,7 @@ def insert_if_new(connection: Connection, table: Table, values: Mapping[str, obj
 
 
 def insert_row(connection: Connection, table: Table, values: Mapping[str, object]) -> int:
-    """Insert one row and return its id.
-
-    Args:
-        connection: inside the caller's transaction.
-        table: a table with an id.
-        values: column values by name.
-    """
+    """Insert one row and return its id."""
     done = connection.execute(insert(table).values(**_digested(table, values)))
     assert done.inserted_primary_key is not None
     return int(done.inserted_primary_key[0])
@@ -98,14 +87,7 @@ def update_rows(
     where: ColumnElement[bool],
     values: Mapping[str, object],
 ) -> None:
-    """Change columns of the rows that meet a condition.
-
-    Args:
-        connection: inside the caller's transaction.
-        table: the table.
-        where: the condition.
-        values: new column values by name.
-    """
+    """Change columns of the rows that meet a condition."""
     keys = table.primary_key.columns
     for row in connection.execute(select(table).where(where).with_for_update()).mappings().all():
         changed = _digested(table, {**row, **values})

@@ -35,9 +35,6 @@ def combination_key(
 
     Returns:
         SHA-256 as 64 hexadecimal digits.
-
-    Raises:
-        InputError: a number that is not finite.
     """
     given = _inputs(**inputs) | {"p2": None if p2 is None else float(p2), "settings": settings}
     return _digest(given if block is None else {**given, "block": block})
@@ -53,9 +50,6 @@ def response_key(*, p2: float, kr: float, **inputs: Any) -> str:
 
     Returns:
         SHA-256 as 64 hexadecimal digits.
-
-    Raises:
-        InputError: a number that is not finite.
     """
     return _digest({**_inputs(**inputs), "p2": float(p2), "kr": float(kr)})
 
@@ -66,11 +60,7 @@ def key_of_row(
     dt_s: float,
     vertical_sha256: str | None,
 ) -> str:
-    """Return the key that a row of `combination` has by its columns and the samples given.
-
-    Raises:
-        ValueError: its settings or its block are no JSON.
-    """
+    """Return the key that a row of `combination` has by its columns and the samples given."""
     return combination_key(
         motion_sha256=motion_sha256,
         dt_s=dt_s,

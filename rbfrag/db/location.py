@@ -80,9 +80,6 @@ def check_revision(found: str, where: str) -> None:
     Args:
         found: the revision stored in the database.
         where: the database as the user names it, for the message.
-
-    Raises:
-        SchemaVersionError: the schema is older or newer.
     """
     if found == SCHEMA_REVISION:
         return

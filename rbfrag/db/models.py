@@ -79,11 +79,7 @@ def load_model(
 
 
 def set_default(connection: Connection, name: str) -> None:
-    """Make a model the one of its kind that answers when none is named.
-
-    Raises:
-        UnknownModelError: there is none of that name.
-    """
+    """Make a model the one of its kind that answers when none is named."""
     _clear_default(connection, load_model(connection, name).kind)
     named = fragility_model.c.name == name
     update_rows(connection, fragility_model, named, {"is_default": True})

@@ -135,15 +135,7 @@ def add_motion(
 
 
 def motion_rows(connection: Connection, *, suite: str | None = None) -> list[MotionRow]:
-    """Return the stored motions without their samples, by id.
-
-    Args:
-        connection: the database.
-        suite: only those of this suite.
-
-    Raises:
-        InputError: there is no such suite.
-    """
+    """Return the stored motions without their samples, by id."""
     query = _row_query()
     if suite is not None:
         suite_id = require_suite(connection, suite)
@@ -161,11 +153,7 @@ def motion_rows(connection: Connection, *, suite: str | None = None) -> list[Mot
 
 
 def motion_row(connection: Connection, motion_id: int) -> MotionRow:
-    """Return one stored motion without its samples.
-
-    Raises:
-        InputError: there is no motion of that id.
-    """
+    """Return one stored motion without its samples."""
     return _motion_row(_row_of(connection, _row_query(), motion_id))
 
 
@@ -210,12 +198,7 @@ def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
 
 
 def same_source(connection: Connection, motion_id: int) -> list[int]:
-    """Return the other motions that were made from the same samples of a file, by id.
-
-    Args:
-        connection: the database.
-        motion_id: a stored motion.
-    """
+    """Return the other motions that were made from the same samples of a file, by id."""
     own = select(schema.motion.c.source_sha256).where(schema.motion.c.id == motion_id)
     interval = select(schema.motion.c.dt_s).where(schema.motion.c.id == motion_id)
     query = (
@@ -413,9 +396,6 @@ def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording
         info: the earthquake. Without an event_id nothing is known, and the recording
             stands for an event of its own.
         recording: name of the recording.
-
-    Raises:
-        InputError: a magnitude that no earthquake has.
     """
     if info.magnitude is not None and not -5.0 < info.magnitude < 11.0:
         raise InputError(
@@ -441,11 +421,7 @@ def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording
 
 
 def add_to_suite(connection: Connection, name: str, motion_id: int) -> None:
-    """Put a motion into a suite, made when new; a motion that is in it stays in it.
-
-    Raises:
-        InputError: the name is empty.
-    """
+    """Put a motion into a suite, made when new; a motion that is in it stays in it."""
     if not name.strip():
         raise InputError("the name of a suite must not be empty")
     name = storable(name)

@@ -57,9 +57,6 @@ class OutcomeMaps:
 
         Returns:
             Shape (n, m).
-
-        Raises:
-            InputError: another shape.
         """
         asked = np.asarray(kr_over_pga, dtype=np.float64)
         n = self.combination_id.size
@@ -98,9 +95,6 @@ def outcome_maps(connection: Connection, combination_id: ArrayLike) -> OutcomeMa
     Args:
         connection: the database.
         combination_id: row ids, such as ``CombinationTable.combination_id``, shape (n,).
-
-    Raises:
-        InputError: an id that is not there.
     """
     wanted = np.atleast_1d(np.asarray(combination_id, dtype=np.int64))
     if not wanted.size:

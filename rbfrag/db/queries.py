@@ -201,11 +201,7 @@ def outcome_grid(connection: Connection, combination_id: ArrayLike) -> OutcomeGr
 
 
 def simulation_points(connection: Connection, combination_id: int) -> SearchPoints:
-    """Return every simulated point of a combination, by falling k_r/PGA.
-
-    Raises:
-        InputError: there is no combination of that id.
-    """
+    """Return every simulated point of a combination, by falling k_r/PGA."""
     query = select(combination.c.id).where(combination.c.id == combination_id)
     if not 0 < combination_id < 2**31 or connection.scalar(query) is None:
         raise InputError(f"there is no combination {combination_id} in the database")

@@ -49,15 +49,7 @@ class ResponseRecord:
 
 
 def insert_responses(connection: Connection, records: Sequence[ResponseRecord]) -> None:
-    """Store responses with their histories; those whose key is there are left alone.
-
-    Args:
-        connection: inside the caller's transaction.
-        records: the responses.
-
-    Raises:
-        InputError: one has no history.
-    """
+    """Store responses with their histories; those whose key is there are left alone."""
     insert_rows(connection, response, _COLUMNS, [_row(record) for record in records])
 
 
@@ -73,11 +65,7 @@ def known_responses(connection: Connection, keys: Iterable[str]) -> set[str]:
 
 
 def stored_history(connection: Connection, natural_key: str) -> ResponseHistory:
-    """Return the history of a stored response.
-
-    Raises:
-        InputError: there is none of that key.
-    """
+    """Return the history of a stored response."""
     column = response.c
     row = connection.execute(
         select(

@@ -27,9 +27,6 @@ _BUSY, _LOCKED, _READONLY, _IOERR, _CORRUPT, _FULL, _CANTOPEN, _NOTADB = 5, 6, 8
 def require_sqlite_file(path: Path) -> None:
     """Check from outside that a file can be an SQLite database.
 
-    Args:
-        path: the file.
-
     Raises:
         DatabaseNotFoundError: there is no such file.
         NotADatabaseError: a folder, an empty file, or content that is not SQLite's.
@@ -77,9 +74,6 @@ def connect_sqlite(
         read_only: forbid writes.
         busy_timeout_s: how long to wait for another process's lock [s].
         check_same_thread: as for :func:`sqlite3.connect`.
-
-    Raises:
-        DatabaseError: one of its kinds, in words.
     """
     require_sqlite_file(path)
     try:
@@ -127,12 +121,7 @@ def _refuse_unreadable_log(path: Path) -> None:
 
 
 def check_sqlite_database(connection: sqlite3.Connection, path: Path) -> None:
-    """Check from inside that an SQLite file is an rbfrag database of this schema.
-
-    Raises:
-        NotADatabaseError: another program's database.
-        SchemaVersionError: an older or newer schema.
-    """
+    """Check from inside that an SQLite file is an rbfrag database of this schema."""
     try:
         (application,) = connection.execute("PRAGMA application_id").fetchone()
         if application != APPLICATION_ID:

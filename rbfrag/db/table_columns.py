@@ -98,9 +98,6 @@ def read_columns(
         columns: names of the columns; None for all, but samples and histories only with
             `arrays`.
         arrays: include samples and histories.
-
-    Raises:
-        InputError: there is no such table or column.
     """
     chosen = chosen_columns(table, columns, arrays=arrays)
     parts: list[list[NDArray[Any]]] = [[] for _ in chosen]

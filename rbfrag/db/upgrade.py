@@ -42,12 +42,6 @@ def upgrade_database(db: str | PathLike[str] | None = None) -> tuple[str, str]:
 
     Returns:
         The revision before and after; they are equal when there was nothing to do.
-
-    Raises:
-        DatabaseNotFoundError: there is no such database.
-        NotADatabaseError: it is not one of rbfrag's.
-        SchemaVersionError: its schema is newer than this rbfrag.
-        DatabaseReadOnlyError: it cannot be written.
     """
     engine = unchecked_engine(locate(db), foreign_keys=False)
     label = database_label(engine.url)
@@ -114,10 +108,6 @@ def create_if_missing(place: Path | str, *, busy_timeout_s: float) -> None:
     Args:
         place: what :func:`rbfrag.db.location.locate` returned.
         busy_timeout_s: how long to wait for another process's lock [s].
-
-    Raises:
-        DatabaseNotFoundError: the folder does not exist.
-        DatabaseReadOnlyError: the folder cannot be written.
     """
     if isinstance(place, str):
         _create_on_server(place)

@@ -49,9 +49,6 @@ def vertical_pairs(connection: Connection, *, suite: str | None = None) -> dict[
     Args:
         connection: the database.
         suite: only the horizontal motions of this suite.
-
-    Raises:
-        InputError: there is no such suite.
     """
     horizontals = [row for row in motion_rows(connection, suite=suite) if not row.is_vertical]
     recording_of = _recordings(connection)
@@ -64,10 +61,6 @@ def vertical_pairs(connection: Connection, *, suite: str | None = None) -> dict[
 
 def vertical_pair(connection: Connection, motion_id: int) -> VerticalPair:
     """Return the vertical companion of one horizontal motion.
-
-    Args:
-        connection: the database.
-        motion_id: the horizontal motion.
 
     Raises:
         InputError: there is no motion of that id, or it is a vertical one.
@@ -86,10 +79,6 @@ def vertical_pair(connection: Connection, motion_id: int) -> VerticalPair:
 
 def load_vertical(connection: Connection, motion_id: int) -> GroundMotion | None:
     """Return the solver's `vertical` for a stored horizontal motion, or None without one.
-
-    Args:
-        connection: the database.
-        motion_id: the horizontal motion.
 
     Raises:
         InputError: there is no motion of that id, or it is a vertical one.

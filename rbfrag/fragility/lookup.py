@@ -128,11 +128,6 @@ def suited_models(
     """Return one stored model for each term that the measures suffice for, the recommended first.
 
     Arguments as for :func:`find_model`.
-
-    Raises:
-        InputError: the measures do not suffice for any.
-        UnknownModelError: the database holds no such model.
-        DatabaseError: the database cannot be read.
     """
     return list(_suited(tuple(given), db, kind, rotation_deg))
 
@@ -298,9 +293,6 @@ def stored_rows(db: str | PathLike[str] | None = None) -> list[ModelRow]:
 
     Args:
         db: database, as for :func:`find_model`.
-
-    Raises:
-        DatabaseError: the database cannot be read.
     """
     place, _ = _place(db)
     if isinstance(place, Path):

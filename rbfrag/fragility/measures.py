@@ -139,11 +139,7 @@ BEST_FIRST = tuple(sorted(TERMS, key=lambda name: -TERMS[name].level))
 
 
 def intensity_term(name: str) -> Term:
-    """Return the term of that name.
-
-    Raises:
-        InputError: there is none.
-    """
+    """Return the term of that name."""
     try:
         return TERMS[name]
     except KeyError:

@@ -270,9 +270,6 @@ def student_half_width(level: float, degrees_of_freedom: int) -> float:
     Args:
         level: confidence level, between 0 and 1.
         degrees_of_freedom: earthquakes less one; 0 for the normal quantile.
-
-    Raises:
-        InputError: the level is not between 0 and 1.
     """
     if isinstance(level, bool):
         raise _no_level(level)
@@ -321,12 +318,6 @@ def normal_half_width(level: float) -> float:
 
     Newton's method on the logarithm of the upper tail, ln Q(q) = ln((1 - level)/2); the
     logarithm is concave, so that the iteration ends from one side.
-
-    Args:
-        level: confidence level, between 0 and 1.
-
-    Raises:
-        InputError: the level is not between 0 and 1.
     """
     if not isinstance(level, int | float) or not 0.0 < level < 1.0:
         raise _no_level(level)

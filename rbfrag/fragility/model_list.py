@@ -9,11 +9,7 @@ from rbfrag.db.model_file import ModelRow
 
 
 def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
-    """Return what `rbfrag models list` says of each model.
-
-    Args:
-        rows: the models as they are stored.
-    """
+    """Return what `rbfrag models list` says of each model."""
     return [
         {
             "name": row.name,

@@ -313,11 +313,7 @@ def is_single(value: object) -> bool:
 
 
 def single(name: str, value: object) -> float:
-    """Return a value as a float.
-
-    Raises:
-        InputError: it is no number.
-    """
+    """Return a value as a float."""
     if isinstance(value, bool | str | bytes):
         raise InputError(f"{name} = {value!r} is not a number: give a number or an array")
     try:
@@ -430,11 +426,7 @@ def _predict_motion(
     level: float,
     db: str | PathLike[str] | None,
 ) -> Prediction:
-    """Return the probability for one block; arguments as for :func:`predict`.
-
-    Raises:
-        InputError: measures beside the motion, several blocks, an unknown polarity.
-    """
+    """Return the probability for one block; arguments as for :func:`predict`."""
     # Kept apart: a motion needs numpy.
     from rbfrag.fragility.prediction_motion import measures_of
 

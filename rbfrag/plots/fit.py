@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
+from rbfrag.fragility.methods import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.plots.canvas import density, new_figure, plot_path, save_figure, written_numbers
 from rbfrag.plots.model_lines import (
@@ -63,7 +64,12 @@ def plot_fit(
         InputError: nothing to draw, or a path that cannot be written.
     """
     plot_path(path)
-    term = model.term
+    term, block = model.term, model.method.block
+    if block.names != TOPPLING_BLOCK.names:
+        raise InputError(
+            f"model {model.name} is of blocks known by {' and '.join(block.names)}: the figure is "
+            f"that of blocks known by {' and '.join(TOPPLING_BLOCK.names)}"
+        )
     alone = term.name in ONE_NUMBER_TERMS and not model.has_exponent
     spectrum = np.full(table.p2.shape, np.nan) if xp_m_s is None else xp_m_s
     x = (

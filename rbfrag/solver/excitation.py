@@ -127,9 +127,6 @@ def excitation(
             same sampling interval (or, for node motions, the same node times). Where one
             component is shorter, it is taken as zero after its last sample, with a warning.
         polarity: ``forward`` or ``reverse``; the vertical is never reversed.
-
-    Raises:
-        InputError: unknown polarity, or components that cannot be brought together.
     """
     k_h = driving_acceleration_g(motion.acceleration_g, polarity)
     time_s, interval_s = motion.time_s, motion.interval_s

@@ -246,11 +246,7 @@ class Kind:
         case: Case,
         k_over_pga: Sequence[float],
     ) -> SearchPoints:
-        """Run blocks of stated strengths k/PGA, falling: those of the campaign option `grid`.
-
-        Raises:
-            InputError: the kind knows no such blocks.
-        """
+        """Run blocks of stated strengths k/PGA, falling: those of the campaign option `grid`."""
         raise InputError(
             f"no block of k/PGA {k_over_pga[0]!r} belongs to a campaign of {self.kind}"
         )
@@ -263,11 +259,7 @@ class Kind:
         case: Case,
         k_over_pga: float,
     ) -> Response:
-        """Return the motion in time of one block: the campaign option `store_responses`.
-
-        Raises:
-            InputError: the kind keeps none.
-        """
+        """Return the motion in time of one block: the campaign option `store_responses`."""
         raise InputError(f"campaigns of {self.kind} keep no histories")
 
     def refuse_foreign(self, given: Iterable[str], own: Sequence[str]) -> None:

@@ -24,11 +24,7 @@ def models() -> dict[str, Kind]:
 
 
 def model_of_kind(kind: str) -> Kind:
-    """Return the model of that name.
-
-    Raises:
-        InputError: there is none; the message lists what there is.
-    """
+    """Return the model of that name."""
     known = models()
     if kind not in known:
         raise InputError(f"unknown kind {kind!r}: use one of {', '.join(sorted(known))}")

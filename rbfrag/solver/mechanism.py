@@ -44,11 +44,7 @@ class MechanismKind(Kind):
         return mechanism_response(self.kind, self._without_cohesion(site), shaking)
 
     def runner(self, site: BlockOnPlanes) -> Runner:
-        """Return a function that says how the block ends under an excitation.
-
-        Raises:
-            InputError: the base has cohesion.
-        """
+        """Return a function that says how the block ends under an excitation."""
         mechanism = self._without_cohesion(site)
 
         def run(drive: Excitation) -> RunEnd:

@@ -14,9 +14,6 @@ def number(value: object, name: str, what: str) -> float:
         value: what was given.
         name: its name, for the message.
         what: what it should be, for the message.
-
-    Raises:
-        InputError: it is no number, or not finite.
     """
     if isinstance(value, bool | str | bytes):
         raise InputError(f"{name} = {value!r} is not a number: give {what}")

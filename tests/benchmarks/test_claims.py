@@ -61,6 +61,7 @@ def table(seed: int = 1, *, slope: float = 0.72, scatter: float = 0.2) -> Combin
         pgd_m=pgd,
         tm_s=tm,
         natural_key=np.array([str(next(number)) for _ in range(n)], dtype=object),
+        block=np.full(n, None, dtype=object),
     )
 
 

@@ -32,11 +32,6 @@ def connected(address: str) -> Iterator[Any]:
 
     Returns:
         The client, for :func:`run_on_cluster`.
-
-    Raises:
-        MissingExtraError: distributed is not installed.
-        InputError: nobody answers there.
-        WorkFailedError: the scheduler has no workers.
     """
     if importlib.util.find_spec("distributed") is None:
         raise MissingExtraError("Dask clusters need distributed", "dask")

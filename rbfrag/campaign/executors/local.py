@@ -34,9 +34,6 @@ def run_locally(
         work: the pieces.
         workers: number of processes.
         after_a_death: what to do next when a worker process has died.
-
-    Raises:
-        WorkFailedError: a process died.
     """
     if workers <= 1:
         yield from map(do, work)

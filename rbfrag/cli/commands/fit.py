@@ -164,6 +164,8 @@ def print_report(report: FitReport, *, json: bool) -> None:
     intervals = details.get("score_intervals") or {}
     print(f"scores, judged on {details.get('judged_on', 'critical values')}:")
     for name, value in report.scores.items():
+        if not name.endswith(("_in_sample", "_held_out")):
+            continue  # another name of one that is printed
         around = intervals.get(name)
         ends = f"  ({cell(around[0])} to {cell(around[1])} by earthquakes)" if around else ""
         print(f"  {name}: {cell(value)}{ends}")

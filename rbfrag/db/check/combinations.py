@@ -27,11 +27,7 @@ _ROWS_AT_ONCE = 500
 
 
 def check_combinations(connection: Connection) -> Iterator[Finding]:
-    """Yield what is wrong with combinations, their intervals and their simulations.
-
-    Args:
-        connection: the database, inside one transaction.
-    """
+    """Yield what is wrong with combinations, their intervals and their simulations."""
     query = _query()
     last = 0
     while True:

@@ -28,9 +28,6 @@ def check_database(connection: Connection) -> list[Finding]:
     y = kr·g/p, the map of intervals, simulations against both, histories, rows that nothing
     refers to, the digest of each row, numbers that are not finite, and the models. Makes no
     simulation.
-
-    Args:
-        connection: the database, inside one transaction.
     """
     found: list[Finding] = []
     if connection.dialect.name == "sqlite":
@@ -80,11 +77,7 @@ def _check_models(connection: Connection) -> Iterator[Finding]:
 
 
 def check_digests(connection: Connection) -> Iterator[Finding]:
-    """Yield every row whose values were altered after rbfrag wrote it.
-
-    Args:
-        connection: the database, inside one transaction.
-    """
+    """Yield every row whose values were altered after rbfrag wrote it."""
     for name, table in sorted(metadata.tables.items()):
         key = list(table.primary_key.columns)
         columns = [column.name for column in table.c]
@@ -101,11 +94,7 @@ def check_digests(connection: Connection) -> Iterator[Finding]:
 
 
 def check_numbers(connection: Connection) -> Iterator[Finding]:
-    """Yield every row with a number that is not finite.
-
-    Args:
-        connection: the database, inside one transaction.
-    """
+    """Yield every row with a number that is not finite."""
     for name, table in sorted(metadata.tables.items()):
         doubles = [column for column in table.c if isinstance(column.type, Double)]
         if not doubles:

@@ -110,10 +110,6 @@ def contradictions(
 ) -> Iterator[tuple[float, float, str, str]]:
     """Yield stretches that one map has toppling and the other safe.
 
-    Args:
-        one: intervals by rising ends.
-        other: likewise.
-
     Returns:
         Lower end, upper end, what the first says, what the second says.
     """

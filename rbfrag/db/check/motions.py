@@ -26,11 +26,7 @@ _ROUNDING = 1e-9
 
 
 def check_motions(connection: Connection) -> Iterator[Finding]:
-    """Yield what is wrong with motions: bytes, sha256, and intensity measures calculated anew.
-
-    Args:
-        connection: the database, inside one transaction.
-    """
+    """Yield what is wrong with motions: bytes, sha256, and intensity measures calculated anew."""
     query = select(motion).order_by(motion.c.id)
     ids = list(connection.scalars(select(motion.c.id).order_by(motion.c.id)))
     for row_id in ids:  # one at a time: the samples of all may not fit into memory
@@ -81,11 +77,7 @@ def _measure_problems(row: Any, samples: np.ndarray) -> Iterator[str]:
 
 
 def check_spectra(connection: Connection) -> Iterator[Finding]:
-    """Yield every X(p) of the present numerics that its motion does not give.
-
-    Args:
-        connection: the database, inside one transaction.
-    """
+    """Yield every X(p) of the present numerics that its motion does not give."""
     column = toppling_spectrum.c
     query = (
         select(column.motion_id, column.polarity, column.p2, column.x_m_s)

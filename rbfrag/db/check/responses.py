@@ -15,11 +15,7 @@ _BLOCK = ("polarity", "kind", "p2", "kr", "numerics_version", "linear")
 
 
 def check_responses(connection: Connection) -> Iterator[Finding]:
-    """Yield histories whose key is not the hash of their inputs, or of another length than stated.
-
-    Args:
-        connection: the database, inside one transaction.
-    """
+    """Yield histories whose key is not the hash of their inputs, or of another length."""
     vertical = motion.alias("vertical")
     lengths = [func.length(response.c[name]).label(name) for name in _SERIES]
     query = (

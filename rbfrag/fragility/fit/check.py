@@ -111,10 +111,6 @@ def held_out_of(connection: Connection, name: str | None, *, seed: int = 0) -> H
         connection: the database.
         name: the model; None for the default.
         seed: of the draws.
-
-    Raises:
-        UnknownModelError: no model of that name.
-        FitError: the data cannot carry the fit.
     """
     row = load_model(connection, name)
     method = method_named(row.method)

@@ -55,13 +55,6 @@ def fit_lognormal(
     Combinations without a critical value above the search limit count as "below the limit".
     Covariance is clustered by earthquake; a bootstrap by earthquake is reported beside it.
 
-    Args:
-        data: the rows, found and censored.
-        method: the method.
-        term: the intensity term.
-        seed: seed of the bootstrap.
-        estimate_m: fit the method's exponent too.
-
     Raises:
         FitError: the median does not rise with intensity, or there is no scatter.
     """
@@ -134,15 +127,6 @@ def fit_censored(data: FitData, method: Method, term: Term, *, seed: int) -> Met
     """Fit a method whose formula states eta and scatter, to found and censored rows.
 
     The covariance is that of the fits that each leave an earthquake out.
-
-    Args:
-        data: the rows.
-        method: the method.
-        term: the intensity term.
-        seed: seed of the bootstrap.
-
-    Raises:
-        FitError: there is no maximum of the likelihood.
     """
     form = method.forms[term.name]
     rows = censored_rows(data, form)
@@ -188,11 +172,7 @@ def censored_rows(data: FitData, form: Form) -> CensoredNormal:
 
 
 def most_likely(rows: CensoredNormal, start: FloatArray) -> FloatArray:
-    """Return the parameters under which the rows are likeliest.
-
-    Raises:
-        FitError: there is no maximum.
-    """
+    """Return the parameters under which the rows are likeliest."""
     b, _ = maximise(rows, start, tolerance=1e-15)
     if not np.all(np.isfinite(b)) or np.abs(rows.derivatives(b)[0]).max() > 1e-4 * rows.event.size:
         raise FitError(

@@ -176,7 +176,9 @@ def fit_source(
     data = fit_data(source, method, term, kind=kind)
     options = {"estimate_m": True} if estimate_m else {}
     result: MethodResult = method.fitter()(data, method, term, seed=seed, **options)
-    law, correlations = power_law(table), log_correlations(table)
+    of_any_strength = method.block.strength == "kr"
+    law = power_law(table) if of_any_strength else None
+    correlations = log_correlations(table) if of_any_strength else {}
     of_outcomes = method.reads == "outcomes"
     row = ModelRow(
         name=name or _name(method, term, data.kind, asked),

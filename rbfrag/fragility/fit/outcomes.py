@@ -72,18 +72,7 @@ class OutcomeRows:
 def fit_outcomes(
     data: FitData, method: Method, term: Term, *, seed: int, estimate_m: bool = False
 ) -> MethodResult:
-    """Fit a method that reads outcomes.
-
-    Args:
-        data: the rows.
-        method: the method.
-        term: the intensity term.
-        seed: seed of the bootstrap by earthquake.
-        estimate_m: fit the method's exponent too.
-
-    Raises:
-        FitError: outcomes all alike or separated, or too few failures.
-    """
+    """Fit a method that reads outcomes."""
     form, names = method.forms[term.name], parameter_names(method, term, estimate_m=estimate_m)
     rows = outcome_rows(data, method, term, names)
     failures = int((rows.data.outcome > 0.5).sum())
@@ -129,11 +118,7 @@ def fit_outcomes(
 def fit_parameters(
     data: FitData, method: Method, term: Term
 ) -> tuple[tuple[str, ...], FloatArray, FloatArray, int]:
-    """Return names and values of the parameters, their covariance and its degrees of freedom.
-
-    Raises:
-        FitError: as for :func:`fit_outcomes`.
-    """
+    """Return names and values of the parameters, their covariance and its degrees of freedom."""
     names = parameter_names(method, term)
     rows = outcome_rows(data, method, term, names).data
     b = most_likely(rows)

@@ -286,11 +286,7 @@ def method_names() -> tuple[str, ...]:
 
 @lru_cache(maxsize=64)
 def method_named(name: str) -> Method:
-    """Return a method.
-
-    Raises:
-        InputError: there is none of that name.
-    """
+    """Return a method."""
     if not name.isidentifier() or name.startswith("_"):
         raise _unknown(name)
     home = f"{__name__}.{name}"

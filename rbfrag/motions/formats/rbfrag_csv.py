@@ -81,11 +81,7 @@ def read(file: RecordFile) -> list[GroundMotion]:
 
 
 def write(motions: Sequence[GroundMotion]) -> Iterator[str]:
-    """Yield the lines of a file that :func:`read` reads back, without newlines.
-
-    Args:
-        motions: equally spaced motions.
-    """
+    """Yield the lines of a file that :func:`read` reads back, without newlines."""
     for motion in motions:
         if motion.dt_s is None:
             raise InputError(f"{motion.label}: only equally spaced samples can be written")

@@ -68,9 +68,6 @@ def cut_number(text: str) -> str:
 
     A file that ends without a newline may have been cut. Its last number shows so if all those
     before it are printed with one number of decimals, and it has fewer.
-
-    Args:
-        text: the text of a file.
     """
     if text.endswith("\n"):
         return ""
@@ -89,20 +86,12 @@ def cut_number(text: str) -> str:
 
 
 def holds_integers(line: str) -> bool:
-    """Return whether a line holds integers and nothing else.
-
-    Args:
-        line: a line of a file.
-    """
+    """Return whether a line holds integers and nothing else."""
     return set(line) <= _OF_INTEGERS and any(character.isdigit() for character in line)
 
 
 def without_blank_end(lines: Sequence[str]) -> Sequence[str]:
-    """Return lines without the blank ones after the last that is not.
-
-    Args:
-        lines: some lines of a file.
-    """
+    """Return lines without the blank ones after the last that is not."""
     end = len(lines)
     while end and not lines[end - 1].strip():
         end -= 1

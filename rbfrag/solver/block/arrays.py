@@ -28,9 +28,6 @@ CHUNK = 1 << 14
 def common_shape(given: dict[str, ArrayLike]) -> tuple[dict[str, FloatArray], tuple[int, ...]]:
     """Return the arguments as arrays of floats, and the shape they broadcast to.
 
-    Args:
-        given: numbers or arrays by name.
-
     Raises:
         InputError: an argument holds no numbers, or the shapes do not go together.
     """

@@ -62,9 +62,6 @@ def extent_m(vertices: Sequence[Point]) -> float:
 def checked_polygon(vertices: object) -> tuple[Point, ...]:
     """Return the corners of a simple counter-clockwise polygon as floats.
 
-    Args:
-        vertices: pairs (x, y) in metres.
-
     Raises:
         InputError: fewer than three corners, a corner that is no pair of finite numbers or
             repeats the one before it, edges that cross or touch, clockwise order.

@@ -36,14 +36,7 @@ from rbfrag.solver.search.scale import ScaledKind
 
 
 def mechanism(site: BlockOnPlanes) -> Mechanism:
-    """Return the confined block.
-
-    Args:
-        site: the block and its planes.
-
-    Raises:
-        InputError: no back plane hinders the block.
-    """
+    """Return the confined block."""
     block = site.block
     assert block is not None
     if not site.back_fracture or not block.confines:

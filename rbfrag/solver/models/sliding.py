@@ -232,11 +232,7 @@ class Sliding(MechanismKind):
         )
 
     def cases(self, **asked: Any) -> tuple[Case, ...]:
-        """Return the first motion and every stated displacement.
-
-        Raises:
-            InputError: a displacement that is not above zero, or repeats.
-        """
+        """Return the first motion and every stated displacement."""
         self.refuse_foreign(asked, self.campaign_options)
         stated = asked.get("displacements_m", THRESHOLDS_M)
         stated = [positive(value, "--displacement", "m") for value in stated]

@@ -76,9 +76,6 @@ from rbfrag.solver.search.scale import (
 def mechanism(site: BlockOnPlanes) -> Mechanism:
     """Return the slumping block.
 
-    Args:
-        site: the block and its planes.
-
     Raises:
         InputError: there is no back plane, or the corner at the heel is missing.
     """
@@ -286,9 +283,6 @@ class Slumping(ScaledKind):
         """Return critical scale and outcome grid of every case under one motion.
 
         Cases of one block share their runs. The map is what the search saw; it costs nothing.
-
-        Raises:
-            InputError: a stored block is none of this rbfrag's.
         """
         drive = excitation(motion, vertical, polarity)
         together: defaultdict[BlockClass, list[int]] = defaultdict(list)

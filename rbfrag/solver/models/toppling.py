@@ -108,11 +108,7 @@ class Toppling(Kind):
         return critical(motion, kind=self.kind, **options)
 
     def cases(self, **asked: Any) -> tuple[Case, ...]:
-        """Return the block sizes.
-
-        Raises:
-            InputError: a p² that is not positive or repeats.
-        """
+        """Return the block sizes."""
         self.refuse_foreign(asked, ("p2",))
         sizes = [positive(value, "p2", "1/s²") for value in asked.get("p2", DEFAULT_P2)]
         each_once(sizes, "p2")

@@ -108,14 +108,7 @@ def keeps_order(drive: Excitation, linear: bool) -> bool:
 
 
 def surely_topples_below(g: Ground, drive: Excitation, bottom: float, top: float) -> float:
-    """Return a k_r below which every block topples, `bottom` where none is known.
-
-    Args:
-        g: the excitation of the blocks.
-        drive: the excitation.
-        bottom: least k_r of interest.
-        top: greatest k_r of interest.
-    """
+    """Return a k_r below which every block topples, `bottom` where none is known."""
     if g.linear or not keeps_order(drive, False):
         return bottom
     return float(all_topple_below(g, bottom, top, MARGIN)[0])

@@ -53,11 +53,7 @@ class SlidingBlocks:
         return {}
 
     def displacement_m(self, ky_over_pga: float) -> float:
-        """Return the permanent displacement down a level plane [m]; NaN where it is thrown.
-
-        Args:
-            ky_over_pga: strength over PGA, above zero.
-        """
+        """Return the permanent displacement down a level plane [m]; NaN where it is thrown."""
         if ky_over_pga not in self.known:
             self.known[ky_over_pga] = self.slide_m(self.drive, ky_over_pga * self.drive.pga_g)
         return self.known[ky_over_pga]
@@ -93,9 +89,6 @@ def critical_of(
         search_limit: least k_y/PGA looked at.
         tolerance: width of the bracket, k_y/PGA.
         warnings: sentences about the motion.
-
-    Raises:
-        InputError: a value outside its range.
     """
     distance = not_negative(displacement_m, "displacement_m", "m")
     limit = positive(search_limit, "search_limit", "k_y/PGA")

@@ -63,10 +63,6 @@ def margins(block: Block, around: Surroundings) -> tuple[Margin, ...]:
 
     A parallelogram stays one when an angle changes, so that γ changes with it; a polygon keeps
     its γ.
-
-    Args:
-        block: the block.
-        around: friction, dip and back plane.
     """
     a1, a3, limit = block.alpha1_deg, block.alpha3_deg, around.limit_deg
     confined = block.confines

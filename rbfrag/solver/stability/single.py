@@ -290,9 +290,6 @@ def rectangle_r3_m(p2: float) -> float:
 
     Args:
         p2: frequency parameter p² [1/s²], above 0.
-
-    Raises:
-        InputError: p2 is not above 0.
     """
     return 0.75 * STANDARD_GRAVITY_M_S2 / positive(p2, "p2", "1/s²")
 
@@ -303,9 +300,6 @@ def level_rectangle(p2: float, kr: float) -> tuple[Block, Stability]:
     Args:
         p2: its frequency parameter p² [1/s²], above 0.
         kr: its yield acceleration coefficient k_r = tan(critical angle), above 0.
-
-    Raises:
-        InputError: a value that is not above 0.
     """
     slender_deg = math.degrees(math.atan(positive(kr, "kr", "")))
     block = Block.from_angles(-slender_deg, slender_deg, rectangle_r3_m(p2))
@@ -317,10 +311,6 @@ def stability_as_dict(block: Block, found: Stability) -> dict[str, Any]:
     """Return the answer with the keys of the JSON contract.
 
     A yield acceleration that no number expresses is None; the state says why.
-
-    Args:
-        block: the block.
-        found: its stability.
     """
     answer: dict[str, Any] = {
         "mode": found.mode,

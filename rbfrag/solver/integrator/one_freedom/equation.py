@@ -78,11 +78,7 @@ class Equation:
         return all(row.constant for row in everywhere) and not self.braking.coefficients[0]
 
     def first_without_strength(self, limit: float) -> float:
-        """Return the least x at which a block at rest moves of itself, or `limit`.
-
-        Args:
-            limit: greatest x.
-        """
+        """Return the least x at which a block at rest moves of itself, or `limit`."""
         places = limit * np.arange(_LOOKS + 1) / _LOOKS
         weak = np.flatnonzero(self.resistance.at(places[1:]) <= 0.0)
         if not weak.size:
