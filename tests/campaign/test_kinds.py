@@ -183,7 +183,7 @@ def test_toppling_rows_do_not_notice(database: Path) -> None:
 
 
 def test_tables_of_one_rotation_hold_each_block_once(database: Path) -> None:
-    slump(database)
+    slump(database, full_map=True)
     with opened_database(database, read_only=True) as engine, engine.connect() as connection:
         one = combination_table(connection, kind="slumping", rotation_deg=1.0)
         recovery = combination_table(connection, kind="slumping")
@@ -251,6 +251,9 @@ def test_what_two_databases_found_is_merged_and_exported(
         ({"kind": "sliding", "displacements_m": (0.0,)}, "above zero"),
         ({"kind": "confined_toppling"}, "campaigns are of sliding, slumping, toppling"),
         ({"kind": "sliding", "jobs": 0}, "at least 1"),
+        ({"kind": "sliding", "full_map": True}, "--map goes with --kind slumping or toppling"),
+        ({"kind": "slumping", "p2": (1.0,)}, "--p2 goes with --kind toppling, not with slumping"),
+        ({"rotations_deg": (2.0,)}, "--rotation goes with --kind slumping, not with toppling"),
     ],
 )
 def test_what_cannot_be_run_is_refused(database: Path, options: dict[str, Any], words: str) -> None:
