@@ -82,9 +82,9 @@ def test_no_space_left(small_disk: Path, untouched: bytes, undisturbed: str) -> 
 def test_a_database_that_may_not_grow(
     database: Path, undisturbed: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import rbfrag.db.engine
+    import rbfrag.db.connect
 
-    connect = rbfrag.db.engine.connect_sqlite
+    connect = rbfrag.db.connect.connect_sqlite
     most = database.stat().st_size // 4096 + 4
 
     def limited(*arguments: object, **options: object) -> object:
@@ -93,7 +93,7 @@ def test_a_database_that_may_not_grow(
         return raw
 
     seen: list[CampaignProgress] = []
-    monkeypatch.setattr(rbfrag.db.engine, "connect_sqlite", limited)
+    monkeypatch.setattr(rbfrag.db.connect, "connect_sqlite", limited)
     with pytest.raises(DatabaseFailedError, match="the disk is full; what was finished is kept"):
         simulate(database, p2=P2, jobs=1, on_progress=seen.append)
     monkeypatch.undo()

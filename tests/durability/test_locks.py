@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
+import stat
 import subprocess
 from pathlib import Path
 
@@ -203,7 +204,12 @@ class TestUnusable:
     ) -> None:
         was_root = os.geteuid() == 0
         database.chmod(0o444)
-        folders = [database.parent, *database.parent.parents][:3]
+        # those that pytest made for its own user alone
+        folders = [
+            folder
+            for folder in (database.parent, *database.parent.parents)
+            if not folder.stat().st_mode & stat.S_IXOTH
+        ]
         rights = [folder.stat().st_mode for folder in folders]
         for folder in folders:
             folder.chmod(0o555)
