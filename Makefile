@@ -35,8 +35,8 @@ docs: $(VENV)/.installed-dev  ## the documentation, into docs/_build/html
 	$(RUN) sphinx -E -W --keep-going -q -b html docs docs/_build/html
 
 # The folder of matplotlib's settings is given because HOME may not be writable.
-unit: $(VENV)/.installed-dev  ## the tests alone
-	MPLCONFIGDIR="$$(cd $(VENV) && pwd)/matplotlib" $(RUN) pytest
+unit: $(VENV)/.installed-dev  ## the tests alone, one process a core
+	MPLCONFIGDIR="$$(cd $(VENV) && pwd)/matplotlib" $(RUN) pytest -n auto
 
 format: $(VENV)/.installed-dev  ## put the source in the style that lint asks for
 	$(RUN) ruff check --fix .

@@ -1,1 +1,1 @@
-"""Hazard curves, annual rates of failure, survival."""
+"""Hazard curves, annual rates of failure."""
