@@ -202,7 +202,9 @@ class TestMaps:
     @pytest.mark.parametrize(
         ("intervals", "problem"),
         [
+            (((0.2, 0.3, "undecided"), (0.3, 1.0, "safe")), "begins at kr/PGA 0.2, above 0.1"),
             (((0.001, 0.01, "safe"), *MAP), "begins at kr/PGA 0.001, below the search limit 0.01"),
+            (MAP[:2] + MAP[3:], "a gap from kr/PGA"),
             ((*MAP[:-1], (0.099, 1.0, "safe")), "overlap from kr/PGA 0.099"),
             (MAP[:-1], "below K_up 1.0"),
             ((*MAP[:-1], (MAP[-1][0], 1.0, "topples")), "topples up to kr/PGA 1.0, above its"),

@@ -60,8 +60,15 @@ def _cover_problems(row: RowMapping, intervals: Sequence[Row[Any]]) -> Iterator[
     limit, bottom = row["search_limit"], intervals[0].k_lo
     if limit is not None and bottom < limit * (1.0 - _ROUNDING):
         yield f"its map begins at kr/PGA {bottom!r}, below the search limit {limit!r}"
+    # a map that says where it is undecided leaves nothing out; others hold what was seen alone
+    whole = any(interval.outcome == "undecided" for interval in intervals)
+    needed = limit if row["lower"] is None else row["lower"]
+    if whole and needed is not None and bottom > needed * (1.0 + _CLEARANCE):
+        yield f"its map begins at kr/PGA {bottom!r}, above {needed!r}"
     for below, above in itertools.pairwise(intervals):
-        if below.k_hi > above.k_lo:
+        if whole and below.k_hi < above.k_lo:
+            yield f"its map has a gap from kr/PGA {below.k_hi!r} to {above.k_lo!r}"
+        elif below.k_hi > above.k_lo:
             yield f"two of its intervals overlap from kr/PGA {above.k_lo!r} to {below.k_hi!r}"
     top, k_up = intervals[-1].k_hi, row["k_up_over_pga"]
     if k_up is not None and top < k_up * (1.0 - _ROUNDING):

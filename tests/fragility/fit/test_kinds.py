@@ -16,7 +16,7 @@ from rbfrag.fragility.fit.data import fit_data
 from rbfrag.fragility.fit.fitting import fit, fit_source
 from rbfrag.fragility.fit.report import FitReport
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import SINGLE, arrays, methods
+from rbfrag.fragility.methods import methods
 from rbfrag.fragility.model import FragilityModel
 from tests.fragility.kind_draws import METHOD_OF, TRUE, drawn
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
@@ -52,33 +52,6 @@ def test_leaving_the_censored_rows_out_would_be_wrong() -> None:
     right, wrong = most_likely(rows, start), most_likely(rows.only(data.found), start)
     true = np.array(TRUE["slumping", "pgv_pga"])
     assert np.abs(right - true).max() < 0.5 * np.abs(wrong - true).max()
-
-
-@pytest.mark.parametrize(
-    ("method", "term"),
-    [(m, t) for m in methods() for t in m.forms],
-    ids=lambda each: getattr(each, "name", each),
-)
-def test_slopes_are_the_derivatives(method, term) -> None:
-    form = method.forms[term]
-    p = [v + 0.1 for v in form.start or (0.02, 0.7, 0.05, 0.04, 0.03, 0.02)][: len(form.parameters)]
-    values = {"ky": 0.1, "ks": 0.15, "kr": 0.12, "p2": 3.0, "ps2": 3.0, "p": 3.0**0.5}
-    values |= {"pgv_m_s": 0.4, "pga_g": 0.5, "tm_s": 0.5, "intensity_m_s": 0.9, "y_m_s": 0.3}
-    values["displacement_m"] = 0.05
-    here = form.eta(p, values, SINGLE)
-    step = 1e-6
-    for i in range(len(p)):
-        up, down = list(p), list(p)
-        up[i] += step
-        down[i] -= step
-        above, below = form.eta(up, values, SINGLE), form.eta(down, values, SINGLE)
-        slope = (above.eta - below.eta) / (2 * step)
-        assert here.slopes[i] == pytest.approx(slope, rel=1e-5, abs=1e-9)
-        if here.log_sigma is not None:
-            slope = (above.log_sigma - below.log_sigma) / (2 * step)
-            assert here.sigma_slopes[i] == pytest.approx(slope, rel=1e-6, abs=1e-9)
-    many = {name: np.array([value, value]) for name, value in values.items()}
-    assert form.eta(p, many, arrays()).eta[0] == pytest.approx(here.eta, rel=1e-12)
 
 
 def test_a_slump_is_judged_by_the_outcomes_that_are_stored() -> None:
