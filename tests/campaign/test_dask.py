@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -75,6 +77,31 @@ def test_a_lost_worker_changes_nothing(
     assert killed.is_set()
     assert told.combinations == 20
     assert digest_of(three_component_database) == digest_of(undisturbed)
+
+
+def test_results_that_died_with_their_workers_are_computed_again(cluster: Any) -> None:
+    with dask_executor.connected(cluster.scheduler_address) as client:
+        client.wait_for_workers(2, timeout=60)
+        results = dask_executor.run_on_cluster(client, math.sqrt, iter(range(8)))
+        seen = [next(results)]
+        wait_until(lambda: len(client.has_what()) == 2 and held(client) >= 5)
+        for pid in client.run(os.getpid).values():
+            os.kill(pid, signal.SIGKILL)
+        wait_until(lambda: held(client) == 0)
+        seen.extend(results)
+    assert sorted(seen) == [math.sqrt(number) for number in range(8)]
+
+
+def held(client: Any) -> int:
+    """Count the results that the workers hold."""
+    return sum(len(keys) for keys in client.has_what().values())
+
+
+def wait_until(reached: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 60
+    while not reached():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
 
 
 def test_nobody_at_the_address(

@@ -68,7 +68,7 @@ def run_on_cluster(
 
     Args:
         client: from :func:`connected`.
-        run_work: does one piece of work; a function of a module, which workers can find.
+        run_work: does one chunk of work; a function of a module, which workers can find.
         work: what to do.
 
     Raises:
@@ -83,9 +83,9 @@ def run_on_cluster(
         for item in work:
             waiting.add(client.submit(run_work, item, pure=False))
             while waiting.count() >= _most_under_way(client):
-                yield _result(next(waiting), address)
+                yield from _next_result(waiting, address)
         while waiting.count():
-            yield _result(next(waiting), address)
+            yield from _next_result(waiting, address)
     finally:
         if not waiting.is_empty():
             client.cancel(list(waiting.futures))
@@ -94,6 +94,19 @@ def run_on_cluster(
 def _most_under_way(client: Any) -> int:
     threads = int(sum(client.nthreads().values()))  # workers come and go
     return max(threads, 1) * (1 + QUEUED_PER_THREAD)
+
+
+def _next_result(waiting: Any, address: str) -> Iterator[Any]:
+    """Yield the next result, or nothing where its worker died after the work was done.
+
+    A result stays on its worker until it is fetched. The scheduler has it computed again, and
+    its future, which was reported as done, waits once more.
+    """
+    future = next(waiting)
+    if future.status in ("pending", "lost"):
+        waiting.add(future)
+    else:
+        yield _result(future, address)
 
 
 def _result(future: Any, address: str) -> Any:
