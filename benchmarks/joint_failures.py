@@ -1,0 +1,397 @@
+"""What falls together in one earthquake:  python -m benchmarks.joint_failures [--db DATABASE]
+
+Estimates the copula of failures from predictions of held-out earthquakes, and tests it on
+portfolios of blocks in earthquakes that neither the probabilities nor the copula were fitted to.
+The reference that is shipped has all that is read. Five minutes of processor time. With --write
+the tables of docs/theory/joint-failures.md are replaced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from benchmarks.joint_models import FOLDS, SHAPES, HeldOut, Outcomes, held_out, read_outcomes
+from benchmarks.model_acceptance import Mark, acceptance_table
+from benchmarks.page import ROOT, parser, replaced
+from rbfrag.bench.tables import markdown
+from rbfrag.db.location import REFERENCE
+from rbfrag.fragility.dependence import Dependence, event_range
+from rbfrag.fragility.fit.dependence import PairTables, estimate_dependence
+from rbfrag.fragility.fit.pair_tables import ANGLES, PairTable
+from rbfrag.fragility.joint import FailureCount, Placement
+from rbfrag.fragility.joint_sampling import JointSampler
+
+FloatArray = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+PAGE = ROOT / "docs" / "theory" / "joint-failures.md"
+
+PUBLISHED = {
+    "pgv": Dependence(0.136, 0.236, 0.219, 0.409, 1.0, 2.5, 6.7, 0.50),
+    "pgv_pga": Dependence(0.055, 0.162, 0.270, 0.513, 1.7, 2.5, 5.1, 0.67),
+    "pgv_pga_tm": Dependence(0.035, 0.182, 0.283, 0.500, 2.5, 0.55, 8.1, 0.57),
+    "record": Dependence(0.082, 0.021, 0.450, 0.447, 2.7, 2.1, 0.66, 0.32),
+}
+"""An earlier estimate by other code, with its rounding errors put into rho_v."""
+
+STEP = float(np.log(40.0) / 24.0)
+"""Of the grid, in ln y."""
+
+AT_EQUAL_SIZE = {
+    "other site": ((0.14, 0.05, 0.03, 0.11), 0, 0),
+    "other component": ((0.32, 0.24, 0.22, 0.05), 0, 0),
+    "opposite side": ((0.16, 0.03, -0.04, 0.08), -1, 0),
+    "one step": ((0.84, 0.81, 0.81, 0.65), 1, 1),
+    "four steps": ((0.56, 0.50, 0.45, 0.24), 1, 4),
+    "eight steps": ((0.25, 0.29, 0.15, 0.15), 1, 8),
+}
+"""R of blocks of equal size by the earlier estimate, by model; sign of sides, steps apart."""
+
+SAMPLES = 2000
+LEVEL = 0.95
+RANGES = {"mixed": (0.005, 0.995), "rare": (0.002, 0.15)}
+PLACES = ("one site one side", "one site", "several sites")
+PORTFOLIOS = {"mixed": 1500, "rare": 400}
+FEWEST = 100
+"""Portfolios, below which a line of a table is left out."""
+
+CELLS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 0.98)
+
+
+def placement(data: Outcomes, rows: Rows) -> Placement:
+    value = data.value
+    return Placement(
+        np.log(value["p"][rows]), np.log(value["y"][rows]),
+        data.event[rows], data.site[rows], data.motion[rows], data.polarity[rows],
+    )  # fmt: skip
+
+
+def dependence_columns(data: Outcomes, model: HeldOut) -> tuple[NDArray[np.generic], ...]:
+    return (
+        model.probability, data.failed, data.event, data.site, data.motion, data.polarity,
+        data.value["p2"], data.value["y"],
+    )  # fmt: skip
+
+
+def of_folds(data: Outcomes, tables: PairTables) -> list[Dependence]:
+    """Return the copula without each fold."""
+    everything = tables.likeliest()
+    fold_of = dict(zip(data.event.tolist(), data.fold.tolist(), strict=True))
+    fold = np.array([fold_of[int(one)] for one in tables.earthquakes])
+    return [
+        tables.likeliest((fold != number).astype(np.float64), start=everything)
+        for number in range(FOLDS)
+    ]
+
+
+def portfolio(
+    data: Outcomes, usable: list[Rows], place: str, generator: np.random.Generator
+) -> Rows | None:
+    """Return 10 to 50 blocks of one earthquake: of one component and side, a site, or 4 to 10
+    components; None where there are too few."""
+    own = usable[int(generator.integers(len(usable)))]
+    label = data.site if place == "one site" else data.motion
+    labels = np.unique(label[own])
+    if place == "several sites":
+        if labels.size < 4:
+            return None
+        number = int(generator.integers(4, min(10, labels.size) + 1))
+        own = own[np.isin(label[own], generator.choice(labels, number, replace=False))]
+    else:
+        own = own[label[own] == generator.choice(labels)]
+        if place == "one site one side":
+            own = own[data.polarity[own] == generator.choice((-1, 1))]
+    number = int(generator.integers(10, 51))
+    return None if own.size < number else generator.choice(own, number, replace=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """Portfolios of one kind: what was expected of them, and what they did, each (number,).
+
+    Args:
+        event: the earthquake.
+        count: number of failures.
+        mean: its expectation.
+        variance: its variance by the copula.
+        alone: the same, were the blocks independent.
+        inside: whether the number is inside its 95 % range by sampling.
+        any_by: probability that any fails, by name of how it was found.
+    """
+
+    event: Rows
+    count: FloatArray
+    mean: FloatArray
+    variance: FloatArray
+    alone: FloatArray
+    inside: NDArray[np.bool_]
+    any_by: dict[str, FloatArray]
+
+    def ratio(self, variance: FloatArray) -> float:
+        return float(np.sum((self.count - self.mean) ** 2) / variance.sum())
+
+    def ratio_range(self) -> tuple[float, float]:
+        """Return the 90 % interval of the variance ratio by resampling earthquakes."""
+        number = np.unique(self.event, return_inverse=True)[1]
+        top = np.bincount(number, (self.count - self.mean) ** 2)
+        bottom = np.bincount(number, self.variance)
+        generator = np.random.default_rng(0)
+        times = generator.multinomial(top.size, np.full(top.size, 1.0 / top.size), size=1000)
+        low, high = np.quantile((times @ top) / (times @ bottom), (0.05, 0.95))
+        return float(low), float(high)
+
+    def scores(self) -> dict[str, tuple[float, float, float]]:
+        """Return mean P(any), log score and Brier score of each way."""
+        found = {}
+        for name, p in self.any_by.items():
+            p, some = np.clip(p, 1e-4, 1.0 - 1e-4), self.count > 0
+            loss = -np.where(some, np.log(p), np.log1p(-p))
+            found[name] = (float(p.mean()), float(loss.mean()), float(((p - some) ** 2).mean()))
+        return found
+
+
+def line(
+    data: Outcomes, model: HeldOut, laws: Sequence[Dependence], place: str, kind: str
+) -> Line | None:
+    """Draw portfolios of one kind and predict them."""
+    generator = np.random.default_rng(len(place) + len(kind))
+    low, high = RANGES[kind]
+    p = model.probability
+    usable = np.flatnonzero((p > low) & (p < high))
+    by_event = [usable[data.event[usable] == event] for event in np.unique(data.event[usable])]
+    asked = PORTFOLIOS[kind]
+    rows: list[tuple[float, ...]] = []
+    for _ in range(40 * asked if by_event else 0):
+        some = portfolio(data, by_event, place, generator)
+        if some is None:
+            continue
+        law, blocks = laws[int(data.fold[some[0]])], placement(data, some)
+        own, count = p[some], float(data.failed[some].sum())
+        failures = FailureCount.of(own, blocks, law)
+        drawn = JointSampler(law, blocks).counts(own, SAMPLES, generator)
+        ends = np.quantile(drawn, (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), method="inverted_cdf")
+        rows.append((
+            float(data.event[some[0]]), count, failures.mean, failures.variance,
+            float(np.sum(own * (1.0 - own))), float(ends[0] <= count <= ends[1]),
+            float(np.mean(drawn > 0)), failures.probability_any,
+            float(1.0 - np.prod(1.0 - own)), float(own.max()),
+        ))  # fmt: skip
+        if len(rows) == asked:
+            break
+    if len(rows) < FEWEST or len({row[0] for row in rows}) < 10:
+        return None
+    column = np.array(rows).T
+    ways = ("copula", "beta-binomial", "independent", "greatest P")
+    return Line(
+        column[0].astype(np.intp), *column[1:5], column[5] > 0.5,
+        dict(zip(ways, column[6:], strict=True)),
+    )  # fmt: skip
+
+
+def cells(
+    data: Outcomes, model: HeldOut, laws: Sequence[Dependence]
+) -> dict[str, tuple[float, int]]:
+    """Return how many shares failing, by earthquake and class of P, are in their 95 % ranges."""
+    generator = np.random.default_rng(0)
+    p, found = model.probability, []
+    tails = (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL)
+    for event in np.unique(data.event):
+        rows = np.flatnonzero((data.event == event) & (p > CELLS[0]) & (p < CELLS[-1]))
+        law = laws[int(data.fold[data.event == event][0])]
+        kind = np.digitize(p[rows], CELLS) - 1
+        failed = JointSampler(law, placement(data, rows)).failures(p[rows], SAMPLES // 2, generator)
+        motions = np.unique(data.motion[rows]).size
+        for number in np.unique(kind):
+            own = kind == number
+            share = float(data.failed[rows[own]].mean())
+            ends = np.quantile(failed[:, own].mean(axis=1), tails)
+            single = event_range(float(p[rows[own]].mean()), law.rho_e, LEVEL)
+            alone = generator.random((SAMPLES // 2, int(own.sum()))) < p[rows[own]]
+            apart = np.quantile(alone.mean(axis=1), tails)
+            found.append((
+                ends[0] <= share <= ends[1], motions >= 4,
+                single[0] <= share <= single[1], apart[0] <= share <= apart[1],
+            ))  # fmt: skip
+    table = np.array(found, dtype=np.float64).T
+    large = table[1] > 0.5
+    return {
+        "sampled": (float(table[0].mean()), table.shape[1]),
+        "sampled, 4 components or more": (float(table[0][large].mean()), int(large.sum())),
+        "closed form of many sites": (float(table[2].mean()), table.shape[1]),
+        "independent": (float(table[3].mean()), table.shape[1]),
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    options = parser(__doc__)
+    options.add_argument("--db", default=str(REFERENCE), help="database with outcomes of the grid")
+    options.add_argument(
+        "--published", action="store_true", help="test the earlier estimate's copula instead"
+    )
+    chosen = options.parse_args(arguments)
+    data = read_outcomes(chosen.db)
+    models = [held_out(shape, data) for shape in SHAPES]
+    pairs = {one.shape.name: PairTables.of(*dependence_columns(data, one)) for one in models}
+    laws = {
+        name: [PUBLISHED[name]] * FOLDS if chosen.published else of_folds(data, tables)
+        for name, tables in pairs.items()
+    }
+    lines = {
+        (model.shape.name, place, kind): line(data, model, laws[model.shape.name], place, kind)
+        for kind in RANGES
+        for place in PLACES
+        for model in models
+    }
+    shares = {model.shape.name: cells(data, model, laws[model.shape.name]) for model in models}
+    tables = {
+        "models": model_table(models),
+        "parameters": parameter_table(data, models),
+        "equal-size": equal_size_table(pairs),
+        "counts": count_table(lines),
+        "any": any_table(lines),
+        "cells": cell_table(shares),
+        "asked": acceptance_table(marks(lines, shares)),
+    }
+    page = PAGE.read_text(encoding="utf-8") if chosen.write else ""
+    for name, table in tables.items():
+        print(f"## {name}\n\n{table}\n", flush=True)
+        page = replaced(page, name, table) if chosen.write else page
+    if chosen.write:
+        PAGE.write_text(page, encoding="utf-8")
+
+
+def likeliest_r(table: PairTable, sign: int, steps: int) -> float:
+    """Return the R of greatest likelihood of pairs of equal size.
+
+    Args:
+        table: of one kind of pair.
+        sign: product of the sides, 0 where any.
+        steps: how many steps of the grid apart in strength.
+    """
+    here = (table.distance_l < 1e-6) & (table.sign == sign)
+    here &= np.abs(table.distance_y - steps * STEP) < 0.3 * STEP
+    fine = np.linspace(ANGLES[0], ANGLES[-1], 4001)
+    curve = CubicSpline(ANGLES, table.value[:, here].sum(axis=(0, 1)))(fine)
+    return float(np.sin(fine[np.argmax(curve)]))
+
+
+def equal_size_table(pairs: dict[str, PairTables]) -> str:
+    """Return R of blocks of equal size, without any law of how it falls off."""
+    rows = []
+    for name, (asked, sign, steps) in AT_EQUAL_SIZE.items():
+        found = []
+        for tables in pairs.values():
+            kinds = {"other site": tables.far, "other component": tables.near}
+            found.append(likeliest_r(kinds.get(name, tables.own), sign, steps))
+        cell = [f"{one:.2f} ({other:.2f})" for one, other in zip(found, asked, strict=True)]
+        rows.append([name, *cell])
+    return markdown((["pairs", *(f"{name} (earlier)" for name in pairs)], rows))
+
+
+def model_table(models: Sequence[HeldOut]) -> str:
+    """Return coefficients and log losses beside the earlier ones."""
+    head = ["model", "b", "earlier", "CR3 errors", "earlier", "log loss", "earlier"]
+
+    def words(values: Sequence[float] | FloatArray) -> str:
+        return " ".join(f"{one:.3f}" for one in values)
+
+    return markdown((head, [
+        [one.shape.name, words(one.coefficients), words(one.shape.coefficients),
+         words(one.errors), words(one.shape.errors), f"{one.log_loss:.4f}",
+         f"{one.shape.log_loss:.4f}"]
+        for one in models
+    ]))  # fmt: skip
+
+
+def parameter_table(data: Outcomes, models: Sequence[HeldOut]) -> str:
+    """Return the estimates with their errors, each over the earlier one."""
+    names = [field.name for field in fields(Dependence)]
+    rows = []
+    for model in models:
+        found = estimate_dependence(*dependence_columns(data, model))
+        law = found.dependence
+        rows.append([
+            model.shape.name,
+            *(f"{getattr(law, name):.3f} ± {found.errors[name]:.3f}" for name in names),
+            " ".join(f"{pairs:,}" for pairs in found.pairs),
+        ])  # fmt: skip
+        asked = PUBLISHED[model.shape.name]
+        rows.append(["earlier", *(f"{getattr(asked, name):.3f}" for name in names), ""])
+    return markdown((["model", *names, "pairs"], rows))
+
+
+Lines = dict[tuple[str, str, str], Line | None]
+
+
+def count_table(lines: Lines) -> str:
+    """Return the variance of numbers of failures, observed over modelled."""
+    head = ["model", "portfolio", "portfolios", "variance ratio", "90 % by earthquakes",
+            "if independent", "inside 95 %"]  # fmt: skip
+    rows = []
+    for (model, place, kind), one in lines.items():
+        if one is not None:
+            low, high = one.ratio_range()
+            rows.append([
+                model, f"{place}, {kind}", str(one.count.size), f"{one.ratio(one.variance):.2f}",
+                f"{low:.2f}–{high:.2f}", f"{one.ratio(one.alone):.1f}", f"{one.inside.mean():.3f}",
+            ])  # fmt: skip
+    return markdown((head, rows))
+
+
+def any_table(lines: Lines) -> str:
+    """Return mean, log score and Brier score of the probability of any failure."""
+    rows = []
+    for (model, place, kind), one in lines.items():
+        if one is not None and kind == "rare":
+            scores = one.scores()
+            cell = [f"{p:.3f}, {loss:.3f}, {brier:.3f}" for p, loss, brier in scores.values()]
+            rows.append([model, place, f"{np.mean(one.count > 0):.3f}", *cell])
+    head = ["model", "rare blocks of", "observed", *WAYS]
+    return markdown((head, rows))
+
+
+WAYS = ("copula", "beta-binomial", "independent", "greatest P")
+
+
+def cell_table(shares: dict[str, dict[str, tuple[float, int]]]) -> str:
+    """Return how many cells lie in their ranges."""
+    head = ["model", *next(iter(shares.values()))]
+    return markdown((head, [
+        [model, *(f"{share:.3f} of {number}" for share, number in one.values())]
+        for model, one in shares.items()
+    ]))  # fmt: skip
+
+
+def marks(lines: Lines, shares: dict[str, dict[str, tuple[float, int]]]) -> list[Mark]:
+    """Return the aims, with what is reached."""
+    found = [
+        Mark(model, "share of cells in their 95 % ranges", 0.90, 0.985, one["sampled"][0])
+        for model, one in shares.items()
+    ]
+    for place, low in (("one site", 0.80), ("several sites", 0.65)):
+        for model in shares:
+            one = lines[model, place, "mixed"]
+            if one is not None:
+                words = f"variance ratio, {place}, mixed"
+                found.append(Mark(model, words, low, 1.25, one.ratio(one.variance)))
+    for place in PLACES:
+        one = lines["pgv_pga", place, "rare"]
+        if one is not None:
+            loss = {name: score[1] for name, score in one.scores().items()}
+            words = f"log score of any failure below that of {{}}, {place}"
+            for other in WAYS[2:]:
+                gain = loss[other] - loss["copula"]
+                found.append(Mark("pgv_pga", words.format(other), 0.01, np.inf, gain))
+            apart = abs(loss["beta-binomial"] - loss["copula"])
+            words = f"beta-binomial from the copula's log score, {place}"
+            found.append(Mark("pgv_pga", words, -np.inf, 0.02, apart))
+    return found
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,195 @@
+"""How strongly the failures of blocks in one earthquake go together: the copula's parameters.
+
+Block i fails if Z_i ≤ Φ⁻¹(P_i) with Z_i standard normal, so that every P stays as it is. What two
+blocks of one earthquake share is the correlation of their Z; blocks of different earthquakes share
+nothing. For single numbers no library is loaded; what needs arrays is in
+:mod:`rbfrag.fragility.joint` and :mod:`rbfrag.fragility.joint_sampling`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+from rbfrag.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
+
+_ROOT_HALF = math.sqrt(0.5)
+_ROOT_TWO_PI = math.sqrt(2.0 * math.pi)
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """Correlation of Z of two blocks of one earthquake.
+
+        R = ρ_e exp(-D/λ_e)                                    any two blocks
+          + ρ_s exp(-D/λ_e)                                    of the same site
+          + [ρ_v exp(-D/λ_v) + q ρ_o exp(-D/λ_o)] exp(-d/λ_y)  and of the same component
+
+    with D = |l_i - l_j|, l = ln(p s), d = |ln y_i - ln y_j|, q = +1 for the same polarity and -1
+    for opposite ones. D and d, and so all lengths, are differences of logarithms without unit.
+
+    Args:
+        rho_e: share of the variance of Z that all blocks of an earthquake have in common, 0 to 1.
+        rho_s: what those of one recording site have in common beyond it.
+        rho_v: what those of one component have in common beyond that, whatever the polarity.
+        rho_o: what changes its sign with the polarity. The four add up to 1.
+        l_e: length λ_e in ln p over which earthquake and site are forgotten.
+        l_v: the same of the component's symmetric part.
+        l_o: the same of its antisymmetric part.
+        l_y: length in ln y over which the component is forgotten.
+
+    Raises:
+        InputError: a share is below 0, they do not add up to 1, or a length is not above 0.
+    """
+
+    rho_e: float
+    rho_s: float
+    rho_v: float
+    rho_o: float
+    l_e: float
+    l_v: float
+    l_o: float
+    l_y: float
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if name.startswith("rho") and not 0.0 <= value <= 1.0:
+                raise InputError(f"{name} is a share between 0 and 1, not {value!r}")
+            if name.startswith("l_") and not 0.0 < value < math.inf:
+                raise InputError(f"{name} is a length above 0 and finite, not {value!r}")
+        total = self.rho_e + self.rho_s + self.rho_v + self.rho_o
+        if abs(total - 1.0) > 1e-9:
+            raise InputError(
+                f"rho_e + rho_s + rho_v + rho_o is {total:.10g} and must be 1: they are shares of "
+                "one variance"
+            )
+
+    def of_pairs(
+        self,
+        distance_l: NDArray[np.float64],
+        distance_y: NDArray[np.float64],
+        same_site: NDArray[np.bool_],
+        same_component: NDArray[np.bool_],
+        sign: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Return R of pairs of blocks of one earthquake.
+
+        Args:
+            distance_l: D, any shape.
+            distance_y: d, same shape.
+            same_site: whether they are of one site.
+            same_component: whether they are of one component of it.
+            sign: q, the product of the polarities.
+        """
+        import numpy as np
+
+        shared = self.rho_e + self.rho_s * same_site
+        symmetric = self.rho_v * np.exp(-distance_l / self.l_v)
+        antisymmetric = sign * self.rho_o * np.exp(-distance_l / self.l_o)
+        own = same_component * (symmetric + antisymmetric) * np.exp(-distance_y / self.l_y)
+        return np.asarray(shared * np.exp(-distance_l / self.l_e) + own)
+
+    def correlation(
+        self,
+        l: ArrayLike,  # noqa: E741  the symbol of the formula
+        ln_y: ArrayLike,
+        earthquake: ArrayLike,
+        site: ArrayLike,
+        component: ArrayLike,
+        polarity: ArrayLike,
+    ) -> NDArray[np.float64]:
+        """Return R of every two blocks, shape (n, n), with 1 on the diagonal.
+
+        Args:
+            l: ln of the frequency parameter p [1/s], shape (n,).
+            ln_y: ln of the toppling velocity y = k_r g/p [m/s], shape (n,).
+            earthquake: labels of earthquakes, shape (n,).
+            site: labels of sites within an earthquake, shape (n,).
+            component: labels of horizontal components within a site, shape (n,).
+            polarity: +1 or -1, the side of the component that the block faces, shape (n,).
+
+        Raises:
+            InputError: a polarity is neither +1 nor -1 (an unknown azimuth has no single R).
+        """
+        import numpy as np
+
+        side = np.asarray(polarity, dtype=np.float64)
+        if not np.all(np.abs(side) == 1.0):
+            raise InputError(
+                "correlation needs polarities of +1 or -1: draw unknown azimuths first"
+            )
+
+        def equal(labels: ArrayLike) -> NDArray[np.bool_]:
+            one = np.asarray(labels)
+            return np.asarray(one[:, None] == one[None, :])
+
+        def apart(values: ArrayLike) -> NDArray[np.float64]:
+            one = np.asarray(values, dtype=np.float64)
+            return np.abs(one[:, None] - one[None, :])
+
+        together = equal(earthquake)
+        at_site = together & equal(site)
+        r = self.of_pairs(
+            apart(l),
+            apart(ln_y),
+            at_site,
+            at_site & equal(component),
+            np.multiply.outer(side, side),
+        )
+        r *= together
+        np.fill_diagonal(r, 1.0)
+        return r
+
+
+def event_range(probability: float, rho_e: float, level: float = 0.95) -> tuple[float, float]:
+    """Return between which shares of like blocks at many sites fail in one future earthquake.
+
+        Φ((Φ⁻¹(P) + √ρ_e Φ⁻¹(q)) / √(1 - ρ_e)),   q = (1 - level)/2 and (1 + level)/2
+
+    Too narrow for few sites or few blocks, whose own scatter it leaves out.
+
+    Args:
+        probability: P of one block, 0 to 1.
+        rho_e: share of the variance of Z that an earthquake's blocks have in common, 0 to 1.
+        level: probability that the share lies between both ends.
+    """
+    if not 0.0 < level < 1.0:
+        raise InputError(f"a level is above 0 and below 1, not {level!r}")
+    if not 0.0 <= rho_e <= 1.0:
+        raise InputError(f"rho_e is a share between 0 and 1, not {rho_e!r}")
+    if not 0.0 < probability < 1.0 or rho_e == 0.0:
+        return probability, probability
+    a, reach = normal_quantile(probability), -math.sqrt(rho_e) * normal_quantile(0.5 - 0.5 * level)
+    scale = math.sqrt(1.0 - rho_e)
+    if scale == 0.0:  # all such blocks fail, or none
+        return float(a > reach), float(a > -reach)
+    return normal_share((a - reach) / scale), normal_share((a + reach) / scale)
+
+
+def normal_share(z: float) -> float:
+    """Return Φ(z), the standard normal distribution function."""
+    return 0.5 * math.erfc(-z * _ROOT_HALF)
+
+
+def normal_quantile(probability: float) -> float:
+    """Return Φ⁻¹ of a probability above 0 and below 1, to the last digits of a double.
+
+    Newton's steps on ln Φ, which is concave: after the first they come from one side.
+    """
+    if probability > 0.5:
+        return -normal_quantile(1.0 - probability)
+    target = math.log(probability)
+    z = -math.sqrt(-2.0 * target) if probability < 0.01 else 0.0
+    for _ in range(60):
+        share = normal_share(z)
+        density = math.exp(-0.5 * z * z) / _ROOT_TWO_PI
+        step = (target - math.log(share)) * share / density
+        z += step
+        if abs(step) <= 1e-15 * max(1.0, -z):
+            break
+    return z

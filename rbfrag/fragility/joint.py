@@ -1,0 +1,350 @@
+"""Several blocks in one earthquake, in closed form: how many fail, and whether any does.
+
+The law is the normal copula of :mod:`rbfrag.fragility.dependence`. Means and variances of counts
+are exact; the probability of any failure and quantiles of a count are those of the beta-binomial
+distribution with the same mean and variance. Samples are drawn in
+:mod:`rbfrag.fragility.joint_sampling`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import betaln, ndtr, ndtri
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.dependence import Dependence, event_range
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+UNKNOWN = 0
+"""Polarity of a block whose azimuth is not known: component and polarity are drawn at random."""
+
+COMPONENTS = 2
+"""Horizontal components that an unknown azimuth is drawn from: labels 0 and 1."""
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
+_NEAR_ONE = 0.99
+_PANELS = (0.0, *(0.25**k for k in range(5, -1, -1)))
+_FARTHEST = 38.0
+_LEAST_RHO = 1e-9
+_PAIRS_AT_ONCE = 2**18
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Blocks, and what they share with one another.
+
+    Args:
+        l: ln of the frequency parameter p [1/s], shape (n,).
+        ln_y: ln of the toppling velocity y = k_r g/p [m/s], shape (n,).
+        earthquake: numbers of earthquakes, shape (n,).
+        site: numbers of sites within an earthquake, shape (n,).
+        component: numbers of horizontal components within a site, shape (n,).
+        polarity: +1 or -1, the side of the component that the block faces; `UNKNOWN` where the
+            azimuth is not known, shape (n,). Then the component does not count.
+
+    Raises:
+        InputError: lengths differ, a number is not finite, or a label is none.
+    """
+
+    l: FloatArray  # noqa: E741  the symbol of the formula
+    ln_y: FloatArray
+    earthquake: IntArray
+    site: IntArray
+    component: IntArray
+    polarity: IntArray
+
+    @classmethod
+    def of(
+        cls,
+        l: ArrayLike,  # noqa: E741
+        ln_y: ArrayLike,
+        *,
+        earthquake: ArrayLike = 0,
+        site: ArrayLike = 0,
+        component: ArrayLike = 0,
+        polarity: ArrayLike = 1,
+    ) -> Placement:
+        """Return a placement of values that are broadcast: by default one side of one site."""
+        real = (np.asarray(part, dtype=np.float64) for part in (l, ln_y))
+        whole = (
+            np.asarray(part, dtype=np.int64) for part in (earthquake, site, component, polarity)
+        )
+        try:
+            parts = np.broadcast_arrays(*(np.atleast_1d(part) for part in (*real, *whole)))
+        except ValueError as error:
+            raise InputError(f"blocks of a portfolio need columns of one length: {error}") from None
+        return cls(*parts)
+
+    def __post_init__(self) -> None:
+        columns = vars(self)
+        if len({part.shape for part in columns.values()}) != 1 or self.l.ndim != 1:
+            shapes = ", ".join(f"{name} {part.shape}" for name, part in columns.items())
+            raise InputError(f"blocks of a portfolio need columns of one length, not {shapes}")
+        if not (np.isfinite(self.l).all() and np.isfinite(self.ln_y).all()):
+            raise InputError("ln p and ln y of every block of a portfolio must be finite")
+        if not np.isin(self.polarity, (-1, UNKNOWN, 1)).all():
+            raise InputError("a polarity is +1, -1, or 0 where the azimuth is not known")
+        if self.drawn.any() and not np.isin(self.component[~self.drawn], range(COMPONENTS)).all():
+            raise InputError(
+                "beside blocks of unknown azimuth the components are numbered 0 and 1: an unknown "
+                "azimuth is drawn from these two"
+            )
+
+    @property
+    def size(self) -> int:
+        """Number of blocks."""
+        return self.l.size
+
+    @property
+    def drawn(self) -> NDArray[np.bool_]:
+        """Which blocks have no known azimuth, shape (n,)."""
+        return np.asarray(self.polarity == UNKNOWN)
+
+    def only(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Placement:
+        """Return some of the blocks."""
+        return Placement(*(part[chosen] for part in vars(self).values()))
+
+    def with_azimuth(self, generator: np.random.Generator) -> Placement:
+        """Return the blocks with unknown azimuths drawn at random."""
+        component = generator.integers(COMPONENTS, size=self.size)
+        polarity = generator.choice((-1, 1), size=self.size)
+        return Placement(
+            self.l,
+            self.ln_y,
+            self.earthquake,
+            self.site,
+            np.where(self.drawn, component, self.component),
+            np.where(self.drawn, polarity, self.polarity),
+        )
+
+    def correlation(self, dependence: Dependence) -> FloatArray:
+        """Return R of every two blocks, shape (n, n); azimuths must be known."""
+        return dependence.correlation(*vars(self).values())
+
+
+def bivariate_normal(a: ArrayLike, b: ArrayLike, r: ArrayLike) -> FloatArray:
+    """Return Φ₂(a, b; R), the probability that two standard normals are below a and b.
+
+    Args:
+        a: first bound, any shape.
+        b: second bound.
+        r: correlation, -1 to 1.
+    """
+    first, second = (np.asarray(bound, dtype=np.float64) for bound in (a, b))
+    return np.asarray(joint_excess(first, second, r) + ndtr(first) * ndtr(second))
+
+
+def joint_excess(a: ArrayLike, b: ArrayLike, r: ArrayLike) -> FloatArray:
+    """Return Φ₂(a, b; R) - Φ(a) Φ(b), the covariance of two failures.
+
+        1/2π ∫₀^{asin R} exp(-(a² + b² - 2ab sin t)/(2 cos² t)) dt
+
+    by 32 Gauss-Legendre nodes. Near R = 1 the same integral is taken from there, where Φ₂ is
+    min(Φ(a), Φ(b)), so that the error stays below 1e-9 for every R.
+
+    Args:
+        a: first bound, any shape; infinite where P is 0 or 1.
+        b: second bound.
+        r: correlation, -1 to 1.
+    """
+    first, second, r = np.broadcast_arrays(*(np.asarray(x, dtype=np.float64) for x in (a, b, r)))
+    first = np.clip(first, -_FARTHEST, _FARTHEST)
+    second = np.clip(second, -_FARTHEST, _FARTHEST)
+    near = np.abs(r) > _NEAR_ONE
+    excess = np.empty(r.shape)
+    excess[~near] = _integral(first[~near], second[~near], np.arcsin(r[~near]))
+    if near.any():
+        excess[near] = _excess_near_one(first[near], second[near], r[near])
+    return excess
+
+
+def _integral(a: FloatArray, b: FloatArray, angle: FloatArray) -> FloatArray:
+    total, squares, product = np.zeros(a.shape), 0.5 * (a * a + b * b), a * b
+    for node, weight in zip(_NODES, _WEIGHTS, strict=True):
+        sine = np.sin(angle * (0.5 + 0.5 * node))
+        total += weight * np.exp((product * sine - squares) / (1.0 - sine * sine))
+    return np.asarray(total * angle / (4.0 * np.pi))
+
+
+def _excess_near_one(a: FloatArray, b: FloatArray, r: FloatArray) -> FloatArray:
+    # Φ₂(a, b; -R) = Φ(a) - Φ₂(a, -b; R) leaves R > 0; from there t = π/2 - s. What is missing
+    # begins as exp(-c/s²): panels that shrink towards 0 follow it wherever it rises.
+    sign = np.where(r < 0.0, -1.0, 1.0)
+    b = b * sign
+    apart, product, missing = 0.5 * (a - b) ** 2, a * b, np.zeros(a.shape)
+    for low, high in pairwise(_PANELS):
+        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
+            s = np.arccos(np.abs(r)) * (low + (high - low) * (0.5 + 0.5 * node))
+            sine = np.maximum(np.sin(s), 1e-150)
+            decay = np.exp(-apart / (sine * sine) - product / (1.0 + np.cos(s)))
+            missing += weight * (high - low) * decay
+    pa, pb = ndtr(a), ndtr(b)
+    missing *= np.arccos(np.abs(r)) / (4.0 * np.pi)
+    return np.asarray(sign * (np.minimum(pa, pb) - pa * pb - missing))
+
+
+def event_ranges(
+    probability: ArrayLike, rho_e: float, level: float = 0.95
+) -> tuple[FloatArray, FloatArray]:
+    """Return `rbfrag.fragility.dependence.event_range` of many P, two arrays of their shape."""
+    p = np.asarray(probability, dtype=np.float64)
+    if rho_e in (0.0, 1.0):
+        ends = np.array([event_range(one, rho_e, level) for one in p.ravel().tolist()])
+        low, high = ends.reshape(*p.shape, 2).transpose(-1, *range(p.ndim))
+        return low, high
+    a, scale = ndtri(p), np.sqrt(1.0 - rho_e)
+    reach = np.sqrt(rho_e) * ndtri(0.5 + 0.5 * level)
+    return np.asarray(ndtr((a - reach) / scale)), np.asarray(ndtr((a + reach) / scale))
+
+
+def count_moments(
+    probability: ArrayLike,
+    blocks: Placement,
+    dependence: Dependence,
+    weights: ArrayLike | None = None,
+) -> tuple[float, float]:
+    """Return mean and variance of the weighted number of failures, exactly.
+
+        E = Σ w_i P_i,   Var = Σ w_i² P_i (1-P_i) + 2 Σ_{i<j} w_i w_j [Φ₂(a_i, a_j; R_ij) - P_i P_j]
+
+    Of a block with unknown azimuth the covariance is the mean over the azimuths.
+
+    Args:
+        probability: P of each block, shape (n,).
+        blocks: where they stand.
+        dependence: the copula.
+        weights: weight or loss of each block, shape (n,); None for 1.
+    """
+    p, w = checked(probability, blocks, weights)
+    variance = float(np.sum(w * w * p * (1.0 - p)))
+    for number in np.unique(blocks.earthquake):
+        some = blocks.earthquake == number
+        variance += 2.0 * _shared_variance(p[some], w[some], blocks.only(some), dependence)
+    return float(w @ p), variance
+
+
+def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Dependence) -> float:
+    """Return the sum of covariances over all pairs of blocks of one earthquake."""
+    a, total, n = ndtri(p), 0.0, blocks.size
+    rows = max(1, _PAIRS_AT_ONCE // max(n, 1))
+    for start in range(0, n, rows):
+        i, j = np.nonzero(np.arange(start, min(start + rows, n))[:, None] < np.arange(n))
+        i += start
+        d_l, d_y = np.abs(blocks.l[i] - blocks.l[j]), np.abs(blocks.ln_y[i] - blocks.ln_y[j])
+        site = blocks.site[i] == blocks.site[j]
+        component = site & (blocks.component[i] == blocks.component[j])
+        sign = (blocks.polarity[i] * blocks.polarity[j]).astype(np.float64)
+        either = site & (sign == UNKNOWN)
+        excess = joint_excess(a[i], a[j], law.of_pairs(d_l, d_y, site, component & ~either, sign))
+        if either.any():  # another component in half of the cases, else the same or opposite side
+            here = np.ones(int(either.sum()), dtype=np.bool_)
+            a_i, a_j, apart = a[i[either]], a[j[either]], (d_l[either], d_y[either])
+            own = [
+                joint_excess(a_i, a_j, law.of_pairs(*apart, here, here, np.full(here.size, side)))
+                for side in (-1.0, 1.0)
+            ]
+            excess[either] = 0.5 * excess[either] + 0.25 * (own[0] + own[1])
+        total += float((w[i] * w[j]) @ excess)
+    return total
+
+
+def checked(
+    probability: ArrayLike, blocks: Placement, weights: ArrayLike | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return P and weights of the blocks, each of shape (n,).
+
+    Raises:
+        InputError: their numbers are not that of the blocks, or a value makes no sense.
+    """
+    p = np.asarray(probability, dtype=np.float64)
+    w = np.ones(p.shape) if weights is None else np.asarray(weights, dtype=np.float64)
+    for name, part in (("probabilities", p), ("weights", w)):
+        if part.shape != (blocks.size,):
+            raise InputError(f"{blocks.size} blocks need as many {name}, not {part.shape}")
+    if not np.all((p >= 0.0) & (p <= 1.0)):
+        raise InputError("a probability of the portfolio is not between 0 and 1")
+    if not np.isfinite(w).all():
+        raise InputError("a weight of the portfolio is not finite")
+    return p, w
+
+
+@dataclass(frozen=True)
+class FailureCount:
+    """Number of failures among n blocks: the beta-binomial law of known mean and variance.
+
+    Its beta distribution has the mean π = mean/n, and ρ = 1/(α + β + 1) solves
+    Var = n π(1-π)(1 + (n-1)ρ). Blocks of unlike P that are nearly independent scatter less than a
+    binomial number; then it is the binomial law of as many blocks as have this mean and variance.
+
+    Args:
+        n: number of blocks.
+        mean: expected number of failures.
+        variance: its variance.
+        least_any: greatest P of one block, below which the probability of any failure cannot lie.
+    """
+
+    n: int
+    mean: float
+    variance: float
+    least_any: float = 0.0
+
+    @classmethod
+    def of(cls, probability: ArrayLike, blocks: Placement, dependence: Dependence) -> FailureCount:
+        """Return the law of the failures of some blocks (see `count_moments`)."""
+        p = np.asarray(probability, dtype=np.float64)
+        mean, variance = count_moments(p, blocks, dependence)
+        return cls(blocks.size, mean, variance, float(p.max(initial=0.0)))
+
+    @property
+    def overdispersion(self) -> float:
+        """ρ, from 0 for independent blocks of equal P to 1 where all fail or none."""
+        share = self.mean / self.n if self.n else 0.0
+        alone = self.n * share * (1.0 - share)
+        if self.n < 2 or alone <= 0.0:
+            return 0.0
+        return min(1.0, (self.variance / alone - 1.0) / (self.n - 1.0))
+
+    @property
+    def probability_any(self) -> float:
+        """Probability that at least one fails, between the greatest P and the sum of all."""
+        share, rho = self.mean / max(self.n, 1), self.overdispersion
+        if not 0.0 < share < 1.0:
+            return share
+        if rho >= 1.0:
+            none = 1.0 - share
+        elif rho > _LEAST_RHO:
+            alpha, beta = share * (1.0 / rho - 1.0), (1.0 - share) * (1.0 / rho - 1.0)
+            none = float(np.exp(betaln(alpha, beta + self.n) - betaln(alpha, beta)))
+        else:
+            n, p = self._binomial()
+            none = (1.0 - p) ** n
+        return min(max(1.0 - none, self.least_any), self.mean, 1.0)
+
+    def quantile(self, q: ArrayLike) -> IntArray:
+        """Return the smallest number that is not exceeded with probability q, same shape as q."""
+        from scipy.stats import betabinom, binom
+
+        share, rho = self.mean / max(self.n, 1), self.overdispersion
+        levels = np.asarray(q, dtype=np.float64)
+        if not 0.0 < share < 1.0:
+            return np.full(levels.shape, round(self.mean), dtype=np.int64)
+        if rho >= 1.0:
+            return np.where(levels <= 1.0 - share, 0, self.n).astype(np.int64)
+        if rho > _LEAST_RHO:
+            more = 1.0 / rho - 1.0
+            counts = betabinom.ppf(levels, self.n, share * more, (1.0 - share) * more)
+        else:  # of whole blocks: the mean stays
+            n = int(np.clip(np.ceil(self._binomial()[0]), np.ceil(self.mean), self.n))
+            counts = binom.ppf(levels, n, self.mean / n)
+        return np.asarray(counts, dtype=np.int64)
+
+    def _binomial(self) -> tuple[float, float]:
+        """Return n and P of the binomial law with this mean and variance; n is not whole."""
+        p = 1.0 - self.variance / self.mean
+        return (self.mean / p, p) if p > 0.0 else (float(self.n), self.mean / self.n)

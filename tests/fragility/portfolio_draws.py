@@ -1,0 +1,19 @@
+"""A copula, and portfolios of blocks at random, for tests of joint failures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rbfrag.fragility.dependence import Dependence
+from rbfrag.fragility.joint import Placement
+
+LAW = Dependence(0.055, 0.162, 0.270, 0.513, 1.7, 2.5, 5.1, 0.67)
+
+
+def anywhere(n: int, seed: int) -> Placement:
+    """Return blocks of two earthquakes, three sites and two components, on both sides."""
+    random = np.random.default_rng(seed)
+    return Placement(
+        random.uniform(-1.2, 1.7, n), random.normal(size=n), random.integers(2, size=n),
+        random.integers(3, size=n), random.integers(2, size=n), random.choice((-1, 1), size=n),
+    )  # fmt: skip

@@ -1,0 +1,124 @@
+"""The copula estimated from outcomes."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.special import ndtr, ndtri
+
+from rbfrag.errors import FitError, InputError
+from rbfrag.fragility.dependence import Dependence
+from rbfrag.fragility.fit import pair_tables
+from rbfrag.fragility.fit.dependence import PairTables, estimate_dependence
+from rbfrag.fragility.joint import Placement, bivariate_normal
+from rbfrag.fragility.joint_sampling import JointSampler
+
+TRUE = Dependence(0.15, 0.20, 0.25, 0.40, 1.5, 1.5, 3.0, 0.5)
+
+
+def simulated(earthquakes: int, sites: int = 2, seed: int = 0) -> dict[str, Any]:
+    """Draw outcomes of blocks of four strengths and three sizes on both sides of each component."""
+    random = np.random.default_rng(seed)
+    axes = (np.arange(earthquakes), np.arange(sites), (0, 1), (-1, 1), (0.1, 1.0, 10.0), range(4))
+    event, site, component, polarity, p2, step = (
+        part.ravel() for part in np.meshgrid(*axes, indexing="ij")
+    )
+    y = np.exp(0.35 * (step - 1.5))
+    blocks = Placement(0.5 * np.log(p2), np.log(y), event, site, component, polarity)
+    p = ndtr(-1.2 * np.log(y))
+    z = JointSampler(TRUE, blocks).normals(1, random)[0]
+    return {
+        "probability": p, "failed": (z <= ndtri(p)).astype(float), "earthquake": event,
+        "site": site, "component": component, "polarity": polarity, "p2": p2, "y_m_s": y,
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def columns() -> dict[str, Any]:
+    return simulated(100)
+
+
+def test_known_parameters_are_found_again(columns: dict[str, Any]) -> None:
+    found = estimate_dependence(**columns, replicates=12)
+    assert (found.earthquakes, found.replicates, found.seed) == (100, 12, 0)
+    law = asdict(found.dependence)
+    for name, true in asdict(TRUE).items():
+        if name.startswith("rho"):
+            assert law[name] == pytest.approx(true, abs=0.1)
+            assert 0.005 < found.errors[name] < 0.1
+            assert abs(law[name] - true) < 4.0 * found.errors[name]
+    assert law["l_y"] == pytest.approx(0.5, rel=0.3)
+
+
+def test_a_seed_gives_the_same_estimate(
+    columns: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pair_tables, "MOST_PAIRS", 500)
+    one, same, other = (
+        estimate_dependence(**columns, replicates=2, seed=seed) for seed in (1, 1, 2)
+    )
+    assert one == same
+    assert one.dependence != other.dependence
+
+
+def test_labels_and_order_do_not_matter(columns: dict[str, Any]) -> None:
+    some = columns["earthquake"] < 15
+    part = {name: value[some] for name, value in columns.items()}
+    order = np.random.default_rng(0).permutation(int(some.sum()))
+    mixed = {name: value[order] for name, value in part.items()}
+    mixed["earthquake"] = np.array([f"event {one:03}" for one in mixed["earthquake"]])
+    one, other = (PairTables.of(**some).likeliest() for some in (part, mixed))
+    for name, value in asdict(one).items():
+        assert getattr(other, name) == pytest.approx(value, rel=1e-3)
+
+
+def test_earthquakes_that_do_not_count_are_left_out(columns: dict[str, Any]) -> None:
+    times = (np.arange(100) < 30).astype(float)
+    tables = PairTables.of(**columns)
+    names = tables.earthquakes.astype(int)
+    without = tables.likeliest(times[names])
+    some = columns["earthquake"] < 30
+    alone = PairTables.of(**{name: value[some] for name, value in columns.items()}).likeliest()
+    for name, value in asdict(alone).items():
+        assert getattr(without, name) == pytest.approx(value, rel=1e-3)
+
+
+def test_likelihood_of_a_pair_is_the_copula_s() -> None:
+    # one pair: its table holds the logarithm of the chance of what both did
+    bound = np.array([0.3, -0.6])
+    for side in ([1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]):
+        zero = np.zeros(2, dtype=np.intp)
+        rows = pair_tables.PairRows(
+            bound, np.array(side), zero, zero, zero, np.ones(2), np.zeros(2), np.zeros(2)
+        )
+        table = pair_tables._log_likelihoods(rows, zero[:1], zero[:1] + 1)[:, 0]
+        r = np.sin(pair_tables.ANGLES)
+        a, b = np.array(side) * bound
+        np.testing.assert_allclose(
+            np.exp(table), bivariate_normal(a, b, side[0] * side[1] * r), atol=1e-5
+        )
+
+
+def test_many_cells_are_joined(monkeypatch: pytest.MonkeyPatch) -> None:
+    random = np.random.default_rng(0)
+    d_l, d_y = random.uniform(0, 3, 20_000), random.uniform(0, 4, 20_000)
+    cell, count = pair_tables._cells(d_l, d_y, random.choice((-1.0, 1.0), 20_000))
+    assert count <= pair_tables._MOST_CELLS
+    spread = [np.ptp(d_l[cell == one]) for one in range(0, count, 50)]
+    assert max(spread) < 0.5
+
+
+def test_too_little_is_refused(columns: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="differ in length"):
+        estimate_dependence(**{**columns, "p2": [1.0]})
+    few = columns["earthquake"] < 5
+    with pytest.raises(FitError, match=r"in 10 earthquakes: there are \d+ in 5"):
+        estimate_dependence(**{name: value[few] for name, value in columns.items()})
+    one_site = columns["site"] == 0
+    with pytest.raises(FitError, match="other sites in 10 earthquakes: there are 0 in 0"):
+        estimate_dependence(**{name: value[one_site] for name, value in columns.items()})
+    with pytest.raises(FitError, match="there are 0 in 0"):
+        estimate_dependence(**{**columns, "failed": np.full(columns["p2"].size, np.nan)})
