@@ -66,18 +66,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def compare(drive: Excitation, p2: float, kr: np.ndarray) -> tuple[float, float, float, int]:
     """Return the least times of both ways [s], the steps, and the number of runs that differ."""
-    arrays = (
-        drive.time_s, drive.interval_s, drive.k_h, drive.w, drive.q, drive.tail_min_q,
-        drive.block_max_q,
-    )  # fmt: skip
     p = np.full(kr.size, np.sqrt(p2))
     whole = [np.empty((3, kr.size), dtype=np.int64) for _ in range(2)]
     real = [np.empty((4, kr.size)) for _ in range(2)]
     ways: list[Callable[[], None]] = [
-        lambda: run_blocks(
-            *arrays, drive.jump_node, kr, p, False, ORDER, PH_MAX, whole[0], real[0]
-        ),
-        lambda: run_batch(*arrays, drive.jump_node, kr, p, PH_MAX, whole[1], real[1]),
+        lambda: run_blocks(drive.nodes, kr, p, ORDER, PH_MAX, whole[0], real[0]),
+        lambda: run_batch(drive.nodes, kr, p, PH_MAX, whole[1], real[1]),
     ]
     least = [np.inf, np.inf]
     for way in ways:

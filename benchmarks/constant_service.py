@@ -9,10 +9,12 @@ delayed acknowledgement hold every answer back.
 from __future__ import annotations
 
 import sys
+from typing import Annotated
 
 import uvicorn
-from fastapi import FastAPI
+from fastapi import FastAPI, Query
 
+from rbfrag.service.parameters import PredictQuery
 from rbfrag.service.run import Workers, listener
 
 ANSWER = {
@@ -29,6 +31,12 @@ app = FastAPI(openapi_url=None)
 @app.get("/constant")
 async def constant(p2: float, kr: float, pgv: float) -> dict[str, float | str]:  # noqa: ARG001
     """Take what `/v1/predict` takes, and answer the same whatever it is."""
+    return ANSWER
+
+
+@app.get("/model")
+async def model(asked: Annotated[PredictQuery, Query()]) -> dict[str, float | str]:  # noqa: ARG001
+    """Take the parameters of `/v1/predict` as FastAPI reads such a model."""
     return ANSWER
 
 

@@ -25,8 +25,8 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.database_content import content_digest
 from rbfrag.db.check.database import check_database
-from rbfrag.db.content import content_digest
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import add_motion
 from rbfrag.db.queries import database_info

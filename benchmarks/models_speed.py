@@ -72,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def models(drive: Excitation) -> dict[str, Run]:
     """Return runs of blocks whose strength is a fifth of PGA, or a little less, by model."""
     k = 0.2 * drive.pga_g
-    topple = runner(drive, p2=3.0, linear=False)
+    topple = runner(drive, p2=3.0)
     mechanisms = {
         "sliding": sliding.mechanism(planes(None, 0.0, math.degrees(math.atan(k)))),
         "slumping": slumping.mechanism(at_strength(Block.from_angles(45, 65, 2.0), k, slumping)),

@@ -44,13 +44,15 @@ def plot_other_kinds(
 
 
 def _slides(axes: Any, model: FragilityModel, data: FitData) -> None:
-    v, found = data.values, data.found
+    v, observed = data.values, data.observed
     r = v["ky"] / v["pga_g"]
     size = v["pgv_m_s"] ** 2 / (v["ky"] * STANDARD_GRAVITY_M_S2)
     share = v["displacement_m"] / size
     rng = np.random.default_rng(0)
     jitter = r + rng.uniform(-0.008, 0.008, r.size)
-    axes.plot(jitter[found], share[found], ".", ms=1.6, color="#9a9a9a", alpha=0.5, rasterized=True)
+    axes.plot(
+        jitter[observed], share[observed], ".", ms=1.6, color="#9a9a9a", alpha=0.5, rasterized=True
+    )
     grid = np.linspace(0.01, 0.97, 120)
     pga, pgv = 0.3, 0.3
     line = {"ky": grid * pga, "pgv_m_s": np.full(120, pgv), "pga_g": np.full(120, pga)}
@@ -81,8 +83,8 @@ def _slumps(axes: Any, model: FragilityModel, data: FitData) -> None:
     z = np.sqrt(v["ps2"]) * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2)
     excess = (1.0 - r) / r
     for chosen, colour, text in (
-        (~data.found, "#7fb2d8", "not failed before the model ends"),
-        (data.found, "#8a8a8a", "fails"),
+        (~data.observed, "#7fb2d8", "not failed before the model ends"),
+        (data.observed, "#8a8a8a", "fails"),
     ):
         axes.plot(z[chosen], excess[chosen], ".", ms=1.8, color=colour, alpha=0.5, rasterized=True)
         axes.plot([], [], "o", ms=4, color=colour, label=text)

@@ -1,6 +1,5 @@
 """How fast `predict` answers:  python -m benchmarks.predict_speed --db DATABASE
 
-Shell: median of paired runs of `rbfrag predict` and `python -c "import typer"`, in turn.
 Python: a scalar call with the model in hand, and with the database's path, in CPU time.
 Arrays: ten million rows, against one pass of `scipy.special.ndtr` over as many normal scores, in
 turn; wall time with a thread for each core, in brackets the processor time, which is what one
@@ -9,9 +8,6 @@ thread takes.
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Sequence
 from statistics import median
@@ -19,7 +15,7 @@ from statistics import median
 import numpy as np
 from scipy.special import ndtr
 
-from benchmarks.page import ROOT, parser, report
+from benchmarks.page import parser, report
 from rbfrag.bench.tables import markdown
 from rbfrag.fragility.lookup import suited_models
 from rbfrag.fragility.predict import predict
@@ -41,40 +37,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser(__doc__)
     options.add_argument("--db", required=True, help="database with fitted models")
     options.add_argument("--rows", type=int, default=10_000_000)
-    options.add_argument("--repeat", type=int, default=21)
     chosen = options.parse_args(arguments)
-    cells = [shell(chosen.db, chosen.repeat)]
+    cells: list[list[str]] = []
     for known in KNOWN:
         cells += scalar(chosen.db, known)
         cells.append(array(chosen.db, known, chosen.rows, interval=False))
         cells.append(array(chosen.db, known, chosen.rows, interval=True))
     head = ["what", "time", "compared with", "time", "ratio"]
     report("predict-speed", markdown((head, cells)), write=chosen.write)
-
-
-def shell(db: str, repeat: int) -> list[str]:
-    """Return the row of the shell."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    ask = "import sys; sys.argv[0] = 'rbfrag'; from rbfrag.cli.start import run; run()"
-    options = ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--db", db]
-    commands = (
-        [sys.executable, "-c", ask, "predict", *options],
-        [sys.executable, "-c", "import typer"],
-    )
-    times: tuple[list[float], list[float]] = ([], [])
-    for _ in range(repeat + 1):
-        for command, found in zip(commands, times, strict=True):
-            before = time.perf_counter()
-            subprocess.run(command, check=True, env=environment, capture_output=True)
-            found.append(time.perf_counter() - before)
-    ours, typer = (median(found[1:]) for found in times)
-    return [
-        "`rbfrag predict` from the shell, median wall time",
-        f"{1e3 * ours:.0f} ms",
-        '`python -c "import typer"`',
-        f"{1e3 * typer:.0f} ms",
-        f"{ours / typer:.2f}",
-    ]
 
 
 def scalar(db: str, known: dict[str, float]) -> list[list[str]]:

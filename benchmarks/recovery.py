@@ -77,7 +77,7 @@ def straight_line(seed: int) -> Draw:
     events = np.unique(table.event_id[order].astype(str), return_inverse=True)[1].astype(np.intp)
     fit = iterate(Bins.equal_count(x), y, np.ones(x.size), 1)
     weights = 1.0 / (fit.parameters[2] + fit.parameters[3] * x)
-    line, covariance, _ = clustered_line(x, y, weights, events)
+    line, covariance, *_ = clustered_line(x, y, weights, events)
     return line, np.sqrt(np.diag(covariance)), np.array([0.002, 0.72]), EVENTS - 1
 
 

@@ -21,6 +21,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, delete, func, select
 
+from benchmarks.database_content import content_digest
 from benchmarks.page import ROOT
 from rbfrag.bench.cases import RECORDS_VARIABLE
 from rbfrag.bench.tables import markdown
@@ -28,7 +29,6 @@ from rbfrag.campaign.add_motions import AddReport, add_motions
 from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
 from rbfrag.db import schema
 from rbfrag.db.check.database import check_database
-from rbfrag.db.content import content_digest
 from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import update_rows
 from rbfrag.db.location import REFERENCE

@@ -84,13 +84,9 @@ def _verdicts(motion: GroundMotion, polarity: Polarity, p2: float, *, full: bool
     if drive.max_q <= SEARCH_LIMIT * drive.pga_g:
         return Done(True, 0, 0)
     bottom = SEARCH_LIMIT * drive.pga_g
-    found = certified_map(drive, p2=p2, linear=False, bottom=bottom, full=full)
+    found = certified_map(drive, p2=p2, bottom=bottom, full=full)
     bracket = bracket_of(found)
-    undecided = (
-        float((found.high - found.low)[found.undecided].sum()) + max(found.reached - bottom, 0.0)
-        if bracket is None
-        else bracket[2]
-    )
+    undecided = found.undecided_above(bottom) if bracket is None else bracket.undecided
     return Done(undecided <= SLIVERS * drive.pga_g, found.runs, found.steps)
 
 

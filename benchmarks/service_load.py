@@ -1,7 +1,7 @@
 """The service under load, asked by `wrk`:  python -m benchmarks.service_load
 
-One block by `GET /v1/predict`, with one and two processes that answer, in turn with an equivalent
-FastAPI operation that answers a constant under the same server. `--soak MINUTES` instead asks for
+One block by `GET /v1/predict`, with one and two processes that answer, in turn with FastAPI
+operations that answer a constant under the same server. `--soak MINUTES` instead asks for
 so long and reports how the memory of the processes grew.
 """
 
@@ -69,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 Path(folder), workers, chosen.seconds, chosen.repeat, chosen.connections
             )
             bad += sum(load.bad for loads in found for load in loads)
-            rows += table_rows(workers, *found)
+            rows += table_rows(workers, found)
         head = [
             *("processes", "what", "requests a second", "p50", "p99", "processor time a request"),
             *("ratio to it", "of pairs", "by processor time"),
@@ -80,22 +80,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def compared(
     folder: Path, workers: int, seconds: int, repeat: int, connections: int
-) -> tuple[list[Load], list[Load], list[Load]]:
-    """Return loads of the service, of the equivalent constant and of the bare one, in turn."""
+) -> list[list[Load]]:
+    """Return loads of the service and of each of the constants, in turn."""
     port = free_port()
     constant = ["-m", "benchmarks.constant_service", str(port), str(workers)]
     address = f"http://127.0.0.1:{port}"
-    ours: list[Load] = []
-    equivalent: list[Load] = []
-    bare: list[Load] = []
+    found: list[list[Load]] = [[], [], [], []]
     with (
         running_service(folder, workers=workers) as service,
         running_program(constant, folder / "constant.log", f"{address}/bare", {}) as other,
     ):
         asked = (
-            (f"{service.address}/v1/predict{QUERY}", service.process.pid, ours),
-            (f"{address}/constant{QUERY}", other.pid, equivalent),
-            (f"{address}/bare", other.pid, bare),
+            (f"{service.address}/v1/predict{QUERY}", service.process.pid, found[0]),
+            (f"{address}/constant{QUERY}", other.pid, found[1]),
+            (f"{address}/model{QUERY}", other.pid, found[2]),
+            (f"{address}/bare", other.pid, found[3]),
         )
         for url, _, _ in asked:
             wrk(url, 2, connections)
@@ -106,10 +105,10 @@ def compared(
             # the order alternates, so that whatever else the machine does hits each alike
             for url, pid, loads in asked if turn % 2 == 0 else reversed(asked):
                 before = processor_s(pid)
-                found = wrk(url, seconds, connections)
+                load = wrk(url, seconds, connections)
                 spent = processor_s(pid) - before
-                loads.append(replace(found, cpu_us=1e6 * spent / max(found.answers, 1)))
-    return ours, equivalent, bare
+                loads.append(replace(load, cpu_us=1e6 * spent / max(load.answers, 1)))
+    return found
 
 
 def wrk(url: str, seconds: int, connections: int) -> Load:
@@ -139,16 +138,19 @@ def _milliseconds(printed: str, percent: str) -> float:
     return float(value) * _UNIT_MS[unit]
 
 
-def table_rows(
-    workers: int, ours: list[Load], equivalent: list[Load], bare: list[Load]
-) -> list[list[str]]:
+NAMES = (
+    "`GET /v1/predict`",
+    "a constant, the three parameters given",
+    "a constant, all parameters of predict as FastAPI reads them",
+    "a constant, no parameters",
+)
+
+
+def table_rows(workers: int, found: list[list[Load]]) -> list[list[str]]:
     """Return the rows of the table for one number of processes."""
     rows = []
-    for name, loads in (
-        ("`GET /v1/predict`", ours),
-        ("a constant, the same parameters", equivalent),
-        ("a constant, no parameters", bare),
-    ):
+    ours = found[0]
+    for name, loads in zip(NAMES, found, strict=True):
         ratios = [a.per_s / b.per_s for a, b in zip(ours, loads, strict=True)]
         of_cpu = [b.cpu_us / a.cpu_us for a, b in zip(ours, loads, strict=True)]
         rows.append(

@@ -57,7 +57,7 @@ def simulated_source(database: str, *, vertical: bool, cache: Path | None = None
                 for p2 in DEFAULT_P2:
                     found = critical(motion, p2=p2, vertical=upward, polarity=polarity)
                     y0 = row.pgv_m_s * Y0_OVER_PGV
-                    run = runner(drive, p2=p2, linear=False)
+                    run = runner(drive, p2=p2)
                     outcomes.append([
                         float(run(float(y) * p2**0.5 / STANDARD_GRAVITY_M_S2).outcome == TOPPLED)
                         for y in y0

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import resource
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from statistics import median
 
 from benchmarks.page import ROOT, parser, report
@@ -16,6 +17,16 @@ from rbfrag.bench.tables import markdown, seconds
 PULSE = "from rbfrag.motions.pulses import reversal_pulse; m = reversal_pulse(0.4, 0.5, 1.0, 0.005)"
 RESPOND = f"from rbfrag.solver.toppling_run import respond; {PULSE}; respond(m, p2=3, kr=0.1)"
 CRITICAL = f"from rbfrag.solver.search.critical import critical; {PULSE}; critical(m, p2=3)"
+SIMULATE = f"""
+import os, tempfile
+import rbfrag
+from rbfrag.motions.export import export_motions
+{PULSE}
+os.chdir(tempfile.mkdtemp())
+export_motions([m], "pulse.csv")
+rbfrag.add_motions(["pulse.csv"], db="first.db", raw=True)
+rbfrag.simulate(db="first.db", jobs=1)
+"""
 NUMBA = "import numba"
 
 STEPS = (
@@ -24,9 +35,22 @@ STEPS = (
     ("… and imports numba", NUMBA, False),
     ("… and makes one run, kernels on disk", RESPOND, False),
     ("… and makes one critical search, kernels on disk", CRITICAL, False),
+    ("… and simulates one motion for six sizes of block, kernels on disk", SIMULATE, False),
     ("… and makes one run, first call after installation", RESPOND, True),
     ("… and makes one critical search, first call after installation", CRITICAL, True),
+    ("… and simulates one motion, first call after installation", SIMULATE, True),
 )
+
+
+QUESTION = ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
+TYPER = '`python -c "import typer"`'
+SHELL = {
+    TYPER: ("import typer", ()),
+    "`rbfrag --version`": ("from rbfrag.cli.start import run; run()", ("--version",)),
+    "`rbfrag --help`": ("from rbfrag.cli.start import run; run()", ("--help",)),
+    "`rbfrag predict`": ("from rbfrag.cli.start import run; run()", QUESTION),
+    "`rbfrag predict` without its own parser": ("from rbfrag.cli.main import run; run()", QUESTION),
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -49,11 +73,34 @@ def main(arguments: Sequence[str] | None = None) -> None:
             ]
             cells.append([name, seconds(median(times)), seconds(min(times))])
     cells.append(["`import rbfrag` alone", *import_alone(chosen.repeat)])
-    report("start-up", markdown((["process", "median", "least"], cells)), write=chosen.write)
+    report(
+        "start-up",
+        markdown((["process", "processor time, median", "least"], cells)),
+        write=chosen.write,
+    )
+    head = ["command", "median", "least", "over `import typer`"]
+    report("shell-start", markdown((head, shell(4 * chosen.repeat))), write=chosen.write)
+
+
+def shell(repeat: int) -> list[list[str]]:
+    """Return processor times of commands, which take turns with `import typer`."""
+    times: dict[str, list[float]] = {name: [] for name in SHELL}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for _ in range(repeat + 1):
+        for name, (code, arguments) in SHELL.items():
+            program = f"import sys; sys.argv[0] = 'rbfrag'; {code}"
+            command = [sys.executable, "-c", program, *arguments]
+            run = partial(subprocess.run, command, check=True, env=environment, capture_output=True)
+            times[name].append(processor_time(run))
+    typer = median(times[TYPER][1:])
+    return [
+        [name, seconds(median(each[1:])), seconds(min(each)), f"{median(each[1:]) / typer:.2f}"]
+        for name, each in times.items()
+    ]
 
 
 def started(code: str, kernels: str | None) -> float:
-    """Wall time of one process.
+    """Processor time of one process and its workers.
 
     Args:
         code: what it does.
@@ -65,9 +112,16 @@ def started(code: str, kernels: str | None) -> float:
             "PYTHONPATH": str(ROOT),
             "NUMBA_CACHE_DIR": empty if kernels is None else kernels,
         }  # fmt: skip
-        before = time.perf_counter()
-        subprocess.run([sys.executable, "-c", code], check=True, env=environment)
-        return time.perf_counter() - before
+        program = [sys.executable, "-c", code]
+        return processor_time(lambda: subprocess.run(program, check=True, env=environment))
+
+
+def processor_time(work: Callable[[], object]) -> float:
+    """Processor time of the processes that some work starts and waits for."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    work()
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def import_alone(repeat: int) -> tuple[str, str]:

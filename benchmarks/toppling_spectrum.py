@@ -19,6 +19,7 @@ from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.integrator.single_run import TOPPLED
 from rbfrag.solver.results import DEFAULT_P2
 from rbfrag.solver.toppling_run import runner
+from tests.physics import linear_block
 from tests.solver.excursions_from_rest import fails
 
 PAGE = ROOT / "docs" / "theory" / "toppling-spectrum.md"
@@ -58,8 +59,8 @@ def bounds(records: Records, p2: Sequence[float]) -> list[list[str]]:
                 k = bound_k(toppling_spectrum(motion, size, polarity), size)
                 if k <= 0.0:
                     continue
-                below = fails(drive, size, True, k * (1.0 - EXACT))
-                wrong += not below or fails(drive, size, True, k * (1.0 + EXACT))
+                below = linear_block.fails(drive, size, k * (1.0 - EXACT))
+                wrong += not below or linear_block.fails(drive, size, k * (1.0 + EXACT))
                 linear += 1
                 k_up = non_linear_bound(drive, size, k)
                 strengths.append(k_up)
@@ -100,7 +101,7 @@ def trials(records: Records, number: int, seed: int) -> list[list[str]]:
                 k = bound_k(toppling_spectrum(motion, p2, polarity), p2)
                 if k <= 0.0:
                     continue
-                run = runner(drive, p2=p2, linear=False)
+                run = runner(drive, p2=p2)
                 factor = math.exp(rng.uniform(*map(math.log, ABOVE)))
                 toppled += run(factor * k).outcome == TOPPLED
                 just_below += run(0.98 * k).outcome == TOPPLED
@@ -141,13 +142,13 @@ def non_linear_bound(drive: Excitation, p2: float, guess: float) -> float:
     """Bisect for the greatest k_r of the non-linear model with a failing excursion from rest."""
     low, high = guess, guess
     step = 0.002
-    while low > 0.0 and not fails(drive, p2, False, low):
+    while low > 0.0 and not fails(drive, p2, low):
         high, low, step = low, low * (1.0 - step), 2.0 * step
-    while high <= drive.max_q and fails(drive, p2, False, high):
+    while high <= drive.max_q and fails(drive, p2, high):
         low, high, step = high, high * (1.0 + step), 2.0 * step
     while high - low > WIDTH * high:
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if fails(drive, p2, False, middle) else (low, middle)
+        low, high = (middle, high) if fails(drive, p2, middle) else (low, middle)
     return low
 
 

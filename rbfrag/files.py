@@ -1,4 +1,4 @@
-"""Files that are read with words for every trouble, and written whole or not at all."""
+"""Files that are read, with a sentence for every trouble, and written whole or not at all."""
 
 from __future__ import annotations
 

@@ -27,6 +27,9 @@ LEVELS = (
 )
 """Lowest first: a package imports only from levels below its own."""
 
+MOST_LINES, MOST_PARAMETERS = 120, 10
+"""Of a function of the solver."""
+
 FREE = {"errors", "files", "version"}
 """Top-level modules that every package may import."""
 
@@ -62,16 +65,18 @@ QUOTED_KIND = re.compile(f"['\"]({'|'.join(sorted(KINDS))})['\"]")
 def kind_names(source: str) -> list[int]:
     """Return the lines where a string names a kind, or quotes one inside SQL.
 
-    Defaults of arguments, and of fields that are arguments of their class, are set aside, and
-    docstrings.
+    Defaults of arguments, and of fields that are arguments of their class, are set aside with all
+    that declares them, and docstrings.
     """
     aside: set[int] = set()
     tree = ast.parse(source)
     for node in ast.walk(tree):
         if isinstance(node, ast.arguments):
-            aside.update(id(default) for default in (*node.defaults, *node.kw_defaults))
+            defaults = [default for default in (*node.defaults, *node.kw_defaults) if default]
+            aside.update(id(part) for default in defaults for part in ast.walk(default))
         elif isinstance(node, ast.ClassDef):
-            aside.update(id(part.value) for part in node.body if isinstance(part, ast.AnnAssign))
+            fields = [part.value for part in node.body if isinstance(part, ast.AnnAssign)]
+            aside.update(id(part) for value in fields if value for part in ast.walk(value))
         elif isinstance(node, ast.Expr):
             aside.add(id(node.value))
         elif isinstance(node, ast.keyword) and node.arg in {"help", "epilog"}:
@@ -249,6 +254,19 @@ def test_no_folder_holds_more_than_a_page_of_files() -> None:
         if len(list(folder.glob("*.py"))) > MOST_FILES
     }
     assert large == set()
+
+
+def test_functions_of_the_solver_can_be_read_at_a_glance() -> None:
+    large = set()
+    for path in (PACKAGE / "solver").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                lines = (node.end_lineno or 0) - node.lineno + 1
+                given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+                if lines > MOST_LINES or len(given) > MOST_PARAMETERS:
+                    large.add(node.name)
+    # the two faces of the solver, whose docstrings say why
+    assert large == {"respond", "critical"}
 
 
 def test_figure_and_walk_of_the_documentation_are_those_of_today(

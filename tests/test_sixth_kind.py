@@ -14,7 +14,6 @@ from fastapi.testclient import TestClient
 import rbfrag
 import rbfrag.solver.models
 from rbfrag.db.engine import opened_database
-from rbfrag.db.models import save_model
 from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.errors import InputError
@@ -120,8 +119,6 @@ def test_what_is_simulated_is_fitted_and_predicts(database: Path) -> None:
     assert rbfrag.simulate(database, kind="falls", jobs=1).resumed == summary.combinations
     model = rbfrag.fit(database, kind="falls", term="pgv", method="logistic").model.row
     assert model.kind == "falls"
-    with opened_database(database) as engine, engine.begin() as connection:
-        save_model(connection, model)
     weak = rbfrag.predict(3.0, 0.02, kind="falls", pgv_m_s=0.6, db=database)
     strong = rbfrag.predict(3.0, 2.0, kind="falls", pgv_m_s=0.6, db=database)
     assert (weak.kind, weak.model) == ("falls", model.name)

@@ -80,7 +80,7 @@ def study(combinations: Sequence[Combination], rng: np.random.Generator) -> dict
                 low = float(result.intervals.k_lo[m + 1]) * drive.pga_g
                 high = float(result.intervals.k_hi[m + 1]) * drive.pga_g
                 pairs.append((low, high) if said[m] == "topples" else (high, low))
-        run = runner(drive, p2=one.p2, linear=False)
+        run = runner(drive, p2=one.p2)
         for topples, stays in pairs:
             critical_kr = border(drive, one.p2, topples, stays)
             if critical_kr is None:

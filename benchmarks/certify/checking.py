@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.integrator.block_excitation import block_excitation
+from rbfrag.solver.integrator.block_excitation import BlockExcitation, block_excitation
+from rbfrag.solver.integrator.compiled import bare_kernel
 from rbfrag.solver.integrator.single_run import STABLE, TOPPLED
 from rbfrag.solver.search.certified import MARGIN, keeps_order
 from rbfrag.solver.search.envelopes import ALL_SAFE, ALL_TOPPLE, decide
-from rbfrag.solver.search.renewal import begin, no_starts
+from rbfrag.solver.search.renewal import ExcursionTable, begin, excursion_table, no_work
 from rbfrag.solver.toppling_run import runner
 
 FloatArray = NDArray[np.float64]
@@ -35,7 +36,7 @@ class Count:
         self, drive: Excitation, p2: float, low: float, high: float, topples: bool, kr: FloatArray
     ) -> list[str]:
         """Run blocks inside [low, high], of which it is said whether they topple."""
-        run = runner(drive, p2=p2, linear=False)
+        run = runner(drive, p2=p2)
         self.intervals += 1
         self.topple += topples
         wrong = []
@@ -62,10 +63,22 @@ def inner_values(
 
 def verdict_on(drive: Excitation, p2: float, low: float, high: float) -> bool | None:
     """Ask the rules of the search for one interval of k_r: all topple, none does, or None."""
-    n = drive.q.size
-    check = not keeps_order(drive, False)
-    starts = no_starts(n)
-    g = block_excitation(drive, p2=p2, linear=False)
-    begin(starts, low, low * (1.0 - MARGIN), high * (1.0 + MARGIN), check, 0, n)
-    what, *_ = decide(g, low, high, MARGIN, check, starts, 0)
-    return {ALL_SAFE: False, ALL_TOPPLE: True}.get(what)
+    verdict = _verdict(
+        block_excitation(drive, p2=p2), low, high, MARGIN, not keeps_order(drive),
+        excursion_table(drive.q.size), no_work(),
+    )  # fmt: skip
+    return {ALL_SAFE: False, ALL_TOPPLE: True}.get(verdict)
+
+
+@bare_kernel
+def _verdict(
+    excitation: BlockExcitation,
+    low: float,
+    high: float,
+    margin: float,
+    check: bool,
+    table: ExcursionTable,
+    work: np.void,
+) -> int:
+    begin(table, low, margin, high * (1.0 + margin), check, 0, excitation.q.size)
+    return decide(excitation, low, high, margin, check, table, 0, work).verdict

@@ -66,7 +66,7 @@ def study(combinations: Sequence[Combination], wanted: int, values: int) -> dict
         narrowest = min(narrowest, *gaps)
         said = np.array(result.intervals.outcome)
         drive = one.drive()
-        run = runner(drive, p2=one.p2, linear=False)
+        run = runner(drive, p2=one.p2)
         bottom = result.search_limit
         top = drive.max_q / drive.pga_g
         half = values // 2

@@ -37,7 +37,7 @@ class Case:
 
     motion: GroundMotion
     polarity: Polarity
-    drive: Excitation
+    excitation: Excitation
     p2: float
     kr: float
 
@@ -73,7 +73,7 @@ def find_records(folder: str | os.PathLike[str] | None = None) -> Records:
 def _read(root: Path) -> tuple[GroundMotion, ...]:
     """Read what can be read, each accelerogram once, in an order that never changes."""
     files = sorted(p for p in root.rglob("*") if p.is_file()) if root.is_dir() else [root]
-    found: dict[str, GroundMotion] = {}
+    by_samples: dict[str, GroundMotion] = {}
     for file in files:
         try:
             motions = read_motions(file)
@@ -82,8 +82,8 @@ def _read(root: Path) -> tuple[GroundMotion, ...]:
         for motion in motions:
             usable = motion.is_vertical is not True and motion.npts > 1
             if usable and motion.node_time_s is None and motion.acceleration_g.any():
-                found.setdefault(motion.sha256, motion)
-    return tuple(found.values())
+                by_samples.setdefault(motion.sha256, motion)
+    return tuple(by_samples.values())
 
 
 def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[Case, ...]:
@@ -104,10 +104,10 @@ def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[Case,
         polarity = POLARITIES[int(rng.integers(2))]
         p2 = float(rng.choice(DEFAULT_P2))
         low, high = np.log(STRENGTHS)
-        drive = excitation(motion, None, polarity)
-        kr = float(np.exp(rng.uniform(low, high))) * drive.pga_g
-        if drive.max_q > kr:
-            cases.append(Case(motion, polarity, drive, p2, kr))
+        excited = excitation(motion, None, polarity)
+        kr = float(np.exp(rng.uniform(low, high))) * excited.pga_g
+        if excited.max_q > kr:
+            cases.append(Case(motion, polarity, excited, p2, kr))
     if not cases:
         raise InputError("no drawn block lifts off under these records: name other records")
     return tuple(cases)

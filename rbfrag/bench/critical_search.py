@@ -10,7 +10,7 @@ import numpy as np
 from rbfrag.bench.cases import Case
 from rbfrag.bench.methods import taylor_run
 from rbfrag.bench.peers import cvode_is_installed, cvode_run
-from rbfrag.bench.timing import spread, timed
+from rbfrag.bench.timing import spread, timed_in_turns
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.batch import simulate_many
@@ -86,9 +86,7 @@ def compare_searches(
         if j == 0:
             for work in works[:3]:
                 work(cases)  # compiles
-        answers: dict[int, object] = {}
-        for i in rng.permutation(len(works)):
-            answers[int(i)], seconds[i, j] = timed(_bound(works[i], cases))
+        answers, seconds[:, j] = timed_in_turns(works, cases, rng)
         ours = answers[1]
         assert isinstance(ours, tuple)
         for i in range(2, len(works)):
@@ -120,10 +118,10 @@ def compare_searches(
 
 def search_runs(motion: GroundMotion, polarity: Polarity, p2: float) -> tuple[Case, ...]:
     """Return the 23 runs of one search: a descending scan, then a bisection."""
-    drive = excitation(motion, None, polarity)
+    excited = excitation(motion, None, polarity)
 
     def case(ratio: float) -> Case:
-        return Case(motion, polarity, drive, p2, ratio * drive.pga_g)
+        return Case(motion, polarity, excited, p2, ratio * excited.pga_g)
 
     ratios = np.geomspace(1.0, SEARCH_LIMIT, SCAN)
     runs = [case(float(ratio)) for ratio in ratios]
@@ -145,7 +143,9 @@ def _search(cases: tuple[Case, ...]) -> object:
 
 
 def _runs_in_batch(cases: tuple[Case, ...]) -> tuple[str, ...]:
-    runs = simulate_many(cases[0].drive, p2=cases[0].p2, kr=np.array([case.kr for case in cases]))
+    runs = simulate_many(
+        cases[0].excitation, p2=cases[0].p2, kr=np.array([case.kr for case in cases])
+    )
     return tuple(OUTCOMES[code].value for code in runs.outcome.tolist())
 
 
@@ -155,9 +155,3 @@ def _runs_by_kernel(cases: tuple[Case, ...]) -> tuple[str, ...]:
 
 def _runs_by_cvode(rtol: float) -> Callable[[tuple[Case, ...]], object]:
     return lambda cases: tuple(cvode_run(case, rtol).outcome for case in cases)
-
-
-def _bound(
-    work: Callable[[tuple[Case, ...]], object], cases: tuple[Case, ...]
-) -> Callable[[], object]:
-    return lambda: work(cases)

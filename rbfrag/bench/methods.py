@@ -46,7 +46,7 @@ class Method:
 
 def taylor_run(case: Case, order: int = ORDER, ph_max: float = PH_MAX) -> Answer:
     """Run one case with rbfrag's kernel."""
-    run = simulate(case.drive, p2=case.p2, kr=case.kr, order=order, ph_max=ph_max)
+    run = simulate(case.excitation, p2=case.p2, kr=case.kr, order=order, ph_max=ph_max)
     return Answer(OUTCOMES[run.outcome].value, run.peak_rad)
 
 
@@ -54,14 +54,14 @@ def methods(*, quick: bool = False) -> tuple[Method, ...]:
     """Return every method that can be run here."""
     splits = dict.fromkeys((UNSPLIT, PH_MAX, PH_MAX / 3.0))
     orders = dict.fromkeys((4, 5, 6, ORDER))
-    found = [_taylor(order, ph_max) for ph_max in splits for order in orders]
-    found += [_euler(parts) for parts in ((1, 8) if quick else (1, 8, 64))]
+    result = [_taylor(order, ph_max) for ph_max in splits for order in orders]
+    result += [_euler(parts) for parts in ((1, 8) if quick else (1, 8, 64))]
     solvers: tuple[Solver, ...] = ("RK45", "DOP853", "LSODA")
     tolerances = (1e-6,) if quick else (1e-4, 1e-6)
-    found += [_scipy(solver, rtol) for solver in solvers for rtol in tolerances]
+    result += [_scipy(solver, rtol) for solver in solvers for rtol in tolerances]
     if cvode_is_installed():
-        found += [_cvode(rtol) for rtol in ((1e-6, 1e-8) if quick else (1e-6, 1e-8, 1e-10))]
-    return tuple(found)
+        result += [_cvode(rtol) for rtol in ((1e-6, 1e-8) if quick else (1e-6, 1e-8, 1e-10))]
+    return tuple(result)
 
 
 def missing_peers() -> tuple[str, ...]:

@@ -24,7 +24,6 @@ from rbfrag.solver.integrator.compiled import kernel
 
 FloatArray = NDArray[np.float64]
 Solver = Literal["RK45", "DOP853", "LSODA"]
-Formula = Literal["Adams", "BDF"]
 
 STABLE, TOPPLED = "stable", "toppled"
 
@@ -79,13 +78,13 @@ def free_motion(
 
 def euler(case: Case, parts: int) -> Answer:
     """Run one case with `parts` Euler steps per sample interval."""
-    drive = case.drive
+    excited = case.excitation
     p, theta_c = math.sqrt(case.p2), math.atan(case.kr)
-    border = math.atan(min(float(drive.q.min()), 0.0))
-    fell, theta, rate, peak = _march(
-        drive.k_h, float(drive.interval_s[0]), case.kr, case.p2, theta_c, border, parts
+    border = math.atan(min(float(excited.q.min()), 0.0))
+    topples, theta, rate, peak = _march(
+        excited.k_h, float(excited.interval_s[0]), case.kr, case.p2, theta_c, border, parts
     )
-    if fell:
+    if topples:
         return Answer(TOPPLED, math.nan)
     if theta <= 0.0 and rate <= 0.0:
         return Answer(STABLE, peak)
@@ -94,13 +93,7 @@ def euler(case: Case, parts: int) -> Answer:
 
 @kernel
 def _march(
-    k_h: FloatArray,
-    dt: float,
-    kr: float,
-    p2: float,
-    theta_c: float,
-    border: float,
-    parts: int,
+    k_h: FloatArray, dt: float, kr: float, p2: float, theta_c: float, border: float, parts: int
 ) -> tuple[bool, float, float, float]:
     theta = 0.0
     rate = 0.0
@@ -139,14 +132,14 @@ class Problem:
     """One case as scalar Python functions, made as cheap as Python allows."""
 
     def __init__(self, case: Case) -> None:
-        self.k: list[float] = case.drive.k_h.tolist()
-        self.dt = float(case.drive.interval_s[0])
+        self.k: list[float] = case.excitation.k_h.tolist()
+        self.dt = float(case.excitation.interval_s[0])
         self.end_s = self.dt * (len(self.k) - 1)
         self.p2, self.kr, self.p = case.p2, case.kr, math.sqrt(case.p2)
         self.theta_c = math.atan(case.kr)
         # Below this angle to balance nothing in the record brings the block back.
-        self.border = self.theta_c - math.atan(min(float(case.drive.q.min()), 0.0))
-        self._lifts = np.flatnonzero(case.drive.k_h > case.kr)
+        self.border = self.theta_c - math.atan(min(float(case.excitation.q.min()), 0.0))
+        self._lifts = np.flatnonzero(case.excitation.k_h > case.kr)
         k, inverse, last = self.k, 1.0 / self.dt, len(self.k) - 2
         p2, theta_c, sin, cos = self.p2, self.theta_c, math.sin, math.cos
 
@@ -200,7 +193,7 @@ def run_through(case: Case, excursion: Callable[[Problem, float], Excursion]) ->
 
 
 def solve_ivp_run(case: Case, solver: Solver, rtol: float) -> Answer:
-    """Run one case."""
+    """Run one case by a method of scipy."""
     return run_through(case, lambda problem, t: _scipy_excursion(problem, t, solver, rtol))
 
 
@@ -258,15 +251,13 @@ def cvode_is_installed() -> bool:
     return find_spec(CVODE_PACKAGE) is not None
 
 
-def cvode_run(case: Case, rtol: float, formula: Formula = "Adams") -> Answer:
+def cvode_run(case: Case, rtol: float) -> Answer:
     """Run one case."""
     cvode = importlib.import_module(f"{CVODE_PACKAGE}.cvode").CVODE
-    return run_through(case, lambda problem, t: _cvode_excursion(cvode, problem, t, rtol, formula))
+    return run_through(case, lambda problem, t: _cvode_excursion(cvode, problem, t, rtol))
 
 
-def _cvode_excursion(
-    cvode: Any, problem: Problem, start: float, rtol: float, formula: Formula
-) -> Excursion:
+def _cvode_excursion(cvode: Any, problem: Problem, start: float, rtol: float) -> Excursion:
     acceleration, border = problem.acceleration, problem.border
     grace_s = start + GRACE * problem.dt
 
@@ -285,14 +276,9 @@ def _cvode_excursion(
     events.direction = [-1, 1, -1]  # type: ignore[attr-defined]
     absolute = ATOL_PARTS * rtol * problem.theta_c
     solver = cvode(
-        slope,
-        method=formula,
-        rtol=rtol,
-        atol=[absolute, absolute * problem.p],
-        eventsfn=events,
-        num_events=3,
-        max_num_steps=MOST_STEPS,
-    )
+        slope, method="Adams", rtol=rtol, atol=[absolute, absolute * problem.p], eventsfn=events,
+        num_events=3, max_num_steps=MOST_STEPS,
+    )  # fmt: skip
     # A third time asks for output there alone: storing every step would slow CVODE down.
     end = problem.end_s
     solution = solver.solve([start, 0.5 * (start + end), end], [0.0, 0.0])

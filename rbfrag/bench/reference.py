@@ -23,24 +23,24 @@ PH_MAX = 0.25
 
 def reference(case: Case) -> Answer:
     """Return outcome and peak rotation [rad] of one case."""
-    drive = case.drive
-    k = [Real(x) for x in drive.k_h]
-    w = [Real(x) for x in drive.w]
+    excited = case.excitation
+    k = [Real(x) for x in excited.k_h]
+    w = [Real(x) for x in excited.w]
     kr, p = Real(case.kr), np.sqrt(Real(case.p2))
     theta_c = np.arctan(kr)
     rest = Real(0)
     # tan falls short past 90 degrees: the block is followed by its angle, never by tan
     border = [
-        np.arctan(min(Real(q), rest)) for q in np.minimum.accumulate(drive.q[::-1])[::-1].tolist()
+        np.arctan(min(Real(q), rest)) for q in np.minimum.accumulate(excited.q[::-1])[::-1].tolist()
     ]
-    g = drive.k_h - drive.w * case.kr
+    g = excited.k_h - excited.w * case.kr
     lifts = np.flatnonzero(g > 0.0)
     peak = rest
     moving = False
     theta = rate = rest
     i = 0
     while i < len(k) - 1:
-        h = Real(drive.interval_s[i])
+        h = Real(excited.interval_s[i])
         if not moving and (h == 0 or (g[i] <= 0.0 and g[i + 1] <= 0.0)):
             later = lifts[np.searchsorted(lifts, i + 1) :]
             if not later.size:
@@ -56,8 +56,8 @@ def reference(case: Case) -> Answer:
             moving, theta, rate = True, rest, rest
         while moving and at < 1 and h > 0:
             left = h * (1 - at)
-            pieces = max(1, math.ceil(float(p * left) / PH_MAX))
-            part = (1 - at) / pieces
+            parts = max(1, math.ceil(float(p * left) / PH_MAX))
+            part = (1 - at) / parts
             u = _coefficients(
                 theta_c - theta, rate * h * part, (p * h * part) ** 2,
                 k[i] + da * at, da * part, w[i] + dw * at, dw * part, from_rest,
@@ -70,7 +70,7 @@ def reference(case: Case) -> Answer:
                     peak = max(peak, _value(path, turn))
             if landing is None:
                 theta, rate = _value(path, Real(1)), _value(u, Real(1)) / (h * part)
-                at = at + part if pieces > 1 else Real(1)
+                at = at + part if parts > 1 else Real(1)
                 if rate > 0 and theta_c - theta < border[i]:
                     return Answer(TOPPLED, math.nan)
                 continue
@@ -95,12 +95,12 @@ def _coefficients(
     """Taylor coefficients of h theta' over one step."""
     u, s, c = [u0], [np.sin(phi)], [np.cos(phi)]
     for n in range(ORDER):
-        drive = a * c[n] - w * s[n]
+        moment = a * c[n] - w * s[n]
         if n:
-            drive += da * c[n - 1] - dw * s[n - 1]
+            moment += da * c[n - 1] - dw * s[n - 1]
         elif from_rest:
-            drive = Real(0)  # a = w k_r is where the motion starts
-        u.append(big_p * drive / (n + 1))
+            moment = Real(0)  # a = w k_r is where the motion starts
+        u.append(big_p * moment / (n + 1))
         s.append(-sum((u[j] * c[n - j] for j in range(n + 1)), Real(0)) / (n + 1))
         c.append(sum((u[j] * s[n - j] for j in range(n + 1)), Real(0)) / (n + 1))
     return u
@@ -122,13 +122,13 @@ def _roots(x: list[Real]) -> list[Real]:
     """Sign changes of a polynomial in (0, 1], in order; a root at 0 itself is divided out."""
     while x and x[0] == 0:
         x = x[1:]
-    found: list[Real] = []
+    roots: list[Real] = []
     if x:
-        _isolate(x, Real(0), Real(1), found)
-    return found
+        _isolate(x, Real(0), Real(1), roots)
+    return roots
 
 
-def _isolate(x: list[Real], low: Real, high: Real, found: list[Real]) -> None:
+def _isolate(x: list[Real], low: Real, high: Real, roots: list[Real]) -> None:
     middle, half = (low + high) / 2, (high - low) / 2
     about = x if low == 0 and high == 1 else _shifted(x, middle, half)
     if about is x:  # expanded at 0: bounds hold on [0, 1]
@@ -142,10 +142,10 @@ def _isolate(x: list[Real], low: Real, high: Real, found: list[Real]) -> None:
     if (tail and tail[0] > slope) or high - low < 1e-9:
         at_low, at_high = _value(x, low), _value(x, high)
         if at_low != 0 and (at_high == 0 or (at_low > 0) != (at_high > 0)):
-            found.append(_bisected(x, low, high, at_low))
+            roots.append(_bisected(x, low, high, at_low))
         return
-    _isolate(x, low, middle, found)
-    _isolate(x, middle, high, found)
+    _isolate(x, low, middle, roots)
+    _isolate(x, middle, high, roots)
 
 
 def _bisected(x: list[Real], low: Real, high: Real, at_low: Real) -> Real:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from rbfrag.bench import methods as known
+from rbfrag.bench import methods
 from rbfrag.bench.cases import choose_cases, choose_combinations, find_records
 from rbfrag.bench.critical_search import SearchTimes, compare_searches
 from rbfrag.bench.scaling import LengthRow, WorkersRow, record_length, workers
@@ -81,18 +81,18 @@ def run_bench(
     size = QUICK if quick else FULL
     started = time.perf_counter()
     about = machine()
-    found = find_records(records)
-    say(f"{size.cases} runs under {found.source}, each by every method ...")
-    work_precision = measure(choose_cases(found, size.cases), known.methods(quick=quick))
+    chosen = find_records(records)
+    say(f"{size.cases} runs under {chosen.source}, each by every method ...")
+    work_precision = measure(choose_cases(chosen, size.cases), methods.methods(quick=quick))
     say(f"{size.combinations} critical searches ...")
-    searches = compare_searches(choose_combinations(found, size.combinations))
+    searches = compare_searches(choose_combinations(chosen, size.combinations))
     say("scaling ...")
-    length = record_length(found.motions[0], times=size.times_longer)
-    by_workers = workers(found.motions, processes=size.workers, combinations=size.searches)
+    length = record_length(chosen.motions[0], times=size.times_longer)
+    by_workers = workers(chosen.motions, processes=size.workers, combinations=size.searches)
     return BenchResult(
         machine=about,
-        records=found.source,
-        not_installed=known.missing_peers(),
+        records=chosen.source,
+        not_installed=methods.missing_peers(),
         seconds=time.perf_counter() - started,
         work_precision=work_precision,
         critical_search=searches,

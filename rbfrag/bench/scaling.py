@@ -74,15 +74,15 @@ def record_length(
                 else np.tile(samples, n)
             )
             record = GroundMotion(longer, motion.dt_s)
-            drive, made_s = timed(lambda record=record: excitation(record))  # type: ignore[misc]
-            case = Case(record, "forward", drive, p2, kr)
+            excited, excitation_s = timed(lambda record=record: excitation(record))  # type: ignore[misc]
+            case = Case(record, "forward", excited, p2, kr)
             _, run_s = timed(lambda case=case: taylor_run(case))  # type: ignore[misc]
-            rows.append(LengthRow(lengthened, longer.size, _moved(case), run_s, made_s))
+            rows.append(LengthRow(lengthened, longer.size, _moved(case), run_s, excitation_s))
     return tuple(rows)
 
 
 def _moved(case: Case) -> int:
-    return simulate(case.drive, p2=case.p2, kr=case.kr).samples_moved
+    return simulate(case.excitation, p2=case.p2, kr=case.kr).samples_moved
 
 
 def workers(
@@ -103,8 +103,8 @@ def workers(
         with ProcessPoolExecutor(number, mp_context=context, initializer=prepare) as pool:
             warm = [_work(motions[i % len(motions)], i, 1, kind) for i in range(4 * number)]
             list(pool.map(run_work, warm))
-            for wanted in combinations:
-                chosen = range(max(1, wanted // each))
+            for count in combinations:
+                chosen = range(max(1, count // each))
                 work = [_work(motions[i % len(motions)], i, each, kind) for i in chosen]
                 started = time.perf_counter()
                 done = sum(len(answer.results) for answer in pool.map(run_work, work))

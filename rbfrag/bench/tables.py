@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import TypeVar
 
 from rbfrag.bench.critical_search import SearchTimes
 from rbfrag.bench.scaling import LengthRow, WorkersRow
@@ -14,32 +14,32 @@ from rbfrag.errors import InputError
 
 Row = WorkPrecision | SearchTimes | LengthRow | WorkersRow
 Table = tuple[list[str], list[list[str]]]
+"""Headers and cells."""
+
+R = TypeVar("R")
+
+
+def _table(rows: Sequence[R], columns: dict[str, Callable[[R], str]]) -> Table:
+    return list(columns), [[text(row) for text in columns.values()] for row in rows]
 
 
 def work_precision_table(rows: Sequence[WorkPrecision]) -> Table:
-    """Return headers and cells."""
-    headers = [
-        "method", "setting", "wrong", "error, median", "error, worst",
-        "time of a run", "10–90 %", "slower, median", "slower, least",
-    ]  # fmt: skip
-    return headers, [
-        [
-            row.family,
-            row.setting,
-            f"{row.wrong} of {row.cases}",
-            _error(row.error_median),
-            _error(row.error_worst),
-            seconds(row.time_s),
-            f"{seconds(row.time_low_s)} – {seconds(row.time_high_s)}",
-            ratio(row.slower),
-            ratio(row.slower_least),
-        ]
-        for row in rows
-    ]
+    """Return time against error of each method."""
+    return _table(rows, {
+        "method": lambda row: row.family,
+        "setting": lambda row: row.setting,
+        "wrong": lambda row: f"{row.wrong} of {row.cases}",
+        "error, median": lambda row: _error(row.error_median),
+        "error, worst": lambda row: _error(row.error_worst),
+        "time of a run": lambda row: seconds(row.time_s),
+        "10–90 %": lambda row: f"{seconds(row.time_low_s)} – {seconds(row.time_high_s)}",
+        "slower, median": lambda row: ratio(row.slower),
+        "slower, least": lambda row: ratio(row.slower_least),
+    })  # fmt: skip
 
 
 def critical_table(rows: Sequence[SearchTimes]) -> Table:
-    """Return headers and cells."""
+    """Return the times of searches, and of the same runs by others."""
     headers = [
         "work for one combination", "time", "10–90 %", "over rbfrag's 23 runs, median", "least",
         "over the search, median", "least", "other outcomes",
@@ -49,10 +49,8 @@ def critical_table(rows: Sequence[SearchTimes]) -> Table:
             row.name,
             seconds(row.time_s),
             f"{seconds(row.time_low_s)} – {seconds(row.time_high_s)}",
-            ratio(row.over_runs),
-            ratio(row.over_runs_least),
-            ratio(row.over_search),
-            ratio(row.over_search_least),
+            *map(ratio, (row.over_runs, row.over_runs_least)),
+            *map(ratio, (row.over_search, row.over_search_least)),
             "" if row.wrong is None else f"{row.wrong} of {23 * row.combinations}",
         ]
         for row in rows
@@ -60,27 +58,24 @@ def critical_table(rows: Sequence[SearchTimes]) -> Table:
 
 
 def length_table(rows: Sequence[LengthRow]) -> Table:
-    """Return headers and cells."""
-    headers = ["made longer by", "samples", "moved", "one run", "excitation"]
-    return headers, [
-        [
-            row.lengthened,
-            str(row.samples),
-            str(row.moved),
-            seconds(row.run_s),
-            seconds(row.excitation_s),
-        ]
-        for row in rows
-    ]
+    """Return how time grows with the record."""
+    return _table(rows, {
+        "made longer by": lambda row: row.lengthened,
+        "samples": lambda row: str(row.samples),
+        "moved": lambda row: str(row.moved),
+        "one run": lambda row: seconds(row.run_s),
+        "excitation": lambda row: seconds(row.excitation_s),
+    })  # fmt: skip
 
 
 def workers_table(rows: Sequence[WorkersRow]) -> Table:
-    """Return headers and cells."""
-    headers = ["workers", "combinations", "wall time", "combinations per second"]
-    return headers, [
-        [str(row.workers), str(row.combinations), seconds(row.seconds), f"{row.per_s:.0f}"]
-        for row in rows
-    ]
+    """Return how time falls with the workers."""
+    return _table(rows, {
+        "workers": lambda row: str(row.workers),
+        "combinations": lambda row: str(row.combinations),
+        "wall time": lambda row: seconds(row.seconds),
+        "combinations per second": lambda row: f"{row.per_s:.0f}",
+    })  # fmt: skip
 
 
 def markdown(table: Table) -> str:
@@ -92,12 +87,10 @@ def markdown(table: Table) -> str:
 
 def write_csv(rows: Sequence[Row], path: Path) -> None:
     """Write rows, one column per field."""
-    table = [asdict(row) for row in rows]
+    import pandas as pd
+
     try:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, fieldnames=list(table[0]) if table else [])
-            writer.writeheader()
-            writer.writerows(table)
+        pd.DataFrame([asdict(row) for row in rows], dtype=object).to_csv(path, index=False)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror}") from error
 

@@ -7,16 +7,18 @@ time that a user waits.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+C = TypeVar("C")
 T = TypeVar("T")
 
 SHORTEST_S = 4e-4
-"""Least time measured in one piece: some thousand times the cost of reading the clock."""
+"""Least time measured at once: some thousand times the cost of reading the clock."""
 
 LONG_S = 0.02
 """Work that takes longer is done once: its first call is no slower than the next."""
@@ -40,6 +42,17 @@ def timed(work: Callable[[], T]) -> tuple[T, float]:
             work()
         best = min(best, (time.thread_time() - started) / calls)
     return answer, float(best)
+
+
+def timed_in_turns(
+    works: Sequence[Callable[[C], T]], case: C, rng: np.random.Generator
+) -> tuple[list[T], list[float]]:
+    """Return answers and seconds of several works on one case, run in an order drawn at random."""
+    timings: dict[int, tuple[T, float]] = {}
+    for i in rng.permutation(len(works)).tolist():
+        timings[i] = timed(partial(works[i], case))
+    answers, seconds = zip(*(timings[i] for i in range(len(works))), strict=True)
+    return list(answers), list(seconds)
 
 
 def spread(values: ArrayLike) -> tuple[float, float, float]:

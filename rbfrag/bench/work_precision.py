@@ -12,7 +12,7 @@ from rbfrag.bench.cases import Case
 from rbfrag.bench.methods import Method
 from rbfrag.bench.peers import STABLE, Answer
 from rbfrag.bench.reference import reference
-from rbfrag.bench.timing import spread, timed
+from rbfrag.bench.timing import spread, timed_in_turns
 
 
 @dataclass(frozen=True)
@@ -71,11 +71,9 @@ def measure(
     seconds = np.empty((len(methods), len(cases)))
     for j, case in enumerate(cases):
         truth.append(reference(case))
-        given: dict[int, Answer] = {}
-        for i in rng.permutation(len(methods)):
-            given[int(i)], seconds[i, j] = timed(_bound(methods[i], case))
-        for i in range(len(methods)):
-            answers[i].append(given[i])
+        of_case, seconds[:, j] = timed_in_turns([method.run for method in methods], case, rng)
+        for of_method, answer in zip(answers, of_case, strict=True):
+            of_method.append(answer)
         if on_case is not None:
             on_case(j + 1, len(cases))
     base = next(i for i, method in enumerate(methods) if method.of_use)
@@ -83,10 +81,6 @@ def measure(
         _row(method, truth, answers[i], seconds[i], seconds[base])
         for i, method in enumerate(methods)
     )
-
-
-def _bound(method: Method, case: Case) -> Callable[[], Answer]:
-    return lambda: method.run(case)
 
 
 def _row(

@@ -35,12 +35,7 @@ DOCUMENTS = frozenset({".md", ".rst", ".pdf", ".htm", ".html", ".doc", ".docx"})
 
 @dataclass(frozen=True)
 class FailedFile:
-    """A file that was left out.
-
-    Args:
-        path: the file.
-        reason: one sentence: what is wrong, and what to do.
-    """
+    """A file that was left out; `reason` says what is wrong, and what to do."""
 
     path: str
     reason: str
@@ -196,11 +191,11 @@ def _take_note(run: _Run, stored: list[_Stored]) -> None:
 
 def _mixed_intervals(connection: Connection, touched: dict[int, str]) -> list[str]:
     return [
-        f"recording {found.name!r} has components of dt = "
-        f"{' and '.join(f'{dt:g}' for dt in found.dt_s)} s: those that differ are not used "
+        f"recording {mixed.name!r} has components of dt = "
+        f"{' and '.join(f'{dt:g}' for dt in mixed.dt_s)} s: those that differ are not used "
         "together"
-        for found in recordings_of_mixed_dt(connection)
-        if not touched.keys().isdisjoint(found.motion_ids)
+        for mixed in recordings_of_mixed_dt(connection)
+        if not touched.keys().isdisjoint(mixed.motion_ids)
     ]
 
 
@@ -208,7 +203,7 @@ def _files(
     paths: Sequence[str | os.PathLike[str]], leave_out: str | os.PathLike[str] | None
 ) -> Iterator[Path]:
     skipped = None if leave_out is None else Path(leave_out).resolve()
-    found = False
+    any_file = False
     for path in map(Path, paths):
         if path.is_dir():
             below = sorted(
@@ -225,9 +220,9 @@ def _files(
             raise InputError(f"there is no file or folder {path}: check the path")
         for file in below:
             if file.resolve() != skipped:
-                found = True
+                any_file = True
                 yield file
-    if not found:
+    if not any_file:
         raise InputError(f"there is no file in {', '.join(map(str, paths))}")
 
 

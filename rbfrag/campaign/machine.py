@@ -22,7 +22,7 @@ def machine() -> dict[str, str | int | float | None]:
     }
 
 
-def made_on() -> str:
+def processor_and_compiler() -> str:
     """Return processor and compiler: where both are the same, so is every bit of a result."""
     about = machine()
     return f"{about['processor']}, numba {about['numba']}"

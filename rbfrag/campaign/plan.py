@@ -11,7 +11,7 @@ from sqlalchemy import Connection
 
 from rbfrag.campaign.worker import PlannedCase, Task
 from rbfrag.db.campaigns import KnownCombination, combinations_with_points, known_combinations
-from rbfrag.db.keys import combination_key, response_key
+from rbfrag.db.keys import combination_key
 from rbfrag.db.motions import motion_rows
 from rbfrag.db.queries import Vertical
 from rbfrag.db.responses import known_responses
@@ -128,7 +128,6 @@ def plan_campaign(
     """Return every combination: horizontal motions x vertical or not x polarity x cases.
 
     Args:
-        connection: the database.
         kind: what the blocks do.
         cases: the blocks and what counts as failure, from the kind.
         suite: only the horizontal motions of this suite; their verticals need not be in it.
@@ -178,11 +177,10 @@ def plan_campaign(
     return CampaignPlan(kind, tuple(kept), len(lacking), tuple(warnings))
 
 
-def still_to_do(connection: Connection, plan: CampaignPlan, wanted: Wanted) -> Todo:
+def remaining_work(connection: Connection, plan: CampaignPlan, wanted: Wanted) -> Todo:
     """Compare a plan with what is stored.
 
     Args:
-        connection: the database.
         plan: the campaign.
         wanted: what it asks for beside critical values and outcome grids.
     """
@@ -331,18 +329,9 @@ def _histories(there: KnownCombination | None, wanted: Wanted) -> Iterable[float
 
 
 def _history_key(motion: MotionPlan, planned: PlannedCase, k_over_pga: float) -> str:
-    row = motion.motion
     up = motion.vertical if planned.vertical_id is not None else None
-    assert planned.case.p2 is not None  # other kinds keep no histories
-    return response_key(
-        motion_sha256=row.sha256,
-        dt_s=row.dt_s,
-        vertical_sha256=None if up is None else up.vertical_sha256,
-        polarity=planned.polarity,
-        kind=planned.case.kind,
-        p2=planned.case.p2,
-        kr=k_over_pga * row.pga_g,
-        numerics_version=NUMERICS_VERSION,
+    return planned.history_key(
+        motion.motion, None if up is None else up.vertical_sha256, k_over_pga
     )
 
 

@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 
 from sqlalchemy import Connection
 
-from rbfrag.campaign.machine import made_on
+from rbfrag.campaign.machine import processor_and_compiler
 from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
-from rbfrag.db.check.maps import BORDER_ERROR, Interval, contradictions
+from rbfrag.db.check.maps import BORDER_ERROR, contradictions
 from rbfrag.db.motions import load_motion
+from rbfrag.db.rows import Interval
 from rbfrag.db.stored_combination import (
     StoredCombination,
     keys_with_samples,
@@ -81,13 +82,12 @@ def resimulate(connection: Connection, *, sample: int, seed: int = 0) -> Resimul
     natural keys: equal databases give equal samples.
 
     Args:
-        connection: the database, inside one transaction.
         sample: number of combinations; all there are when there are fewer.
         seed: of the random choice.
     """
     keys = keys_with_samples(connection, numerics_version=NUMERICS_VERSION)
     chosen = random.Random(seed).sample(keys, min(sample, len(keys)))
-    here = made_on()
+    here = processor_and_compiler()
     exact = within_error = 0
     findings: list[Finding] = []
     for key in chosen:
@@ -128,7 +128,7 @@ def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain
     vertical = None
     if stored.vertical_motion_id is not None:
         vertical = load_motion(connection, stored.vertical_motion_id)
-    (found,) = kind.run_cases(
+    (answer,) = kind.run_cases(
         motion,
         vertical,
         polarity,
@@ -138,9 +138,9 @@ def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain
         full_map=stored.intervals.k_lo.size > 0,
         map_depth=stored.campaign_settings.get("map_depth") or MAP_DEPTH,
     )
-    ends = ends_of(found.grid)
-    if found.critical is not None:
-        ends = {**ends_of(found.critical.points), **ends}
+    ends = ends_of(answer.grid)
+    if answer.critical is not None:
+        ends = {**ends_of(answer.critical.points), **ends}
     others = tuple(k for k in stored.points.kr_over_pga.tolist() if k not in ends)
     if others:
         ends |= ends_of(kind.run_blocks(motion, vertical, polarity, case, others))
@@ -153,7 +153,7 @@ def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain
             return 0.0
         return alone.error_estimate * alone.peak_theta_n / alone.peak_theta_rad
 
-    return ComputedAgain(found.critical, ends, error)
+    return ComputedAgain(answer.critical, ends, error)
 
 
 @dataclass(frozen=True)
@@ -188,43 +188,43 @@ def ends_of(points: SearchPoints | None) -> dict[float, End]:
 
 def differences(stored: StoredCombination, again: ComputedAgain) -> Iterator[str]:
     """Yield every value that is not the same bit for bit, and maps that contradict each other."""
-    found = again.critical
-    if found is not None:
+    critical = again.critical
+    if critical is not None:
         for name in _VALUES:
-            then, now = stored.values[name], getattr(found, name)
+            then, now = stored.values[name], getattr(critical, name)
             if then != now:
                 yield f"{name} is {then!r}, computed again {now!r}"
-        yield from _map_differences(stored, found)
+        yield from _map_differences(stored, critical)
     then_at = ends_of(stored.points)
     for k in sorted(then_at.keys() | again.ends.keys(), reverse=True):
         if k not in then_at:
             yield f"the simulation at kr/PGA {k!r} is missing"
         elif then_at[k] != again.ends.get(k):
             yield (
-                f"the simulation at kr/PGA {k!r} is {_told(then_at[k])}, computed again "
-                f"{_told(again.ends.get(k))}"
+                f"the simulation at kr/PGA {k!r} is {_described(then_at[k])}, computed again "
+                f"{_described(again.ends.get(k))}"
             )
 
 
 def deviations(stored: StoredCombination, again: ComputedAgain) -> Iterator[str]:
     """Yield what differs by more than the error of the solver."""
-    values, found = stored.values, again.critical
+    values, critical = stored.values, again.critical
     borders: list[float] = []
-    if found is not None:
-        if values["status"] != found.status:
-            yield f"status is {values['status']!r}, computed again {found.status!r}"
+    if critical is not None:
+        if values["status"] != critical.status:
+            yield f"status is {values['status']!r}, computed again {critical.status!r}"
             return
-        if found.status == "found":
-            low = max(values["lower"], found.lower or 0.0)
-            high = min(values["upper"], found.upper or math.inf)
+        if critical.status == "found":
+            low = max(values["lower"], critical.lower or 0.0)
+            high = min(values["upper"], critical.upper or math.inf)
             if low > high * (1.0 + BORDER_ERROR):
                 yield (
                     f"its bracket {values['lower']!r} to {values['upper']!r} does not meet the one "
-                    f"computed again, {found.lower!r} to {found.upper!r}"
+                    f"computed again, {critical.lower!r} to {critical.upper!r}"
                 )
-        yield from _map_differences(stored, found)
-        borders = [*found.intervals.k_lo.tolist(), *found.intervals.k_hi.tolist()]
-        borders += [edge for edge in (found.lower, found.upper) if edge is not None]
+        yield from _map_differences(stored, critical)
+        borders = [*critical.intervals.k_lo.tolist(), *critical.intervals.k_hi.tolist()]
+        borders += [edge for edge in (critical.lower, critical.upper) if edge is not None]
     for k, (outcome, theta, slid) in ends_of(stored.points).items():
         if k not in again.ends:
             continue
@@ -241,14 +241,14 @@ def deviations(stored: StoredCombination, again: ComputedAgain) -> Iterator[str]
             yield f"the block of ky/PGA {k!r} slides {slid!r} m, computed again {slid_now!r}"
 
 
-def _map_differences(stored: StoredCombination, found: CriticalResult) -> Iterator[str]:
+def _map_differences(stored: StoredCombination, critical: CriticalResult) -> Iterator[str]:
     for low, high, then, now in contradictions(
-        _intervals(stored.intervals), _intervals(found.intervals)
+        _intervals(stored.intervals), _intervals(critical.intervals)
     ):
         yield f"its map says {then} from kr/PGA {low!r} to {high!r}, computed again {now}"
 
 
-def _told(end: End | None) -> object:
+def _described(end: End | None) -> object:
     if end is None:
         return "none"
     outcome, theta, slid = end
@@ -270,4 +270,4 @@ def _number(value: float) -> float | None:
 
 
 def _intervals(of: OutcomeIntervals) -> list[Interval]:
-    return list(zip(of.k_lo.tolist(), of.k_hi.tolist(), of.outcome, strict=True))
+    return list(map(Interval, of.k_lo.tolist(), of.k_hi.tolist(), of.outcome))

@@ -46,7 +46,7 @@ class ShakingProgress:
 
 
 def shake(
-    made: Realisations,
+    blocks: Realisations,
     motion: GroundMotion,
     *,
     scales: Sequence[float] = (1.0,),
@@ -68,7 +68,7 @@ def shake(
         polarity: ``forward`` (positive samples drive out of the slope) or ``reverse``.
         limits: what counts as failure.
         jobs: worker processes; None for one per processor, where there is work enough for them.
-        on_progress: called at the beginning and after each piece of work.
+        on_progress: called at the beginning and after each chunk of work.
 
     Raises:
         InputError: as for :func:`rbfrag.rockmasses.shaking.plan_shaking`; `jobs` below 1;
@@ -78,7 +78,7 @@ def shake(
     if jobs is not None and jobs < 1:
         raise InputError(f"--jobs must be at least 1, not {jobs}")
     plan = plan_shaking(
-        made, motion, scales=scales, vertical=vertical, polarity=polarity, limits=limits
+        blocks, motion, scales=scales, vertical=vertical, polarity=polarity, limits=limits
     )
     total = int(plan.places.size)
     workers = min(jobs or os.cpu_count() or 1, math.ceil(total / CHUNK))
@@ -86,7 +86,7 @@ def shake(
         workers = 1
     started = time.perf_counter()
 
-    def told(answers: Iterator[BlockOutcomes]) -> Iterator[BlockOutcomes]:
+    def reported(answers: Iterator[BlockOutcomes]) -> Iterator[BlockOutcomes]:
         done = 0
         if on_progress is not None and total:
             on_progress(ShakingProgress(0, total, 0.0))
@@ -99,4 +99,4 @@ def shake(
     answers = run_locally(
         run_blocks, plan.work(), workers, after_a_death="run the same command again"
     )
-    return plan.gathered(told(answers))
+    return plan.gathered(reported(answers))

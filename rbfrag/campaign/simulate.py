@@ -11,8 +11,8 @@ from typing import Any, Literal
 
 from sqlalchemy import Engine
 
-from rbfrag.campaign.executors.choice import CLUSTER, check_workers, executor
-from rbfrag.campaign.machine import made_on
+from rbfrag.campaign.executors.local import CLUSTER, check_workers, executor
+from rbfrag.campaign.machine import processor_and_compiler
 from rbfrag.campaign.plan import (
     CampaignPlan,
     MotionTasks,
@@ -20,7 +20,7 @@ from rbfrag.campaign.plan import (
     Wanted,
     checked_ratios,
     plan_campaign,
-    still_to_do,
+    remaining_work,
     strengths_of,
 )
 from rbfrag.campaign.worker import MotionResults, MotionWork, TaskResult, run_work
@@ -72,8 +72,8 @@ class CampaignProgress:
     @property
     def rate_per_s(self) -> float:
         """Combinations finished per second by this run."""
-        made = self.done - self.resumed
-        return made / self.seconds if self.seconds > 0.0 else 0.0
+        computed = self.done - self.resumed
+        return computed / self.seconds if self.seconds > 0.0 else 0.0
 
     @property
     def seconds_left(self) -> float | None:
@@ -191,7 +191,7 @@ def simulate(
     with opened_database(db) as engine:
         with engine.connect() as connection:
             plan = plan_campaign(connection, kind, cases, suite=suite, vertical=vertical)
-            todo = still_to_do(connection, plan, wanted)
+            todo = remaining_work(connection, plan, wanted)
         with executor(run_work, jobs, scheduler if todo.motions else None) as execute:
             settings = {
                 "kind": kind,
@@ -201,7 +201,7 @@ def simulate(
                 "grid": list(wanted.blocks),
                 "store_responses": list(map(str, store_responses or ())),
                 "map_depth": depth if full_map else None,
-                "made_on": made_on() if scheduler is None else CLUSTER,
+                "made_on": processor_and_compiler() if scheduler is None else CLUSTER,
             }
             with engine.begin() as connection:
                 campaign_id = start_campaign(connection, settings)
@@ -318,10 +318,12 @@ class _Run:
         return time.perf_counter() - self._started
 
 
-def _as_known(found: CriticalResult | None) -> KnownCombination:
-    if found is None:
+def _as_known(result: CriticalResult | None) -> KnownCombination:
+    if result is None:
         return KnownCombination(0, "not_searched", None, False, None)
-    return KnownCombination(0, found.status, found.kr_over_pga, found.certified, found.reentrant)
+    return KnownCombination(
+        0, result.status, result.kr_over_pga, result.certified, result.reentrant
+    )
 
 
 def _wanted(
@@ -329,14 +331,14 @@ def _wanted(
     store_responses: Sequence[float | Literal["critical"]] | None,
     full_map: bool,
 ) -> Wanted:
-    asked = store_responses or ()
-    histories = [value for value in asked if value != "critical"]
+    selected = store_responses or ()
+    histories = [value for value in selected if value != "critical"]
     blocks = strengths_of(grid) if isinstance(grid, int) else checked_ratios(grid or (), "--grid")
     return Wanted(
         full_map=full_map,
         blocks=blocks,
         histories=checked_ratios(histories, "--store-responses"),
-        critical_history="critical" in asked,
+        critical_history="critical" in selected,
     )
 
 

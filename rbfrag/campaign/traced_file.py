@@ -17,12 +17,7 @@ NOTHING_STATED = TraceMetadata(file="", line=0)
 
 @dataclass(frozen=True)
 class Trace:
-    """One trace of a file.
-
-    Args:
-        motion: as the file has it.
-        stated: what the metadata state; empty where they do not name the trace.
-    """
+    """One trace as its file has it, and what the metadata state of it, empty where nothing."""
 
     motion: GroundMotion
     stated: TraceMetadata
@@ -91,7 +86,7 @@ def missing_files(
         if place in seen or place.exists():
             continue
         seen.add(place)
-        if any(place == asked or asked in place.parents for asked in places):
+        if any(place == searched or searched in place.parents for searched in places):
             yield str(named), row
 
 
@@ -110,12 +105,12 @@ def _refuse_rows_apart(file: Path, rows: list[TraceMetadata]) -> None:
 
 
 def _refuse_other_direction(file: Path, trace: Trace) -> None:
-    stated, found = trace.stated.is_vertical, trace.motion.is_vertical
-    if stated is not None and found is not None and stated != found:
+    stated, in_file = trace.stated.is_vertical, trace.motion.is_vertical
+    if stated is not None and in_file is not None and stated != in_file:
         says = {True: "vertical", False: "horizontal"}
         raise MotionFileError(
             file,
-            f"trace {trace.motion.trace_index} ({trace.motion.component}) is {says[found]}, but "
+            f"trace {trace.motion.trace_index} ({trace.motion.component}) is {says[in_file]}, but "
             f"line {trace.stated.line} of the metadata says {says[stated]}: correct the metadata",
         )
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from rbfrag.db.keys import response_key
 from rbfrag.db.responses import ResponseRecord
+from rbfrag.db.rows import MotionRow
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.solver.kind import Case
@@ -24,19 +25,32 @@ from rbfrag.solver.results import (
 
 @dataclass(frozen=True)
 class PlannedCase:
-    """One case under one motion: a combination.
-
-    Args:
-        natural_key: of the combination.
-        polarity: ``forward`` or ``reverse``.
-        vertical_id: the vertical motion that goes with it, or None.
-        case: the block and what counts as failure.
-    """
+    """One case under one motion, with the vertical one that goes with it: a combination."""
 
     natural_key: str
     polarity: Polarity
     vertical_id: int | None
     case: Case
+
+    def history_key(
+        self,
+        motion: GroundMotion | MotionRow,
+        vertical_sha256: str | None,
+        k_over_pga: float,
+    ) -> str:
+        """Return the natural key of the motion in time of one block."""
+        assert motion.dt_s is not None  # the database holds no other motions
+        assert self.case.p2 is not None  # other kinds keep no histories
+        return response_key(
+            motion_sha256=motion.sha256,
+            dt_s=motion.dt_s,
+            vertical_sha256=vertical_sha256,
+            polarity=self.polarity,
+            kind=self.case.kind,
+            p2=self.case.p2,
+            kr=k_over_pga * motion.pga_g,
+            numerics_version=NUMERICS_VERSION,
+        )
 
 
 @dataclass(frozen=True)
@@ -97,9 +111,9 @@ class TaskResult:
     @property
     def runs(self) -> int:
         """How many simulations were made."""
-        made = 0 if self.critical is None else self.critical.n_runs
-        made += sum(len(some.outcome) for some in (self.grid, self.blocks) if some is not None)
-        return made + len(self.responses)
+        count = 0 if self.critical is None else self.critical.n_runs
+        count += sum(len(some.outcome) for some in (self.grid, self.blocks) if some is not None)
+        return count + len(self.responses)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,13 +139,7 @@ class MotionWork:
 
 @dataclass(frozen=True, eq=False)
 class SpectrumPart:
-    """X(p) of one motion and polarity.
-
-    Args:
-        polarity: ``forward`` or ``reverse``.
-        p2: frequency parameters [1/s²].
-        x_m_s: X(p) at each of them [m/s].
-    """
+    """X(p) [m/s] of one motion and polarity at frequency parameters p² [1/s²]."""
 
     polarity: Polarity
     p2: tuple[float, ...]
@@ -177,7 +185,7 @@ def _run_group(work: MotionWork, tasks: list[Task]) -> list[TaskResult]:
     search = first.search or first.full_map
     answers: list[tuple[CriticalResult | None, SearchPoints | None]] = [(None, None)] * len(tasks)
     if search or first.grid:
-        found = kind.run_cases(
+        results_of_cases = kind.run_cases(
             work.motion,
             vertical,
             polarity,
@@ -187,7 +195,7 @@ def _run_group(work: MotionWork, tasks: list[Task]) -> list[TaskResult]:
             full_map=first.full_map,
             map_depth=work.map_depth,
         )
-        answers = [(each.critical, each.grid) for each in found]
+        answers = [(each.critical, each.grid) for each in results_of_cases]
     results = []
     for task, (critical, grid) in zip(tasks, answers, strict=True):
         blocks = None
@@ -207,29 +215,19 @@ def _history(
     work: MotionWork, planned: PlannedCase, vertical: GroundMotion | None, k_over_pga: float
 ) -> ResponseRecord:
     motion, case = work.motion, planned.case
-    assert motion.dt_s is not None  # the database holds no other motions
     assert case.p2 is not None
-    kr = k_over_pga * motion.pga_g
     response = model_of_kind(case.kind).history(
         motion, vertical, planned.polarity, case, k_over_pga
     )
-    key = response_key(
-        motion_sha256=motion.sha256,
-        dt_s=motion.dt_s,
-        vertical_sha256=None if vertical is None else vertical.sha256,
-        polarity=planned.polarity,
-        kind=case.kind,
-        p2=case.p2,
-        kr=kr,
-        numerics_version=NUMERICS_VERSION,
-    )
     return ResponseRecord(
-        natural_key=key,
+        natural_key=planned.history_key(
+            motion, None if vertical is None else vertical.sha256, k_over_pga
+        ),
         motion_id=work.motion_id,
         vertical_motion_id=planned.vertical_id,
         polarity=planned.polarity,
         p2=case.p2,
-        kr=kr,
+        kr=k_over_pga * motion.pga_g,
         response=response,
         numerics_version=NUMERICS_VERSION,
     )

@@ -1,34 +1,67 @@
-"""The `rbfrag` command: where every command group is hung up.
+"""The `rbfrag` command: its commands by name, each loaded when it is called.
 
 Command modules import only typer at their top; what a command needs is imported inside it,
-so that `rbfrag predict` and `rbfrag --help` start without numba, pandas or matplotlib.
+so that `rbfrag predict` starts without numba, pandas or matplotlib.
 """
 
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from rbfrag.cli.commands import bench as bench_command
-from rbfrag.cli.commands import block as block_command
-from rbfrag.cli.commands import critical, demo, fit, models, motions, plot, predict, respond
-from rbfrag.cli.commands import db as database
-from rbfrag.cli.commands import export as export_command
-from rbfrag.cli.commands import hazard as hazard_command
-from rbfrag.cli.commands import rockmass as rockmass_command
-from rbfrag.cli.commands import serve as serve_command
-from rbfrag.cli.commands import shakemap as shakemap_command
-from rbfrag.cli.commands import simulate as simulate_command
-from rbfrag.cli.commands import spectrum as spectrum_command
 from rbfrag.errors import RbfragError
 from rbfrag.version import __version__
 
+COMMANDS = {
+    "block": "Print a block's failure mode, yield accelerations and size.",
+    "rockmass": "Draw blocks from two fracture sets; print their modes and yields.",
+    "motions": "Add, list, show and export accelerograms.",
+    "respond": "Run one block under one accelerogram.",
+    "critical": "Find the critical block of one accelerogram, with its bracket.",
+    "spectrum": "Compute the toppling spectrum X(p): what a motion can topple.",
+    "simulate": "Store critical values and outcomes of every motion and block.",
+    "fit": "Fit a fragility model to stored critical values or outcomes.",
+    "predict": "Print the probability that a block fails, with its interval.",
+    "hazard": "Print the annual rate at which a block topples.",
+    "shakemap": "Write the probability that blocks topple across a ShakeMap.",
+    "export": "Write fragility functions for other tools.",
+    "models": "List, show and choose fitted fragility models.",
+    "plot": "Draw models, data, spectra, responses and failure modes.",
+    "db": "Upgrade, describe, check, export and merge databases.",
+    "serve": "Answer over HTTP, and serve the page.",
+    "bench": "Measure speed against error beside general ODE solvers.",
+    "demo": "Run the whole chain from records to a prediction.",
+}
+"""The modules of `rbfrag/cli/commands`, and the first line of each one's help."""
 
-class _OneLineErrors(TyperGroup):
-    """Turn every error raised on purpose into one message and its exit status."""
+
+class _Commands(TyperGroup):
+    """Loads a command when it is called, and turns every error raised on purpose into a message."""
+
+    def __init__(self, **about: Any) -> None:
+        super().__init__(**about)
+        names: Any = dict.fromkeys(COMMANDS)
+        self.commands = names  # for suggestions after a typing error
+
+    def get_command(self, _: Any, cmd_name: str) -> Any:
+        if cmd_name not in COMMANDS:
+            return None
+        module = import_module(f"rbfrag.cli.commands.{cmd_name}")
+        group = getattr(module, "app", None)
+        if group is None:
+            group = typer.Typer(rich_markup_mode=None, add_completion=False)
+            group.command(cmd_name, epilog=module.EXAMPLE)(getattr(module, cmd_name))
+        command = typer.main.get_command(group)
+        command.name = cmd_name
+        return command
+
+    def format_commands(self, _: Any, formatter: Any) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an rbfrag error ends it without a traceback."""
@@ -41,7 +74,7 @@ class _OneLineErrors(TyperGroup):
 
 app = typer.Typer(
     name="rbfrag",
-    cls=_OneLineErrors,
+    cls=_Commands,
     help="Seismic fragility of rock blocks: from accelerograms to failure probabilities.\n\n"
     "Units: accelerations in g, velocities in m/s, displacements in m, times in s, "
     "p2 in 1/s2, angles in degrees.",
@@ -68,26 +101,6 @@ def _options(
     ] = False,
 ) -> None:
     pass
-
-
-app.command("block", epilog=block_command.EXAMPLE)(block_command.block)
-app.command("rockmass", epilog=rockmass_command.EXAMPLE)(rockmass_command.rockmass)
-app.add_typer(motions.app, name="motions")
-app.command("respond", epilog=respond.EXAMPLE)(respond.respond)
-app.command("critical", epilog=critical.EXAMPLE)(critical.critical)
-app.command("spectrum", epilog=spectrum_command.EXAMPLE)(spectrum_command.spectrum)
-app.command("simulate", epilog=simulate_command.EXAMPLE)(simulate_command.simulate)
-app.command("fit", epilog=fit.EXAMPLE)(fit.fit)
-app.command("predict", epilog=predict.EXAMPLE)(predict.predict)
-app.command("hazard", epilog=hazard_command.EXAMPLE)(hazard_command.hazard)
-app.command("shakemap", epilog=shakemap_command.EXAMPLE)(shakemap_command.shakemap)
-app.add_typer(export_command.app, name="export")
-app.add_typer(models.app, name="models")
-app.add_typer(plot.app, name="plot")
-app.add_typer(database.app, name="db")
-app.command("serve", epilog=serve_command.EXAMPLE)(serve_command.serve)
-app.command("bench", epilog=bench_command.EXAMPLE)(bench_command.bench)
-app.command("demo", epilog=demo.EXAMPLE)(demo.demo)
 
 
 def run() -> None:

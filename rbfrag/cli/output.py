@@ -1,4 +1,4 @@
-"""What commands print: JSON for scripts, tables for people, and how far a long command is."""
+"""What commands print: JSON for scripts, tables for people, progress of a long command."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ import json
 import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Protocol
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as RichProgress
 
 
 def print_json(document: object) -> None:
@@ -42,6 +46,18 @@ def print_warnings(warnings: Iterable[str]) -> None:
     """Print warnings on standard error, one a line."""
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)
+
+
+@cache
+def say_when_compiling() -> None:
+    """Say once, where kernels are not compiled yet on this machine, why the answer takes long."""
+    from rbfrag.solver.integrator.compiled import on_compilation
+
+    on_compilation(_say_compiling)
+
+
+def _say_compiling() -> None:
+    print("compiling the kernels for this machine; this happens once", file=sys.stderr, flush=True)
 
 
 def check_files(*, table: str | None = None, plot: str | None = None) -> None:
@@ -80,71 +96,77 @@ def _is_number(text: str) -> bool:
 
 
 SECONDS_BETWEEN_LINES = 5.0
-"""Pause between two lines where they are not rewritten in place [s]."""
+"""Pause between two lines where there is no terminal for a bar [s]."""
 
 
-class Progress(Protocol):
-    """What a line tells of."""
-
-    @property
-    def done(self) -> int:
-        """Things done."""
-
-    @property
-    def total(self) -> int:
-        """Things to do."""
-
-    @property
-    def rate_per_s(self) -> float:
-        """Things done per second; 0 while that is not known."""
-
-    @property
-    def seconds_left(self) -> float | None:
-        """Estimated time left [s]."""
-
-
-class ProgressLine:
-    """A line on standard error: rewritten on a terminal, now and then elsewhere.
+class ProgressBar:
+    """How far a command is: a bar with rate and time left on a terminal, lines elsewhere.
 
     Args:
         command: the command that is under way.
         things: what is counted.
+        on_lines: whether to say it where there is no terminal.
     """
 
-    def __init__(self, command: str, things: str) -> None:
+    def __init__(self, command: str, things: str, *, on_lines: bool = True) -> None:
         self._command = command
         self._things = things
-        self._terminal = sys.stderr.isatty()
-        self._last = -SECONDS_BETWEEN_LINES
-        self._shown = False
+        self._on_lines = on_lines
+        self._bar: RichProgress | None = None
+        self._task: Any = None
+        self._first = 0
+        self._started = 0.0
+        self._last: float | None = None
 
-    def __enter__(self) -> ProgressLine:
+    def __enter__(self) -> ProgressBar:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._terminal and self._shown:
-            print(file=sys.stderr)
+        if self._bar is not None:
+            self._bar.stop()
 
-    def show(self, progress: Progress, remark: str = "") -> None:
-        """Show how far the command is."""
+    def show(self, done: int, total: int, remark: str = "") -> None:
+        """Show how far the command is; what the first call calls done was done before."""
         now = time.monotonic()
-        finished = progress.done == progress.total
-        if not self._terminal and now - self._last < SECONDS_BETWEEN_LINES and not finished:
+        if self._last is None:
+            self._first, self._started = done, now
+        rate = (done - self._first) / (now - self._started) if now > self._started else 0.0
+        about = f" {self._things}" + (f" ({remark})" if remark else "")
+        if sys.stderr.isatty() or self._bar is not None:
+            self._show_bar(done, total, about, rate)
+        elif not self._on_lines:
+            return
+        elif self._last is None or done == total or now - self._last >= SECONDS_BETWEEN_LINES:
+            text = f"{self._command}: {done}/{total}{about}"
+            if rate:
+                text += f", {rate:.1f} per second"
+                seconds = int((total - done) / rate)
+                text += f", {seconds // 60}:{seconds % 60:02d} left" if done < total else ""
+            print(text, file=sys.stderr, flush=True)
+        else:
             return
         self._last = now
-        left = progress.seconds_left
-        text = f"{self._command}: {progress.done}/{progress.total} {self._things}"
-        if remark:
-            text += f" ({remark})"
-        if progress.rate_per_s:
-            text += f", {progress.rate_per_s:.1f} per second"
-        if left is not None and not finished:
-            text += f", {int(left) // 60}:{int(left) % 60:02d} left"
-        if self._terminal:
-            print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
-            self._shown = True
-        else:
-            print(text, file=sys.stderr, flush=True)
+
+    def _show_bar(self, done: int, total: int, about: str, rate: float) -> None:
+        per_second = f"{rate:.1f} per second" if rate else ""
+        if self._bar is None:
+            from rich.console import Console
+            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+            from rich.progress import TimeRemainingColumn as TimeLeft
+
+            self._bar = Progress(
+                TextColumn("{task.description}:"), BarColumn(), MofNCompleteColumn(),
+                TextColumn("{task.fields[about]}"), TextColumn("{task.fields[rate]}"), TimeLeft(),
+                console=Console(stderr=True),
+            )  # fmt: skip
+            self._task = self._bar.add_task(
+                self._command, total=total, completed=done, about=about.strip(), rate=per_second
+            )
+            self._bar.start()
+            return
+        self._bar.update(
+            self._task, completed=done, total=total, about=about.strip(), rate=per_second
+        )
 
 
 def show_prediction(document: dict[str, Any], *, json: bool) -> None:

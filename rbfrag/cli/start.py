@@ -73,9 +73,8 @@ def quick_predict(arguments: Sequence[str]) -> int | None:
 
         show_prediction(prediction_document(given, **stated), json=json)
         sys.stdout.flush()
-    except RbfragError as error:
-        print(f"rbfrag: {error}", file=sys.stderr)
-        return error.exit_status
+    except RbfragError:
+        return None  # the full command refuses it in its words
     except BrokenPipeError:
         # the reader has gone; nothing more can be written, not even by Python's own last flush
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -7,27 +7,25 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count, repeat
 
-from sqlalchemy import Connection, bindparam, exists, select
+from sqlalchemy import Connection, exists, select
 
-from rbfrag.db.insert import insert_row, insert_rows, portions, update_rows, utc_now
+from rbfrag.db.digest import NOT_DIGESTED
+from rbfrag.db.insert import insert_row, insert_rows, rows_of_keys, update_rows, utc_now
 from rbfrag.db.keys import canonical_json
+from rbfrag.db.rows import Interval, Point
 from rbfrag.db.schema import campaign, combination, outcome_interval, simulation
 from rbfrag.errors import InputError
-from rbfrag.solver.results import (
-    NUMERICS_VERSION,
-    CriticalResult,
-    SearchPoints,
-)
+from rbfrag.solver.results import NUMERICS_VERSION, CriticalResult, SearchPoints
 from rbfrag.version import __version__
 
-_COLUMNS = (
-    "natural_key", "campaign_id", "motion_id", "vertical_motion_id", "polarity", "kind", "linear",
-    "p2", "block", "settings", "numerics_version", "status", "search_limit", "kr_over_pga", "lower",
-    "upper", "kr", "y_m_s", "certified", "k_up_over_pga", "undecided", "island_width",
-    "kr_over_pga_resolved", "reentrant", "n_runs", "warnings",
+_COLUMNS = tuple(column.name for column in combination.c if column.name not in NOT_DIGESTED)
+_NUMBERS = (
+    "search_limit", "kr_over_pga", "lower", "upper", "kr", "y_m_s", "k_up_over_pga", "undecided",
+    "island_width", "kr_over_pga_resolved",
 )  # fmt: skip
-_POINT_COLUMNS = ("combination_id", "kr_over_pga", "theta_n", "outcome", "displacement_m", "grid")
+_OF_A_MAP = ("island_width", "kr_over_pga_resolved", "reentrant", "n_runs", "warnings")
 GRID_MEETS_POINT = (
     "(combination_id, kr_over_pga) DO UPDATE SET theta_n = excluded.theta_n, "
     "outcome = excluded.outcome, displacement_m = excluded.displacement_m, "
@@ -35,7 +33,8 @@ GRID_MEETS_POINT = (
 )
 """What becomes of a block that was run before, for another reason, where the grid meets it."""
 
-_INTERVAL_COLUMNS = ("combination_id", "k_lo", "k_hi", "outcome")
+POINT_COLUMNS = ("combination_id", *Point._fields)
+INTERVAL_COLUMNS = ("combination_id", *Interval._fields)
 
 
 @dataclass(frozen=True)
@@ -101,8 +100,7 @@ def start_campaign(
     """Record that a campaign begins, and return its id.
 
     Args:
-        connection: inside the caller's transaction.
-        settings: what the user asked for; plain values.
+        settings: what the user asked for; values that JSON can hold.
         numerics_version: of the solver.
     """
     return insert_row(
@@ -126,7 +124,6 @@ def known_combinations(connection: Connection, keys: Iterable[str]) -> dict[str,
     """Return what is stored of each combination, by natural key.
 
     Args:
-        connection: the database.
         keys: the natural keys asked about; those that are not stored are left out.
     """
     column = combination.c
@@ -139,12 +136,9 @@ def known_combinations(connection: Connection, keys: Iterable[str]) -> dict[str,
         column.reentrant,
         exists().where(simulation.c.combination_id == column.id, simulation.c.grid.is_not(None)),
         exists().where(outcome_interval.c.combination_id == column.id),
-    ).where(column.natural_key.in_(bindparam("keys", expanding=True)))
-    found: dict[str, KnownCombination] = {}
-    for some in portions(keys):
-        for key, *values in connection.execute(query, {"keys": some}):
-            found[key] = KnownCombination(*values)
-    return found
+    )
+    rows = rows_of_keys(connection, query, column.natural_key, keys)
+    return {key: KnownCombination(*values) for key, *values in rows}
 
 
 def known_keys(connection: Connection, keys: Iterable[str]) -> set[str]:
@@ -156,17 +150,12 @@ def combinations_with_points(
     connection: Connection, keys: Iterable[str], kr_over_pga: Sequence[float]
 ) -> set[str]:
     """Return those natural keys whose combinations hold a simulation at each of some strengths."""
-    query = (
-        select(combination.c.natural_key, simulation.c.kr_over_pga)
-        .join(simulation)
-        .where(combination.c.natural_key.in_(bindparam("keys", expanding=True)))
-    )
+    query = select(combination.c.natural_key, simulation.c.kr_over_pga).join(simulation)
+    rows = rows_of_keys(connection, query, combination.c.natural_key, keys)
     # Compared here: a long list of strengths is no list of variables for every database.
     wanted = set(kr_over_pga)
-    found: Counter[str] = Counter()
-    for some in portions(keys):
-        found.update(key for key, k in connection.execute(query, {"keys": some}) if k in wanted)
-    return {key for key, number in found.items() if number == len(wanted)}
+    counts = Counter(key for key, k in rows if k in wanted)
+    return {key for key, number in counts.items() if number == len(wanted)}
 
 
 def insert_combinations(
@@ -191,7 +180,8 @@ def insert_combinations(
     known = known_combinations(connection, new)
     # What another campaign stored meanwhile stays all its own: two processors may have made
     # maps that differ in the last bits, and a mixture of both would be none.
-    own = _of_campaign(connection, campaign_id, new)
+    query = select(combination.c.natural_key).where(combination.c.campaign_id == campaign_id)
+    own = {key for (key,) in rows_of_keys(connection, query, combination.c.natural_key, new)}
     new = {key: record for key, record in new.items() if key in own}
     results = {key: record.result for key, record in new.items() if record.result is not None}
     _insert_intervals(connection, known, results)
@@ -201,22 +191,10 @@ def insert_combinations(
     return len(new)
 
 
-def _of_campaign(connection: Connection, campaign_id: int, keys: Iterable[str]) -> set[str]:
-    query = select(combination.c.natural_key).where(
-        combination.c.natural_key.in_(bindparam("keys", expanding=True)),
-        combination.c.campaign_id == campaign_id,
-    )
-    found: set[str] = set()
-    for some in portions(keys):
-        found.update(connection.scalars(query, {"keys": some}))
-    return found
-
-
 def insert_points(connection: Connection, points: Mapping[str, SearchPoints]) -> None:
     """Store simulated blocks of combinations that are there; a strength that is there stays.
 
     Args:
-        connection: inside the caller's transaction.
         points: the blocks, by the natural key of their combination.
     """
     _insert_points(connection, _all_known(connection, points), points, {})
@@ -226,7 +204,6 @@ def add_grids(connection: Connection, grids: Mapping[str, SearchPoints]) -> None
     """Store the blocks of the kind's grid of combinations that are there without them.
 
     Args:
-        connection: inside the caller's transaction.
         grids: the blocks by the natural key of their combination, number i of the grid at place i.
     """
     known = _all_known(connection, grids)
@@ -237,20 +214,14 @@ def add_maps(connection: Connection, results: Mapping[str, CriticalResult]) -> N
     """Store the maps of combinations that are there without one, and what only a map tells.
 
     Args:
-        connection: inside the caller's transaction.
         results: searches with their maps, by the natural key of their combination.
     """
     known = _all_known(connection, results)
     new = {key: result for key, result in results.items() if not known[key].mapped}
     _insert_intervals(connection, known, new)
     for key, result in new.items():
-        values = {
-            "island_width": _number(result.island_width),
-            "kr_over_pga_resolved": _number(result.kr_over_pga_resolved),
-            "reentrant": result.reentrant,
-            "n_runs": int(result.n_runs),
-            "warnings": json.dumps(list(result.warnings)),
-        }
+        columns = _result_values(result)
+        values = {name: columns[name] for name in _OF_A_MAP}
         update_rows(connection, combination, combination.c.id == known[key].id, values)
 
 
@@ -269,14 +240,14 @@ def _insert_points(
     points: Mapping[str, SearchPoints],
     grids: Mapping[str, SearchPoints],
 ) -> None:
-    rows = [row for key, blocks in points.items() for row in _point_rows(known[key].id, blocks)]
-    insert_rows(connection, simulation, _POINT_COLUMNS, [(*row, None) for row in rows])
-    rows = [
-        (*row, number)
-        for key, blocks in grids.items()
-        for number, row in enumerate(_point_rows(known[key].id, blocks))
-    ]
-    insert_rows(connection, simulation, _POINT_COLUMNS, rows, on_conflict=GRID_MEETS_POINT)
+    rows: list[tuple[object, ...]] = []
+    for key, blocks in points.items():
+        rows += _point_rows(known[key].id, blocks, repeat(None))
+    insert_rows(connection, simulation, POINT_COLUMNS, rows)
+    rows = []
+    for key, blocks in grids.items():
+        rows += _point_rows(known[key].id, blocks, count())
+    insert_rows(connection, simulation, POINT_COLUMNS, rows, on_conflict=GRID_MEETS_POINT)
 
 
 def _insert_intervals(
@@ -284,68 +255,62 @@ def _insert_intervals(
     known: Mapping[str, KnownCombination],
     results: Mapping[str, CriticalResult],
 ) -> None:
-    rows = [row for key, result in results.items() for row in _interval_rows(known[key].id, result)]
-    insert_rows(connection, outcome_interval, _INTERVAL_COLUMNS, rows)
+    rows: list[tuple[object, ...]] = []
+    for key, result in results.items():
+        map_ = result.intervals
+        ends = zip(map_.k_lo.tolist(), map_.k_hi.tolist(), map_.outcome, strict=True)
+        rows += ((known[key].id, *interval) for interval in ends)
+    insert_rows(connection, outcome_interval, INTERVAL_COLUMNS, rows)
 
 
 def _combination_row(campaign_id: int, record: CombinationRecord) -> tuple[object, ...]:
-    result = record.result
-    inputs = (
-        record.natural_key,
-        campaign_id,
-        record.motion_id,
-        record.vertical_motion_id,
-        record.polarity,
-        record.kind,
-        result is not None and bool(result.linear),
-        _number(record.p2),
-        None if record.block is None else canonical_json(record.block),
-        canonical_json(record.settings),
-        record.numerics_version,
-    )
+    values = {
+        "natural_key": record.natural_key,
+        "campaign_id": campaign_id,
+        "motion_id": record.motion_id,
+        "vertical_motion_id": record.vertical_motion_id,
+        "polarity": record.polarity,
+        "kind": record.kind,
+        "linear": False,
+        "p2": _number(record.p2),
+        "block": None if record.block is None else canonical_json(record.block),
+        "settings": canonical_json(record.settings),
+        "numerics_version": record.numerics_version,
+        **_result_values(record.result),
+    }
+    return tuple(values[name] for name in _COLUMNS)
+
+
+def _result_values(result: CriticalResult | None) -> dict[str, object]:
     if result is None:
-        nothing = (None,) * 6
-        return (*inputs, "not_searched", *nothing, False, *nothing[:5], 0, "[]")
-    return (
-        *inputs,
-        result.status,
-        float(result.search_limit),
-        _number(result.kr_over_pga),
-        _number(result.lower),
-        _number(result.upper),
-        _number(result.kr),
-        _number(result.y_m_s),
-        bool(result.certified),
-        _number(result.k_up_over_pga),
-        _number(result.undecided),
-        _number(result.island_width),
-        _number(result.kr_over_pga_resolved),
-        None if result.reentrant is None else bool(result.reentrant),
-        int(result.n_runs),
-        json.dumps(list(result.warnings)),
-    )
+        nothing = dict.fromkeys((*_NUMBERS, "reentrant"))
+        return {
+            **nothing, "status": "not_searched", "certified": False, "n_runs": 0, "warnings": "[]"
+        }  # fmt: skip
+    return {
+        **{name: _number(getattr(result, name)) for name in _NUMBERS},
+        "status": result.status,
+        "certified": bool(result.certified),
+        "reentrant": None if result.reentrant is None else bool(result.reentrant),
+        "n_runs": int(result.n_runs),
+        "warnings": json.dumps(list(result.warnings)),
+    }
 
 
-def _interval_rows(combination_id: int, result: CriticalResult) -> Iterator[tuple[object, ...]]:
-    intervals = result.intervals
-    for low, high, outcome in zip(
-        intervals.k_lo.tolist(), intervals.k_hi.tolist(), intervals.outcome, strict=True
-    ):
-        yield combination_id, low, high, outcome
-
-
-def _point_rows(combination_id: int, points: SearchPoints) -> Iterator[tuple[object, ...]]:
+def _point_rows(
+    combination_id: int, points: SearchPoints, numbers: Iterable[int | None]
+) -> Iterator[tuple[object, ...]]:
     # A search may come back to a point; a run of the same input gives the same answer.
     slid = points.displacement_m
-    rows = zip(
+    return zip(
+        repeat(combination_id),
         points.kr_over_pga.tolist(),
-        points.theta_n.tolist(),
-        points.outcome,
-        [None] * len(points.outcome) if slid is None else slid.tolist(),
-        strict=True,
+        map(_number, points.theta_n.tolist()),
+        map(str, points.outcome),
+        repeat(None) if slid is None else map(_number, slid.tolist()),
+        numbers,
+        strict=False,
     )
-    for k, theta, outcome, displacement_m in rows:
-        yield combination_id, k, _number(theta), str(outcome), _number(displacement_m)
 
 
 def _number(value: float | None) -> float | None:

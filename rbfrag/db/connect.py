@@ -21,7 +21,7 @@ from sqlalchemy import (
 
 from rbfrag.db.sqlite_file import (
     connect_sqlite,
-    sqlite_error_in_words,
+    explained_sqlite_error,
 )
 from rbfrag.errors import (
     DatabaseBusyError,
@@ -69,7 +69,7 @@ def unchecked_engine(
         engine = _sqlite_engine(url, place, read_only, foreign_keys, busy_timeout_s)
     else:
         engine = _server_engine(url, read_only)
-    event.listen(engine, "handle_error", _raise_in_words)
+    event.listen(engine, "handle_error", _raise_explained)
     return engine
 
 
@@ -120,26 +120,30 @@ def sqlalchemy_url(place: Path | str) -> URL:
     return url.set(drivername="postgresql+psycopg")
 
 
-def _raise_in_words(context: ExceptionContext) -> None:
+def _raise_explained(context: ExceptionContext) -> None:
     error = context.original_exception
     url = context.engine.url if context.engine is not None else None
     label = database_label(url) if url is not None else "the database"
     if isinstance(error, sqlite3.Error):
         if not isinstance(error, sqlite3.IntegrityError | sqlite3.ProgrammingError):
-            raise sqlite_error_in_words(error, label) from error
+            raise explained_sqlite_error(error, label) from error
         return
-    words = _server_error_in_words(error, label)
-    if words is not None:
-        raise words from error
+    # without a connection it was one that could not be made
+    explained = _explained_server_error(error, label, connected=context.connection is not None)
+    if explained is not None:
+        raise explained from error
 
 
-def _server_error_in_words(error: BaseException, label: str) -> DatabaseError | None:
+def _explained_server_error(
+    error: BaseException, label: str, *, connected: bool
+) -> DatabaseError | None:
     # psycopg is an extra: its classes are told by what they carry, not by import.
     state: Any = getattr(error, "sqlstate", None)
     if type(error).__module__.partition(".")[0] != "psycopg":
         return None
     reason = " ".join(str(error).split())
-    if state is None and type(error).__name__ == "OperationalError":
+    unnamed = state is None and type(error).__name__ == "OperationalError"
+    if unnamed and not connected:
         return DatabaseNotFoundError(
             f"cannot reach {label}: {reason}; check host, port, user and database name"
         )
@@ -150,7 +154,8 @@ def _server_error_in_words(error: BaseException, label: str) -> DatabaseError | 
             f"{label} is locked by another session; what was finished is kept: run the same "
             f"command again ({reason})"
         )
-    if state is not None and state[:2] in ("08", "53", "57", "58"):
+    # a connection may break before the server can say why, and then has no state
+    if unnamed or (state is not None and state[:2] in ("08", "53", "57", "58")):
         return DatabaseFailedError(
             f"{label}: the server gave up: {reason}; what was finished is kept: run the same "
             "command again"

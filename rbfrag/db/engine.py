@@ -7,40 +7,17 @@ from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 
-from sqlalchemy import (
-    Connection,
-    Engine,
-    inspect,
-    text,
-)
+from sqlalchemy import Connection, Engine, inspect, text
 
 from rbfrag.db.connect import (
     BUSY_TIMEOUT_S,
     database_label,
     raw_sqlite,
-    sqlalchemy_url,
     unchecked_engine,
 )
 from rbfrag.db.location import VERSION_TABLE, check_revision, locate
-from rbfrag.db.sqlite_file import (
-    check_sqlite_database,
-)
-from rbfrag.errors import (
-    NotADatabaseError,
-)
-
-
-def database_url(db: str | PathLike[str] | None = None) -> str:
-    """Return the SQLAlchemy URL of a database.
-
-    Args:
-        db: a path or an SQLAlchemy URL; None for the environment variable ``RBFRAG_DB``,
-            or else ``rbfrag.db`` in the current folder. ``postgresql://`` goes to psycopg.
-
-    Raises:
-        InputError: a URL that cannot be read, or of a database that rbfrag does not use.
-    """
-    return sqlalchemy_url(locate(db)).render_as_string(hide_password=False)
+from rbfrag.db.sqlite_file import check_sqlite_database
+from rbfrag.errors import NotADatabaseError
 
 
 def open_database(
@@ -58,7 +35,8 @@ def open_database(
     :func:`opened_database`.
 
     Args:
-        db: as for :func:`database_url`.
+        db: a path or an SQLAlchemy URL; None for the environment variable ``RBFRAG_DB``,
+            or else ``rbfrag.db`` in the current folder. ``postgresql://`` goes to psycopg.
         create: make the database when there is none; it appears complete or not at all.
         read_only: forbid writes; works on a file in a folder that cannot be written.
         busy_timeout_s: how long to wait for another process's lock [s].
@@ -68,6 +46,7 @@ def open_database(
         the database, and SQLAlchemy's own only for mistakes in rbfrag.
 
     Raises:
+        InputError: a URL that cannot be read, or of a database that rbfrag does not use.
         DatabaseError: one of its kinds: not found, no database, another schema, read-only, busy.
         MissingExtraError: PostgreSQL without psycopg.
     """
@@ -98,7 +77,7 @@ def opened_database(
     """Open a database for a ``with`` block and close its connections behind it.
 
     Args:
-        db: as for :func:`database_url`.
+        db: as for :func:`open_database`.
         create: as for :func:`open_database`.
         read_only: as for :func:`open_database`.
     """
@@ -110,14 +89,14 @@ def opened_database(
 
 
 def _check_server_database(connection: Connection, label: str) -> None:
-    found = (
+    revision = (
         connection.scalar(text(f"SELECT version_num FROM {VERSION_TABLE}"))
         if inspect(connection).has_table(VERSION_TABLE)
         else None
     )
-    if found is None:
+    if revision is None:
         raise NotADatabaseError(
             f"{label} holds no rbfrag tables yet: make them with  rbfrag motions add FILES "
             f"--db {label}"
         )
-    check_revision(str(found), label)
+    check_revision(str(revision), label)

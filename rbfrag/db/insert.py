@@ -14,7 +14,9 @@ from sqlalchemy import (
     Float,
     Integer,
     LargeBinary,
+    Select,
     Table,
+    bindparam,
     insert,
     select,
     update,
@@ -60,7 +62,6 @@ def insert_rows(
     value would cost more than the insertion.
 
     Args:
-        connection: inside the caller's transaction.
         table: the table.
         columns: names of the columns that the rows fill.
         rows: tuples of None, bool, int, float, str and bytes, in the order of `columns`; numpy's
@@ -151,8 +152,12 @@ def storable(text: str) -> str:
     return visible.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
-def portions(keys: Iterable[str]) -> Iterator[list[str]]:
-    """Yield keys, each once, so many at a time as any SQLite build takes variables."""
+def rows_of_keys(
+    connection: Connection, query: Select[Any], column: ColumnElement[str], keys: Iterable[str]
+) -> Iterator[Any]:
+    """Yield the rows of a query whose column is one of many keys, in any order."""
+    query = query.where(column.in_(bindparam("keys", expanding=True)))
     wanted = list(dict.fromkeys(keys))
+    # as many at a time as any SQLite build takes variables
     for start in range(0, len(wanted), _KEYS_AT_ONCE):
-        yield wanted[start : start + _KEYS_AT_ONCE]
+        yield from connection.execute(query, {"keys": wanted[start : start + _KEYS_AT_ONCE]})

@@ -101,15 +101,15 @@ def canonical_json(value: object) -> str:
     Raises:
         InputError: a number that is not finite, or something JSON has no word for.
     """
-    plain = _plain(value)
-    return json.dumps(plain, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    storable = _storable(value)
+    return json.dumps(storable, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
 
 
 def _digest(value: object) -> str:
     return hashlib.sha256(canonical_json(value).encode("ascii")).hexdigest()
 
 
-def _plain(value: object) -> object:
+def _storable(value: object) -> object:
     if value is None or isinstance(value, bool | str):
         return str(value) if isinstance(value, str) else value
     if isinstance(value, numbers.Integral):
@@ -120,7 +120,7 @@ def _plain(value: object) -> object:
             raise InputError(f"{number} cannot be stored: numbers must be finite")
         return number
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): _storable(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [_storable(item) for item in value]
     raise InputError(f"{value!r} ({type(value).__name__}) cannot be stored as a setting")

@@ -74,21 +74,21 @@ def reference_file() -> Path | None:
     return REFERENCE if REFERENCE.is_file() else None
 
 
-def check_revision(found: str, where: str) -> None:
+def check_revision(revision: str, where: str) -> None:
     """Refuse a database whose schema this rbfrag does not work with.
 
     Args:
         found: the revision stored in the database.
         where: the database as the user names it, for the message.
     """
-    if found == SCHEMA_REVISION:
+    if revision == SCHEMA_REVISION:
         return
-    if found in REVISIONS:
+    if revision in REVISIONS:
         raise SchemaVersionError(
-            f"{where}: the database has schema {found}, this rbfrag needs {SCHEMA_REVISION}: "
+            f"{where}: the database has schema {revision}, this rbfrag needs {SCHEMA_REVISION}: "
             f"run  rbfrag db upgrade --db {where}"
         )
     raise SchemaVersionError(
-        f"{where}: the database has schema {found}, newer than {SCHEMA_REVISION} of this rbfrag: "
-        "install a newer rbfrag"
+        f"{where}: the database has schema {revision}, newer than {SCHEMA_REVISION} of this "
+        "rbfrag: install a newer rbfrag"
     )

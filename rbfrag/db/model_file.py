@@ -17,7 +17,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from rbfrag.db.sqlite_file import check_sqlite_database, connect_sqlite, sqlite_error_in_words
+from rbfrag.db.sqlite_file import check_sqlite_database, connect_sqlite, explained_sqlite_error
 from rbfrag.errors import DatabaseError, InputError
 
 
@@ -177,5 +177,5 @@ def read_models(path: str | PathLike[str]) -> list[ModelRow]:
         try:
             rows = [decode_model(row) for row in connection.execute(_SELECT)]
         except sqlite3.Error as error:
-            raise sqlite_error_in_words(error, file) from error
+            raise explained_sqlite_error(error, file) from error
     return sorted(rows, key=lambda model: model.name)

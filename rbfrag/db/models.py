@@ -20,7 +20,6 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
     A model that is replaced passes its being the default on.
 
     Args:
-        connection: inside the caller's transaction.
         row: the model; without a time of creation it is now.
         replace: overwrite a model of the same name.
 
@@ -60,7 +59,6 @@ def load_model(
     """Return one model.
 
     Args:
-        connection: the database.
         name: its name; None for the default of a kind.
         kind: the kind whose default is meant.
 

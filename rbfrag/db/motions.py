@@ -10,17 +10,7 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-from sqlalchemy import (
-    Connection,
-    RowMapping,
-    Select,
-    and_,
-    case,
-    delete,
-    exists,
-    or_,
-    select,
-)
+from sqlalchemy import Connection, RowMapping, Select, and_, case, delete, exists, or_, select
 
 from rbfrag.db import schema
 from rbfrag.db.insert import insert_if_new, storable, update_rows, utc_now
@@ -29,15 +19,6 @@ from rbfrag.db.rows import EarthquakeInfo, MotionRow
 from rbfrag.db.schema import earthquake, suite, suite_motion
 from rbfrag.errors import DatabaseError, InputError
 from rbfrag.motions.ground_motion import GroundMotion
-
-__all__ = [
-    "add_motion",
-    "load_motion",
-    "motion_row",
-    "motion_rows",
-    "same_source",
-    "suite_names",
-]
 
 MEASURES = (
     "pga_g", "pgv_m_s", "pgd_m", "tm_s", "final_velocity_m_s", "final_displacement_m",
@@ -78,7 +59,6 @@ def add_motion(
     refused.
 
     Args:
-        connection: inside the caller's transaction.
         motion: equally spaced samples [g].
         earthquake: where it belongs; without an event_id it stands for itself alone.
         is_vertical: True for a vertical component.
@@ -310,15 +290,14 @@ def _recording_id_for(
     earthquake_id = earthquake_id_for(connection, event, recording=name)
     values = {"earthquake_id": earthquake_id, "name": name, "station": station}
     insert_if_new(connection, schema.recording, values)
-    found: int = connection.execute(select(schema.recording.c.id).filter_by(**values)).scalar_one()
-    return found
+    row_id: int = connection.execute(select(schema.recording.c.id).filter_by(**values)).scalar_one()
+    return row_id
 
 
 def delete_orphans(connection: Connection, recording_id: int) -> None:
     """Delete a recording without motions, and a guessed earthquake that nothing refers to.
 
     Args:
-        connection: inside the caller's transaction.
         recording_id: the recording that a motion was moved away from.
     """
     recording, event = schema.recording, schema.earthquake
@@ -375,8 +354,8 @@ def _motion_row(row: RowMapping) -> MotionRow:
 def _row_of(connection: Connection, query: Select[Any], motion_id: int) -> RowMapping:
     row = None
     if 0 < motion_id < _ID_LIMIT:
-        found = connection.execute(query.where(schema.motion.c.id == motion_id))
-        row = found.mappings().one_or_none()
+        result = connection.execute(query.where(schema.motion.c.id == motion_id))
+        row = result.mappings().one_or_none()
     if row is None:
         raise InputError(
             f"there is no motion {motion_id} in the database: rbfrag motions list  shows the ids"
@@ -392,7 +371,6 @@ def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording
     magnitudes); what was not known is filled in.
 
     Args:
-        connection: inside the caller's transaction.
         info: the earthquake. Without an event_id nothing is known, and the recording
             stands for an event of its own.
         recording: name of the recording.

@@ -45,7 +45,7 @@ class OutcomeMaps:
     def outcomes(self, kr_over_pga: ArrayLike) -> FloatArray:
         """Return what becomes of blocks of any strength: 1 topples, 0 safe, NaN not known.
 
-        Above the uppermost interval (and so above K_up) every block is safe: no drive lifts it.
+        Above the uppermost interval (and so above K_up) every block is safe: no shaking lifts it.
         Where a map has no answer, NaN: below the search limit, inside an undecided
         interval (a border between the others is one, some 1e-9 wide), below the point where a
         search was given up, for ``outside_model``, and for a NaN asked about. An end that an
@@ -58,16 +58,15 @@ class OutcomeMaps:
         Returns:
             Shape (n, m).
         """
-        asked = np.asarray(kr_over_pga, dtype=np.float64)
+        ratios = np.asarray(kr_over_pga, dtype=np.float64)
         n = self.combination_id.size
-        if asked.ndim not in (1, 2) or (asked.ndim == 2 and asked.shape[0] != n):
+        if ratios.ndim not in (1, 2) or (ratios.ndim == 2 and ratios.shape[0] != n):
             raise InputError(
-                f"kr/PGA must have shape (m,) or ({n}, m) for {n} combinations, not {asked.shape}"
+                f"kr/PGA must have shape (m,) or ({n}, m) for {n} combinations, not {ratios.shape}"
             )
-        answer = np.full((n, asked.shape[-1]), np.nan)
+        answer = np.full((n, ratios.shape[-1]), np.nan)
         for i in range(n):
-            strengths = asked if asked.ndim == 1 else asked[i]
-            self._look_up(i, strengths, answer[i])
+            self._look_up(i, ratios if ratios.ndim == 1 else ratios[i], answer[i])
         return answer
 
     def _look_up(self, i: int, k: FloatArray, answer: FloatArray) -> None:
@@ -78,22 +77,21 @@ class OutcomeMaps:
             answer[known] = SAFE
             return
         at = np.searchsorted(low, k, side="right") - 1
-        found = outcome[np.maximum(at, 0)]
+        outcomes = outcome[np.maximum(at, 0)]
         # Between two intervals, where a map holds the decided ones alone, nothing is known.
-        found[k > high[np.maximum(at, 0)]] = np.nan
+        outcomes[k > high[np.maximum(at, 0)]] = np.nan
         # A shared end belongs to the decided one of its two neighbours.
         before = np.maximum(at - 1, 0)
-        shared = np.isnan(found) & (at > 0) & (k == high[before])
-        found[shared] = outcome[before[shared]]
-        found[k > high[-1]] = SAFE
-        answer[known] = found[known]
+        shared = np.isnan(outcomes) & (at > 0) & (k == high[before])
+        outcomes[shared] = outcome[before[shared]]
+        outcomes[k > high[-1]] = SAFE
+        answer[known] = outcomes[known]
 
 
 def outcome_maps(connection: Connection, combination_id: ArrayLike) -> OutcomeMaps:
     """Return the maps of outcomes of some combinations.
 
     Args:
-        connection: the database.
         combination_id: row ids, such as ``CombinationTable.combination_id``, shape (n,).
     """
     wanted = np.atleast_1d(np.asarray(combination_id, dtype=np.int64))

@@ -26,7 +26,7 @@ from rbfrag.db.schema import (
 )
 from rbfrag.errors import InputError
 from rbfrag.motions.quality import PGD_IN_DOUBT
-from rbfrag.solver.results import NUMERICS_VERSION, SearchPoints
+from rbfrag.solver.results import NUMERICS_VERSION
 
 Vertical = Literal["without", "with", "both"]
 
@@ -70,7 +70,6 @@ def combination_table(
     the displacements. Versions of the numerics never mix.
 
     Args:
-        connection: the database.
         suite: only motions of this suite.
         vertical: ``without`` vertical motion, ``with`` it, or ``both``.
         kind: response kind.
@@ -121,26 +120,18 @@ def combination_table(
         column[:] = [row[name] for row in kept]
         return column
 
+    pgd_m = floats("pgd_m")
+    if not doubtful_pgd:
+        pgd_m[np.array([_pgd_in_doubt(row) for row in kept], dtype=np.bool_)] = np.nan
+    numbers = ("p2", "search_limit", "kr_over_pga", "kr", "y_m_s", "pga_g", "pgv_m_s", "tm_s")
+    others = ("event_id", "polarity", "status", "natural_key", "block")
     return CombinationTable(
         combination_id=np.array([row["id"] for row in kept], dtype=np.int64),
         motion_id=np.array([row["motion_id"] for row in kept], dtype=np.int64),
-        event_id=objects("event_id"),
         event_guessed=np.array([row["guessed"] for row in kept], dtype=np.bool_),
-        polarity=objects("polarity"),
-        p2=floats("p2"),
-        status=objects("status"),
-        search_limit=floats("search_limit"),
-        kr_over_pga=floats("kr_over_pga"),
-        kr=floats("kr"),
-        y_m_s=floats("y_m_s"),
-        pga_g=floats("pga_g"),
-        pgv_m_s=floats("pgv_m_s"),
-        pgd_m=np.where([_pgd_in_doubt(row) for row in kept], np.nan, floats("pgd_m"))
-        if kept and not doubtful_pgd
-        else floats("pgd_m"),
-        tm_s=floats("tm_s"),
-        natural_key=objects("natural_key"),
-        block=objects("block"),
+        pgd_m=pgd_m,
+        **{name: floats(name) for name in numbers},
+        **{name: objects(name) for name in others},
     )
 
 
@@ -166,7 +157,6 @@ def outcome_grid(connection: Connection, combination_id: ArrayLike) -> OutcomeGr
     """Return what the blocks of the grid do in some combinations, of one kind.
 
     Args:
-        connection: the database.
         combination_id: row ids, such as ``CombinationTable.combination_id``, shape (n,).
 
     Returns:
@@ -200,23 +190,6 @@ def outcome_grid(connection: Connection, combination_id: ArrayLike) -> OutcomeGr
     return OutcomeGrid(*grid)
 
 
-def simulation_points(connection: Connection, combination_id: int) -> SearchPoints:
-    """Return every simulated point of a combination, by falling k_r/PGA."""
-    query = select(combination.c.id).where(combination.c.id == combination_id)
-    if not 0 < combination_id < 2**31 or connection.scalar(query) is None:
-        raise InputError(f"there is no combination {combination_id} in the database")
-    rows = connection.execute(
-        select(simulation.c.kr_over_pga, simulation.c.theta_n, simulation.c.outcome)
-        .where(simulation.c.combination_id == combination_id)
-        .order_by(simulation.c.kr_over_pga.desc())
-    ).all()
-    return SearchPoints(
-        kr_over_pga=np.array([k for k, _, _ in rows], dtype=np.float64),
-        theta_n=np.array([np.nan if t is None else t for _, t, _ in rows], dtype=np.float64),
-        outcome=tuple(outcome for _, _, outcome in rows),
-    )
-
-
 def database_info(connection: Connection, *, kind: str = "toppling") -> DatabaseInfo:
     """Return what the database holds, counted, and which model of a kind is its default."""
     by_status = select(combination.c.status, func.count().label("number")).group_by(
@@ -247,25 +220,14 @@ def _pgd_in_doubt(row: RowMapping) -> bool:
 
 
 def _combination_query() -> Select[Any]:
+    own = (
+        "id", "natural_key", "motion_id", "vertical_motion_id", "polarity", "p2", "block",
+        "settings", "status", "search_limit", "kr_over_pga", "kr", "y_m_s",
+    )  # fmt: skip
+    of_motion = ("pga_g", "pgv_m_s", "pgd_m", "tm_s", "flags")
     return select(
-        combination.c.id,
-        combination.c.natural_key,
-        combination.c.motion_id,
-        combination.c.vertical_motion_id,
-        combination.c.polarity,
-        combination.c.p2,
-        combination.c.block,
-        combination.c.settings,
-        combination.c.status,
-        combination.c.search_limit,
-        combination.c.kr_over_pga,
-        combination.c.kr,
-        combination.c.y_m_s,
-        motion.c.pga_g,
-        motion.c.pgv_m_s,
-        motion.c.pgd_m,
-        motion.c.tm_s,
-        motion.c.flags,
+        *(combination.c[name] for name in own),
+        *(motion.c[name] for name in of_motion),
         earthquake.c.event_id,
         earthquake.c.guessed,
     ).select_from(

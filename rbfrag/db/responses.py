@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Connection, bindparam, select
+from sqlalchemy import Connection, select
 
-from rbfrag.db.insert import insert_rows, portions
+from rbfrag.db.insert import insert_rows, rows_of_keys
 from rbfrag.db.schema import response
 from rbfrag.errors import InputError
-from rbfrag.solver.results import Response, ResponseHistory
+from rbfrag.solver.results import Response
 
 _COLUMNS = (
     "natural_key", "motion_id", "vertical_motion_id", "polarity", "kind", "linear", "p2", "kr",
@@ -26,15 +26,9 @@ class ResponseRecord:
     """One response with its history as it is stored.
 
     Args:
-        natural_key: from :func:`rbfrag.db.keys.response_key`.
-        motion_id: the horizontal motion.
-        vertical_motion_id: the vertical one, or None.
-        polarity: ``forward`` or ``reverse``.
+        natural_key: from :func:`rbfrag.db.keys.response_key`, of all but `response`.
         p2: frequency parameter p² [1/s²].
         kr: rocking acceleration coefficient.
-        response: what the solver answered, with its history.
-        numerics_version: the same that went into the key.
-        linear: True for the linear verification model.
     """
 
     natural_key: str
@@ -45,7 +39,6 @@ class ResponseRecord:
     kr: float
     response: Response
     numerics_version: str
-    linear: bool = False
 
 
 def insert_responses(connection: Connection, records: Sequence[ResponseRecord]) -> None:
@@ -55,26 +48,8 @@ def insert_responses(connection: Connection, records: Sequence[ResponseRecord]) 
 
 def known_responses(connection: Connection, keys: Iterable[str]) -> set[str]:
     """Return those natural keys whose responses are stored already."""
-    query = select(response.c.natural_key).where(
-        response.c.natural_key.in_(bindparam("keys", expanding=True))
-    )
-    found: set[str] = set()
-    for some in portions(keys):
-        found.update(connection.scalars(query, {"keys": some}))
-    return found
-
-
-def stored_history(connection: Connection, natural_key: str) -> ResponseHistory:
-    """Return the history of a stored response."""
-    column = response.c
-    row = connection.execute(
-        select(
-            column.time_s, column.theta_rad, column.theta_dot_rad_s, column.k_h, column.k_v
-        ).where(column.natural_key == natural_key)
-    ).one_or_none()
-    if row is None:
-        raise InputError(f"there is no stored response {natural_key!r}")
-    return ResponseHistory(*[np.frombuffer(blob, dtype="<f8").astype(np.float64) for blob in row])
+    column = response.c.natural_key
+    return {key for (key,) in rows_of_keys(connection, select(column), column, keys)}
 
 
 def _row(record: ResponseRecord) -> tuple[object, ...]:
@@ -88,7 +63,7 @@ def _row(record: ResponseRecord) -> tuple[object, ...]:
         record.vertical_motion_id,
         record.polarity,
         answer.kind,
-        record.linear,
+        False,
         float(record.p2),
         float(record.kr),
         record.numerics_version,

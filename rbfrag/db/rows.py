@@ -1,4 +1,4 @@
-"""What goes into the database and comes out of it: plain frozen data.
+"""What goes into the database and comes out of it: frozen dataclasses.
 
 This module loads neither SQLAlchemy nor numpy, because `rbfrag predict` needs it.
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 if TYPE_CHECKING:
     import numpy as np
@@ -64,6 +64,24 @@ class MotionRow:
     start_time: str | None
     sha256: str
     flags: tuple[str, ...]
+
+
+class Interval(NamedTuple):
+    """One interval of a map: its ends, k_r/PGA, and what becomes of every block in it."""
+
+    k_lo: float
+    k_hi: float
+    outcome: Literal["topples", "safe", "undecided"]
+
+
+class Point(NamedTuple):
+    """One simulated block; `grid` is its number in the kind's outcome grid, None beside it."""
+
+    kr_over_pga: float
+    theta_n: float | None
+    outcome: str
+    displacement_m: float | None
+    grid: int | None
 
 
 @dataclass(frozen=True)

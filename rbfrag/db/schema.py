@@ -1,10 +1,13 @@
 """The tables. Units are in the column names; natural unique keys hold no NULL.
 
-The tables are made by the migrations; a test proves that these definitions equal them. Each row
-carries a digest of its values, which :mod:`rbfrag.db.insert` writes.
+The tables are made by the migrations; a test proves that these definitions equal them. What each
+table and column means stands beside it, for :mod:`rbfrag.db.data_dictionary`. Each row carries a
+digest of its values, which :mod:`rbfrag.db.insert` writes.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 from sqlalchemy import (
     BigInteger,
@@ -15,6 +18,7 @@ from sqlalchemy import (
     ForeignKey,
     Index,
     Integer,
+    Join,
     LargeBinary,
     MetaData,
     PrimaryKeyConstraint,
@@ -23,6 +27,7 @@ from sqlalchemy import (
     UniqueConstraint,
     text,
 )
+from sqlalchemy.schema import SchemaItem
 
 metadata = MetaData(
     naming_convention={
@@ -45,64 +50,139 @@ OUTCOME = (
     "outcome IN ('stable', 'toppled', 'undetermined', 'jump', 'contact_lost', 'indeterminate')"
 )
 
+_POLARITY = "forward: positive samples drive toppling out of the slope; reverse: negative ones do"
+_KIND = "response kind: the model that answers, such as toppling or sliding"
+_LINEAR = "true for the linear verification model, in which k_r is the critical angle in rad"
+_NUMERICS = "version of the solver; results of different versions are never mixed"
+_P2 = "frequency parameter p² of the block, m g r3 over the inertia about the toe"
+_KEY = (
+    "SHA-256 over everything that decides the row: motions, polarity, kind, block, settings, "
+    "numerics; the same in every database"
+)
+_OUTCOME = (
+    "how the run ended: stable, toppled, undetermined (closer to critical than the error), jump"
+    " (1 + k_v <= 0), contact_lost, indeterminate"
+)
+
+
+def _table(name: str, meaning: str, *parts: SchemaItem, **options: Any) -> Table:
+    digest = "hash of the row's other values, by which rbfrag db check finds altered ones"
+    columns = (*parts, _column("digest", BigInteger, digest))
+    return Table(name, metadata, *columns, info={"meaning": meaning}, **options)
+
+
+def _column(name: str, type_: Any, meaning: str, unit: str = "", **options: Any) -> Column[Any]:
+    info = {"unit": unit, "meaning": meaning}
+    return Column(name, type_, info=info, **{"nullable": False, **options})
+
+
+def _optional(name: str, type_: Any, meaning: str, unit: str = "") -> Column[Any]:
+    return _column(name, type_, meaning, unit, nullable=True)
+
+
+def _reference(
+    name: str, to: str, on_delete: str, meaning: str, *, nullable: bool = False
+) -> Column[Any]:
+    return _column(name, ForeignKey(to, ondelete=on_delete), meaning, nullable=nullable)
+
+
+def _row_number() -> Column[Any]:
+    return _column("id", Integer, "row number, of this database alone", primary_key=True)
+
+
+def _shaken() -> tuple[Column[Any], ...]:
+    """Return the columns that say under which excitation a block was run, and as what."""
+    return (
+        _reference("motion_id", "motion.id", "RESTRICT", "the horizontal motion"),
+        _reference(
+            "vertical_motion_id",
+            "motion.id",
+            "RESTRICT",
+            "the vertical motion; missing without one",
+            nullable=True,
+        ),
+        _column("polarity", Text, _POLARITY),
+        _column("kind", Text, _KIND),
+        _column("linear", Boolean, _LINEAR),
+    )
+
+
 # One event has many spellings: what a file header says is a guess and stays apart from what
 # metadata state, even where the texts agree.
-earthquake = Table(
+earthquake = _table(
     "earthquake",
-    metadata,
-    Column("id", Integer, primary_key=True),
-    Column("event_id", Text, nullable=False),
-    Column("guessed", Boolean, nullable=False),
-    Column("name", Text, nullable=False),
-    Column("magnitude", Double),
-    Column("time", Text),
-    Column("digest", BigInteger, nullable=False),
+    "Earthquakes. What a file header says is a guess and stays apart from what metadata state.",
+    _row_number(),
+    _column("event_id", Text, "the id that earthquakes are told apart by"),
+    _column("guessed", Boolean, "true: read off a file header; false: stated by metadata"),
+    _column("name", Text, "name for people; may be empty"),
+    _optional("magnitude", Double, "magnitude as the source gives it, scales not harmonised"),
+    _optional("time", Text, "origin time, or the year, as text"),
     UniqueConstraint("event_id", "guessed"),
     CheckConstraint("event_id <> ''", name="event_id"),
     CheckConstraint("magnitude > -5 AND magnitude < 11", name="magnitude"),
 )
 
-recording = Table(
+recording = _table(
     "recording",
-    metadata,
-    Column("id", Integer, primary_key=True),
-    Column("earthquake_id", ForeignKey("earthquake.id", ondelete="RESTRICT"), nullable=False),
-    Column("name", Text, nullable=False),
-    Column("station", Text, nullable=False),
-    Column("digest", BigInteger, nullable=False),
+    "Recordings: what the components of one earthquake at one station share.",
+    _row_number(),
+    _reference("earthquake_id", "earthquake.id", "RESTRICT", "the earthquake"),
+    _column("name", Text, "name that all components of the recording share"),
+    _column("station", Text, "station code or name; may be empty"),
     UniqueConstraint("earthquake_id", "name", "station"),
     CheckConstraint("name <> ''", name="name"),
 )
 
-motion = Table(
+motion = _table(
     "motion",
-    metadata,
-    Column("id", Integer, primary_key=True),
-    Column("recording_id", ForeignKey("recording.id", ondelete="RESTRICT"), nullable=False),
-    Column("component", Text, nullable=False),
-    Column("orientation_deg", Double),
-    Column("is_vertical", Boolean, nullable=False),
-    Column("dt_s", Double, nullable=False),
-    Column("npts", Integer, nullable=False),
-    Column("pga_g", Double, nullable=False),
-    Column("pgv_m_s", Double, nullable=False),
-    Column("pgd_m", Double, nullable=False),
-    Column("tm_s", Double),
-    Column("final_velocity_m_s", Double, nullable=False),
-    Column("final_displacement_m", Double, nullable=False),
-    Column("source_file", Text, nullable=False),
-    Column("trace_index", Integer, nullable=False),
-    Column("file_format", Text, nullable=False),
-    Column("processing", Text, nullable=False),  # what the source says was done
-    Column("processing_applied", Text),  # JSON object; NULL where the samples are the file's
-    Column("source_sha256", Text, nullable=False),  # of the samples as the file has them
-    Column("start_time", Text),  # of the first sample, as the file's clock has it
-    Column("flags", Text, nullable=False),  # JSON list
-    Column("remarks", Text, nullable=False),  # JSON list
-    Column("samples_sha256", Text, nullable=False),
-    Column("samples", LargeBinary),  # little-endian float64 [g]; NULL in a reference file
-    Column("added", Text, nullable=False),
-    Column("digest", BigInteger, nullable=False),
+    "Accelerograms, one component each, with intensity measures of the piecewise linear record "
+    "started from rest.",
+    _row_number(),
+    _reference("recording_id", "recording.id", "RESTRICT", "the recording"),
+    _column("component", Text, "component as the source names it; may be empty"),
+    _optional(
+        "orientation_deg", Double, "azimuth of a horizontal component, clockwise from north", "deg"
+    ),
+    _column("is_vertical", Boolean, "true for a vertical component, upward positive"),
+    _column("dt_s", Double, "sampling interval", "s"),
+    _column("npts", Integer, "number of samples"),
+    _column("pga_g", Double, "peak ground acceleration, max |a| over both signs", "g"),
+    _column("pgv_m_s", Double, "peak ground velocity, extreme of the exact integral", "m/s"),
+    _column("pgd_m", Double, "peak ground displacement, extreme of the exact double integral", "m"),
+    _optional(
+        "tm_s",
+        Double,
+        "mean period of Rathje, Abrahamson and Bray (1998), 0.25 to 20 Hz; missing where it is "
+        "not defined",
+        "s",
+    ),
+    _column("final_velocity_m_s", Double, "velocity at the last sample; a sign of quality", "m/s"),
+    _column(
+        "final_displacement_m", Double, "displacement at the last sample; a sign of quality", "m"
+    ),
+    _column("source_file", Text, "name of the file it was read from"),
+    _column("trace_index", Integer, "number of the trace in that file, from 0"),
+    _column("file_format", Text, "format of that file"),
+    _column("processing", Text, "what metadata or file say was done to the record before"),
+    _optional(
+        "processing_applied",
+        Text,
+        "JSON object: every parameter of what rbfrag did to the samples; missing where they are "
+        "those of the file",
+    ),
+    _column("source_sha256", Text, "SHA-256 of the samples as the file has them"),
+    _optional("start_time", Text, "time of the first sample by the file's clock, where it says"),
+    _column("flags", Text, "JSON list of quality signs"),
+    _column("remarks", Text, "JSON list of sentences about the file"),
+    _column("samples_sha256", Text, "SHA-256 of the samples as little-endian float64"),
+    _optional(
+        "samples",
+        LargeBinary,
+        "the samples, little-endian float64; missing in a reference file",
+        "g",
+    ),
+    _column("added", Text, "UTC time at which it was stored"),
     UniqueConstraint("samples_sha256", "dt_s"),
     CheckConstraint("dt_s > 0", name="dt_s"),
     CheckConstraint("npts > 0", name="npts"),
@@ -114,85 +194,120 @@ motion = Table(
     Index(None, "source_sha256"),
 )
 
-suite = Table(
+suite = _table(
     "suite",
-    metadata,
-    Column("id", Integer, primary_key=True),
-    Column("name", Text, nullable=False),
-    Column("digest", BigInteger, nullable=False),
+    "Named sets of motions.",
+    _row_number(),
+    _column("name", Text, "name of the suite"),
     UniqueConstraint("name"),
     CheckConstraint("name <> ''", name="name"),
 )
 
-suite_motion = Table(
+suite_motion = _table(
     "suite_motion",
-    metadata,
-    Column("suite_id", ForeignKey("suite.id", ondelete="CASCADE"), nullable=False),
-    Column("motion_id", ForeignKey("motion.id", ondelete="CASCADE"), nullable=False),
-    Column("digest", BigInteger, nullable=False),
+    "Which motion is in which suite.",
+    _reference("suite_id", "suite.id", "CASCADE", "the suite"),
+    _reference("motion_id", "motion.id", "CASCADE", "the motion"),
     PrimaryKeyConstraint("suite_id", "motion_id"),
     Index(None, "motion_id"),
     sqlite_with_rowid=False,
 )
 
-toppling_spectrum = Table(
+toppling_spectrum = _table(
     "toppling_spectrum",
-    metadata,
-    Column("motion_id", ForeignKey("motion.id", ondelete="CASCADE"), nullable=False),
-    Column("polarity", Text, nullable=False),
-    Column("p2", Double, nullable=False),  # 1/s²
-    Column("numerics_version", Text, nullable=False),
-    Column("x_m_s", Double, nullable=False),
-    Column("digest", BigInteger, nullable=False),
+    "The toppling spectrum X(p) of motions.",
+    _reference("motion_id", "motion.id", "CASCADE", "the motion"),
+    _column("polarity", Text, _POLARITY),
+    _column("p2", Double, _P2, "1/s²"),
+    _column("numerics_version", Text, _NUMERICS),
+    _column(
+        "x_m_s",
+        Double,
+        "X(p), toppling velocity of the linear model, over excursions from rest",
+        "m/s",
+    ),
     PrimaryKeyConstraint("motion_id", "polarity", "p2", "numerics_version"),
     CheckConstraint(POLARITY, name="polarity"),
     CheckConstraint("p2 > 0 AND x_m_s >= 0", name="ranges"),
     sqlite_with_rowid=False,
 )
 
-campaign = Table(
+campaign = _table(
     "campaign",
-    metadata,
-    Column("id", Integer, primary_key=True),
-    Column("settings", Text, nullable=False),  # JSON
-    Column("numerics_version", Text, nullable=False),
-    Column("rbfrag_version", Text, nullable=False),
-    Column("started", Text, nullable=False),
-    Column("finished", Text),  # NULL while it runs, and for ever if it was killed
-    Column("digest", BigInteger, nullable=False),
+    "Runs of rbfrag simulate. Which of them made a row is no part of what the row says.",
+    _row_number(),
+    _column("settings", Text, "JSON: what was asked for, and on which processor with which numba"),
+    _column("numerics_version", Text, _NUMERICS),
+    _column("rbfrag_version", Text, "version of rbfrag"),
+    _column("started", Text, "UTC time of its start"),
+    _optional("finished", Text, "UTC time of its end; missing while it runs and if it was killed"),
 )
 
-combination = Table(
+combination = _table(
     "combination",
-    metadata,
-    Column("id", Integer, primary_key=True),
-    Column("natural_key", Text, nullable=False),
-    Column("campaign_id", ForeignKey("campaign.id", ondelete="RESTRICT"), nullable=False),
-    Column("motion_id", ForeignKey("motion.id", ondelete="RESTRICT"), nullable=False),
-    Column("vertical_motion_id", ForeignKey("motion.id", ondelete="RESTRICT")),
-    Column("polarity", Text, nullable=False),
-    Column("kind", Text, nullable=False),
-    Column("linear", Boolean, nullable=False),
-    Column("p2", Double),  # 1/s²; NULL where the block needs none
-    Column("block", Text),  # JSON object; NULL where p2 says all
-    Column("settings", Text, nullable=False),  # JSON
-    Column("numerics_version", Text, nullable=False),
-    Column("status", Text, nullable=False),
-    Column("search_limit", Double),  # kr/PGA; NULL without a search
-    Column("kr_over_pga", Double),
-    Column("lower", Double),  # kr/PGA
-    Column("upper", Double),  # kr/PGA
-    Column("kr", Double),
-    Column("y_m_s", Double),
-    Column("certified", Boolean, nullable=False),
-    Column("k_up_over_pga", Double),
-    Column("undecided", Double),  # kr/PGA
-    Column("island_width", Double),  # kr/PGA
-    Column("kr_over_pga_resolved", Double),
-    Column("reentrant", Boolean),
-    Column("n_runs", Integer, nullable=False),
-    Column("warnings", Text, nullable=False),  # JSON list
-    Column("digest", BigInteger, nullable=False),
+    "Critical searches: the strongest block of size p² that a motion topples, or that it slides a"
+    " stated distance; for blocks that slump, their strength over the critical factor on the "
+    "record.",
+    _row_number(),
+    _column("natural_key", Text, _KEY),
+    _reference("campaign_id", "campaign.id", "RESTRICT", "the campaign that made it"),
+    *_shaken(),
+    _optional("p2", Double, f"{_P2}; p_s² at rest of other kinds; missing for sliding", "1/s²"),
+    _optional(
+        "block",
+        Text,
+        "JSON object: shape, size, friction and dip of a block that slumps or topples confined, "
+        "or the plane that it slides on; missing for toppling",
+    ),
+    _column("settings", Text, "JSON: what else decided the answer, part of the natural key"),
+    _column("numerics_version", Text, _NUMERICS),
+    _column(
+        "status",
+        Text,
+        "found; below_limit: nothing topples down to the search limit (censored); no_motion: no "
+        "such block ever lifts; outside_model: 1 + k_v <= 0; not_searched: only the blocks of the"
+        " grid were run",
+    ),
+    _optional(
+        "search_limit", Double, "smallest strength looked at; missing without a search", "k_r/PGA"
+    ),
+    _optional(
+        "kr_over_pga", Double, "greatest strength known to topple; missing unless found", "k_r/PGA"
+    ),
+    _optional("lower", Double, "lower end of the bracket: topples", "k_r/PGA"),
+    _optional("upper", Double, "upper end of the bracket: safe", "k_r/PGA"),
+    _optional(
+        "kr", Double, "the critical k_r itself, kr_over_pga times PGA in g; missing unless found"
+    ),
+    _optional("y_m_s", Double, "critical toppling velocity k_r g/p; missing unless found", "m/s"),
+    _column("certified", Boolean, "true: everything above the bracket is proven safe"),
+    _optional(
+        "k_up_over_pga",
+        Double,
+        "proven bound for excursions from rest: nothing above it topples",
+        "k_r/PGA",
+    ),
+    _optional("undecided", Double, "length above the bracket that is not proven safe", "k_r/PGA"),
+    _optional(
+        "island_width",
+        Double,
+        "width of the toppling interval that ends at the bracket; missing without a map",
+        "k_r/PGA",
+    ),
+    _optional(
+        "kr_over_pga_resolved",
+        Double,
+        "critical value when toppling intervals narrower than 1e-6 are ignored; missing without a"
+        " map",
+        "k_r/PGA",
+    ),
+    _optional(
+        "reentrant",
+        Boolean,
+        "true: a safe island wider than 1e-6 lies below the critical value; missing without a map",
+    ),
+    _column("n_runs", Integer, "simulations made, most of which are not stored"),
+    _column("warnings", Text, "JSON list of sentences about the input or the answer"),
     UniqueConstraint("natural_key"),
     CheckConstraint("length(natural_key) = 64", name="natural_key"),
     CheckConstraint(POLARITY, name="polarity"),
@@ -211,30 +326,39 @@ combination = Table(
     Index(None, "campaign_id"),
 )
 
-outcome_interval = Table(
+outcome_interval = _table(
     "outcome_interval",
-    metadata,
-    Column("combination_id", ForeignKey("combination.id", ondelete="CASCADE"), nullable=False),
-    Column("k_lo", Double, nullable=False),  # kr/PGA
-    Column("k_hi", Double, nullable=False),  # kr/PGA
-    Column("outcome", Text, nullable=False),
-    Column("digest", BigInteger, nullable=False),
+    "The certified map, made on request: what becomes of every block of an interval of strengths.",
+    _reference("combination_id", "combination.id", "CASCADE", "the combination"),
+    _column("k_lo", Double, "lower end", "k_r/PGA"),
+    _column("k_hi", Double, "upper end; the next interval begins there", "k_r/PGA"),
+    _column("outcome", Text, "topples: every block in it; safe: none; undecided: not proven"),
     PrimaryKeyConstraint("combination_id", "k_lo"),
     CheckConstraint("k_lo >= 0 AND k_hi >= k_lo", name="ranges"),
     CheckConstraint("outcome IN ('topples', 'safe', 'undecided')", name="outcome"),
     sqlite_with_rowid=False,
 )
 
-simulation = Table(
+simulation = _table(
     "simulation",
-    metadata,
-    Column("combination_id", ForeignKey("combination.id", ondelete="CASCADE"), nullable=False),
-    Column("kr_over_pga", Double, nullable=False),
-    Column("theta_n", Double),  # peak rotation over the critical angle; NULL where it toppled
-    Column("outcome", Text, nullable=False),
-    Column("displacement_m", Double),  # down a level plane, of blocks that slide
-    Column("grid", Integer),  # number in the grid of outcomes; NULL for a block beside it
-    Column("digest", BigInteger, nullable=False),
+    "Single blocks that were run: the critical one, those of the grid that fits read, and others "
+    "that were asked for.",
+    _reference("combination_id", "combination.id", "CASCADE", "the combination"),
+    _column("kr_over_pga", Double, "strength of the block", "k_r/PGA"),
+    _optional("theta_n", Double, "peak rotation over the critical angle; missing where it toppled"),
+    _column("outcome", Text, _OUTCOME),
+    _optional(
+        "displacement_m",
+        Double,
+        "permanent displacement of a sliding block down a level plane; missing for others",
+        "m",
+    ),
+    _optional(
+        "grid",
+        Integer,
+        "number of the block in the grid of its kind, which does not depend on outcomes; missing "
+        "for a block beside it",
+    ),
     PrimaryKeyConstraint("combination_id", "kr_over_pga"),
     CheckConstraint("kr_over_pga > 0", name="kr_over_pga"),
     CheckConstraint("theta_n >= 0", name="theta_n"),
@@ -243,30 +367,27 @@ simulation = Table(
     sqlite_with_rowid=False,
 )
 
-response = Table(
+response = _table(
     "response",
-    metadata,
-    Column("id", Integer, primary_key=True),
-    Column("natural_key", Text, nullable=False),
-    Column("motion_id", ForeignKey("motion.id", ondelete="RESTRICT"), nullable=False),
-    Column("vertical_motion_id", ForeignKey("motion.id", ondelete="RESTRICT")),
-    Column("polarity", Text, nullable=False),
-    Column("kind", Text, nullable=False),
-    Column("linear", Boolean, nullable=False),
-    Column("p2", Double, nullable=False),  # 1/s²
-    Column("kr", Double, nullable=False),
-    Column("numerics_version", Text, nullable=False),
-    Column("outcome", Text, nullable=False),
-    Column("peak_theta_n", Double),
-    Column("peak_theta_rad", Double),
-    Column("npts", Integer, nullable=False),
+    "Histories of single blocks, kept only when asked for.",
+    _row_number(),
+    _column("natural_key", Text, _KEY),
+    *_shaken(),
+    _column("p2", Double, _P2, "1/s²"),
+    _column("kr", Double, "rocking acceleration coefficient k_r = tan(critical angle)"),
+    _column("numerics_version", Text, _NUMERICS),
+    _column("outcome", Text, _OUTCOME),
+    _optional(
+        "peak_theta_n", Double, "peak rotation over the critical angle; missing if it toppled"
+    ),
+    _optional("peak_theta_rad", Double, "peak rotation; missing if it toppled", "rad"),
+    _column("npts", Integer, "length of each of the arrays"),
     # Little-endian float64, npts values each.
-    Column("time_s", LargeBinary, nullable=False),
-    Column("theta_rad", LargeBinary, nullable=False),
-    Column("theta_dot_rad_s", LargeBinary, nullable=False),
-    Column("k_h", LargeBinary, nullable=False),
-    Column("k_v", LargeBinary, nullable=False),
-    Column("digest", BigInteger, nullable=False),
+    _column("time_s", LargeBinary, "times, little-endian float64", "s"),
+    _column("theta_rad", LargeBinary, "rotation", "rad"),
+    _column("theta_dot_rad_s", LargeBinary, "rotation rate", "rad/s"),
+    _column("k_h", LargeBinary, "driving horizontal acceleration, polarity applied", "g"),
+    _column("k_v", LargeBinary, "vertical acceleration, upward positive", "g"),
     UniqueConstraint("natural_key"),
     CheckConstraint("length(natural_key) = 64", name="natural_key"),
     CheckConstraint(POLARITY, name="polarity"),
@@ -277,22 +398,23 @@ response = Table(
     Index(None, "vertical_motion_id"),
 )
 
-fragility_model = Table(
+fragility_model = _table(
     "fragility_model",
-    metadata,
-    Column("id", Integer, primary_key=True),
-    Column("name", Text, nullable=False),
-    Column("kind", Text, nullable=False),
-    Column("term", Text, nullable=False),
-    Column("method", Text, nullable=False),
-    Column("coefficients", Text, nullable=False),  # JSON object, ordered
-    Column("covariance", Text, nullable=False),  # JSON list of lists, in that order
-    Column("domain", Text, nullable=False),  # JSON object: [low, high] by variable
-    Column("data_fingerprint", Text, nullable=False),
-    Column("diagnostics", Text, nullable=False),  # JSON object
-    Column("is_default", Boolean, nullable=False),
-    Column("created", Text, nullable=False),
-    Column("digest", BigInteger, nullable=False),
+    "Fitted fragility models.",
+    _row_number(),
+    _column("name", Text, "name of the model"),
+    _column("kind", Text, _KIND),
+    _column("term", Text, "intensity term: pgv, pga_tm, pgd_tm, pgv_pga, pgv_pga_tm, xp"),
+    _column("method", Text, "method of the fit"),
+    _column("coefficients", Text, "JSON object: value by parameter, in order"),
+    _column("covariance", Text, "JSON list of lists: covariance of the parameters in that order"),
+    _column("domain", Text, "JSON object: fitted range [low, high] by variable"),
+    _column("data_fingerprint", Text, "hash of the data that were fitted"),
+    _column("diagnostics", Text, "JSON object: counts, scores, warnings"),
+    _column(
+        "is_default", Boolean, "true for the one model of its kind that answers when none is named"
+    ),
+    _column("created", Text, "UTC time of the fit"),
     UniqueConstraint("name"),
     CheckConstraint("name <> ''", name="name"),
     CheckConstraint(KIND, name="kind"),
@@ -305,3 +427,13 @@ fragility_model = Table(
         postgresql_where=text("is_default"),
     ),
 )
+
+vertical = motion.alias("vertical")
+"""The vertical motion of a combination or response, where it has one."""
+
+
+def with_motions(table: Table) -> Join:
+    """Return a table that names motions, joined to the horizontal and the :data:`vertical` one."""
+    return table.join(motion, motion.c.id == table.c.motion_id).outerjoin(
+        vertical, vertical.c.id == table.c.vertical_motion_id
+    )

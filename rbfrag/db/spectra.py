@@ -27,52 +27,21 @@ def store_spectrum(
     p2: Sequence[float] | NDArray[np.float64],
     x_m_s: Sequence[float] | NDArray[np.float64],
     numerics_version: str = NUMERICS_VERSION,
-) -> int:
+) -> None:
     """Store values of one motion's spectrum; values that are there already stay.
 
     Args:
-        connection: inside the caller's transaction.
         motion_id: the motion.
         polarity: ``forward`` or ``reverse``.
         p2: frequency parameters [1/s²], shape (n,).
         x_m_s: X(p) at each of them [m/s], shape (n,).
         numerics_version: of the computation.
-
-    Returns:
-        How many were new.
     """
-    there, _ = stored_spectrum(
-        connection, motion_id, polarity=polarity, numerics_version=numerics_version
-    )
-    known = set(there.tolist())
     rows: list[tuple[object, ...]] = [
         (motion_id, polarity, float(size), numerics_version, float(velocity))
         for size, velocity in zip(p2, x_m_s, strict=True)
-        if float(size) not in known
     ]
     insert_rows(connection, toppling_spectrum, _COLUMNS, rows)
-    return len(rows)
-
-
-def stored_spectrum(
-    connection: Connection,
-    motion_id: int,
-    *,
-    polarity: Polarity,
-    numerics_version: str = NUMERICS_VERSION,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what is stored of one motion's spectrum: p² [1/s²], rising, and X(p) [m/s]."""
-    rows = connection.execute(
-        select(toppling_spectrum.c.p2, toppling_spectrum.c.x_m_s)
-        .where(
-            toppling_spectrum.c.motion_id == motion_id,
-            toppling_spectrum.c.polarity == polarity,
-            toppling_spectrum.c.numerics_version == numerics_version,
-        )
-        .order_by(toppling_spectrum.c.p2)
-    ).all()
-    table = np.array([tuple(row) for row in rows], dtype=np.float64).reshape(-1, 2)
-    return table[:, 0].copy(), table[:, 1].copy()
 
 
 def spectrum_values(
@@ -84,7 +53,6 @@ def spectrum_values(
     """Return X(p) [m/s] of all motions, by motion id, polarity and p².
 
     Args:
-        connection: the database.
         p2: only these frequency parameters [1/s²].
         numerics_version: of the computation.
     """

@@ -1,4 +1,4 @@
-"""One SQLite file on disk: opening, recognising it, and its errors in words.
+"""One SQLite file on disk: opening, recognising it, and explaining its errors.
 
 Standard library only: `rbfrag predict` reads its model through this module.
 """
@@ -85,7 +85,7 @@ def connect_sqlite(
             _refuse_unreadable_log(path)
             return _connect(path, "mode=ro&immutable=1", True, busy_timeout_s, check_same_thread)
     except sqlite3.Error as error:
-        raise sqlite_error_in_words(error, path) from error
+        raise explained_sqlite_error(error, path) from error
 
 
 def _connect(
@@ -128,16 +128,16 @@ def check_sqlite_database(connection: sqlite3.Connection, path: Path) -> None:
             raise NotADatabaseError(
                 f"{path} is an SQLite database, but not one of rbfrag's: name another with --db"
             )
-        (found,) = connection.execute(
+        (tables,) = connection.execute(
             "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?", (VERSION_TABLE,)
         ).fetchone()
         row = (
             connection.execute(f"SELECT version_num FROM {VERSION_TABLE}").fetchone()
-            if found
+            if tables
             else None
         )
     except sqlite3.Error as error:
-        raise sqlite_error_in_words(error, path) from error
+        raise explained_sqlite_error(error, path) from error
     if row is None:
         raise NotADatabaseError(
             f"{path} is marked as rbfrag's but holds no schema: restore it from a copy"
@@ -145,8 +145,8 @@ def check_sqlite_database(connection: sqlite3.Connection, path: Path) -> None:
     check_revision(row[0], str(path))
 
 
-def sqlite_error_in_words(error: sqlite3.Error, path: Path | str) -> DatabaseError:
-    """Return the rbfrag error that says in words what SQLite ran into."""
+def explained_sqlite_error(error: sqlite3.Error, path: Path | str) -> DatabaseError:
+    """Return the rbfrag error that explains what SQLite ran into."""
     code = _primary_code(error)
     if code in (_BUSY, _LOCKED):
         return DatabaseBusyError(

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection, Table, select
 
-from rbfrag.db.schema import campaign, combination, motion, outcome_interval, simulation
+from rbfrag.db.rows import Interval, Point
+from rbfrag.db.schema import (
+    campaign,
+    combination,
+    motion,
+    outcome_interval,
+    simulation,
+    vertical,
+    with_motions,
+)
 from rbfrag.solver.results import OutcomeIntervals, SearchPoints
 
 
@@ -50,17 +60,11 @@ def keys_with_samples(connection: Connection, *, numerics_version: str) -> list[
     """Return, sorted, the natural keys of combinations that can be computed again.
 
     Args:
-        connection: the database.
         numerics_version: of the solver at hand; other versions may give other numbers.
     """
-    vertical = motion.alias("vertical")
     query = (
         select(combination.c.natural_key)
-        .select_from(
-            combination.join(motion, motion.c.id == combination.c.motion_id).outerjoin(
-                vertical, vertical.c.id == combination.c.vertical_motion_id
-            )
-        )
+        .select_from(with_motions(combination))
         .where(
             combination.c.numerics_version == numerics_version,
             motion.c.samples.is_not(None),
@@ -83,22 +87,8 @@ def stored_combination(connection: Connection, natural_key: str) -> StoredCombin
         .mappings()
         .one()
     )
-    points = connection.execute(
-        select(
-            simulation.c.kr_over_pga,
-            simulation.c.theta_n,
-            simulation.c.outcome,
-            simulation.c.displacement_m,
-            simulation.c.grid,
-        )
-        .where(simulation.c.combination_id == row["id"])
-        .order_by(simulation.c.kr_over_pga.desc())
-    ).all()
-    intervals = connection.execute(
-        select(outcome_interval.c.k_lo, outcome_interval.c.k_hi, outcome_interval.c.outcome)
-        .where(outcome_interval.c.combination_id == row["id"])
-        .order_by(outcome_interval.c.k_lo)
-    ).all()
+    points = points_of(connection, [row["id"]])[row["id"]][::-1]
+    intervals = intervals_of(connection, [row["id"]])[row["id"]]
     return StoredCombination(
         id=row["id"],
         motion_id=row["motion_id"],
@@ -117,14 +107,35 @@ def stored_combination(connection: Connection, natural_key: str) -> StoredCombin
             else _floats([point.displacement_m for point in points]),
         ),
         intervals=OutcomeIntervals(
-            k_lo=_floats([low for low, _, _ in intervals]),
-            k_hi=_floats([high for _, high, _ in intervals]),
-            outcome=tuple(outcome for _, _, outcome in intervals),
+            k_lo=_floats([interval.k_lo for interval in intervals]),
+            k_hi=_floats([interval.k_hi for interval in intervals]),
+            outcome=tuple(interval.outcome for interval in intervals),
         ),
         grid=np.array(
             [-1 if point.grid is None else point.grid for point in points], dtype=np.int64
         ),
     )
+
+
+def intervals_of(connection: Connection, ids: Sequence[int]) -> Mapping[int, list[Interval]]:
+    """Return the maps of combinations, by their id."""
+    return _belonging(connection, outcome_interval, Interval, ids)
+
+
+def points_of(connection: Connection, ids: Sequence[int]) -> Mapping[int, list[Point]]:
+    """Return the simulations of combinations, by their id."""
+    return _belonging(connection, simulation, Point, ids)
+
+
+def _belonging(
+    connection: Connection, table: Table, row: type[Any], ids: Sequence[int]
+) -> defaultdict[int, list[Any]]:
+    query = select(table.c.combination_id, *(table.c[name] for name in row._fields))
+    query = query.where(table.c.combination_id.in_(ids)).order_by(*table.primary_key.columns)
+    by_id: defaultdict[int, list[Any]] = defaultdict(list)
+    for owner, *values in connection.execute(query):
+        by_id[owner].append(row._make(values))
+    return by_id
 
 
 def _floats(values: list[float | None]) -> NDArray[np.float64]:

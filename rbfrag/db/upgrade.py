@@ -23,7 +23,7 @@ from rbfrag.db.location import (
     check_revision,
     locate,
 )
-from rbfrag.db.sqlite_file import sqlite_error_in_words
+from rbfrag.db.sqlite_file import explained_sqlite_error
 from rbfrag.errors import (
     DatabaseError,
     DatabaseNotFoundError,
@@ -38,7 +38,7 @@ def upgrade_database(db: str | PathLike[str] | None = None) -> tuple[str, str]:
     """Bring a database to the schema of this rbfrag, in one transaction.
 
     Args:
-        db: a path or an SQLAlchemy URL; None as for :func:`rbfrag.db.engine.database_url`.
+        db: a path or an SQLAlchemy URL; None as for :func:`rbfrag.db.engine.open_database`.
 
     Returns:
         The revision before and after; they are equal when there was nothing to do.
@@ -133,8 +133,8 @@ def create_if_missing(place: Path | str, *, busy_timeout_s: float) -> None:
             f"cannot make the database {place}: {error.strerror or error}"
         ) from error
     finally:
-        for leftover in (draft, *(Path(f"{draft}{tail}") for tail in ("-wal", "-shm", "-journal"))):
-            leftover.unlink(missing_ok=True)
+        for tail in ("", "-wal", "-shm", "-journal"):
+            Path(f"{draft}{tail}").unlink(missing_ok=True)
 
 
 def _draft_file(place: Path, folder: Path) -> Path:
@@ -164,7 +164,7 @@ def _build(draft: Path, busy_timeout_s: float) -> None:
         finally:
             raw.close()
     except sqlite3.Error as error:
-        raise sqlite_error_in_words(error, draft) from error
+        raise explained_sqlite_error(error, draft) from error
     engine = unchecked_engine(draft, foreign_keys=False, busy_timeout_s=busy_timeout_s)
     try:
         migrate(engine)

@@ -47,7 +47,6 @@ def vertical_pairs(connection: Connection, *, suite: str | None = None) -> dict[
     of different lengths are companions: the shorter is followed by rest, and a remark says so.
 
     Args:
-        connection: the database.
         suite: only the horizontal motions of this suite.
     """
     horizontals = [row for row in motion_rows(connection, suite=suite) if not row.is_vertical]
@@ -74,7 +73,7 @@ def vertical_pair(connection: Connection, motion_id: int) -> VerticalPair:
         .where(motion.c.is_vertical, motion.c.recording_id == own)
         .order_by(motion.c.id)
     )
-    return _pair(row, [motion_row(connection, found) for found in connection.scalars(query)])
+    return _pair(row, [motion_row(connection, each) for each in connection.scalars(query)])
 
 
 def load_vertical(connection: Connection, motion_id: int) -> GroundMotion | None:
@@ -89,13 +88,7 @@ def load_vertical(connection: Connection, motion_id: int) -> GroundMotion | None
 
 @dataclass(frozen=True)
 class MixedRecording:
-    """A recording whose components differ in their sampling interval.
-
-    Args:
-        name: the recording.
-        dt_s: the intervals [s], rising.
-        motion_ids: its motions.
-    """
+    """A recording whose components differ in their sampling interval, `dt_s` rising."""
 
     name: str
     dt_s: tuple[float, ...]
@@ -115,16 +108,16 @@ def recordings_of_mixed_dt(connection: Connection) -> list[MixedRecording]:
         .where(recording.c.id.in_(mixed))
         .order_by(recording.c.id, motion.c.id)
     )
-    found: dict[int, list[Any]] = defaultdict(list)
+    by_recording: dict[int, list[Any]] = defaultdict(list)
     for row in connection.execute(query):
-        found[row.id].append(row)
+        by_recording[row.id].append(row)
     return [
         MixedRecording(
             name=rows[0].name,
             dt_s=tuple(sorted({row.dt_s for row in rows})),
             motion_ids=tuple(row.motion_id for row in rows),
         )
-        for rows in found.values()
+        for rows in by_recording.values()
     ]
 
 

@@ -20,9 +20,16 @@ from rbfrag.exchange.batch_table import (
     parquet_parts,
     parquet_writer,
 )
-from rbfrag.exchange.block_table import table_path
+from rbfrag.exchange.block_table import (
+    NUMBERS,
+    RECTANGLE,
+    is_of_rectangles,
+    rectangle_columns,
+    table_path,
+)
 from rbfrag.files import reading, written_whole
 from rbfrag.fragility.lookup import block_of, find_model
+from rbfrag.fragility.methods import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import MEASURES, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
@@ -45,7 +52,7 @@ BLOCK_COLUMNS = {
 ANSWERS = ("probability", "ci_low", "ci_high", "in_domain", "reason")
 """The columns that are appended; a table that has them gets new ones."""
 
-NUMERIC = (*BLOCK_COLUMNS, *MEASURES)
+NUMERIC = (*BLOCK_COLUMNS, *RECTANGLE, *MEASURES)
 """Columns that hold numbers."""
 
 OTHER_MODE = "the block's mode is {mode}: the {kind} model says nothing about it"
@@ -95,7 +102,7 @@ def predict_table(
             opened = csv_parts if suffix == ".csv" else parquet_parts
             header, parts = opened(origin, NUMERIC, stack)
             names = _columns(origin, header, given)
-            known = [*names.values(), *given]
+            known = [*_known_names(names), *given]
             chosen = find_model(model, known, db, kind=kind, rotation_deg=rotation_deg)
             partial = stack.enter_context(written_whole(goal))
             writer = csv_writer if goal.suffix.lower() == ".csv" else parquet_writer
@@ -128,11 +135,20 @@ def predict_table(
 def _columns(origin: Path, header: list[str], given: Mapping[str, float]) -> dict[str, str]:
     """Return what each column of numbers is called in `predict`."""
     block = block_of([*(BLOCK_COLUMNS.get(name, "") for name in header), *given])
-    columns = {
-        column: name
-        for column, name in BLOCK_COLUMNS.items()
-        if name in (*block.names, *block.options)
-    }
+    rectangles = (
+        block is TOPPLING_BLOCK
+        and is_of_rectangles(header)
+        and not {*block.names}.intersection(given)
+    )
+    columns = (
+        {name: name for name in RECTANGLE}
+        if rectangles
+        else {
+            column: name
+            for column, name in BLOCK_COLUMNS.items()
+            if name in (*block.names, *block.options)
+        }
+    )
     for column, name in columns.items():
         if name in block.names and name not in given and column not in header:
             raise InputError(
@@ -143,11 +159,19 @@ def _columns(origin: Path, header: list[str], given: Mapping[str, float]) -> dic
     if doubled:
         raise InputError(f"{origin}: the column {doubled[0]} is there twice")
     columns |= {name: name for name in MEASURES}
-    found = {column: name for column, name in columns.items() if column in header}
-    for column, name in found.items():
+    present = {column: name for column, name in columns.items() if column in header}
+    for column, name in present.items():
         if name in given:
             raise InputError(f"{column} is an option and a column of {origin}: give it once")
-    return found
+    return present
+
+
+def _known_names(names: Mapping[str, str]) -> list[str]:
+    """Return what is known of blocks and motions, rectangles by their numbers."""
+    if "height_m" not in names:
+        return list(names.values())
+    measures = (name for name in names.values() if name not in RECTANGLE)
+    return [*(BLOCK_COLUMNS[name] for name in NUMBERS), *measures]
 
 
 def _answer(
@@ -160,6 +184,10 @@ def _answer(
     level: float,
 ) -> dict[str, NDArray[Any]]:
     values = {names[column]: numbers(origin, column, part[column], first_line) for column in names}
+    if "height_m" in values:
+        numbers_of = rectangle_columns(values)
+        values = {name: value for name, value in values.items() if name not in RECTANGLE}
+        values |= {BLOCK_COLUMNS[name]: value for name, value in numbers_of.items()}
     predicted = answer_given(model, {**values, **given}, level)
     assert isinstance(predicted, PredictionArray)
     answer: dict[str, NDArray[Any]] = {

@@ -143,15 +143,15 @@ def numbers(origin: Path, column: str, cells: Any, first_line: int) -> NDArray[n
     """Return the numbers of some cells; NaN where one is empty."""
     if isinstance(cells, np.ndarray):
         return cells
-    found = np.empty(len(cells))
+    values = np.empty(len(cells))
     for i, cell in enumerate(cells):
         try:
-            found[i] = float(cell.strip() or "nan")
+            values[i] = float(cell.strip() or "nan")
         except ValueError:
             raise InputError(
                 f"{origin}, line {first_line + i}: {column} = {cell.strip()!r} is not a number"
             ) from None
-    return found
+    return values
 
 
 def csv_writer(
@@ -223,8 +223,8 @@ def parquet_writer(
         table = arrow.table(_columns(arrow, part, answer, header, answers, numeric, bare=False))
         if not open_file:
             texts = [field.name for field in table.schema if arrow.types.is_string(field.type)]
-            made = parquet.ParquetWriter(partial, table.schema, use_dictionary=texts)
-            open_file.append(stack.enter_context(made))
+            parquet_file = parquet.ParquetWriter(partial, table.schema, use_dictionary=texts)
+            open_file.append(stack.enter_context(parquet_file))
         open_file[0].write_table(table.cast(open_file[0].schema))
 
     return write

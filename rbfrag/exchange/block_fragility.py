@@ -107,9 +107,9 @@ def _probabilities(
         for start in range(0, p2.size, _CHUNK):
             some = slice(start, start + _CHUNK)
             shaking: dict[str, Any] = {measure: x[None, :], **fixed}
-            found = predict(p2[some, None], kr[some, None], **shaking, model=chosen)
-            assert isinstance(found, PredictionArray)
-            yield found.probability
+            prediction = predict(p2[some, None], kr[some, None], **shaking, model=chosen)
+            assert isinstance(prediction, PredictionArray)
+            yield prediction.probability
 
     kind = IntensityType(measure, 0.01 if measure == "pgv_m_s" else 1.0)
     return kind, (chosen.name, chosen.term.name, chosen.row.method), rows()

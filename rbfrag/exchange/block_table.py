@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -25,9 +25,17 @@ from rbfrag.exchange.batch_table import (
 from rbfrag.exchange.points import SUFFIXES as GEOJSON
 from rbfrag.exchange.points import read_points
 from rbfrag.files import output_path, reading, written_whole
+from rbfrag.solver.block.formulas import array_elementwise
+from rbfrag.solver.described import rectangle_numbers
 
 SUFFIXES = (".csv", ".parquet")
 """File types of a block table."""
+
+NUMBERS = ("p2_1_s2", "kr")
+"""Columns of a block that topples."""
+
+RECTANGLE = ("height_m", "width_m", "dip_deg")
+"""Columns of a rectangle, which are read where those are not all there; the dip may be missing."""
 
 _ROWS = 1 << 14
 
@@ -109,29 +117,52 @@ def read_columns(
                 if name not in header:
                     have = ", ".join(header) or "none"
                     raise InputError(f"{source}: there is no column {name}; the columns are {have}")
-            found: dict[str, list[NDArray[Any]]] = {
+            collected: dict[str, list[NDArray[Any]]] = {
                 name: [np.empty(0, dtype=object if name in texts else np.float64)]
                 for name in (*wanted, *texts)
                 if name in header
             }
             for first, part in parts:
-                for name, arrays in found.items():
+                for name, arrays in collected.items():
                     if name in texts:
                         cells = [str(cell).strip() for cell in cells_of(part[name])]
                         arrays.append(np.array(cells, dtype=object))
                     else:
                         arrays.append(numbers(source, name, part[name], first))
-            return {name: np.concatenate(arrays) for name, arrays in found.items()}
+            return {name: np.concatenate(arrays) for name, arrays in collected.items()}
     except csv.Error as error:
         raise InputError(f"{source}: not a CSV file: {error}") from None
+
+
+def is_of_rectangles(names: Collection[str]) -> bool:
+    """Return whether columns of these names describe blocks by height and width."""
+    return not {*NUMBERS} <= {*names} and {"height_m", "width_m"} <= {*names}
+
+
+def rectangle_columns(columns: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """Return ``p2_1_s2`` and ``kr`` of rectangles backed by a slope; NaN where there is none.
+
+    Args:
+        columns: ``height_m``, ``width_m`` and, unless the bases are level, ``dip_deg``.
+    """
+    height, width, dip = (
+        np.asarray(columns.get(name, 0.0), dtype=np.float64) for name in RECTANGLE
+    )
+    with np.errstate(all="ignore"):
+        p2_and_kr = rectangle_numbers(height, width, dip, array_elementwise())
+        is_block = (height > 0.0) & (width > 0.0) & (np.abs(dip) < 90.0)
+        return {
+            name: np.where(is_block & np.isfinite(values), values, np.nan)
+            for name, values in zip(NUMBERS, p2_and_kr, strict=True)
+        }
 
 
 def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     """Return the blocks of a table (.csv, .parquet) or of GeoJSON points as columns.
 
     Args:
-        path: file with ``p2_1_s2`` [1/s²] and ``kr``, and ``block_id``, ``weight``, ``lon`` and
-            ``lat`` [deg] if it has them.
+        path: file with ``p2_1_s2`` [1/s²] and ``kr``, or ``height_m`` and ``width_m`` (and
+            ``dip_deg``), and ``block_id``, ``weight``, ``lon`` and ``lat`` [deg] if it has them.
 
     Returns:
         Columns of one length; ``block_id`` are texts, numbers from 1 on where there are none.
@@ -142,11 +173,11 @@ def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
             message names it.
         MissingExtraError: a Parquet file without pyarrow.
     """
-    found = _points(path) if str(path).lower().endswith(GEOJSON) else _rows(path)
-    if found["kr"].size == 0:
+    columns = _points(path) if str(path).lower().endswith(GEOJSON) else _rows(path)
+    if columns["kr"].size == 0:
         raise InputError(f"{path}: there is no block in the file")
-    for i in range(found["kr"].size):
-        row = {name: column[i] for name, column in found.items()}
+    for i in range(columns["kr"].size):
+        row = {name: column[i] for name, column in columns.items()}
         block = f"{path}: block {row['block_id']}"
         a, b = float(row["p2_1_s2"]), float(row["kr"])
         if not (0.0 < a < math.inf and 0.0 < b < math.inf):
@@ -160,35 +191,53 @@ def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
             )
         if "weight" in row and not row["weight"] >= 0.0:
             raise InputError(f"{block} has a weight below zero")
-    if "weight" in found and not found["weight"].sum() > 0.0:
+    if "weight" in columns and not columns["weight"].sum() > 0.0:
         raise InputError(f"{path}: the weights of the blocks sum to zero")
-    return found
+    return columns
 
 
 def _points(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     points = read_points(path)
-    found: dict[str, NDArray[Any]] = {
+    columns: dict[str, NDArray[Any]] = {
         "lon": np.array([lon for lon, _, _ in points]),
         "lat": np.array([lat for _, lat, _ in points]),
         "block_id": np.array(
             [str(p.get("block_id", i + 1)) for i, (_, _, p) in enumerate(points)], dtype=object
         ),
     }
-    for name in ("p2_1_s2", "kr"):
-        values = [p.get(name) for _, _, p in points]
-        for i, value in enumerate(values):
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise InputError(f"{path}, features[{i}]: {name} = {value!r} is not a number")
-        found[name] = np.array(values, dtype=np.float64)
-    return found
+    properties = [p for _, _, p in points]
+    rectangles = any(is_of_rectangles(p) for p in properties)
+    for name in ("height_m", "width_m") if rectangles else NUMBERS:
+        columns[name] = _numbers(path, name, [p.get(name) for p in properties])
+    if rectangles:
+        columns["dip_deg"] = _numbers(path, "dip_deg", [p.get("dip_deg", 0.0) for p in properties])
+        columns |= rectangle_columns(columns)
+    return columns
+
+
+def _numbers(path: str | os.PathLike[str], name: str, values: list[Any]) -> NDArray[np.float64]:
+    for i, value in enumerate(values):
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InputError(f"{path}, features[{i}]: {name} = {value!r} is not a number")
+    return np.array(values, dtype=np.float64)
 
 
 def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
-    found = read_columns(
-        path, ("p2_1_s2", "kr"), optional=("lon", "lat", "weight"), texts=("block_id",)
+    columns = read_columns(
+        path, (), optional=(*NUMBERS, *RECTANGLE, "lon", "lat", "weight"), texts=("block_id",)
     )
-    if ("lon" in found) != ("lat" in found):
+    if is_of_rectangles(columns):
+        columns |= rectangle_columns(columns)
+    for name in NUMBERS:
+        if name not in columns:
+            raise InputError(
+                f"{path}: there is no column {name}: a table of blocks has p2_1_s2 and kr, or "
+                "height_m and width_m"
+            )
+    if ("lon" in columns) != ("lat" in columns):
         raise InputError(f"{path}: lon and lat go together: give both columns, or neither")
-    if "block_id" not in found:
-        found["block_id"] = np.array([str(i + 1) for i in range(found["kr"].size)], dtype=object)
-    return found
+    if "block_id" not in columns:
+        columns["block_id"] = np.array(
+            [str(i + 1) for i in range(columns["kr"].size)], dtype=object
+        )
+    return columns

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import secrets
@@ -11,9 +10,8 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
 from sqlalchemy import Connection
 
 from rbfrag.db.data_dictionary import (
@@ -22,7 +20,7 @@ from rbfrag.db.data_dictionary import (
     dictionary_as_markdown,
 )
 from rbfrag.db.engine import opened_database
-from rbfrag.db.table_columns import TABLES, Batch, chosen_columns, column_batches, read_columns
+from rbfrag.db.frames import TABLES, chosen_columns, frames
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.exchange.batch_table import pyarrow
 
@@ -144,20 +142,16 @@ def _write_csv(
     connection: Connection, table: str, columns: Sequence[ColumnMeaning], file: Path
 ) -> int:
     rows = 0
-    with file.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(column.name for column in columns)
-        for batch in column_batches(connection, table, columns):
-            cells = [_cells(c, values) for c, values in zip(columns, batch.values, strict=True)]
-            writer.writerows(zip(*cells, strict=True))
-            rows += len(batch.values[0])
+    words = {True: "true", False: "false"}
+    for frame in frames(connection, table, columns):
+        for column in columns:
+            if column.type == "true/false":
+                frame[column.name] = frame[column.name].map(words)
+        frame.to_csv(
+            file, mode="a", header=not rows, index=False, lineterminator="\n", encoding="utf-8"
+        )
+        rows += len(frame)
     return rows
-
-
-def _cells(column: ColumnMeaning, values: Sequence[Any]) -> Sequence[Any]:
-    if column.type == "true/false":
-        return [None if value is None else str(value).lower() for value in values]
-    return values  # csv writes None as an empty cell, and numbers with all their digits
 
 
 def _write_parquet(
@@ -185,22 +179,10 @@ def _write_parquet(
     )
     rows = 0
     with parquet.ParquetWriter(file, schema) as writer:
-        for batch in column_batches(connection, table, columns):
-            writer.write_table(_arrow_table(arrow, schema, batch))
-            rows += len(batch.values[0])
+        for frame in frames(connection, table, columns):
+            writer.write_table(arrow.Table.from_pandas(frame, schema, preserve_index=False))
+            rows += len(frame)
     return rows
-
-
-def _arrow_table(arrow: Any, schema: Any, batch: Batch) -> Any:
-    arrays = [
-        arrow.array(_arrays(values) if column.type == "array" else values, type=field.type)
-        for column, values, field in zip(batch.columns, batch.values, schema, strict=True)
-    ]
-    return arrow.Table.from_arrays(arrays, schema=schema)
-
-
-def _arrays(blobs: Sequence[bytes | None]) -> list[Any]:
-    return [None if blob is None else np.frombuffer(blob, dtype="<f8") for blob in blobs]
 
 
 def read_table(
@@ -228,12 +210,8 @@ def read_table(
         InputError: there is no such table or column.
         DatabaseError: the database cannot be used.
     """
-    # Imported here: no other answer of rbfrag needs pandas.
     import pandas as pd
 
     chosen = chosen_columns(table, columns, arrays=arrays)
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        values = read_columns(connection, table, columns, arrays=arrays)
-    frame = pd.DataFrame(values)
-    whole = [c.name for c in chosen if c.type == "integer" and c.may_be_missing]
-    return frame.astype(dict.fromkeys(whole, "Int64"))
+        return pd.concat(frames(connection, table, chosen), ignore_index=True)

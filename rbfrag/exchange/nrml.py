@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import groupby
 from xml.sax.saxutils import escape, quoteattr
 
@@ -19,21 +18,9 @@ from rbfrag.exchange.fragility_function import (
     lognormal_function,
     openquake_type,
 )
-from rbfrag.exchange.xml_source import parse_xml
+from rbfrag.exchange.xml_source import Node, read_xml
 
 _UNITS = {"g": 1.0, "cm/s": 0.01, "m/s": 1.0}
-
-
-@dataclass
-class _Function:
-    """One fragilityFunction (0.5) or ffs (0.4) while it is read."""
-
-    line: int
-    name: str = ""
-    form: str = ""
-    imls: Mapping[str, str] = field(default_factory=dict)
-    levels: str = ""
-    states: dict[str, tuple[str, Mapping[str, str]]] = field(default_factory=dict)
 
 
 def read_nrml(path: str | os.PathLike[str]) -> list[FragilityFunction]:
@@ -46,140 +33,99 @@ def read_nrml(path: str | os.PathLike[str]) -> list[FragilityFunction]:
         InputError: not such a file, a limit state without its function, or numbers that make
             none; the message names line or element.
     """
-    reading = _Reading(str(path))
-    parse_xml(
-        path, "an NRML fragility model", start=reading.start, end=reading.end, text=reading.text
-    )
-    return reading.result()
-
-
-class _Reading:
-    def __init__(self, source: str) -> None:
-        self._source = source
-        self._functions: list[_Function] = []
-        self._states: list[str] | None = None
-        self._format = ""
-        self._state = ""
-        self._text = ""
-        self._is_model = False
-
-    def start(self, name: str, attributes: Mapping[str, str], line: int) -> None:
-        self._text = ""
-        if name == "fragilityModel":
-            self._is_model = True
-            self._format = attributes.get("format", "")
-        elif name == "fragilityFunction":
-            if "id" not in attributes:
-                raise InputError(f"{self._source}, line {line}: fragilityFunction has no id")
-            form = attributes.get("format", "")
-            shape = attributes.get("shape", "logncdf")
-            if form == "continuous" and shape != "logncdf":
+    source = str(path)
+    document = read_xml(path, "an NRML fragility model")
+    model = next(document.of("fragilityModel"), None)
+    # fragilityFunction in version 0.5, ffs in 0.4
+    assets = [] if model is None else list(model.of("fragilityFunction", "ffs"))
+    if model is None or not assets:
+        raise InputError(f"{source}: there is no fragility function in the file")
+    stated = next(model.of("limitStates"), None)
+    if stated is None:
+        raise InputError(f"{source}: limitStates is missing")
+    states = stated.text.split()
+    if not states:
+        raise InputError(f"{source}, line {stated.line}: there is no limit state")
+    functions = []
+    for asset in assets:
+        name, form = _name_and_format(asset, model, source)
+        curves = _curves(asset, source)
+        for state in states:
+            if state not in curves:
                 raise InputError(
-                    f"{self._source}, line {line}: shape {shape!r} is not known: logncdf is"
+                    f"{source}, line {asset.line}: {name!r} lacks the limit state {state!r}"
                 )
-            self._functions.append(_Function(line, attributes["id"], form))
-        elif name == "ffs":
-            self._functions.append(_Function(line, "", self._format))
-        elif name in ("imls", "IML") and self._functions:
-            self._functions[-1].imls = attributes
-        elif name in ("ffc", "ffd"):
-            self._state = attributes.get("ls", "")
-            if not self._state:
-                raise InputError(f"{self._source}, line {line}: {name} has no limit state ls")
-        elif name in ("params", "poes") and self._functions:
-            state = attributes.get("ls", self._state)
-            if not state:
-                raise InputError(f"{self._source}, line {line}: {name} has no limit state ls")
-            if state in self._functions[-1].states:
+        for state in curves:
+            if state not in states:
                 raise InputError(
-                    f"{self._source}, line {line}: limit state {state!r} is given twice"
+                    f"{source}, line {asset.line}: limit state {state!r} of {name!r} is none of "
+                    f"{' '.join(states)}"
                 )
-            self._state = state
-            if name == "params":
-                self._functions[-1].states[state] = ("", attributes)
+        for state in states:
+            where = f"{source}, line {asset.line}, {name!r}, {state}"
+            functions.append(_function(asset, name, form, state, curves[state], where))
+    return functions
 
-    def text(self, piece: str) -> None:
-        self._text += piece
 
-    def end(self, name: str, line: int) -> None:
-        if name == "limitStates":
-            self._states = self._text.split()
-            if not self._states:
-                raise InputError(f"{self._source}, line {line}: there is no limit state")
-        elif name == "taxonomy" and self._functions:
-            self._functions[-1].name = self._text.strip()
-        elif name in ("imls", "IML") and self._functions:
-            self._functions[-1].levels = self._text
-        elif name in ("poes", "poEs") and self._functions:
-            self._functions[-1].states[self._state] = (self._text, {})
-        elif name == "fragilityFunction":
-            self._state = ""
-        self._text = ""
+def _name_and_format(asset: Node, model: Node, source: str) -> tuple[str, str]:
+    if asset.name == "ffs":
+        taxonomy = next(asset.of("taxonomy"), None)
+        return "" if taxonomy is None else taxonomy.text.strip(), model.attributes.get("format", "")
+    if "id" not in asset.attributes:
+        raise InputError(f"{source}, line {asset.line}: fragilityFunction has no id")
+    form, shape = asset.attributes.get("format", ""), asset.attributes.get("shape", "logncdf")
+    if form == "continuous" and shape != "logncdf":
+        raise InputError(f"{source}, line {asset.line}: shape {shape!r} is not known: logncdf is")
+    return asset.attributes["id"], form
 
-    def result(self) -> list[FragilityFunction]:
-        if not self._is_model or not self._functions:
-            raise InputError(f"{self._source}: there is no fragility function in the file")
-        if self._states is None:
-            raise InputError(f"{self._source}: limitStates is missing")
-        return [
-            self._one(function, state)
-            for function in self._functions
-            for state in self._complete(function)
-        ]
 
-    def _complete(self, function: _Function) -> list[str]:
-        assert self._states is not None
-        for state in self._states:
-            if state not in function.states:
+def _curves(asset: Node, source: str) -> dict[str, Node]:
+    """The element with the numbers of each limit state."""
+    curves: dict[str, Node] = {}
+    for part in asset.children:
+        if part.name not in ("ffc", "ffd", "params", "poes"):
+            continue
+        state = part.attributes.get("ls", "")
+        if not state:
+            raise InputError(f"{source}, line {part.line}: {part.name} has no limit state ls")
+        for curve in part.of("params", "poEs", "poes") if part.name.startswith("ff") else [part]:
+            if state in curves:
                 raise InputError(
-                    f"{self._source}, line {function.line}: {function.name!r} lacks the limit "
-                    f"state {state!r}"
+                    f"{source}, line {curve.line}: limit state {state!r} is given twice"
                 )
-        for state in function.states:
-            if state not in self._states:
-                raise InputError(
-                    f"{self._source}, line {function.line}: limit state {state!r} of "
-                    f"{function.name!r} is none of {' '.join(self._states)}"
-                )
-        return self._states
+            curves[state] = curve
+    return curves
 
-    def _one(self, function: _Function, state: str) -> FragilityFunction:
-        where = f"{self._source}, line {function.line}, {function.name!r}, {state}"
-        imt = function.imls.get("imt", function.imls.get("IMT"))
-        if imt is None:
-            raise InputError(f"{where}: the intensity measure is not stated")
-        kind = openquake_type(imt, where)
-        unit = function.imls.get("imlUnit")
-        if unit is not None:
-            if unit not in _UNITS or (unit == "g") != (kind.measure != "pgv_m_s"):
-                raise InputError(f"{where}: {imt} in {unit!r} is not known: g, or cm/s for PGV")
-            kind = IntensityType(kind.measure, _UNITS[unit], kind.period_s)
-        limit = function.imls.get("noDamageLimit")
-        lowest = None if limit is None else kind.factor * _number(limit, where)
-        text, parameters = function.states[state]
-        if function.form == "continuous":
-            mean, sd = (_parameter(parameters, key, where) for key in ("mean", "stddev"))
-            if not (mean > 0.0 and sd > 0.0):
-                raise InputError(
-                    f"{where}: mean = {mean:g} and stddev = {sd:g}: both must be above zero"
-                )
-            spread = 1.0 + (sd / mean) ** 2
-            return lognormal_function(
-                function.name,
-                state,
-                kind,
-                kind.factor * mean / math.sqrt(spread),
-                math.sqrt(math.log(spread)),
-                where,
-                lowest,
+
+def _function(
+    asset: Node, name: str, form: str, state: str, curve: Node, where: str
+) -> FragilityFunction:
+    levels = next(asset.of("imls", "IML"), Node("", {}, 0))
+    imt = levels.attributes.get("imt", levels.attributes.get("IMT"))
+    if imt is None:
+        raise InputError(f"{where}: the intensity measure is not stated")
+    kind = openquake_type(imt, where)
+    unit = levels.attributes.get("imlUnit")
+    if unit is not None:
+        if unit not in _UNITS or (unit == "g") != (kind.measure != "pgv_m_s"):
+            raise InputError(f"{where}: {imt} in {unit!r} is not known: g, or cm/s for PGV")
+        kind = IntensityType(kind.measure, _UNITS[unit], kind.period_s)
+    limit = levels.attributes.get("noDamageLimit")
+    lowest = None if limit is None else kind.factor * _number(limit, where)
+    if form == "continuous":
+        mean, sd = (_parameter(curve.attributes, key, where) for key in ("mean", "stddev"))
+        if not (mean > 0.0 and sd > 0.0):
+            raise InputError(
+                f"{where}: mean = {mean:g} and stddev = {sd:g}: both must be above zero"
             )
-        if function.form == "discrete":
-            levels = np.array([_number(word, where) for word in function.levels.split()])
-            poes = np.array([_number(word, where) for word in text.split()])
-            return discrete_function(
-                function.name, state, kind, kind.factor * levels, poes, where, lowest
-            )
-        raise InputError(f"{where}: format {function.form!r} is neither continuous nor discrete")
+        spread = 1.0 + (sd / mean) ** 2
+        median, beta = kind.factor * mean / math.sqrt(spread), math.sqrt(math.log(spread))
+        return lognormal_function(name, state, kind, median, beta, where, lowest)
+    if form == "discrete":
+        x = np.array([_number(word, where) for word in levels.text.split()])
+        poes = np.array([_number(word, where) for word in curve.text.split()])
+        return discrete_function(name, state, kind, kind.factor * x, poes, where, lowest)
+    raise InputError(f"{where}: format {form!r} is neither continuous nor discrete")
 
 
 def _parameter(parameters: Mapping[str, str], key: str, where: str) -> float:

@@ -32,17 +32,17 @@ def of_measure(
     if suffix not in (".xml", ".csv"):
         raise InputError(f"{path}: fragilities are read from .xml (NRML) and .csv (pelicun)")
     functions = read_nrml(path) if suffix == ".xml" else read_pelicun(path).functions
-    found: dict[str, Callable[[FloatArray], FloatArray]] = {
+    curves: dict[str, Callable[[FloatArray], FloatArray]] = {
         f"{function.name}, {function.limit_state}": function.at
         for function in functions
         if function.kind.measure == measure
     }
-    if not found:
+    if not curves:
         have = ", ".join(sorted({function.kind.imt for function in functions})) or "none of ground"
         raise InputError(f"{path}: there is no fragility over {measure}; there are {have}")
-    if len(found) > MOST:
+    if len(curves) > MOST:
         raise InputError(
-            f"{path}: {len(found)} fragilities are too many for one figure (at most {MOST}): make "
+            f"{path}: {len(curves)} fragilities are too many for one figure (at most {MOST}): make "
             "a file of those to compare"
         )
-    return found
+    return curves

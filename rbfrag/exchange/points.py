@@ -32,7 +32,7 @@ def read_points(path: str | os.PathLike[str]) -> list[tuple[float, float, dict[s
     features = document.get("features") if isinstance(document, dict) else None
     if not isinstance(features, list) or document.get("type") != "FeatureCollection":
         raise InputError(f"{path}: not a GeoJSON FeatureCollection")
-    found = []
+    points = []
     for i, feature in enumerate(features):
         where = f"{path}, features[{i}]"
         geometry = feature.get("geometry") if isinstance(feature, dict) else None
@@ -51,8 +51,8 @@ def read_points(path: str | os.PathLike[str]) -> list[tuple[float, float, dict[s
         properties = feature.get("properties") or {}
         if not isinstance(properties, dict):
             raise InputError(f"{where}: properties are no object")
-        found.append((lon, lat, properties))
-    return found
+        points.append((lon, lat, properties))
+    return points
 
 
 def write_points(
@@ -75,7 +75,7 @@ def write_points(
         file.write(head + ', "features": [\n')
         for start in range(0, size, _ROWS):
             some = slice(start, start + _ROWS)
-            lists = [_plain(columns[name][some]) for name in names]
+            lists = [_finite_or_null(columns[name][some]) for name in names]
             places = zip(columns["lon"][some].tolist(), columns["lat"][some].tolist())  # noqa: B905
             lines = [
                 json.dumps(
@@ -93,7 +93,7 @@ def write_points(
         file.write("\n]}\n")
 
 
-def _plain(column: NDArray[Any]) -> list[Any]:
+def _finite_or_null(column: NDArray[Any]) -> list[Any]:
     values: list[Any] = column.tolist()
     if column.dtype.kind == "f":
         return [value if np.isfinite(value) else None for value in values]

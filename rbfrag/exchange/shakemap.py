@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.xml_source import parse_xml
@@ -30,18 +31,7 @@ _MOST = {"pga_g": 10.0, "pgv_m_s": 20.0, "std_ln_pga": 5.0, "std_ln_pgv": 5.0}
 
 @dataclass(frozen=True)
 class ShakeMapEvent:
-    """The earthquake of a ShakeMap.
-
-    Args:
-        event_id: identifier.
-        magnitude: magnitude, or None.
-        depth_km: depth [km], or None.
-        lat: latitude of the epicentre [deg], or None.
-        lon: longitude of the epicentre [deg], or None.
-        time: time of origin as written.
-        description: name for people.
-        version: version of the ShakeMap code.
-    """
+    """The earthquake of a ShakeMap, degrees of its epicentre; None where the file does not say."""
 
     event_id: str
     magnitude: float | None
@@ -101,12 +91,12 @@ class GridReading:
                         f"{have}"
                     )
 
-    def text(self, piece: str) -> None:
-        """Take a piece of text."""
+    def text(self, part: str) -> None:
+        """Take a part of the text."""
         if not self.in_data:
             return
         # a number may be cut where the parser's buffer ends
-        whole = self.rest + piece
+        whole = self.rest + part
         cut = max(whole.rfind(" "), whole.rfind("\n"), whole.rfind("\t"), whole.rfind("\r"))
         self.rest = whole[cut + 1 :]
         self._take(whole[: cut + 1])
@@ -368,24 +358,14 @@ def at_places(
     ):
         raise InputError("the nodes of the grid do not run west to east and north to south")
     on_map = (lon >= x[0]) & (lon <= x[-1]) & (lat <= y[0]) & (lat >= y[-1])
-    i = np.clip(np.searchsorted(x, lon, side="right") - 1, 0, x.size - 2)
-    j = np.clip(np.searchsorted(-y, -lat, side="right") - 1, 0, y.size - 2)
-    u = (lon - x[i]) / (x[i + 1] - x[i])
-    v = (lat - y[j]) / (y[j + 1] - y[j])
 
     def between(values: FloatArray | None, logarithmic: bool) -> FloatArray | None:
         if values is None:
             return None
-        table = values.reshape(shape)
-        if logarithmic:
-            table = np.log(np.maximum(table, 1e-300))
-        found = (
-            (1 - u) * (1 - v) * table[j, i]
-            + u * (1 - v) * table[j, i + 1]
-            + (1 - u) * v * table[j + 1, i]
-            + u * v * table[j + 1, i + 1]
-        )
-        return np.where(on_map, np.exp(found) if logarithmic else found, np.nan)
+        table = np.log(np.maximum(values, 1e-300)) if logarithmic else values
+        bilinear = RegularGridInterpolator((y, x), table.reshape(shape), bounds_error=False)
+        values_there: FloatArray = bilinear(np.column_stack([lat, lon]))
+        return np.exp(values_there) if logarithmic else values_there
 
     fields = {
         "pgv_m_s": between(grid.pgv_m_s, True),

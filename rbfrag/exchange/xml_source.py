@@ -7,7 +7,8 @@ none of the formats here has one.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
@@ -65,6 +66,44 @@ def parse_xml(
         if isinstance(error, InputError):
             raise
         raise InputError(f"{source}: the XML cannot be decoded: {error}") from None
+
+
+@dataclass
+class Node:
+    """An element of a document: local name, attributes, line of its start tag, and content."""
+
+    name: str
+    attributes: Mapping[str, str]
+    line: int
+    text: str = ""
+    children: list[Node] = field(default_factory=list)
+
+    def of(self, *names: str) -> Iterator[Node]:
+        """Yield the elements of some names, at any depth, in the order of the document."""
+        for child in self.children:
+            if child.name in names:
+                yield child
+            yield from child.of(*names)
+
+
+def read_xml(path: str | os.PathLike[str], what: str) -> Node:
+    """Return a whole document as one node above its root."""
+    document = Node("", {}, 0)
+    open_nodes = [document]
+
+    def start(name: str, attributes: Mapping[str, str], line: int) -> None:
+        node = Node(name, attributes, line)
+        open_nodes[-1].children.append(node)
+        open_nodes.append(node)
+
+    def end(_name: str, _line: int) -> None:
+        open_nodes.pop()
+
+    def text(part: str) -> None:
+        open_nodes[-1].text += part
+
+    parse_xml(path, what, start=start, end=end, text=text)
+    return document
 
 
 def _local(name: str) -> str:

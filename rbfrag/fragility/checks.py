@@ -20,7 +20,7 @@ _STRENGTH = (
     "the block's yield acceleration coefficient at rest, tan(critical angle) (a block with k_r "
     "<= 0 falls without an earthquake)"
 )
-_WORDS = {
+_DESCRIPTIONS = {
     "p2": ("1/s²", _SIZE),
     "ps2": ("1/s²", "p_s², the squared frequency parameter of slumping at rest"),
     "kr": ("", _STRENGTH),
@@ -72,7 +72,7 @@ class Finding:
         """Return the sentence for one value."""
         if not self.name:
             return self.text
-        unit = _WORDS[self.name][0]
+        unit = _DESCRIPTIONS[self.name][0]
         return f"{self.name} = {value:.6g}{' ' if unit else ''}{unit} {self.text}"
 
     def in_general(self) -> str:
@@ -89,7 +89,7 @@ def refusals(
     """Yield what makes an answer impossible; `signed` names the values that may be negative."""
     for name in needed:
         value = values[name]
-        wanted = _WORDS[name][1]
+        wanted = _DESCRIPTIONS[name][1]
         yield Finding(value != value, name, value, f"is not a number: give {wanted}")
         if name in _ABOVE_ZERO:
             yield Finding(value <= 0.0, name, value, f"is not above zero: give {wanted}")
@@ -137,7 +137,7 @@ def answer_with_findings(
     *,
     say: Callable[[Any, Finding], None],
     refuse: Callable[[Any, Finding], None],
-    fails_at_rest: Callable[[Any, Finding], None],
+    unstable: Callable[[Any, Finding], None],
     nothing: Any,
 ) -> Judgement:
     """Answer a question of which there may be something to say.
@@ -150,7 +150,7 @@ def answer_with_findings(
         ns: functions for the kind of number given.
         say: called with where a sentence holds, and the finding.
         refuse: the same for what makes an answer impossible.
-        fails_at_rest: the same where a block fails without an earthquake.
+        unstable: the same where a block fails without an earthquake.
         nothing: False, or an array of it in the shape of the values.
     """
     block, term = model.method.block, model.term
@@ -159,9 +159,9 @@ def answer_with_findings(
         refuse(finding.holds, finding)
         missing = missing | finding.holds
     strength = given[block.strength]
-    wanted = _WORDS[block.strength][1]
+    wanted = _DESCRIPTIONS[block.strength][1]
     at_rest = (strength <= 0.0) & _not(missing)
-    fails_at_rest(
+    unstable(
         at_rest, Finding(at_rest, block.strength, strength, f"is not above zero: give {wanted}")
     )
     floored = dict(given)
@@ -222,7 +222,7 @@ def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator
         if name not in values:
             continue
         value = values[name]
-        unit = _WORDS[name][0]
+        unit = _DESCRIPTIONS[name][0]
         # A p² computed from a shape may miss the edge by rounding.
         below, above = value < low * (1.0 - 1e-9), value > high * (1.0 + 1e-9)
         for holds, edge in ((below, low), (above, high)):

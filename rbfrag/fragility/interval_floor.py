@@ -142,8 +142,8 @@ def interval_floor(
         with np.errstate(all="ignore"):
             _, low, high, _ = other.answer(values, half_width, ns)
             width = np.where(possible, high - low, 0.0)
-        told = np.isfinite(sample.intensity_m_s[other.term.name])
-        widest = np.where(told, np.fmax(widest, width / reach), widest)
+        is_known = np.isfinite(sample.intensity_m_s[other.term.name])
+        widest = np.where(is_known, np.fmax(widest, width / reach), widest)
     few = min(_earthquakes(other) for other in richer) < FEW_EARTHQUAKES
     share = SHARE_OF_FEW if few else 1.0
     # eta of an intensity that is not known is a number like any other

@@ -11,7 +11,7 @@ from pathlib import Path
 from rbfrag.db.location import DEFAULT_NAME, REFERENCE, locate, reference_file
 from rbfrag.db.model_file import ModelRow, unknown_model
 from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.fragility.measures import MEASURES, TERMS, terms_from
+from rbfrag.fragility.measures import MEASURES, SINGLE_TERMS, TERMS, terms_from
 from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, methods
 from rbfrag.fragility.model import FragilityModel
 
@@ -45,10 +45,10 @@ class _Store:
 
     def model(self, row: ModelRow) -> FragilityModel:
         """Return one of its models, ready to answer."""
-        found = self.models.get(row.name)
-        if found is None:
-            found = self.models[row.name] = FragilityModel.from_row(row, self.notes)
-        return found
+        model = self.models.get(row.name)
+        if model is None:
+            model = self.models[row.name] = FragilityModel.from_row(row, self.notes)
+        return model
 
 
 _SHIPPED = str(REFERENCE)
@@ -109,12 +109,16 @@ def find_model(
         _check_criterion(chosen.kind, block, rotation_deg)
         if chosen.criterion != rotation_deg:
             raise InputError(
-                f"model {chosen.name!r} tells of {_failure(chosen.criterion)}, asked is "
+                f"model {chosen.name!r} is of {_failure(chosen.criterion)}, asked is "
                 f"{_failure(rotation_deg)}"
             )
     for name in chosen.term.inputs:
         if name not in given:
-            raise InputError(_wanting(chosen, _measures(given)))
+            raise InputError(
+                f"model {chosen.name!r} needs {' and '.join(chosen.term.inputs)} "
+                f"({chosen.term.title}); given is {_measures(given)}: give what it needs, or "
+                "choose a model of another term"
+            )
     return chosen
 
 
@@ -151,12 +155,10 @@ def _suited_in(
 ) -> list[FragilityModel]:
     possible = terms_from(given)
     if not possible:
-        wanted = ", or ".join(" and ".join(TERMS[name].inputs) for name in _ASKED)
-        raise InputError(
-            f"{_known(_measures(given))} is given: a prediction needs {wanted}, or a motion"
-        )
-    asked = block_of(given)
-    kind = asked.kind if kind is None else kind
+        enough = ", or ".join(" and ".join(TERMS[name].inputs) for name in SINGLE_TERMS)
+        raise InputError(f"{_measures(given)} is given: a prediction needs {enough}, or a motion")
+    block_of_question = block_of(given)
+    kind = block_of_question.kind if kind is None else kind
     if not store.rows:
         raise UnknownModelError(unknown_model(None, [], store.place))
     of_kind = [row for row in store.rows if row.kind == kind]
@@ -166,7 +168,7 @@ def _suited_in(
             f"and  rbfrag fit --kind {kind}"
         )
     suited = [store.model(row) for row in of_kind if row.term in possible]
-    block = suited[0].method.block if suited else asked
+    block = suited[0].method.block if suited else block_of_question
     _check_block(kind, block, given, None)
     _check_criterion(kind, block, rotation_deg)
     best: dict[str, FragilityModel] = {}
@@ -179,17 +181,14 @@ def _suited_in(
         have = ", ".join(f"{row.name} ({row.term}{_of_criterion(row, block)})" for row in of_kind)
         of = "" if block.criterion is None else f" of {_failure(rotation_deg)}"
         raise (InputError if block.criterion is None else UnknownModelError)(
-            f"no stored {kind} model{of} works with {_known(_measures(given))}; stored are {have}: "
-            "give the measures that one of them needs, or fit another with  rbfrag fit --kind "
+            f"no stored {kind} model{of} works with {_measures(given)}; stored are {have}: give "
+            "the measures that one of them needs, or fit another with  rbfrag fit --kind "
             f"{kind} --term {' or '.join(possible)}"
         )
     return sorted(
         best.values(),
         key=lambda m: (-m.term.level, not m.row.is_default, possible.index(m.term.name)),
     )
-
-
-_ASKED = ("pgv", "pga_tm", "pgd_tm")
 
 
 def _merit(model: FragilityModel) -> tuple[bool, int]:
@@ -242,20 +241,8 @@ def _of_criterion(row: ModelRow, block: BlockParameters) -> str:
     return f", {_failure(value if isinstance(value, int | float) else None)}"
 
 
-def _measures(given: Collection[str]) -> list[str]:
-    return [name for name in given if name in MEASURES]
-
-
-def _known(measures: Collection[str]) -> str:
-    return " and ".join(measures) or "nothing about the motion"
-
-
-def _wanting(model: FragilityModel, measures: Collection[str]) -> str:
-    return (
-        f"model {model.name!r} needs {' and '.join(model.term.inputs)} "
-        f"({model.term.title}); given is {_known(measures)}: give what it needs, or "
-        "choose a model of another term"
-    )
+def _measures(given: Collection[str]) -> str:
+    return " and ".join(name for name in given if name in MEASURES) or "nothing about the motion"
 
 
 def _of_row(row: ModelRow) -> FragilityModel:
@@ -294,12 +281,7 @@ def stored_rows(db: str | PathLike[str] | None = None) -> list[ModelRow]:
     Args:
         db: database, as for :func:`find_model`.
     """
-    place, _ = _place(db)
-    if isinstance(place, Path):
-        from rbfrag.db.model_file import read_models
-
-        return read_models(place)
-    return _stored_on_server(place)[0]
+    return list(_store(db).rows)
 
 
 def _store(db: str | PathLike[str] | None) -> _Store:
@@ -314,8 +296,11 @@ def _store(db: str | PathLike[str] | None) -> _Store:
     place, shipped = _place(db)
     if isinstance(place, Path):
         return _unchanged(str(place), shipped) or _read_again(place, shipped)
-    rows, label = _stored_on_server(place)
-    return _Store(label, (), rows)
+    from rbfrag.db.engine import opened_database
+    from rbfrag.db.models import model_rows
+
+    with opened_database(place, read_only=True) as engine, engine.connect() as connection:
+        return _Store(str(engine.url), (), model_rows(connection))
 
 
 def _unchanged(path: str, shipped: bool) -> _Store | None:
@@ -332,14 +317,6 @@ def _read_again(path: Path, shipped: bool) -> _Store:
     if stamp:
         _stores_before[key, shipped] = store
     return store
-
-
-def _stored_on_server(url: str) -> tuple[list[ModelRow], str]:
-    from rbfrag.db.engine import opened_database
-    from rbfrag.db.models import model_rows
-
-    with opened_database(url, read_only=True) as engine, engine.connect() as connection:
-        return model_rows(connection), str(engine.url)
 
 
 def _stamp(path: str, shipped: bool) -> _Stamp:

@@ -168,11 +168,7 @@ CREDIBLE = {
         "s): is PGV in m/s and PGA in g?",
     ),
     "tm_s": (0.02, 10.0, "not the mean period of an earthquake (it is in s): is it a frequency?"),
-    "kr": (
-        0.0,
-        5.0,
-        "steeper than 78°: it is the tangent of the critical angle, not degrees",
-    ),
+    "kr": (0.0, 5.0, "steeper than 78°: it is the tangent of the critical angle, not degrees"),
     "ky": (0.0, 5.0, _STEEP),
     "ks": (0.0, 5.0, _STEEP),
 }

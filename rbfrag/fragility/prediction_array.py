@@ -23,23 +23,18 @@ CHUNK = 1 << 14
 
 
 class Reasons:
-    """Sentences by element, kept as one number each until somebody reads them."""
+    """Sentences by element, kept as flat places and their texts until somebody reads them."""
 
-    def __init__(self, shape: tuple[int, ...]) -> None:
-        """Start with no sentence for any element."""
-        self.shape = shape
-        self._places: list[NDArray[np.intp]] = []
-        self._texts: list[NDArray[np.object_]] = []
-
-    def put(self, places: NDArray[np.intp], texts: NDArray[np.object_]) -> None:
-        """Keep the texts of the elements at flat positions."""
-        self._places.append(places)
-        self._texts.append(texts)
+    def __init__(
+        self, shape: tuple[int, ...], parts: list[tuple[NDArray[np.intp], NDArray[np.object_]]]
+    ) -> None:
+        """Keep the sentences of some elements."""
+        self.shape, self._parts = shape, parts
 
     def array(self) -> NDArray[np.object_]:
         """Return the text of every element, empty where there is none."""
         result = np.full(self.shape, "", dtype=object)
-        for places, texts in zip(self._places, self._texts, strict=True):
+        for places, texts in self._parts:
             result.flat[places] = texts
         return result
 
@@ -120,11 +115,10 @@ def predict_many(
     values, shape = _flat(given)
     size = int(np.prod(shape))
     ns = arrays()
-    empty = np.empty((5, size))
-    out = _Columns(empty[0], empty[1], empty[2], empty[3], empty[4], np.ones(size, dtype=np.bool_))
-    for ends in (out.low, out.high) if half_width is None else ():
-        ends[:] = np.nan
-    reasons = Reasons(shape)
+    p, low, high, y, x = np.empty((5, size))
+    out = _Columns(p, low, high, y, x, np.ones(size, dtype=np.bool_))
+    if half_width is None:
+        out.low[:] = out.high[:] = np.nan
 
     def work(start: int) -> tuple[NDArray[np.intp], NDArray[np.object_]] | None:
         part = slice(start, min(start + CHUNK, size))
@@ -136,28 +130,25 @@ def predict_many(
             chosen = {
                 n: v.repeat(flagged.size) if v.size == 1 else v[flagged] for n, v in own.items()
             }
-            place = flagged + start
-            return place, _with_words(
-                model, chosen, half_width, place, shape, out, refuse_nan=refuse_nan
+            places = flagged + start
+            return places, _answer_with_diagnostics(
+                model, chosen, half_width, places, shape, out, refuse_nan=refuse_nan
             )
 
-    starts = range(0, size, CHUNK)
-    workers = min(len(starts), os.cpu_count() or 1)
+    chunks = range(0, size, CHUNK)
+    workers = min(len(chunks), os.cpu_count() or 1)
     if workers > 1:
         with ThreadPoolExecutor(workers) as pool:
-            found = list(pool.map(work, starts))
+            results = list(pool.map(work, chunks))
     else:
-        found = [work(start) for start in starts]
-    for each in found:
-        if each is not None:
-            reasons.put(*each)
+        results = [work(start) for start in chunks]
     return PredictionArray(
         kind=model.kind,
         probability=out.probability.reshape(shape),
         ci_low=out.low.reshape(shape),
         ci_high=out.high.reshape(shape),
         in_domain=out.in_domain.reshape(shape),
-        reasons=reasons,
+        reasons=Reasons(shape, [result for result in results if result is not None]),
         y_m_s=out.y.reshape(shape),
         intensity_m_s=out.x.reshape(shape),
         level=level,
@@ -200,52 +191,54 @@ def _answer_part(
     return np.flatnonzero(~clear)
 
 
-def _with_words(
+def _answer_with_diagnostics(
     model: FragilityModel,
     given: dict[str, FloatArray],
     half_width: float | None,
-    place: NDArray[np.intp],
+    places: NDArray[np.intp],
     shape: tuple[int, ...],
     out: _Columns,
     *,
     refuse_nan: bool,
 ) -> NDArray[np.object_]:
-    """Answer elements of which there may be something to say; return what is said."""
-    said = _Sentences(place.size)
-    at_rest = np.zeros(place.size, dtype=np.bool_)
+    """Answer elements of which there may be something to say; return what is to be said."""
+    sentences = _Sentences(places.size)
+    at_rest = np.zeros(places.size, dtype=np.bool_)
 
     def say(holds: NDArray[np.bool_], finding: Finding) -> None:
-        said.add(holds, finding.in_general())
+        sentences.add(holds, finding.in_general())
 
     def refuse(holds: NDArray[np.bool_], finding: Finding) -> None:
         if refuse_nan and holds.any():
             first = int(np.flatnonzero(holds)[0])
-            where = tuple(int(i) for i in np.unravel_index(place[first], shape))
+            where = tuple(int(i) for i in np.unravel_index(places[first], shape))
             raise InputError(f"element {where}: {finding.about(float(finding.value[first]))}")
         say(holds, finding)
 
-    def fails_at_rest(holds: NDArray[np.bool_], _: Finding) -> None:
+    def unstable(holds: NDArray[np.bool_], _: Finding) -> None:
         at_rest[:] = holds
-        said.add(holds, "unstable")
+        sentences.add(holds, "unstable")
 
     block = model.method.block
     needed = [*block.names, *model.term.inputs, *(o for o in block.options if o in given)]
-    found = answer_with_findings(
+    judgement = answer_with_findings(
         model, given, needed, half_width, arrays(),
-        say=say, refuse=refuse, fails_at_rest=fails_at_rest,
-        nothing=np.zeros(place.size, dtype=np.bool_),
+        say=say, refuse=refuse, unstable=unstable,
+        nothing=np.zeros(places.size, dtype=np.bool_),
     )  # fmt: skip
-    ends = () if half_width is None else ((out.low, found.low), (out.high, found.high))
-    for target, answer in ((out.probability, found.probability), *ends):
-        answer = np.where(found.ruled, 0.0, answer)
-        answer[at_rest] = 1.0
-        answer[found.missing] = np.nan
-        target[place] = answer
-    y = found.values.get("y_m_s", np.full(place.size, np.nan))
-    for target, answer in ((out.y, y), (out.x, found.intensity_m_s)):
-        target[place] = np.where(found.missing, np.nan, answer)
-    out.in_domain[place] = found.in_domain
-    return said.texts()
+    columns = [(out.probability, judgement.probability)]
+    if half_width is not None:
+        columns += [(out.low, judgement.low), (out.high, judgement.high)]
+    for column, answer in columns:
+        values = np.where(judgement.ruled, 0.0, answer)
+        values[at_rest] = 1.0
+        values[judgement.missing] = np.nan
+        column[places] = values
+    y = judgement.values.get("y_m_s", np.nan)
+    for column, value in ((out.y, y), (out.x, judgement.intensity_m_s)):
+        column[places] = np.where(judgement.missing, np.nan, value)
+    out.in_domain[places] = judgement.in_domain
+    return sentences.texts()
 
 
 class _Sentences:

@@ -16,7 +16,7 @@ from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Model, predict
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.hazards.annual_rate import failure_rate, normal_steps, probability_in
+from rbfrag.hazards.annual_rate import checked_years, failure_rate, normal_steps, probability_in
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.conversions import velocity_conversion
 from rbfrag.hazards.curve import HazardCurve
@@ -110,13 +110,8 @@ def hazard(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    blocks = np.broadcast_arrays(
-        np.atleast_1d(np.asarray(p2, dtype=np.float64)),
-        np.atleast_1d(np.asarray(kr, dtype=np.float64)),
-    )
-    p2s, krs = (np.ravel(values) for values in blocks)
-    if not np.isfinite(years) or years <= 0.0:
-        raise InputError(f"years = {years:g}: give a period above 0 years")
+    p2s, krs = (np.ravel(values) for values in np.broadcast_arrays(p2, kr))
+    checked_years(years)
     warnings = list(curve.warnings)
     name, factor, fixed = _measure(curve, tm_s, convert, warnings)
     meaning = component_named("single" if component is None else component)
@@ -142,8 +137,8 @@ def hazard(
         def bands(levels: FloatArray, some: slice = some) -> FloatArray:
             """Return P and the two ends of its interval for blocks x levels, stacked."""
             shaking = {name: (levels[:, None] * shift).reshape(1, -1), **fixed}
-            found = _predicted(p2s[some, None], krs[some, None], shaking, chosen, level)
-            stacked = np.concatenate([found.probability, found.ci_low, found.ci_high])
+            answer = _predicted(p2s[some, None], krs[some, None], shaking, chosen, level)
+            stacked = np.concatenate([answer.probability, answer.ci_low, answer.ci_high])
             averaged: FloatArray = stacked.reshape(-1, levels.size, shift.size) @ weight
             return averaged
 
@@ -151,20 +146,27 @@ def hazard(
     if one_class:
         mean = _mean_bands(curve, p2s, krs, name, shift, fixed, chosen, level)
         parts.append((1, failure_rate(curve, lambda levels: mean(levels) @ weight)))
-    rates = [_split(part.annual_rate, m) for m, part in parts]
-    rate, low, high = (np.concatenate([r[i] for r in rates]) for i in range(3))
-    contribution = np.concatenate([part.contribution[:m] for m, part in parts])
-    above = np.concatenate([part.above[:m] for m, part in parts])
-    above_at_most = np.concatenate([part.above_at_most[:m] for m, part in parts])
-    below = np.concatenate([part.below[:m] for m, part in parts])
+
+    def joined(name: str, row: int = 0) -> FloatArray:
+        """Return one value of all blocks; of the rates, the rows are P and its two ends."""
+        values = [getattr(part, name)[row * m : (row + 1) * m] for m, part in parts]
+        return np.concatenate(values)
+
+    rate, low, high = (joined("annual_rate", row) for row in range(3))
+    contribution, below = joined("contribution"), joined("below")
+    above, above_at_most = joined("above"), joined("above_at_most")
     _tails(curve, rate, above, above_at_most, below, warnings)
     edges = parts[0][1].edges
     shaking = {name: factor / meaning.ratio * np.sqrt(edges[None, 1:] * edges[None, :-1]), **fixed}
-    known = _predicted(p2s[:, None], krs[:, None], shaking, chosen, level).in_domain
-    unknown = 1.0 - known
+    outside = ~_predicted(p2s[:, None], krs[:, None], shaking, chosen, level).in_domain
     if one_class:
-        unknown = unknown.mean(axis=0, keepdims=True)
-    _extrapolated(rate, (unknown * contribution).sum(axis=1), warnings)
+        outside = outside.mean(axis=0, keepdims=True)
+    part = (outside * contribution).sum(axis=1) / np.maximum(rate, np.finfo(np.float64).tiny)
+    if (part > _NOTABLE).any():
+        warnings.append(
+            f"up to {100.0 * float(part.max()):.3g} % of the rate comes from blocks and shaking "
+            "outside the ranges that the model was fitted on"
+        )
     return HazardAnswer(
         annual_rate=rate,
         ci_low=low,
@@ -248,11 +250,9 @@ def _mean_bands(
     for start in range(0, p2.size, _CHUNK):
         some = slice(start, start + _CHUNK)
         shaking = {name: np.exp(u)[None, :], **fixed}
-        found = _predicted(p2[some, None], kr[some, None], shaking, model, level)
-        for row, values in zip(
-            total, (found.probability, found.ci_low, found.ci_high), strict=True
-        ):
-            row += values.sum(axis=0)
+        answer = _predicted(p2[some, None], kr[some, None], shaking, model, level)
+        bands_of = (answer.probability, answer.ci_low, answer.ci_high)
+        total += np.array([values.sum(axis=0) for values in bands_of])
     total[total < 1e-100] = 0.0  # the cubics divide by differences
     smooth = PchipInterpolator(u, total / p2.size, axis=1)
 
@@ -264,28 +264,11 @@ def _mean_bands(
 
 
 def _predicted(
-    p2: FloatArray,
-    kr: FloatArray,
-    shaking: dict[str, Any],
-    model: FragilityModel,
-    level: float,
+    p2: FloatArray, kr: FloatArray, shaking: dict[str, Any], model: FragilityModel, level: float
 ) -> PredictionArray:
-    found = predict(p2, kr, **shaking, model=model, level=level)
-    assert isinstance(found, PredictionArray)
-    return found
-
-
-def _extrapolated(rate: FloatArray, outside: FloatArray, warnings: list[str]) -> None:
-    share = outside / np.maximum(rate, np.finfo(np.float64).tiny)
-    if (share > _NOTABLE).any():
-        warnings.append(
-            f"up to {100.0 * float(share.max()):.3g} % of the rate comes from blocks and shaking "
-            "outside the ranges that the model was fitted on"
-        )
-
-
-def _split(stacked: FloatArray, m: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    return stacked[:m], stacked[m : 2 * m], stacked[2 * m :]
+    answer = predict(p2, kr, **shaking, model=model, level=level)
+    assert isinstance(answer, PredictionArray)
+    return answer
 
 
 def _tails(

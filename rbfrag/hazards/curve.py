@@ -67,9 +67,9 @@ class HazardCurve:
         """
         x = np.asarray(level, dtype=np.float64)
         with np.errstate(divide="ignore", invalid="ignore"):
-            found = np.exp(np.interp(np.log(x), np.log(self.levels), np.log(self.annual_rate)))
+            rate = np.exp(np.interp(np.log(x), np.log(self.levels), np.log(self.annual_rate)))
         inside = (x >= self.levels[0]) & (x <= self.levels[-1])
-        return np.where(inside, found, np.nan)
+        return np.where(inside, rate, np.nan)
 
 
 def rates_from_probabilities(probability: FloatArray, years: float) -> FloatArray:

@@ -12,7 +12,7 @@ from rbfrag.hazards.curve import HazardCurve
 def as_dict(
     curves: Sequence[HazardCurve],
     names: Sequence[str | None],
-    found: Sequence[HazardAnswer],
+    answers: Sequence[HazardAnswer],
     remarks: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Return the answer under the keys of the JSON contract.
@@ -28,32 +28,27 @@ def as_dict(
             "ci_high": float(rates.ci_high[i]),
             "probability": float(rates.probability[i]),
         }
-        for curve, rates in zip(curves, found, strict=True)
+        for curve, rates in zip(curves, answers, strict=True)
         for i, name in enumerate(names)
     ]
     shared = {
-        "years": found[0].years,
-        "level": found[0].level,
-        "model": found[0].model,
-        "term": found[0].term,
-        "method": found[0].method,
+        "years": answers[0].years,
+        "level": answers[0].level,
+        "model": answers[0].model,
+        "term": answers[0].term,
+        "method": answers[0].method,
         "imt": curves[0].imt,
     }
-    warnings = [*remarks, *dict.fromkeys(word for each in found for word in each.warnings)]
+    warnings = [*remarks, *dict.fromkeys(word for each in answers for word in each.warnings)]
     if len(rows) > 1:
         return {**shared, "answers": rows, "warnings": warnings}
     del rows[0]["block_id"]
-    return {**rows[0], **shared, "contributions": _parts(found[0]), "warnings": warnings}
-
-
-def _parts(found: HazardAnswer) -> list[dict[str, float]]:
-    """Return the contributions by intensity in the intervals of the table."""
-    return [
+    first = answers[0]
+    contributions = [
         {"from": low, "to": high, "annual_rate": part}
         for low, high, part in zip(
-            found.edges[:-1].tolist(),
-            found.edges[1:].tolist(),
-            found.contribution[0].tolist(),
+            first.edges[:-1].tolist(), first.edges[1:].tolist(), first.contribution[0].tolist(),
             strict=True,
         )
-    ]
+    ]  # fmt: skip
+    return {**rows[0], **shared, "contributions": contributions, "warnings": warnings}

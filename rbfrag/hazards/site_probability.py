@@ -95,8 +95,8 @@ def site_probability(
     """
     n = pgv_m_s.size
     chosen = find_model(model, ("p2", "kr", "pgv_m_s", "pga_g"), db)
-    shares = np.full(p2.size, 1.0) if weight is None else weight
-    shares = shares / shares.sum()
+    weights = np.full(p2.size, 1.0) if weight is None else weight
+    weights = weights / weights.sum()
     sv = np.zeros(n) if std_ln_pgv is None else std_ln_pgv
     sa = np.zeros(n) if std_ln_pga is None else std_ln_pga
     # the component's scatter is common to both measures
@@ -105,7 +105,7 @@ def site_probability(
     with np.errstate(divide="ignore", invalid="ignore"):
         along = np.where(lv > 0.0, cov / lv, 0.0)
     across = np.sqrt(np.maximum(sa**2 + component.scatter**2 - along**2, 0.0))
-    mean = np.ones(1) if own_block else shares
+    mean = np.ones(1) if own_block else weights
     widest = float(lv.max(initial=0.0))
 
     def answers(sites: NDArray[np.intp], first: FloatArray, second: FloatArray) -> PredictionArray:
@@ -118,18 +118,18 @@ def site_probability(
             for values in (p2, kr)
         )
         shaking: dict[str, Any] = {"pgv_m_s": v[:, None, :], "pga_g": a[:, None, :]}
-        found = predict(sizes, strengths, **shaking, model=chosen, level=level)
-        assert isinstance(found, PredictionArray)
-        return found
+        answer = predict(sizes, strengths, **shaking, model=chosen, level=level)
+        assert isinstance(answer, PredictionArray)
+        return answer
 
     probability, low, high = (np.zeros(n) for _ in range(3))
-    known = np.empty(n, dtype=bool)
+    in_domain = np.empty(n, dtype=bool)
     own = 3 if std_ln_pga is not None else 1
     blocks = 1 if own_block else p2.size
-    for sites in _pieces(np.arange(n), _CHUNK // (blocks * own)):
+    for sites in _chunks(np.arange(n), _CHUNK // (blocks * own)):
         # the median answers for the domain, the strongest shaking for what can fail at all
         median = answers(sites, np.zeros(1), np.zeros(1))
-        known[sites] = median.in_domain[:, :, 0].all(axis=1)
+        in_domain[sites] = median.in_domain[:, :, 0].all(axis=1)
         strongest = median
         if widest > 0.0:
             _, y, _ = _points(1, own)
@@ -141,16 +141,16 @@ def site_probability(
     if widest > 0.0:
         count = 2 * math.ceil(REACH * widest / _STEP) + 1
         first, second, both = _points(min(max(count, 9), 65), 5 if std_ln_pga is not None else 1)
-    for sites in _pieces(alive, _CHUNK // (blocks * both.size)):
-        found = answers(sites, first, second)
-        probability[sites] = (found.probability @ both) @ mean
-        low[sites] = (found.ci_low @ both) @ mean
-        high[sites] = (found.ci_high @ both) @ mean
+    for sites in _chunks(alive, _CHUNK // (blocks * both.size)):
+        answer = answers(sites, first, second)
+        probability[sites] = (answer.probability @ both) @ mean
+        low[sites] = (answer.ci_low @ both) @ mean
+        high[sites] = (answer.ci_high @ both) @ mean
     return SiteProbability(
         probability=probability,
         ci_low=low,
         ci_high=high,
-        in_domain=known,
+        in_domain=in_domain,
         level=level,
         model=chosen.name,
         term=chosen.term.name,
@@ -158,7 +158,7 @@ def site_probability(
     )
 
 
-def _pieces(places: NDArray[np.intp], size: int) -> list[NDArray[np.intp]]:
+def _chunks(places: NDArray[np.intp], size: int) -> list[NDArray[np.intp]]:
     return [places[i : i + max(size, 1)] for i in range(0, places.size, max(size, 1))]
 
 

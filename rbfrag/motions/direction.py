@@ -83,7 +83,7 @@ def azimuth_deg(component: str) -> float | None:
 
 
 SAME_START = 0.5
-"""Starts apart by no more than this share of a sampling interval are the same."""
+"""Starts apart by no more than this part of a sampling interval are the same."""
 
 
 def upward(vertical: GroundMotion) -> GroundMotion:
@@ -181,5 +181,5 @@ def lead_in_of(applied: object) -> int:
     Args:
         applied: `processing_applied` of a motion or of a stored row, or None.
     """
-    found = applied.get("padding_samples", 0) if isinstance(applied, Mapping) else 0
-    return found if isinstance(found, int) else 0
+    samples = applied.get("padding_samples", 0) if isinstance(applied, Mapping) else 0
+    return samples if isinstance(samples, int) else 0

@@ -22,10 +22,10 @@ TM_BAND_HZ = (0.25, 20.0)
 """Frequencies that the mean period uses, both edges included [Hz]."""
 
 TM_FREQUENCY_STEP_HZ = 0.05
-"""Largest frequency step of the mean period [Hz]; a shorter record is padded to it, no further."""
+"""Largest frequency step of the mean period [Hz]; zeros lengthen a shorter record to it."""
 
 _EDGE_TOLERANCE = 1e-9
-_LONGEST_PADDED_FFT = 1 << 22
+_LONGEST_ZERO_FILLED_FFT = 1 << 22
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def mean_period(acceleration_g: FloatArray, dt_s: float) -> float | None:
     if last < first:
         return None
     numbers = np.arange(first, last + 1.0)
-    if nfft > max(scaled.size, _LONGEST_PADDED_FFT):
+    if nfft > max(scaled.size, _LONGEST_ZERO_FILLED_FFT):
         power = _power_by_direct_sum(scaled, numbers / nfft)
     else:
         spectrum = np.fft.rfft(scaled, int(nfft))[int(first) : int(last) + 1]
@@ -210,11 +210,13 @@ def _displacement_extremes(
     curvature, start = curvature[real], start[real]
     # The form without cancellation: q/A and C/q.
     q = -0.5 * (a0 + np.copysign(np.sqrt(discriminant[real]), a0))
-    found = []
+    extremes = []
     for numerator, denominator in ((q, curvature), (start, q)):
         root = np.divide(numerator, denominator, out=np.full(q.size, -1.0), where=denominator != 0)
         ok = (root > 0.0) & (root < 1.0)
         s, at, step = root[ok], inside[ok], length[ok]
         bend = STANDARD_GRAVITY_M_S2 * step * step * s * s
-        found.append(d[at] + v[at] * step * s + bend * (0.5 * a0[ok] + (a1[ok] - a0[ok]) * s / 6.0))
-    return np.concatenate(found)
+        extremes.append(
+            d[at] + v[at] * step * s + bend * (0.5 * a0[ok] + (a1[ok] - a0[ok]) * s / 6.0)
+        )
+    return np.concatenate(extremes)

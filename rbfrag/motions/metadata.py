@@ -129,11 +129,11 @@ def read_metadata(path: str | os.PathLike[str]) -> MotionMetadata:
         by_file.setdefault(place, []).append(row)
     if header is None:
         raise MotionFileError(table, "the table is empty: its first row names the columns")
-    found = {
+    by_place = {
         place: tuple(sorted(traces, key=lambda row: row.trace_index))
         for place, traces in by_file.items()
     }
-    return MotionMetadata(os.fspath(path), tuple(rows), found)
+    return MotionMetadata(os.fspath(path), tuple(rows), by_place)
 
 
 def _numbered_rows(table: Path) -> Iterator[tuple[int, list[str]]]:

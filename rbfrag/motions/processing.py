@@ -23,7 +23,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 LARGEST_ORDER = 8
 
 MOST_SAMPLES = 20_000_000
-"""A padded record beyond this has a wrong dt."""
+"""A record lengthened by zeros beyond this has a wrong dt."""
 
 LARGEST_PGA_G = 1e100
 
@@ -81,7 +81,7 @@ def counts_as_uncorrected(motion: GroundMotion, stated: str = "") -> bool:
 
 
 def processed(motion: GroundMotion, high_pass: HighPass = DEFAULT_HIGH_PASS) -> GroundMotion:
-    """Return a record with its mean removed, padded with zeros and high-pass filtered.
+    """Return a record with its mean removed, zeros added at both ends and high-pass filtered.
 
     Args:
         motion: equally spaced samples, as the file has them.

@@ -20,13 +20,13 @@ LARGEST_PGA_G = 5.0
 LARGEST_PGV_M_S = 5.0
 """The largest recorded ground velocities are near 4 m/s."""
 
-END_VELOCITY_SHARE = 0.05
+END_VELOCITY_RATIO = 0.05
 """A corrected record ends at rest; 5 % of PGV left over means that it was not corrected."""
 
 END_DISPLACEMENT_M = 5.0
 """Permanent displacements are real near a fault, but hardly beyond 5 m at one site."""
 
-EDGE_SHARE = 0.1
+EDGE_RATIO = 0.1
 """A record that starts or ends above 10 % of PGA was cut out of a longer one."""
 
 FEW_SAMPLES = 100
@@ -38,12 +38,7 @@ PGD_IN_DOUBT = frozenset({"final_velocity", "final_displacement"})
 
 @dataclass(frozen=True)
 class QualityFlag:
-    """One doubt about a motion.
-
-    Args:
-        code: short name, as stored and listed.
-        sentence: the value, the limit and what it means.
-    """
+    """One doubt about a motion: its name as stored, and value, limit and meaning in a sentence."""
 
     code: str
     sentence: str
@@ -57,14 +52,14 @@ def quality_flags(motion: GroundMotion) -> tuple[QualityFlag, ...]:
             amplitudes are looked at.
     """
     measures = motion.measures
-    found: list[QualityFlag] = []
+    flags: list[QualityFlag] = []
 
     def doubt(code: str, sentence: str) -> None:
-        found.append(QualityFlag(code, sentence))
+        flags.append(QualityFlag(code, sentence))
 
     if measures.pga_g == 0.0:
         doubt("all_zero", "every sample is zero: this is no motion")
-        return tuple(found)
+        return tuple(flags)
     if measures.pga_g > LARGEST_PGA_G:
         doubt(
             "pga_suspicious",
@@ -80,7 +75,7 @@ def quality_flags(motion: GroundMotion) -> tuple[QualityFlag, ...]:
     if motion.is_partial:
         doubt("partial", "the header states another number of samples than the file holds")
     if motion.dt_s is None:
-        return tuple(found)
+        return tuple(flags)
     if not SHORTEST_DT_S <= motion.dt_s <= LONGEST_DT_S:
         doubt(
             "dt_suspicious",
@@ -96,11 +91,11 @@ def quality_flags(motion: GroundMotion) -> tuple[QualityFlag, ...]:
         )
     if motion.npts < FEW_SAMPLES:
         doubt("short_record", f"{motion.npts} samples are few for an accelerogram")
-    if abs(measures.final_velocity_m_s) > END_VELOCITY_SHARE * measures.pgv_m_s:
+    if abs(measures.final_velocity_m_s) > END_VELOCITY_RATIO * measures.pgv_m_s:
         doubt(
             "final_velocity",
             f"the record ends at {measures.final_velocity_m_s:.3g} m/s, more than "
-            f"{END_VELOCITY_SHARE:.0%} of its PGV: its baseline is not corrected, and PGD means "
+            f"{END_VELOCITY_RATIO:.0%} of its PGV: its baseline is not corrected, and PGD means "
             "little",
         )
     if abs(measures.final_displacement_m) > END_DISPLACEMENT_M:
@@ -116,10 +111,10 @@ def quality_flags(motion: GroundMotion) -> tuple[QualityFlag, ...]:
         edges.tolist(),
         strict=True,
     ):
-        if edge > EDGE_SHARE * measures.pga_g:
+        if edge > EDGE_RATIO * measures.pga_g:
             doubt(
                 code,
-                f"the record {where} at {edge:.3g} g, more than {EDGE_SHARE:.0%} of its PGA: it "
+                f"the record {where} at {edge:.3g} g, more than {EDGE_RATIO:.0%} of its PGA: it "
                 "was cut out of a longer one; the ground is taken to be at rest outside it",
             )
-    return tuple(found)
+    return tuple(flags)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from rbfrag.errors import InputError, MotionFileError, UnknownFormatError
+from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.formats import (
     bhrc_v1,
     cdmg_v1,
@@ -28,8 +31,9 @@ from rbfrag.motions.formats import (
 )
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.file import cut_number, decoded, read_text
-from rbfrag.motions.text.record_file import RecordFile
-from rbfrag.motions.units import acceleration_unit
+from rbfrag.motions.text.record_file import Field, RecordFile, Trace
+from rbfrag.motions.text.times import first_sample_time
+from rbfrag.motions.units import acceleration_unit, unit_in_g
 
 READERS: tuple[ModuleType, ...] = (
     rbfrag_csv,
@@ -49,9 +53,16 @@ READERS: tuple[ModuleType, ...] = (
     ucgmsim_text,
     delimited_text,
 )
-"""One module a format, asked in this order; text without a mark of its own last."""
+"""One module a format, asked in this order; text without a mark of its own last.
+
+Each has `FORMAT`, its name; `recognises`, whether the first characters of a text are of it; and
+`parse`, which yields a file's traces.
+"""
 
 HEAD_CHARACTERS = 4096
+
+TENTH_OF_G = re.compile(r"g\s*/\s*10", re.IGNORECASE)
+"""The unit of the uncorrected (volume 1) formats of the 1970s."""
 
 
 def read_motions(
@@ -142,16 +153,68 @@ def _read(
     file: Path, text: str, units: str | None, dt_s: float | None, *, allow_partial: bool = False
 ) -> list[GroundMotion]:
     reader = _reader(file, text)
+    record = RecordFile(file, text, units, dt_s, allow_partial)
     try:
-        motions: list[GroundMotion] = reader.read(
-            RecordFile(file, text, reader.FORMAT, units, dt_s, allow_partial)
-        )
+        return [
+            _motion(record, trace, file_format=reader.FORMAT, trace_index=index)
+            for index, trace in enumerate(reader.parse(record))
+        ]
     except MotionFileError:
         raise
     except InputError as error:
         # values that no motion can have, which the reader itself has no reason to doubt
         raise MotionFileError(file, f"{error}; export the record again") from None
-    return motions
+
+
+def _motion(file: RecordFile, trace: Trace, **place: Any) -> GroundMotion:
+    factor = trace.scale * _unit_in_g(file, trace.unit)
+    missing = file.missing_samples(trace.count, trace.values.size) if trace.count else ""
+    is_partial = trace.is_partial or bool(missing)
+    if trace.times:
+        file.refuse_other_times(trace.times, trace.dt_s, trace.values.size)
+    further = (missing, trace.remark_if_partial if is_partial else "")
+    name = trace.component if trace.axis is None else trace.axis
+    recording = trace.recording
+    if recording is None:
+        recording = f"{trace.event} {trace.station}".strip()
+    labels: dict[str, Any] = {
+        "station": trace.station,
+        "event": trace.event,
+        "component": trace.component,
+        "recording": recording,
+        "orientation_deg": azimuth_deg(name),
+        "is_vertical": is_vertical_name(name),
+        "start_time": first_sample_time(trace.start),
+        "is_corrected": trace.is_corrected,
+        **trace.labels,
+    }
+    return GroundMotion(
+        trace.values * factor,
+        trace.dt_s,
+        source_file=file.path.name,
+        remarks=(*trace.remarks, *filter(None, further)),
+        is_partial=is_partial,
+        **labels,
+        **place,
+    )
+
+
+def _unit_in_g(file: RecordFile, field: Field | None) -> float:
+    """How many g the header's unit is, or else the caller's; both may not differ."""
+    if field is None:
+        file.require_units()
+        field = Field(file.units or "", 1)
+    unit: str | None = None
+    if not TENTH_OF_G.fullmatch(field.text):
+        try:
+            unit = acceleration_unit(field.text)
+        except InputError as error:
+            raise file.error(str(error), field.line) from None
+    if file.units is not None and acceleration_unit(file.units) != unit:
+        raise file.error(
+            f"the header says {field.text}, not {file.units}: leave --units out", field.line
+        )
+    return 0.1 if unit is None else unit_in_g(unit)
 
 
 def _reader(file: Path, text: str) -> ModuleType:

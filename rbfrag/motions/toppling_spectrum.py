@@ -192,10 +192,10 @@ def _turning_values(
         p: [1/s].
     """
     # s/p + (excess − s/p) exp(−p r) = 0 at the time r before the end, s the slope of a
-    share = -excess / (a1 - a0)
-    x = np.minimum(p * h * share, _LARGEST)
+    reach = -excess / (a1 - a0)
+    x = np.minimum(p * h * reach, _LARGEST)
     ratio = np.divide(np.log1p(x), x, out=np.ones_like(x), where=x > 0.0)
-    fraction = np.minimum(share * ratio, 1.0)
+    fraction = np.minimum(reach * ratio, 1.0)
     decay, near, far = _weights(h * fraction, p)
     return decay * end + near * (a1 - fraction * (a1 - a0)) + far * a1
 

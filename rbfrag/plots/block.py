@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rbfrag.plots.canvas import MODE_COLOURS, mode_words, new_figure, plot_path, save_figure
+from rbfrag.plots.canvas import (
+    MODE_COLOURS,
+    ROCK,
+    light_grid,
+    mode_title,
+    new_figure,
+    plot_path,
+    save_figure,
+    write_near,
+)
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.block.polygon import Point
 from rbfrag.solver.stability.single import Stability
@@ -43,26 +53,25 @@ class BlockLines:
     resultant: Point
 
 
-def block_lines(block: Block, found: Stability) -> BlockLines:
+def block_lines(block: Block, stability: Stability) -> BlockLines:
     """Return what a drawing of the block consists of."""
-    beta = math.radians(found.beta_deg)
+    beta = math.radians(stability.beta_deg)
     cosine, sine = math.cos(beta), math.sin(beta)
 
-    def in_the_slope(point: Point) -> Point:
-        x, y = point
-        return x * cosine + y * sine, -x * sine + y * cosine
+    def in_the_slope(points: Iterable[Point]) -> tuple[Point, ...]:
+        return tuple((x * cosine + y * sine, -x * sine + y * cosine) for x, y in points)
 
     size = max(math.dist(a, b) for a in block.outline for b in block.outline)
-    planes, rock = _planes(block, found.back_fracture, _BAND * size, _REACH * size)
+    planes, rock = _planes(block, stability.back_fracture, _BAND * size, _REACH * size)
     contacts = {"1": block.heel, "2": block.back, "3": block.toe}
-    if not found.back_fracture:
+    if not stability.back_fracture:
         del contacts["2"]
     return BlockLines(
-        outline=tuple(in_the_slope(point) for point in block.outline),
-        contacts={name: in_the_slope(point) for name, point in contacts.items()},
-        planes=tuple(in_the_slope(point) for point in planes),
-        rock=tuple(in_the_slope(point) for point in rock),
-        resultant=_resultant(found, _ARROW * size),
+        outline=in_the_slope(block.outline),
+        contacts=dict(zip(contacts, in_the_slope(contacts.values()), strict=True)),
+        planes=in_the_slope(planes),
+        rock=in_the_slope(rock),
+        resultant=_resultant(stability, _ARROW * size),
     )
 
 
@@ -82,25 +91,24 @@ def _planes(
     corner = (block.back[0] + block.cot_gamma * (block.back[1] - base_y), base_y)
     along = math.dist(corner, block.back) + 0.6 * reach
     top = (corner[0] + up[0] * along, corner[1] + up[1] * along)
-    behind = (top[0] - up[1] * band, top[1] + up[0] * band)
+    beyond = (top[0] - up[1] * band, top[1] + up[0] * band)
     shift = band * min(math.tan(0.5 * gamma), 4.0)
     line = [end, corner, top]
-    return line, [*line, behind, (corner[0] - shift, corner[1] - band), below]
+    return line, [*line, beyond, (corner[0] - shift, corner[1] - band), below]
 
 
-def _resultant(found: Stability, length: float) -> Point:
-    k = found.yield_acceleration
-    right, down = (k, 1.0 + found.kv) if math.isfinite(k) else (0.0, 1.0)
+def _resultant(stability: Stability, length: float) -> Point:
+    k = stability.yield_acceleration
+    right, down = (k, 1.0 + stability.kv) if math.isfinite(k) else (0.0, 1.0)
     scale = length / math.hypot(right, down)
     return right * scale, -down * scale
 
 
-_GROUND = "#8a8378"
-_INK = "#222222"
+_INK, _RESULTANT = "#222222", "#b2182b"
 
 
 def plot_block(
-    block: Block, found: Stability, path: str | PathLike[str], *, title: str = ""
+    block: Block, stability: Stability, path: str | PathLike[str], *, title: str = ""
 ) -> Path:
     """Draw a block to scale on its base and back planes, out of the slope to the right.
 
@@ -110,93 +118,68 @@ def plot_block(
 
     Args:
         block: the block.
-        found: its stability.
+        stability: its stability.
         path: file to write: .png, .pdf or .svg.
         title: title of the figure; mode and yield if empty.
     """
     plot_path(path)
     figure = new_figure(7.4, 4.8)
     axes, panel = figure.subplots(1, 2, width_ratios=[2.6, 1.0])
-    lines = block_lines(block, found)
-    _draw_planes(axes, lines)
-    outline, colour = lines.outline, MODE_COLOURS[found.mode]
+    lines = block_lines(block, stability)
+    axes.fill(*zip(*lines.rock, strict=True), facecolor="#e9e5de", edgecolor=ROCK, hatch="////",
+              lw=0.0)  # fmt: skip
+    axes.plot(*zip(*lines.planes, strict=True), color=ROCK, lw=1.4, zorder=1)
+    outline, colour = lines.outline, MODE_COLOURS[stability.mode]
     axes.fill(*zip(*outline, strict=True), color=colour, alpha=0.28, lw=0, zorder=2)
     axes.plot(*zip(*[*outline, outline[0]], strict=True), color=colour, lw=1.6, zorder=3)
     for name, (x, y) in lines.contacts.items():
         axes.plot([0.0, x], [0.0, y], color=_INK, lw=0.6, ls=":", zorder=4)
         axes.plot(x, y, "o", ms=5, mfc="white", mec=_INK, zorder=6)
-        length = math.hypot(x, y)
-        axes.annotate(
-            name,
-            (x, y),
-            xytext=(13.0 * x / length, 13.0 * y / length),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontsize=9,
-            bbox={"boxstyle": "circle,pad=0.1", "facecolor": "white", "linewidth": 0.0},
-            zorder=7,
-        )
-    _draw_resultant(axes, lines.resultant)
+        outwards = 13.0 / math.hypot(x, y)
+        disc = {"boxstyle": "circle,pad=0.1", "facecolor": "white", "linewidth": 0.0}
+        write_near(axes, name, (x, y), (outwards * x, outwards * y), ha="center", va="center",
+                   fontsize=9, bbox=disc, zorder=7)  # fmt: skip
+    tip = lines.resultant
+    axes.plot([0.0, 1.5 * tip[0]], [0.0, 1.5 * tip[1]], color=_RESULTANT, lw=0.7, ls="--", zorder=4)
+    arrow = {"arrowstyle": "-|>", "color": _RESULTANT, "lw": 1.8, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", xy=tip, xytext=(0.0, 0.0), arrowprops=arrow, zorder=5)
     axes.plot(0.0, 0.0, "o", ms=5, color=_INK, zorder=6)
-    axes.annotate(
-        "C", (0.0, 0.0), xytext=(-5, 5), textcoords="offset points", ha="right", fontsize=10
-    )
+    write_near(axes, "C", (0.0, 0.0), (-5, 5), ha="right", fontsize=10)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.04)
     axes.set_xlabel("horizontal distance from the centroid, out of the slope [m]")
     axes.set_ylabel("height above the centroid [m]")
-    axes.grid(visible=True, lw=0.3, alpha=0.5)
-    _write_panel(panel, block, found)
-    figure.suptitle(title or _title(found), fontsize=11)
+    light_grid(axes)
+    _write_panel(panel, block, stability)
+    figure.suptitle(title or _title(stability), fontsize=11)
     return save_figure(figure, path)
 
 
-def _draw_planes(axes: Axes, lines: BlockLines) -> None:
-    """Draw the rock below and behind as a band along the planes."""
-    axes.fill(
-        *zip(*lines.rock, strict=True),
-        facecolor="#e9e5de", edgecolor=_GROUND, hatch="////", lw=0.0,
-    )  # fmt: skip
-    axes.plot(*zip(*lines.planes, strict=True), color=_GROUND, lw=1.4, zorder=1)
-
-
-def _draw_resultant(axes: Axes, tip: Point) -> None:
-    axes.plot([0.0, 1.5 * tip[0]], [0.0, 1.5 * tip[1]], color="#b2182b", lw=0.7, ls="--", zorder=4)
-    axes.annotate(
-        "",
-        xy=tip,
-        xytext=(0.0, 0.0),
-        arrowprops={"arrowstyle": "-|>", "color": "#b2182b", "lw": 1.8, "shrinkA": 0, "shrinkB": 0},
-        zorder=5,
-    )
-
-
-def _title(found: Stability) -> str:
-    k = found.yield_acceleration
-    name = mode_words(found.mode)
-    if found.state == "locked":
+def _title(stability: Stability) -> str:
+    k = stability.yield_acceleration
+    name = mode_title(stability.mode)
+    if stability.state == "locked":
         return f"{name}: locked, no horizontal acceleration moves the block in this mode"
-    if found.state == "unstable":
+    if stability.state == "unstable":
         held = f" (k = {k:.3f} g)" if math.isfinite(k) else ""
         return f"{name}: fails at rest{held}"
     return f"{name} from k = {k:.3f} g"
 
 
-def _write_panel(panel: Axes, block: Block, found: Stability) -> None:
+def _write_panel(panel: Axes, block: Block, stability: Stability) -> None:
     panel.set_axis_off()
-    k = found.yield_acceleration
+    k = stability.yield_acceleration
     rows = [
-        ("mode", mode_words(found.mode)),
-        ("state", found.state),
+        ("mode", mode_title(stability.mode)),
+        ("state", stability.state),
         ("yield $k$", f"{k:.4f} g" if math.isfinite(k) else "none"),
-        ("sliding $k_y$", f"{found.ky:.4f} g" if math.isfinite(found.ky) else "none"),
+        ("sliding $k_y$", f"{stability.ky:.4f} g" if math.isfinite(stability.ky) else "none"),
         ("", ""),
         (r"$\alpha_1$", f"{block.alpha1_deg:.2f}°"),
         (r"$\alpha_3$", f"{block.alpha3_deg:.2f}°"),
-        (r"$\gamma$", f"{block.gamma_deg:.2f}°" if found.back_fracture else "no back plane"),
-        (r"dip $\beta$", f"{found.beta_deg:.2f}°"),
-        (r"friction $\phi$", _friction(found)),
+        (r"$\gamma$", f"{block.gamma_deg:.2f}°" if stability.back_fracture else "no back plane"),
+        (r"dip $\beta$", f"{stability.beta_deg:.2f}°"),
+        (r"friction $\phi$", _friction(stability)),
         ("", ""),
         ("$S_1$", f"{block.s1_m:.3g} m"),
         ("$S_2$", f"{block.s2_m:.3g} m"),
@@ -205,19 +188,19 @@ def _write_panel(panel: Axes, block: Block, found: Stability) -> None:
         ("area", f"{block.area_m2:.3g} m²"),
         ("$p^2$", f"{block.p2:.3g} s$^{{-2}}$"),
     ]
-    if found.kv:
-        rows.insert(4, ("vertical $k_v$", f"{found.kv:.3g} g"))
+    if stability.kv:
+        rows.insert(4, ("vertical $k_v$", f"{stability.kv:.3g} g"))
     for i, (name, value) in enumerate(rows):
         height = 0.97 - i * 0.92 / len(rows)
         panel.text(0.0, height, name, transform=panel.transAxes, fontsize=9, va="top")
         panel.text(0.47, height, value, transform=panel.transAxes, fontsize=9, va="top")
-    panel.plot([0.0, 0.14], [0.01, 0.01], color="#b2182b", lw=1.8, transform=panel.transAxes)
+    panel.plot([0.0, 0.14], [0.01, 0.01], color=_RESULTANT, lw=1.8, transform=panel.transAxes)
     text = "resultant at yield" if math.isfinite(k) else "weight"
     panel.text(0.19, 0.01, text, transform=panel.transAxes, fontsize=9, va="center")
 
 
-def _friction(found: Stability) -> str:
-    text = f"{found.phi_deg:.4g}°"
-    if found.back_fracture and found.phi_back_deg != found.phi_deg:
-        text += f", back {found.phi_back_deg:.4g}°"
+def _friction(stability: Stability) -> str:
+    text = f"{stability.phi_deg:.4g}°"
+    if stability.back_fracture and stability.phi_back_deg != stability.phi_deg:
+        text += f", back {stability.phi_back_deg:.4g}°"
     return text

@@ -10,7 +10,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.fit.scores import CalibrationBins
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.canvas import light_grid, new_figure, plot_path, save_figure
 
 COLOURS = ("#1f4e79", "#d98c1f", "#4c9a6a", "#8c2d4f")
 MARKERS = ("o", "s", "^", "D")
@@ -27,7 +27,7 @@ def plot_calibration(
 ) -> Path:
     """Draw the share of blocks that toppled over the probability predicted for them.
 
-    Each earthquake was predicted by a fit without it. On the diagonal a model keeps its word.
+    Each earthquake was predicted by a fit without it. On the diagonal a model is calibrated.
 
     Args:
         models: bins by name of the model, at most four.
@@ -46,27 +46,19 @@ def plot_calibration(
         # beside each other, so that their intervals can be told apart
         x = bins.predicted + 0.006 * (number - 0.5 * (len(models) - 1))
         axes.errorbar(
-            x,
-            bins.observed,
+            x, bins.observed,
             yerr=np.clip([bins.observed - bins.low, bins.high - bins.observed], 0.0, None),
-            fmt=MARKERS[number] + "-",
-            ms=4.5,
-            lw=1.0,
-            elinewidth=0.9,
-            capsize=2.0,
-            color=colour,
+            fmt=MARKERS[number] + "-", ms=4.5, lw=1.0, elinewidth=0.9, capsize=2.0, color=colour,
             label=name + _scores((scores or {}).get(name, {})),
-        )
+        )  # fmt: skip
         below.plot(bins.predicted, bins.blocks, MARKERS[number] + "-", ms=3.5, lw=0.9, color=colour)
-    axes.set_xlim(-0.02, 1.02)
-    axes.set_ylim(-0.02, 1.02)
+    axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
     axes.set_ylabel("share of blocks that toppled, 95 % interval")
     axes.legend(loc="upper left", fontsize=8.5, frameon=False)
     below.set_yscale("log")
     below.set_ylabel("blocks per bin")
     below.set_xlabel("probability predicted for an earthquake that was left out")
-    for each in (axes, below):
-        each.grid(visible=True, lw=0.3, alpha=0.6)
+    light_grid(axes, below)
     first = next(iter(models.values()))
     axes.set_title(
         f"{int(first.blocks.sum())} blocks under motions of {first.events} earthquakes"
@@ -78,5 +70,5 @@ def plot_calibration(
 
 def _scores(scores: Mapping[str, float]) -> str:
     known = (("log loss", "log_loss_held_out"), ("Brier", "brier_held_out"))
-    words = [f"{name} {scores[key]:.3f}" for name, key in known if key in scores]
-    return f" ({', '.join(words)})" if words else ""
+    texts = [f"{name} {scores[key]:.3f}" for name, key in known if key in scores]
+    return f" ({', '.join(texts)})" if texts else ""

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,18 +76,56 @@ def spread_out(
 
     None lies below `lowest` or above `highest`, if there is space for all between.
     """
-    highest -= (len(places) - 1) * apart
+    from scipy.optimize import isotonic_regression
+
+    steps = apart * np.arange(len(places))
     # labels that touch move as one group, to the mean of where its members belong
-    groups: list[tuple[float, int]] = []
-    for number, place in enumerate(places):
-        start, count = place - number * apart, 1
-        while groups and groups[-1][0] > start:
-            before, members = groups.pop()
-            start = (before * members + start * count) / (members + count)
-            count += members
-        groups.append((start, count))
-    starts = [min(max(start, lowest), highest) for start, count in groups for _ in range(count)]
-    return [start + number * apart for number, start in enumerate(starts)]
+    starts = isotonic_regression(np.asarray(places) - steps).x if len(places) else steps
+    highest -= (len(places) - 1) * apart
+    moved: list[float] = (np.minimum(np.maximum(starts, lowest), highest) + steps).tolist()
+    return moved
+
+
+def logarithmic(axes: Axes, x: Sequence[float] = (), y: Sequence[float] = ()) -> None:
+    """Make both axes logarithmic, with numbers of these leading digits beside them."""
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis, digits in ((axes.xaxis, x), (axes.yaxis, y)):
+        if digits:
+            written_numbers(axis, *digits)
+
+
+def light_grid(*axes: Axes, which: Literal["major", "both"] = "major") -> None:
+    """Draw thin lines behind the data."""
+    for each in axes:
+        each.grid(visible=True, which=which, lw=0.3, alpha=0.6)
+
+
+def write_near(
+    axes: Axes, text: str, at: tuple[float, float], offset: tuple[float, float], **style: Any
+) -> None:
+    """Write a text some points off a place of the data; `style` as matplotlib's annotate."""
+    axes.annotate(text, at, xytext=offset, textcoords="offset points", **style)
+
+
+def open_corner(axes: Axes) -> None:
+    """Leave out the frame above and at the right."""
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def grey_bars(
+    axes: Axes, values: NDArray[np.float64], edges: NDArray[np.float64], *, flat: bool = False
+) -> None:
+    """Draw a histogram, its bars upright or flat."""
+    axes.hist(
+        values, bins=edges.tolist(), orientation="horizontal" if flat else "vertical",
+        color="#8a8a8a", edgecolor="white", linewidth=0.3,
+    )  # fmt: skip
+
+
+def legend_below(figure: Figure, columns: int) -> None:
+    """Put the labels of all axes below them."""
+    figure.legend(loc="outside lower center", ncols=columns, fontsize=8.5, frameon=False)
 
 
 _CELLS_ACROSS = 60
@@ -105,7 +143,7 @@ def density(
     *,
     beside: Sequence[Axes] = (),
 ) -> None:
-    """Shade hexagons by the number of points in each, on linear or logarithmic axes.
+    """Shade hexagons by the number of points in each, both axes being linear or logarithmic.
 
     Args:
         figure: the sheet.
@@ -122,23 +160,13 @@ def density(
 
     # Neither white for a single block nor so dark that a line disappears.
     greys = ListedColormap(colormaps["Greys"](np.linspace(0.18, 0.72, 256)))
-    scales = axes.get_xscale(), axes.get_yscale()
-    extent = [
-        float(np.log10(edge)) if scale == "log" else edge
-        for edges, scale in ((across, scales[0]), (up, scales[1]))
-        for edge in edges
-    ]
+    log = axes.get_xscale() == "log"
+    left, right, bottom, top = np.log10([*across, *up]) if log else (*across, *up)
+    scale: Literal["log", "linear"] = "log" if log else "linear"
     cells = axes.hexbin(
-        x,
-        y,
-        gridsize=(_CELLS_ACROSS, _CELLS_UP),
-        extent=(extent[0], extent[1], extent[2], extent[3]),
-        xscale="log" if scales[0] == "log" else "linear",
-        yscale="log" if scales[1] == "log" else "linear",
-        mincnt=1,
-        cmap=greys,
-        linewidths=0.2,
-    )
+        x, y, gridsize=(_CELLS_ACROSS, _CELLS_UP), extent=(left, right, bottom, top),
+        xscale=scale, yscale=scale, mincnt=1, cmap=greys, linewidths=0.2,
+    )  # fmt: skip
     axes.set_xlim(*across)
     axes.set_ylim(*up)
     most = max(int(np.asarray(cells.get_array()).max(initial=1)), 2)
@@ -149,6 +177,8 @@ def density(
     key.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.0f}"))
     key.ax.yaxis.set_minor_locator(NullLocator())
 
+
+ROCK, BLUE, RED = "#8a8378", "#1f4e79", "#b2182b"
 
 # Told apart by people who do not see red and green alike, and in grey.
 MODE_COLOURS: dict[ModeName, str] = {
@@ -166,6 +196,6 @@ MODE_LINES: dict[ModeName, str] = {
 }
 
 
-def mode_words(mode: ModeName) -> str:
-    """Return the name of a mode for people."""
+def mode_title(mode: str) -> str:
+    """Return the name of a mode or kind for people."""
     return mode.replace("_", " ")

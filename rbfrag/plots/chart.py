@@ -10,7 +10,7 @@ import numpy as np
 
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure, spread_out, written_numbers
+from rbfrag.plots.canvas import BLUE, logarithmic, new_figure, plot_path, save_figure, spread_out
 from rbfrag.plots.model_lines import MORE_TERMS, HeldMeasures, failure_line, held_measures
 
 if TYPE_CHECKING:
@@ -57,21 +57,15 @@ def plot_chart(
     lines = {p: failure_line(model, x, p, held) for p in CONTOURS}
     figure = new_figure(7.0, 7.0)
     axes = figure.add_subplot()
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
     bottom, top = _vertical_range(x, lines[0.99], lines[0.01])
-    axes.set_xlim(x[0], x[-1])
-    axes.set_ylim(bottom, top)
-    axes.set_aspect("equal")
+    axes.set(xlim=(x[0], x[-1]), ylim=(bottom, top), aspect="equal")
     for probability, y in lines.items():
-        width = 1.9 if probability in _BOLD else 0.9
-        axes.plot(x, y, color="#1f4e79", lw=width)
+        axes.plot(x, y, color=BLUE, lw=1.9 if probability in _BOLD else 0.9)
     _write_beside(axes, x, lines)
     _shade_outside(axes, held.fitted_range(model, low, high), domain.get("y_m_s"))
     axes.set_xlabel(TERMS["pgv"].label if model.term.name in MORE_TERMS else model.term.label)
     axes.set_ylabel("toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
-    written_numbers(axes.xaxis, 1.0, 2.0, 5.0)
-    written_numbers(axes.yaxis, 1.0, 2.0, 5.0)
     axes.grid(visible=True, which="major", lw=0.6, color="#9a9a9a")
     axes.grid(visible=True, which="minor", lw=0.3, color="#c8c8c8")
     axes.set_axisbelow(True)
@@ -101,26 +95,15 @@ def _write_beside(axes: Axes, x: np.ndarray, lines: dict[float, np.ndarray]) -> 
     ends.sort()
     places = spread_out([up for up, *_ in ends], _LABEL_APART, 0.01, 0.99)
     for place, (up, across, probability) in zip(places, ends, strict=True):
-        words = f"{100.0 * probability:g} %"
+        text = f"{100.0 * probability:g} %"
         axes.plot(
-            [across, _LABEL_AT - 0.005],
-            [up, place],
-            color="#1f4e79",
-            lw=0.5,
-            transform=axes.transAxes,
-            clip_on=False,
-            label=f"_{words}",
-        )
+            [across, _LABEL_AT - 0.005], [up, place], color=BLUE, lw=0.5,
+            transform=axes.transAxes, clip_on=False, label=f"_{text}",
+        )  # fmt: skip
         axes.text(
-            _LABEL_AT,
-            place,
-            words,
-            fontsize=8,
+            _LABEL_AT, place, text, fontsize=8, va="center", color=BLUE, transform=axes.transAxes,
             fontweight="bold" if probability in _BOLD else "normal",
-            va="center",
-            color="#1f4e79",
-            transform=axes.transAxes,
-        )
+        )  # fmt: skip
 
 
 def _shade_outside(axes: Axes, across: tuple[float, float], up: tuple[float, float] | None) -> None:

@@ -14,15 +14,26 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize.elementwise import find_root
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import density, new_figure, plot_path, save_figure, written_numbers
+from rbfrag.plots.canvas import (
+    BLUE,
+    RED,
+    density,
+    grey_bars,
+    light_grid,
+    logarithmic,
+    new_figure,
+    plot_path,
+    save_figure,
+    write_near,
+)
 
 FloatArray = NDArray[np.float64]
-
-_HALVINGS = 60
 
 
 def rectangular_lobe(f: ArrayLike) -> FloatArray:
@@ -45,16 +56,15 @@ def triangular_lobe(f: ArrayLike) -> FloatArray:
 def half_sine_lobe(f: ArrayLike) -> FloatArray:
     """Return the critical angle over the amplitude of a half-sine, f = p t_p > 0.
 
-    sin s with x sin s − cos s = exp(−(π − s)/x), x = π/f, by bisection in s.
+    sin s with x sin s − cos s = exp(−(π − s)/x), x = π/f.
     """
     x = np.pi / np.asarray(f, dtype=np.float64)
-    low, high = np.zeros_like(x), np.full_like(x, 0.5 * np.pi)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        below = x * np.sin(middle) - np.cos(middle) < np.exp(-(np.pi - middle) / x)
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    line: FloatArray = np.sin(0.5 * (low + high))
-    return line
+
+    def balance(s: FloatArray, x: FloatArray) -> FloatArray:
+        return np.asarray(x * np.sin(s) - np.cos(s) - np.exp(-(np.pi - s) / x))
+
+    root = find_root(balance, (0.0, 0.5 * np.pi), args=(x,))
+    return np.asarray(np.sin(root.x), dtype=np.float64)
 
 
 LOBES: Mapping[str, Callable[[ArrayLike], FloatArray]] = {
@@ -75,11 +85,7 @@ def lobe_line(name: str, frequency_ratio: ArrayLike) -> FloatArray:
     return LOBES[name](np.pi / np.asarray(frequency_ratio, dtype=np.float64))
 
 
-STYLES = {
-    "rectangular": ("-", "#b2182b"),
-    "half-sine": ("--", "#1f4e79"),
-    "triangular": ("-.", "#2e7d32"),
-}
+STYLES = {"rectangular": ("-", RED), "half-sine": ("--", BLUE), "triangular": ("-.", "#2e7d32")}
 
 
 def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data: str = "") -> Path:
@@ -111,30 +117,19 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
     axes = figure.add_subplot()
     left, right = 0.8 * float(x.min()), 1.25 * float(x.max())
     bottom, top = 0.8 * min(limit, float(y.min())), 1.25 * max(1.0, float(y.max()))
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    logarithmic(axes)
     density(figure, axes, x, y, (left, right), (bottom, top))
     line_x = np.geomspace(left, right, 300)
     for name in LOBES:
         style, colour = STYLES[name]
         above = int(np.sum(y > lobe_line(name, x)))
-        axes.plot(
-            line_x,
-            lobe_line(name, line_x),
-            style,
-            color=colour,
-            lw=1.8,
-            label=f"{name} lobe: {above} above ({100.0 * above / x.size:.1f} %)",
-        )
+        label = f"{name} lobe: {above} above ({100.0 * above / x.size:.1f} %)"
+        axes.plot(line_x, lobe_line(name, line_x), style, color=colour, lw=1.8, label=label)
     if censored.any():
         axes.axhline(limit, color="black", lw=0.8, ls=":")
-        axes.annotate(
-            f"search limit; {int(censored.sum())} critical values lie below it",
-            (0.01, limit),
-            xycoords=("axes fraction", "data"),
-            xytext=(0, 4),
-            textcoords="offset points",
-            fontsize=8,
+        text = f"search limit; {int(censored.sum())} critical values lie below it"
+        write_near(
+            axes, text, (0.01, limit), (0, 4), xycoords=("axes fraction", "data"), fontsize=8
         )
     axes.set_xlabel(r"frequency of the motion over that of the block, $\omega_m/p$")
     axes.set_ylabel(r"critical strength, $k_r/\mathrm{PGA}$")
@@ -145,9 +140,8 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
         + (f"\n{data}" if data else ""),
         fontsize=10,
     )
-    axes.grid(visible=True, which="major", lw=0.3, alpha=0.5)
-    written_numbers(axes.xaxis, 1.0, 2.0, 5.0)
-    written_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    light_grid(axes)
+    logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.09), fontsize=8.5, frameon=False)
     return save_figure(figure, path)
 
@@ -179,27 +173,15 @@ class VerticalPairs:
 
 def vertical_pairs(without: CombinationTable, with_vertical: CombinationTable) -> VerticalPairs:
     """Return the pairs of two tables; what is in one of them alone has no pair."""
-    place = {
-        key: i
-        for i, key in enumerate(
-            zip(
-                without.motion_id.tolist(),
-                without.polarity.tolist(),
-                without.p2.tolist(),
-                strict=True,
-            )
-        )
-    }
-    keys = zip(
-        with_vertical.motion_id.tolist(),
-        with_vertical.polarity.tolist(),
-        with_vertical.p2.tolist(),
-        strict=True,
-    )
-    pairs = np.array(
-        [(place[key], j) for j, key in enumerate(keys) if key in place], dtype=np.intp
-    ).reshape(-1, 2)
-    first, second = pairs[:, 0], pairs[:, 1]
+
+    def combinations(table: CombinationTable) -> pd.DataFrame:
+        columns = {name: getattr(table, name) for name in ("motion_id", "polarity", "p2")}
+        return pd.DataFrame({**columns, "row": np.arange(table.p2.size)})
+
+    keys = ["motion_id", "polarity", "p2"]
+    vertical = combinations(with_vertical)
+    pairs = vertical.merge(combinations(without), on=keys, suffixes=("_with", ""))
+    first, second = pairs["row"].to_numpy(), pairs["row_with"].to_numpy()
     one, other = without.status[first] == "found", with_vertical.status[second] == "found"
     both = one & other
     a = without.kr_over_pga[first[both]]
@@ -231,26 +213,18 @@ def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
     axes, beside = figure.subplots(1, 2, width_ratios=[1.15, 1.0])
     values = np.concatenate([pairs.without, pairs.with_vertical])
     edges = 0.85 * float(values.min()), 1.2 * float(values.max())
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    logarithmic(axes)
     density(figure, axes, pairs.without, pairs.with_vertical, edges, edges)
-    axes.plot(edges, edges, color="#b2182b", lw=1.2, label="no change")
-    written_numbers(axes.xaxis, 1.0, 2.0, 5.0)
-    written_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    axes.plot(edges, edges, color=RED, lw=1.2, label="no change")
+    logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
     axes.set_xlabel(r"critical $k_r/\mathrm{PGA}$ without vertical motion")
     axes.set_ylabel(r"critical $k_r/\mathrm{PGA}$ with it")
     axes.legend(loc="upper left", fontsize=8.5, frameon=False)
 
     d = pairs.ln_ratio
     reach = float(np.clip(1.3 * np.quantile(np.abs(d), 0.995), _NARROWEST, _WIDEST))
-    beside.hist(
-        np.clip(d, -reach, reach),
-        bins=np.linspace(-reach, reach, 58).tolist(),
-        color="#8a8a8a",
-        edgecolor="white",
-        linewidth=0.3,
-    )
-    beside.axvline(0.0, color="#b2182b", lw=1.2)
+    grey_bars(beside, np.clip(d, -reach, reach), np.linspace(-reach, reach, 58))
+    beside.axvline(0.0, color=RED, lw=1.2)
     beside.set_xlim(-reach, reach)
     beside.set_xlabel("ln (with / without)")
     beside.set_ylabel("critical blocks")

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.canvas import (
+    BLUE,
+    RED,
+    legend_below,
+    light_grid,
+    new_figure,
+    plot_path,
+    save_figure,
+)
 from rbfrag.plots.model_lines import model_answers
 
 FloatArray = NDArray[np.float64]
@@ -27,7 +35,7 @@ AXIS = {
 
 FIXED = {"pga_g": "PGA = {:g} g", "tm_s": "$T_m$ = {:g} s"}
 
-_COLOURS = ("#b2182b", "#4d9221", "#e08214", "#762a83", "#636363")
+_COLOURS = (RED, "#4d9221", "#e08214", "#762a83", "#636363")
 _POINTS = 241
 _START = 1e-6
 
@@ -78,27 +86,22 @@ def plot_curve(
     figure = new_figure(7.0, 4.6)
     axes = figure.add_subplot()
     axes.fill_between(
-        x, answer.ci_low, answer.ci_high, color="#1f4e79", alpha=0.2, lw=0.0,
+        x, answer.ci_low, answer.ci_high, color=BLUE, alpha=0.2, lw=0.0,
         label=f"{100.0 * level:g} % confidence in the curve",
     )  # fmt: skip
     if not known.all():
-        axes.plot(
-            x, answer.probability, "--", color="#1f4e79", lw=1.2, label="outside the fitted range"
-        )
-    axes.plot(
-        x, np.where(known, answer.probability, np.nan), color="#1f4e79", lw=2.0,
-        label="probability of toppling",
-    )  # fmt: skip
+        outside = "outside the fitted range"
+        axes.plot(x, answer.probability, "--", color=BLUE, lw=1.2, label=outside)
+    fitted = np.where(known, answer.probability, np.nan)
+    axes.plot(x, fitted, color=BLUE, lw=2.0, label="probability of toppling")
     for i, (name, other) in enumerate((beside or {}).items()):
         style = ("-", "--", "-.", ":")[i // len(_COLOURS) % 4]
         colour = _COLOURS[i % len(_COLOURS)]
         axes.plot(x, other(x), style, color=colour, lw=1.4, label=name)
-    axes.set_xlim(0.0, end)
-    axes.set_ylim(0.0, 1.0)
-    axes.set_xlabel(AXIS[varied])
-    axes.set_ylabel("probability that the block topples")
-    axes.grid(visible=True, lw=0.3, alpha=0.6)
-    words = ", ".join(FIXED.get(name, name + " = {:g}").format(held[name]) for name in others)
+    axes.set(xlim=(0.0, end), ylim=(0.0, 1.0))
+    axes.set(xlabel=AXIS[varied], ylabel="probability that the block topples")
+    light_grid(axes)
+    conditions = ", ".join(FIXED.get(name, name + " = {:g}").format(held[name]) for name in others)
     about = model.row.diagnostics
     counts = (
         f", fitted on {about['n']} critical blocks of {about['events']} earthquakes"
@@ -107,11 +110,11 @@ def plot_curve(
     )
     axes.set_title(
         f"block $p^2$ = {p2:g} s$^{{-2}}$, $k_r$ = {kr:g}, $y$ = {y:.3g} m/s"
-        + (f"; {words}" if words else "")
+        + (f"; {conditions}" if conditions else "")
         + f"\nmodel {model.name}{counts}",
         fontsize=10,
     )
-    figure.legend(loc="outside lower center", ncols=3, fontsize=8.5, frameon=False)
+    legend_below(figure, 3)
     return save_figure(figure, path)
 
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.files import output_path, written_whole
-from rbfrag.plots.canvas import new_figure
-from rbfrag.plots.response import BLOCK, GROUND, STRENGTH
+from rbfrag.plots.canvas import ROCK, light_grid, mode_title, new_figure
+from rbfrag.plots.response import BLOCK, MOTION, STRENGTH
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.results import FloatArray, Response, ResponseHistory
 
@@ -34,8 +34,6 @@ FRAMES_MAX = 100
 
 MARGIN_S = 0.5
 """Rest shown before the first motion and after the last [s]."""
-
-ROCK = "#8a8378"
 
 
 def film(
@@ -75,9 +73,8 @@ def film(
 
     FigureCanvasAgg(figure)
     time_s, speed = _frame_times(response, history)
-    outlines = _outlines(block, history, time_s, exaggerate)
+    shown = _to_slope(_outlines(block, history, time_s, exaggerate), beta_deg)
     scene, trace = figure.subplots(2, 1, height_ratios=[2.6, 1.0])
-    shown = _to_slope(outlines, beta_deg)
     _draw_scene(scene, block, shown, beta_deg, back_fracture)
     (patch,) = scene.fill(*shown[0].T, color=BLOCK, alpha=0.35, lw=0, zorder=3)
     (edge,) = scene.plot(*_closed(shown[0]).T, color=BLOCK, lw=1.6, zorder=4)
@@ -85,7 +82,7 @@ def film(
     cursor = _draw_trace(trace, history, time_s)
     scale = "true scale" if exaggerate == 1.0 else f"displacements times {exaggerate:g}"
     pace = "" if speed == 1.0 else f", {speed:.2g} times as fast as it was"
-    figure.suptitle(f"{title}\n{response.kind.replace('_', ' ')}, {scale}{pace}", fontsize=10)
+    figure.suptitle(f"{title}\n{mode_title(response.kind)}, {scale}{pace}", fontsize=10)
 
     def show(frame: int) -> tuple[Any, ...]:
         patch.set_xy(_closed(shown[frame]))
@@ -161,14 +158,8 @@ def _outlines(
     else:
         turned, centroid = history.turned_rad, history.centroid_m
     angle = exaggerate * np.interp(time_s, history.time_s, turned)
-    places = np.stack(
-        [
-            start[axis]
-            + exaggerate * (np.interp(time_s, history.time_s, centroid[:, axis]) - start[axis])
-            for axis in (0, 1)
-        ],
-        axis=1,
-    )
+    moved = [np.interp(time_s, history.time_s, column) for column in centroid.T]
+    places = start + exaggerate * (np.stack(moved, axis=1) - start)
     arms = np.array(block.vertices_m) - start
     corners: FloatArray = places[:, None, :] + _rotated(arms, angle)
     return corners
@@ -203,30 +194,26 @@ def _draw_scene(
     root = np.array([0.0, 0.0])
     base = _to_slope(np.array([root, [3.0 * size, 0.0]]), beta_deg)
     axes.plot(*base.T, color=ROCK, lw=2.0, zorder=2)
-    behind = (
-        np.array([root, 3.0 * size * up]) if back_fracture else np.array([[-3.0 * size, 0.0], root])
-    )
-    axes.plot(*_to_slope(behind, beta_deg).T, color=ROCK, lw=2.0, zorder=2)
+    back = np.array([root, 3.0 * size * up] if back_fracture else [[-3.0 * size, 0.0], root])
+    axes.plot(*_to_slope(back, beta_deg).T, color=ROCK, lw=2.0, zorder=2)
     axes.plot(*_closed(shown[0]).T, color=ROCK, lw=1.0, ls="--", zorder=1)
     margin = 0.12 * size
     axes.set_xlim(low[0] - 2.0 * margin, high[0] + margin)
     axes.set_ylim(low[1] - margin, high[1] + margin)
     axes.set_aspect("equal")
-    axes.set_xlabel("out of the slope [m]")
-    axes.set_ylabel("up [m]")
+    axes.set(xlabel="out of the slope [m]", ylabel="up [m]")
 
 
 def _draw_trace(axes: Axes, history: ResponseHistory, time_s: FloatArray) -> Any:
     """Draw the ground below the scene; return the line that marks the present."""
     driving = history.k_h / (1.0 + history.k_v)
-    axes.plot(history.time_s, driving, color=GROUND, lw=0.7, label="ground: $k_h/(1+k_v)$")
+    axes.plot(history.time_s, driving, color=MOTION, lw=0.7, label="ground: $k_h/(1+k_v)$")
     if history.strength_g is not None:
         axes.plot(history.time_s, history.strength_g, color=STRENGTH, lw=1.1, label="strength")
     axes.legend(loc="upper right", fontsize=7, ncols=2)
     axes.set_xlim(time_s[0], time_s[-1])
     top = 1.1 * float(np.abs(driving).max())
     axes.set_ylim(-top, 1.35 * top)
-    axes.set_xlabel("time [s]")
-    axes.set_ylabel("[g]")
-    axes.grid(visible=True, lw=0.3, alpha=0.6)
+    axes.set(xlabel="time [s]", ylabel="[g]")
+    light_grid(axes)
     return axes.axvline(time_s[0], color="black", lw=1.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,17 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.fragility.methods import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.plots.canvas import density, new_figure, plot_path, save_figure, written_numbers
+from rbfrag.plots.canvas import (
+    RED,
+    density,
+    grey_bars,
+    legend_below,
+    logarithmic,
+    new_figure,
+    open_corner,
+    plot_path,
+    save_figure,
+)
 from rbfrag.plots.model_lines import (
     ONE_NUMBER_TERMS,
     failure_line,
@@ -21,11 +30,8 @@ from rbfrag.plots.model_lines import (
     running_medians,
 )
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 _LINES = (
-    (0.025, "--", "#b2182b", "2.5 % probability of failure"),
+    (0.025, "--", RED, "2.5 % probability of failure"),
     (0.5, "-", "black", "50 % probability of failure"),
     (0.975, "-.", "#2166ac", "97.5 % probability of failure"),
 )
@@ -110,22 +116,26 @@ def plot_fit(
     above = figure.add_subplot(grid[0, 0], sharex=axes)
     beside = figure.add_subplot(grid[1, 1], sharey=axes)
     if log:
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+        logarithmic(axes)
     density(figure, axes, x, y, (left, right), (bottom, top), beside=[beside, above])
     if log:
-        written_numbers(axes.xaxis, 1.0, 2.0, 5.0)
-        written_numbers(axes.yaxis, 1.0, 2.0, 5.0)
-    for (_, style, colour, words), (line_x, line) in zip(_LINES, lines, strict=True):
-        label = words if np.isfinite(line).any() else f"{words}\n(below zero)"
+        logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
+    for (_, style, colour, label), (line_x, line) in zip(_LINES, lines, strict=True):
+        label += "" if np.isfinite(line).any() else "\n(below zero)"
         axes.plot(line_x, line, style, color=colour, linewidth=1.8, label=label)
     axes.set_xlabel(
         term.label if alone else "expected of the motion: $y$ at 50 % probability of failure [m/s]"
     )
     axes.set_ylabel("critical toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
     spaced = np.geomspace if log else np.linspace
-    _histogram(above, x, spaced(left, right, _BARS + 1), horizontal=False)
-    _histogram(beside, y, spaced(bottom, top, _BARS + 1), horizontal=True)
+    grey_bars(above, x, spaced(left, right, _BARS + 1))
+    above.set_ylabel("blocks", fontsize=8)
+    above.tick_params(labelbottom=False, labelsize=8)
+    grey_bars(beside, y, spaced(bottom, top, _BARS + 1), flat=True)
+    beside.set_xlabel("blocks", fontsize=8)
+    beside.tick_params(labelleft=False, labelsize=8)
+    for edge in (above, beside):
+        open_corner(edge)
     n_events = len(set(table.event_id[shown].tolist()))
     n_censored = int(np.isin(table.status.astype(str), ("below_limit", "no_motion")).sum())
     figure.suptitle(
@@ -133,26 +143,5 @@ def plot_fit(
         f"not shown: {n_censored} whose critical block lies below the search limit",
         fontsize=10,
     )
-    figure.legend(loc="outside lower center", ncols=len(_LINES), fontsize=8.5, frameon=False)
+    legend_below(figure, len(_LINES))
     return save_figure(figure, path)
-
-
-def _histogram(
-    axes: Axes, values: NDArray[np.float64], edges: NDArray[np.float64], *, horizontal: bool
-) -> None:
-    axes.hist(
-        values,
-        bins=edges.tolist(),
-        orientation="horizontal" if horizontal else "vertical",
-        color="#8a8a8a",
-        edgecolor="white",
-        linewidth=0.3,
-    )
-    if horizontal:
-        axes.set_xlabel("blocks", fontsize=8)
-        axes.tick_params(labelleft=False, labelsize=8)
-    else:
-        axes.set_ylabel("blocks", fontsize=8)
-        axes.tick_params(labelbottom=False, labelsize=8)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)

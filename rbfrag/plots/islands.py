@@ -9,7 +9,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.plots.canvas import new_figure, save_figure
+from rbfrag.plots.canvas import BLUE, new_figure, save_figure, written_numbers
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.results import CriticalResult
 from rbfrag.solver.toppling_run import runner
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 BANDS = {"topples": "#e8b4b0", "safe": "#dce9f5", "undecided": "#8c8c8c"}
 NAMES = {"topples": "all topple", "safe": "all stay", "undecided": "undecided"}
-ROTATION = "#1f4e79"
+ROTATION = BLUE
 CRITICAL = "#8b1a1a"
 BOUND = "#5b3a86"
 
@@ -95,13 +95,11 @@ def enlarged_range(result: CriticalResult) -> tuple[float, float, str]:
         return bottom, min(2.0 * bottom, top), "just above the search limit"
     toppling = [w == "topples" for w in result.intervals.outcome]
     first = toppling.index(True) if any(toppling) else len(toppling)
+    intervals = result.intervals
     islands = [
         (float(high - low), float(low), float(high))
         for low, high, outcome in zip(
-            result.intervals.k_lo[first:],
-            result.intervals.k_hi[first:],
-            result.intervals.outcome[first:],
-            strict=True,
+            intervals.k_lo[first:], intervals.k_hi[first:], intervals.outcome[first:], strict=True
         )
         if outcome == "safe" and high < result.lower
     ]
@@ -126,8 +124,8 @@ def _panel(
     *,
     logarithmic: bool,
 ) -> None:
-    seen = result.intervals
-    for k_lo, k_hi, outcome in zip(seen.k_lo, seen.k_hi, seen.outcome, strict=True):
+    all_of = result.intervals
+    for k_lo, k_hi, outcome in zip(all_of.k_lo, all_of.k_hi, all_of.outcome, strict=True):
         drawn = min(k_hi, high) - max(k_lo, low)
         if drawn > (LEAST_DRAWN * (high - low) if outcome == "undecided" else 0.0):
             axes.axvspan(k_lo, k_hi, color=BANDS[outcome], lw=0.0)
@@ -139,12 +137,8 @@ def _panel(
     if result.lower is not None and low <= result.lower <= high:
         axes.axvline(result.lower, color=CRITICAL, lw=1.4)
     if logarithmic:
-        from matplotlib.ticker import LogLocator, NullFormatter
-
         axes.set_xscale("log")
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
-        axes.xaxis.set_major_formatter(lambda x, _: f"{x:g}")
-        axes.xaxis.set_minor_formatter(NullFormatter())
+        written_numbers(axes.xaxis, 1.0, 2.0, 3.0, 5.0)
     axes.set_xlim(low, high)
     axes.set_ylim(0.0, max(1.15, 1.08 * float(np.nanmax(theta_n, initial=0.0))))
     axes.set_ylabel(r"peak rotation $\theta/\theta_c$")
@@ -167,9 +161,9 @@ def rotations(
         [np.outer(edges, 1.0 - offsets).ravel(), np.outer(edges, 1.0 + offsets).ravel()]
     )
     ratios = np.sort(np.concatenate([spread, beside[(beside > low) & (beside < high)]]))
-    run = runner(excited, p2=result.p2, linear=result.linear)
+    run = runner(excited, p2=result.p2)
     kr = ratios * excited.pga_g
-    theta_c = kr if result.linear else np.arctan(kr)
+    theta_c = np.arctan(kr)
     return ratios, np.array([run(k).peak_rad for k in kr.tolist()]) / theta_c
 
 

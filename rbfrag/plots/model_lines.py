@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize.elementwise import find_root
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
@@ -182,8 +183,6 @@ def _middle(model: FragilityModel, name: str) -> float:
 _LOWEST, _HIGHEST = 1e-4, 50.0
 """Range of y/x in which a block of given probability is looked for."""
 
-_HALVINGS = 50
-
 
 def failure_line(
     model: FragilityModel, x_m_s: FloatArray, probability: float, held: HeldMeasures | None = None
@@ -202,33 +201,24 @@ def failure_line(
     """
     held = held_measures(model) if held is None else held
 
-    def toppling(y_m_s: FloatArray) -> FloatArray:
-        return toppling_probability(model, x_m_s, y_m_s, held)
+    def toppling(y_m_s: FloatArray, x_m_s: FloatArray) -> FloatArray:
+        kr = y_m_s * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
+        return model_answers(model, held.p2, kr, held.measures(model, x_m_s)).probability
 
-    none = toppling(_LOWEST * x_m_s) < probability
-    line: FloatArray = np.where(none, np.nan, _of_probability(toppling, x_m_s, probability))
-    return line
+    return _of_probability(probability, toppling, x_m_s)
 
 
 def _of_probability(
-    toppling: Callable[[FloatArray], FloatArray], x_m_s: FloatArray, probability: float
+    probability: float, toppling: Callable[..., FloatArray], x_m_s: FloatArray, *others: FloatArray
 ) -> FloatArray:
-    """Return y [m/s] of a given probability, which falls with y, by bisection of its logarithm."""
-    low, high = np.log(_LOWEST * x_m_s), np.log(_HIGHEST * x_m_s)
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        likely = toppling(np.exp(middle)) >= probability
-        low, high = np.where(likely, middle, low), np.where(likely, high, middle)
-    y: FloatArray = np.exp(0.5 * (low + high))
-    return y
-
-
-def toppling_probability(
-    model: FragilityModel, x_m_s: FloatArray, y_m_s: FloatArray, held: HeldMeasures
-) -> FloatArray:
-    """Return the probability of blocks y [m/s] at intensities x [m/s], arrays of one shape."""
-    kr = y_m_s * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
-    return model_answers(model, held.p2, kr, held.measures(model, x_m_s)).probability
+    """Return y [m/s] where toppling(y, x, *others), which falls with y, has a given probability."""
+    ends = np.log(_LOWEST * x_m_s), np.log(_HIGHEST * x_m_s)
+    root = find_root(
+        lambda ln_y, *columns: toppling(np.exp(ln_y), *columns) - probability,
+        ends,
+        args=(x_m_s, *others),
+    )
+    return np.asarray(np.exp(root.x), dtype=np.float64)
 
 
 def predicted_strengths(
@@ -255,14 +245,15 @@ def predicted_strengths(
         known &= np.isfinite(given[name])
     given = {name: column[known] for name, column in given.items()}
 
-    def toppling(y_m_s: FloatArray) -> FloatArray:
-        kr = y_m_s * np.sqrt(given["p2"]) / STANDARD_GRAVITY_M_S2
-        answer = answer_given(model, {**given, "kr": kr}, 0.95)
+    def toppling(y_m_s: FloatArray, _: FloatArray, *columns: FloatArray) -> FloatArray:
+        one = dict(zip(given, columns, strict=True))
+        kr = y_m_s * np.sqrt(one["p2"]) / STANDARD_GRAVITY_M_S2
+        answer = answer_given(model, {**one, "kr": kr}, 0.95, interval=False)
         assert isinstance(answer, PredictionArray)
         return answer.probability
 
     result = np.full(x.shape, np.nan)
-    result[known] = _of_probability(toppling, x[known], probability)
+    result[known] = _of_probability(probability, toppling, x[known], *given.values())
     return result
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import MODE_COLOURS, mode_words, new_figure, plot_path, save_figure
+from rbfrag.plots.canvas import MODE_COLOURS, mode_title, new_figure, plot_path, save_figure
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
 from rbfrag.solver.stability.modes import LOCKED, MODES, STABLE, UNSTABLE
@@ -74,7 +74,7 @@ def plot_modes(
     nodes = np.arange(-90.0 + 0.5 * _STEP_DEG, 90.0, _STEP_DEG)
     a1, a3 = np.meshgrid(nodes, nodes)
     is_block = a1 < a3
-    found = stability_arrays(
+    stability = stability_arrays(
         # Other angles than a block's are not asked for; their place is taken by one that is.
         BlockArray.from_angles(np.where(is_block, a1, -1.0), np.where(is_block, a3, 1.0), 1.0),
         beta_deg=beta_deg,
@@ -86,19 +86,17 @@ def plot_modes(
     shown = _pairs(alpha1_deg, alpha3_deg)
     figure = new_figure(6.4 if len(shown[0]) > MOST_POINTS else 5.6, 5.5)
     axes = figure.add_subplot()
-    _draw_regions(axes, nodes, is_block, found)
-    values = _draw_yields(axes, nodes, is_block, found)
+    chart = _Chart(axes, nodes, is_block, stability)
+    _draw_regions(chart)
+    values = _draw_yields(chart)
     covered = _draw_blocks(axes, nodes, *shown)
-    names = _name_regions(axes, nodes, is_block, found, back_fracture, covered)
-    _explain_hatches(axes, is_block, found)
+    names = _name_regions(chart, back_fracture, covered)
+    _explain_hatches(chart)
     axes.fill([-90, 90, 90], [-90, -90, 90], color="white", zorder=4, lw=0)
     axes.plot([-90, 90], [-90, 90], color="black", lw=1.0, zorder=5)
     axes.text(38, -38, r"no block: $\alpha_1 \geq \alpha_3$", ha="center", fontsize=9, zorder=5)
-    axes.set_xlim(-90, 90)
-    axes.set_ylim(-90, 90)
-    axes.set_aspect("equal")
-    axes.set_xticks(range(-90, 91, 30))
-    axes.set_yticks(range(-90, 91, 30))
+    ticks = range(-90, 91, 30)
+    axes.set(xlim=(-90, 90), ylim=(-90, 90), aspect="equal", xticks=ticks, yticks=ticks)
     axes.set_xlabel(r"angle of the heel, $\alpha_1$ [°]")
     axes.set_ylabel(r"angle of the toe, $\alpha_3$ [°]")
     figure.suptitle(title or _title(phi_deg, phi_back_deg, beta_deg, back_fracture), fontsize=10)
@@ -131,33 +129,40 @@ def _pairs(
     return a1, a3
 
 
-def _draw_regions(
-    axes: Axes, nodes: FloatArray, is_block: NDArray[np.bool_], found: StabilityArray
-) -> None:
+class _Chart(NamedTuple):
+    """The sheet, the angles of its nodes [deg], which of them is a block, and what blocks do."""
+
+    axes: Axes
+    nodes: FloatArray
+    is_block: NDArray[np.bool_]
+    stability: StabilityArray
+
+    def of_mode(self, code: int) -> NDArray[np.bool_]:
+        return np.asarray(self.is_block & (self.stability.mode_code == code))
+
+    def in_state(self, code: int) -> NDArray[np.bool_]:
+        return np.asarray(self.is_block & (self.stability.state_code == code))
+
+
+def _draw_regions(chart: _Chart) -> None:
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
+    axes, nodes = chart.axes, chart.nodes
     axes.imshow(
-        np.ma.masked_where(~is_block, found.mode_code),
+        np.ma.masked_where(~chart.is_block, chart.stability.mode_code),
         cmap=ListedColormap([MODE_COLOURS[mode] for mode in MODES]),
         norm=BoundaryNorm(np.arange(-0.5, len(MODES)), len(MODES)),
-        alpha=0.30,
-        zorder=1,
-        **_WHOLE_CHART,
-    )
+        alpha=0.30, zorder=1, **_WHOLE_CHART,
+    )  # fmt: skip
     for code, hatch, _ in _HATCHED:
-        here = is_block & (found.state_code == code)
+        here = chart.in_state(code)
         if here.any():
             axes.contourf(
-                nodes,
-                nodes,
-                here.astype(float),
-                levels=[0.5, 1.5],
-                colors="none",
-                hatches=[hatch],
-                zorder=2,
-            ).set_edgecolor("#777777")
+                nodes, nodes, here.astype(float), levels=[0.5, 1.5], colors="none",
+                hatches=[hatch], zorder=2,
+            ).set_edgecolor("#777777")  # fmt: skip
     for code in range(len(MODES)):
-        here = is_block & (found.mode_code == code)
+        here = chart.of_mode(code)
         if here.any():
             axes.contour(
                 nodes, nodes, here.astype(float), levels=[0.5], colors="black", linewidths=1.2,
@@ -165,65 +170,45 @@ def _draw_regions(
             )  # fmt: skip
 
 
-def _draw_yields(
-    axes: Axes, nodes: FloatArray, is_block: NDArray[np.bool_], found: StabilityArray
-) -> list[Text]:
+def _draw_yields(chart: _Chart) -> list[Text]:
     """Draw the contours; return their values."""
-    written: list[Text] = []
+    labels: list[Text] = []
+    values = chart.stability.yield_acceleration
     # Mode by mode: between topple and confined topple the yield jumps.
     for code, mode in enumerate(MODES):
-        here = is_block & (found.mode_code == code) & (found.state_code == STABLE)
-        values = found.yield_acceleration
+        here = chart.of_mode(code) & chart.in_state(STABLE)
         if not here.any() or np.ptp(values[here]) < 1e-9:
             continue
-        lines = axes.contour(
-            nodes,
-            nodes,
-            np.ma.masked_where(~here, values),
+        lines = chart.axes.contour(
+            chart.nodes, chart.nodes, np.ma.masked_where(~here, values),
             levels=_LEVELS if np.ptp(values[here]) > _NARROW_G else _FINE_LEVELS,
-            colors=MODE_COLOURS[mode],
-            linewidths=1.0,
-            zorder=3,
-        )
-        written += axes.clabel(lines, fontsize=7.5, fmt="%g", inline_spacing=3)
-    return written
+            colors=MODE_COLOURS[mode], linewidths=1.0, zorder=3,
+        )  # fmt: skip
+        labels += chart.axes.clabel(lines, fontsize=7.5, fmt="%g", inline_spacing=3)
+    return labels
 
 
-def _name_regions(
-    axes: Axes,
-    nodes: FloatArray,
-    is_block: NDArray[np.bool_],
-    found: StabilityArray,
-    back_fracture: bool,
-    covered: NDArray[np.bool_],
-) -> list[Text]:
+def _name_regions(chart: _Chart, back_fracture: bool, covered: NDArray[np.bool_]) -> list[Text]:
     names = []
     for code, mode in enumerate(MODES):
-        region = is_block & (found.mode_code == code)
-        stable = region & (found.state_code == STABLE)
+        region = chart.of_mode(code)
+        stable = region & chart.in_state(STABLE)
         # Where no block is drawn, or at least where blocks are stable.
-        for here in (stable & ~covered, stable, region):
-            place = _roomiest(here)
-            if place is not None:
-                break
-        else:
+        places = (_widest_point(here) for here in (stable & ~covered, stable, region))
+        place = next((place for place in places if place is not None), None)
+        if place is None:
             continue
-        text = mode_words(mode)
+        text = mode_title(mode)
         if mode == "slump" and not back_fracture:
             text = "turns back\nabout the heel"
-        values = found.yield_acceleration[stable]
+        values = chart.stability.yield_acceleration[stable]
         if values.size and np.ptp(values) < 1e-9:
             text += f"\n{values[0]:.3f} g"
-        name = axes.text(
-            nodes[place[1]],
-            nodes[place[0]],
-            text,
-            ha="center",
-            va="center",
-            fontsize=10,
+        name = chart.axes.text(
+            chart.nodes[place[1]], chart.nodes[place[0]], text, ha="center", va="center",
+            fontsize=10, zorder=6,
             bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "alpha": 0.75, "lw": 0},
-            zorder=6,
-        )
+        )  # fmt: skip
         names.append(name)
     return names
 
@@ -239,26 +224,22 @@ def _hide_illegible(axes: Axes, values: list[Text], names: list[Text]) -> None:
             value.set_visible(False)
 
 
-def _explain_hatches(axes: Axes, is_block: NDArray[np.bool_], found: StabilityArray) -> None:
+def _explain_hatches(chart: _Chart) -> None:
     from matplotlib.patches import Patch
 
     patches = [
         Patch(facecolor="white", edgecolor="#777777", hatch=hatch, label=text)
         for code, hatch, text in _HATCHED
-        if np.any(is_block & (found.state_code == code))
+        if chart.in_state(code).any()
     ]
     if patches:
-        axes.legend(
-            handles=patches,
-            loc="lower right",
-            fontsize=9,
-            frameon=False,
-            handlelength=2.2,
+        chart.axes.legend(
+            handles=patches, loc="lower right", fontsize=9, frameon=False, handlelength=2.2,
             handleheight=1.4,
-        ).set_zorder(8)
+        ).set_zorder(8)  # fmt: skip
 
 
-def _roomiest(here: NDArray[np.bool_]) -> tuple[int, int] | None:
+def _widest_point(here: NDArray[np.bool_]) -> tuple[int, int] | None:
     """Return the place of a region that is furthest from its rim; None if it is too small."""
     if np.count_nonzero(here) * _STEP_DEG**2 < 60.0:
         return None

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import new_figure, save_figure
+from rbfrag.plots.canvas import BLUE, light_grid, mode_title, new_figure, save_figure
 from rbfrag.solver.results import FloatArray, Outcome, Response, ResponseHistory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-GROUND = "#7f7f7f"
+MOTION = "#7f7f7f"
 STRENGTH = "#c44e52"
-BLOCK = "#1f4e79"
+BLOCK = BLUE
 
 QUIET_BEFORE_S = 1.0
 QUIET_AFTER_S = 2.0
@@ -33,7 +33,6 @@ def plot_response(
     *,
     p2: float,
     kr: float,
-    linear: bool = False,
     reverse: bool = False,
     title: str = "",
 ) -> None:
@@ -49,7 +48,6 @@ def plot_response(
         path: .png, .pdf or .svg.
         p2: the block's p² [1/s²], for the title.
         kr: the block's k_r, for the title.
-        linear: the linear model was run.
         reverse: polarity was reversed, for the title.
         title: name of the motion.
     """
@@ -61,8 +59,8 @@ def plot_response(
     ratio = history.theta_rad / theta_c
     remaining = theta_c - history.theta_rad
     # tan runs away beyond 90 degrees past balance, where strength means nothing any more
-    strength = remaining if linear else np.tan(np.clip(remaining, -1.4, 1.4))
-    label = r"$\theta_c-\theta$ (linear)" if linear else r"$k_r(\theta)=\tan(\theta_c-\theta)$"
+    strength = np.tan(np.clip(remaining, -1.4, 1.4))
+    label = r"$k_r(\theta)=\tan(\theta_c-\theta)$"
     figure, upper, lower = _panels(history, strength, f"block: {label}", kr)
     lower.plot(history.time_s, ratio, color=BLOCK, lw=1.3)
     lower.axhline(1.0, color=STRENGTH, lw=0.8, ls="--")
@@ -94,7 +92,7 @@ def _panels(
     figure = new_figure(width_in=7.5, height_in=5.6)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.25, 1.0])
     driving = history.k_h / (1.0 + history.k_v)
-    upper.plot(history.time_s, driving, color=GROUND, lw=0.7, label="ground: $k_h/(1+k_v)$")
+    upper.plot(history.time_s, driving, color=MOTION, lw=0.7, label="ground: $k_h/(1+k_v)$")
     upper.plot(history.time_s, strength, color=STRENGTH, lw=1.3, label=label)
     top = 1.15 * max(float(np.abs(driving).max()), least_top)
     upper.set_ylim(-top, 1.25 * top)
@@ -102,8 +100,7 @@ def _panels(
     upper.set_ylabel("acceleration [g]")
     upper.legend(loc="upper right", fontsize=8, ncols=2, framealpha=0.9)
     lower.set_xlabel("time [s]")
-    for axes in (upper, lower):
-        axes.grid(visible=True, lw=0.3, alpha=0.6)
+    light_grid(upper, lower)
     return figure, upper, lower
 
 
@@ -139,11 +136,7 @@ ROTATION = "#b7791f"
 
 
 def plot_motion(
-    response: Response,
-    path: str | os.PathLike[str],
-    *,
-    title: str = "",
-    reverse: bool = False,
+    response: Response, path: str | os.PathLike[str], *, title: str = "", reverse: bool = False
 ) -> None:
     """Draw the response of a sliding, slumping or confined block and write it to `path`.
 
@@ -196,7 +189,7 @@ def _around(largest: float, least: float) -> tuple[float, float]:
 
 
 def _motion_verdict(response: Response) -> str:
-    kind = response.kind.replace("_", " ")
+    kind = mode_title(response.kind)
     if response.started_s is None:
         return f"{kind}: the block never moves"
     if response.outcome is Outcome.TOPPLED:

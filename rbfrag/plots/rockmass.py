@@ -13,10 +13,13 @@ import numpy as np
 from rbfrag.plots.canvas import (
     MODE_COLOURS,
     MODE_LINES,
-    mode_words,
+    light_grid,
+    mode_title,
     new_figure,
+    open_corner,
     plot_path,
     save_figure,
+    write_near,
 )
 from rbfrag.rockmasses.counts import (
     Crossing,
@@ -38,24 +41,26 @@ _SHOWN = 0.997
 _HIGHEST_PGA_G = 2.0
 
 
-def plot_rockmass(made: Realisations, path: str | PathLike[str], *, title: str = "") -> Path:
+def plot_rockmass(
+    realisations: Realisations, path: str | PathLike[str], *, title: str = ""
+) -> Path:
     """Draw the cumulative counts of blocks against PGA by mode, and the shares of the modes.
 
     The counts are not divided by the number of blocks in the mode, so that curves may be
     compared; where two of them cross is marked.
 
     Args:
-        made: the realisations.
+        realisations: the realisations.
         path: file to write: .png, .pdf or .svg.
         title: title of the figure; a count of the blocks if empty.
     """
     plot_path(path)
-    counts = mode_counts(made)
-    present = [mode for mode, found in counts.items() if found.count]
-    # Every bar takes the room that the name of its mode needs.
+    counts = mode_counts(realisations)
+    present = [mode for mode, count in counts.items() if count.count]
+    # Every bar is as wide as the name of its mode.
     width_in = 0.45 + 0.62 * len(present)
     figure = new_figure(5.7 + width_in, 4.6)
-    yields = {mode: sorted_yields(made, mode) for mode in present}
+    yields = {mode: sorted_yields(realisations, mode) for mode in present}
     finite = np.concatenate(list(yields.values()))
     # A few blocks that hardly any earthquake moves would squeeze all the others to the left.
     right = float(np.quantile(finite, _SHOWN)) if finite.size else 1.0
@@ -64,56 +69,34 @@ def plot_rockmass(made: Realisations, path: str | PathLike[str], *, title: str =
 
     axes, bars = figure.subplots(1, 2, width_ratios=[5.7, width_in])
     for mode in present:
-        axes.plot(
-            pga_g,
-            cumulative_counts(made, mode, pga_g),
-            MODE_LINES[mode],
-            color=MODE_COLOURS[mode],
-            lw=1.8,
-            label=mode_words(mode),
-        )
-    shown = [crossing for crossing in crossings(made) if crossing.pga_g <= right]
+        counted = cumulative_counts(realisations, mode, pga_g)
+        axes.plot(pga_g, counted, MODE_LINES[mode], color=MODE_COLOURS[mode], lw=1.8,
+                  label=mode_title(mode))  # fmt: skip
+    shown = [crossing for crossing in crossings(realisations) if crossing.pga_g <= right]
     for crossing in shown:
         axes.plot(crossing.pga_g, crossing.count, "o", ms=6, mfc="white", mec="black", zorder=5)
         axes.plot([crossing.pga_g] * 2, [0.0, crossing.count], color="black", lw=0.7, ls=":")
-        axes.annotate(
-            _with_error(crossing),
-            (crossing.pga_g, crossing.count),
-            xytext=(9, -12),
-            textcoords="offset points",
-            fontsize=9,
-            va="top",
-        )
+        at = (crossing.pga_g, crossing.count)
+        write_near(axes, _with_error(crossing), at, (9, -12), fontsize=9, va="top")
     axes.set_xlim(0.0, right)
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel("peak ground acceleration, PGA [g]")
     axes.set_ylabel("blocks with a yield acceleration below PGA")
-    axes.grid(visible=True, lw=0.3, alpha=0.6)
+    light_grid(axes)
     # Above the axes, because the curves may run anywhere.
     axes.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=len(present), fontsize=9, frameon=False
     )
 
-    at = range(len(present))
     shares = [100.0 * counts[mode].share for mode in present]
-    bars.bar(at, shares, width=0.7, color=[MODE_COLOURS[mode] for mode in present])
-    for place, share in zip(at, shares, strict=True):
-        bars.annotate(
-            f"{share:.1f} %",
-            (place, share),
-            xytext=(0, 2),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize=8.5,
-        )
-    bars.set_xticks(list(at), [mode_words(mode).replace(" ", "\n") for mode in present], fontsize=9)
-    bars.set_xlim(-0.6, len(present) - 0.4)
+    bars.bar(range(len(shares)), shares, width=0.7, color=[MODE_COLOURS[mode] for mode in present])
+    for place, share in enumerate(shares):
+        write_near(bars, f"{share:.1f} %", (place, share), (0, 2), ha="center", va="bottom",
+                   fontsize=8.5)  # fmt: skip
+    _name_bars(bars, present)
     bars.set_ylim(0.0, 1.12 * max(shares))
     bars.set_ylabel("share of the blocks [%]")
-    for side in ("top", "right"):
-        bars.spines[side].set_visible(False)
-    figure.suptitle(title or _title(made), fontsize=10)
+    figure.suptitle(title or _title(realisations), fontsize=10)
     return save_figure(figure, path)
 
 
@@ -122,11 +105,17 @@ def _with_error(crossing: Crossing) -> str:
     return f"{crossing.pga_g:.3f}{f' ± {error:.3f}' if math.isfinite(error) else ''} g"
 
 
-def _title(made: Realisations) -> str:
-    text = f"{made.n_blocks} blocks of a rock mass"
-    if made.n_blocks < made.n:
-        text += f"; {made.n - made.n_blocks} of {made.n} realisations are no block"
-    return text
+def _name_bars(axes: Axes, modes: Sequence[ModeName | None]) -> None:
+    names = ["all" if mode is None else mode_title(mode).replace(" ", "\n") for mode in modes]
+    axes.set_xticks(range(len(names)), names, fontsize=9)
+    axes.set_xlim(-0.6, len(names) - 0.4)
+    open_corner(axes)
+
+
+def _title(realisations: Realisations) -> str:
+    n, blocks = realisations.n, realisations.n_blocks
+    text = f"{blocks} blocks of a rock mass"
+    return text if blocks == n else f"{text}; {n - blocks} of {n} realisations are no block"
 
 
 PARTS = (
@@ -134,7 +123,7 @@ PARTS = (
     ("unstable", "fails at rest", "#5b1a4e"),
     ("open", "not known", "#c9a227"),
     ("stays", "moves, and stays", "#8fb3d1"),
-    ("still", "does not move", "#d9dde0"),
+    ("at_rest", "does not move", "#d9dde0"),
 )
 """Parts of a bar: what they are made of, what they are called, and their colours."""
 
@@ -154,13 +143,13 @@ def plot_failures(
         title: title of the figure; the motion and the number of blocks if empty.
     """
     plot_path(path)
-    found = failures(shaken, level)
-    bars_of = min(found, key=lambda each: abs(np.log(each.scale)))
+    by_scale = failures(shaken, level)
+    bars_of = min(by_scale, key=lambda each: abs(np.log(each.scale)))
     width_in = 1.9 + 0.75 * (1 + len(bars_of.modes))
-    if len(found) > 1:
+    if len(by_scale) > 1:
         figure = new_figure(5.4 + width_in, 4.6)
         curves, bars = figure.subplots(1, 2, width_ratios=[5.4, width_in])
-        _draw_curves(curves, found, level)
+        _draw_curves(curves, by_scale, level)
     else:
         figure = new_figure(width_in + 1.2, 4.6)
         bars = figure.subplots()
@@ -169,66 +158,47 @@ def plot_failures(
     return save_figure(figure, path)
 
 
-def _draw_curves(axes: Axes, found: Sequence[ScaleFailures], level: float) -> None:
-    scales = [each.scale for each in found]
-    rows: list[tuple[str, str, str, float, list[ModeFailures]]] = [
-        # broad and below the others, because a mode alone may make up the whole of it
-        ("all blocks", "#404040", "-", 4.0, [each.total for each in found])
-    ]
-    rows += [
-        (
-            mode_words(mode),
-            MODE_COLOURS[mode],
-            MODE_LINES[mode],
-            1.8,
-            [each.modes[mode] for each in found],
-        )
-        for mode in found[0].modes
-    ]
-    for label, colour, line, width, counted in rows:
-        axes.plot(
-            scales,
-            [100.0 * each.of_all.value for each in counted],
-            line,
-            color=colour,
-            lw=width,
-            marker="o",
-            ms=3.5,
-            label=label,
-        )
-        axes.fill_between(
-            scales,
-            [100.0 * each.of_all.low for each in counted],
-            [100.0 * each.of_all.high for each in counted],
-            color=colour,
-            alpha=0.18,
-            lw=0,
-        )
-    unknown = np.array([each.total.open_of_all for each in found])
+def _draw_curves(axes: Axes, by_scale: Sequence[ScaleFailures], level: float) -> None:
+    scales = [each.scale for each in by_scale]
+    # broad and below the others, because a mode alone may make up the whole of it
+    _draw_share(axes, scales, [each.total for each in by_scale], "all blocks", "-", "#404040", 4.0)
+    for mode in by_scale[0].modes:
+        of_mode = [each.modes[mode] for each in by_scale]
+        label, line, colour = mode_title(mode), MODE_LINES[mode], MODE_COLOURS[mode]
+        _draw_share(axes, scales, of_mode, label, line, colour, 1.8)
+    unknown = np.array([each.total.open_of_all for each in by_scale])
     if unknown.any():
-        fails = np.array([each.total.of_all.value for each in found])
-        axes.fill_between(
-            scales,
-            100.0 * fails,
-            100.0 * (fails + unknown),
-            color=PARTS[2][2],
-            alpha=0.3,
-            lw=0,
-            label="not known",
-        )
+        fails = np.array([each.total.of_all.value for each in by_scale])
+        axes.fill_between(scales, 100.0 * fails, 100.0 * (fails + unknown), color=PARTS[2][2],
+                          alpha=0.3, lw=0, label="not known")  # fmt: skip
     axes.set_xlim(0.0, 1.02 * scales[-1])
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel("factor on the motion")
     axes.set_ylabel(f"share of all blocks that fail [%], {100.0 * level:g} % interval")
-    axes.grid(visible=True, lw=0.3, alpha=0.6)
+    light_grid(axes)
     axes.legend(loc="upper left", fontsize=9, frameon=False)
     above = axes.twiny()
-    above.set_xlim(0.0, 1.02 * found[-1].pga_g)
+    above.set_xlim(0.0, 1.02 * by_scale[-1].pga_g)
     above.set_xlabel("peak ground acceleration, PGA [g]")
 
 
-def _draw_bars(axes: Axes, found: ScaleFailures) -> None:
-    rows: list[tuple[ModeName | None, ModeFailures]] = [(None, found.total), *found.modes.items()]
+def _draw_share(
+    axes: Axes, scales: list[float], failures: list[ModeFailures], label: str, line: str,
+    colour: str, width: float,
+) -> None:  # fmt: skip
+    share, low, high = (
+        [100.0 * getattr(each.of_all, name) for each in failures]
+        for name in ("value", "low", "high")
+    )
+    axes.plot(scales, share, line, color=colour, lw=width, marker="o", ms=3.5, label=label)
+    axes.fill_between(scales, low, high, color=colour, alpha=0.18, lw=0)
+
+
+def _draw_bars(axes: Axes, of_scale: ScaleFailures) -> None:
+    rows: list[tuple[ModeName | None, ModeFailures]] = [
+        (None, of_scale.total),
+        *of_scale.modes.items(),
+    ]
     at = np.arange(len(rows))
     bottom = np.zeros(len(rows))
     for part, label, colour in PARTS:
@@ -239,31 +209,21 @@ def _draw_bars(axes: Axes, found: ScaleFailures) -> None:
         bottom += heights
     for place, (_, each) in zip(at, rows, strict=True):
         assert each.of_mode is not None
-        axes.annotate(
-            f"{100.0 * each.of_mode.value:.3g} %\nof {each.count}",
-            (float(place), 100.0),
-            xytext=(0, 3),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize=8.5,
-        )
-    names = ["all" if mode is None else mode_words(mode).replace(" ", "\n") for mode, _ in rows]
-    axes.set_xticks(at, names, fontsize=9)
-    axes.set_xlim(-0.6, len(rows) - 0.4)
+        text = f"{100.0 * each.of_mode.value:.3g} %\nof {each.count}"
+        write_near(axes, text, (float(place), 100.0), (0, 3), ha="center", va="bottom",
+                   fontsize=8.5)  # fmt: skip
+    _name_bars(axes, [mode for mode, _ in rows])
     axes.set_ylim(0.0, 113.0)
     axes.set_yticks([0, 20, 40, 60, 80, 100])
     axes.set_ylabel("share of the blocks of a mode [%]")
-    axes.set_title(f"motion times {found.scale:g}, PGA {found.pga_g:.3g} g", fontsize=9)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    axes.set_title(f"motion times {of_scale.scale:g}, PGA {of_scale.pga_g:.3g} g", fontsize=9)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=2, fontsize=8, frameon=False)
 
 
 def _part(each: ModeFailures, part: str) -> int:
     if part == "open":
         return each.open
-    if part == "still":
+    if part == "at_rest":
         return each.outcomes["at_rest"] + each.outcomes["locked"]
     return each.outcomes[part]
 
@@ -272,7 +232,7 @@ def _shaken_title(shaken: ShakenMass) -> str:
     limits = shaken.limits
     turned = "" if limits.rotation_deg is None else f"by more than {limits.rotation_deg:g}° or "
     return (
-        f"{shaken.shaking.motion.label}: {shaken.made.n_blocks} blocks of a rock mass\n"
+        f"{shaken.shaking.motion.label}: {shaken.realisations.n_blocks} blocks of a rock mass\n"
         f"a slide fails beyond {limits.displacement_m:g} m, "
         f"a block that turns {turned}past recovery"
     )

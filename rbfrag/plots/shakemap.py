@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure, write_near
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,12 +79,9 @@ def plot_shakemap(
         inside = west <= epicentre[0] <= east and south <= epicentre[1] <= north
         if inside:
             axes.legend(loc="upper right", fontsize=9, framealpha=0.9)
-    axes.set_xlim(west, east)
-    axes.set_ylim(south, north)
-    axes.set_aspect(1.0 / middle)
+    axes.set(xlim=(west, east), ylim=(south, north), aspect=1.0 / middle)
     _scale(axes, west, east, south, north, middle)
-    axes.set_xlabel("longitude [°]")
-    axes.set_ylabel("latitude [°]")
+    axes.set(xlabel="longitude [°]", ylabel="latitude [°]")
     axes.set_title(title, fontsize=10)
     bar = figure.colorbar(drawn, ax=axes, extend="min", label="probability of toppling", shrink=0.9)
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -92,10 +89,7 @@ def plot_shakemap(
 
 
 def _frame(
-    lon: FloatArray,
-    lat: FloatArray,
-    probability: FloatArray,
-    epicentre: tuple[float, float] | None,
+    lon: FloatArray, lat: FloatArray, probability: FloatArray, epicentre: tuple[float, float] | None
 ) -> tuple[float, float, float, float]:
     """Return west, east, south, north around all that is coloured, within the places given."""
     shown = probability >= LEAST
@@ -127,13 +121,7 @@ def _scale(axes: Axes, west: float, east: float, south: float, north: float, cos
     x = west + 0.05 * (east - west)
     y = south + 0.06 * (north - south)
     axes.plot([x, x + width], [y, y], color="black", lw=3.0, solid_capstyle="butt", zorder=5)
-    axes.annotate(
-        f"{length:g} km",
-        (x + 0.5 * width, y),
-        xytext=(0, 4),
-        textcoords="offset points",
-        ha="center",
-        va="bottom",
-        fontsize=9,
+    write_near(
+        axes, f"{length:g} km", (x + 0.5 * width, y), (0, 4), ha="center", va="bottom", fontsize=9,
         bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "alpha": 0.7, "lw": 0},
-    )
+    )  # fmt: skip

@@ -15,7 +15,15 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES, Polarity
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure, written_numbers
+from rbfrag.plots.canvas import (
+    legend_below,
+    light_grid,
+    logarithmic,
+    new_figure,
+    plot_path,
+    save_figure,
+    written_numbers,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,8 +34,8 @@ LINES: dict[Polarity, str] = {"forward": "-", "reverse": "--"}
 
 MOST_MOTIONS = len(COLOURS)
 _POINTS = 161
-_LOWEST_SHARE = 0.02
-"""Share of the highest value shown below which a curve may leave the sheet."""
+_LOWEST_PART = 0.02
+"""Part of the highest value shown below which a curve may leave the sheet."""
 
 
 def block_size_m(p2: ArrayLike) -> NDArray[np.float64]:
@@ -78,28 +86,21 @@ def plot_spectrum(
         highest = max(highest, motion.pgv_m_s)
     if highest <= 0.0:
         raise InputError("these motions topple no block of any size: there is nothing to draw")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    logarithmic(axes, (1.0, 3.0), (1.0, 2.0, 5.0))
     axes.set_xlim(low, high)
-    bottom = max(_LOWEST_SHARE * highest, 0.8 * _lowest(axes))
+    bottom = max(_LOWEST_PART * highest, 0.8 * _lowest(axes))
     axes.set_ylim(bottom, 1.25 * highest)
     axes.set_xlabel("frequency parameter of the block, $p^2$ [1/s$^2$]")
     axes.set_ylabel("toppling spectrum $X(p)$ and PGV [m/s]")
-    axes.grid(visible=True, which="both", lw=0.3, alpha=0.5)
-    written_numbers(axes.xaxis, 1.0, 3.0)
-    written_numbers(axes.yaxis, 1.0, 2.0, 5.0)
+    light_grid(axes, which="both")
     above = axes.secondary_xaxis("top", functions=(block_size_m, block_size_m))
     above.set_xlabel("size of a rectangular block, $r_3 = 3g/(4p^2)$ [m]", labelpad=7)
     written_numbers(above.xaxis, 1.0, 2.0, 5.0)
-    for words, style in _key(polarities):
-        axes.plot([], [], style, color="black", lw=1.2, label=words)
-    figure.legend(loc="outside lower center", ncols=2, fontsize=8.5, frameon=False)
+    key = [(f"$X(p)$, {each}", LINES[each]) for each in polarities]
+    for label, style in (*key, ("PGV, either polarity", ":")):
+        axes.plot([], [], style, color="black", lw=1.2, label=label)
+    legend_below(figure, 2)
     return save_figure(figure, path)
-
-
-def _key(polarities: Sequence[Polarity]) -> list[tuple[str, str]]:
-    lines = [(f"$X(p)$, {each}", LINES[each]) for each in polarities]
-    return [*lines, ("PGV, either polarity", ":")]
 
 
 def _lowest(axes: Axes) -> float:

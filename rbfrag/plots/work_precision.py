@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import Protocol
 
-from rbfrag.plots.canvas import new_figure, save_figure
+from rbfrag.plots.canvas import light_grid, logarithmic, new_figure, save_figure, write_near
 
 ROUNDING = 1e-16
 """Errors below are drawn here: nothing smaller can be told apart."""
@@ -85,21 +85,15 @@ def plot_work_precision(
         )  # fmt: skip
         for p, x, y in zip(line, error, time_s, strict=True):
             label = p.setting.removeprefix("order ").removeprefix("rtol ")
-            axes.annotate(
-                label, (x, y), xytext=(4, 4), textcoords="offset points", fontsize=6.5, color=color
-            )
+            write_near(axes, label, (x, y), (4, 4), fontsize=6.5, color=color)
             if p.of_use:
                 axes.scatter([x], [y], s=150, facecolors="none", edgecolors="black", zorder=4)
-                axes.annotate(
-                    "as used", (x, y), xytext=(0, -15), textcoords="offset points", ha="center",
-                    fontsize=8,
-                )  # fmt: skip
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+                write_near(axes, "as used", (x, y), (0, -15), ha="center", fontsize=8)
+    logarithmic(axes)
     axes.invert_xaxis()
     axes.set_xlabel("relative error of the peak rotation: median (marker) to worst (bar)")
     axes.set_ylabel("median time of one run [s]")
-    axes.grid(visible=True, which="major", lw=0.3, alpha=0.6)
+    light_grid(axes)
     axes.legend(fontsize=7.5, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     if title:
         axes.set_title(title, fontsize=10)

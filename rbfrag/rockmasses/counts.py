@@ -64,66 +64,67 @@ class Crossing:
     count: float
 
 
-def mode_counts(made: Realisations) -> dict[ModeName, ModeCount]:
+def mode_counts(realisations: Realisations) -> dict[ModeName, ModeCount]:
     """Return the blocks of all modes, in the order of the mode codes."""
-    found = made.stability
+    stability = realisations.stability
     counts: dict[ModeName, ModeCount] = {}
-    for code, mode in enumerate(MODES):
-        here = made.is_block & (found.mode_code == code)
-        count = int(np.count_nonzero(here))
-        share = count / made.n_blocks
-        by_state = np.bincount(found.state_code[here], minlength=len(STATES)).tolist()
-        stable = found.yield_acceleration[here & (found.state_code == 0)]
+    for mode in MODES:
+        of_mode = realisations.of_mode(mode)
+        count = int(np.count_nonzero(of_mode))
+        share = count / realisations.n_blocks
+        by_state = np.bincount(stability.state_code[of_mode], minlength=len(STATES)).tolist()
+        stable = stability.yield_acceleration[realisations.of_mode(mode, "stable")]
         values = np.quantile(stable, QUANTILES).tolist() if stable.size else []
         counts[mode] = ModeCount(
             mode=mode,
             count=count,
             share=share,
-            share_error=math.sqrt(share * (1.0 - share) / made.n_blocks),
+            share_error=math.sqrt(share * (1.0 - share) / realisations.n_blocks),
             states=dict(zip(STATES, by_state, strict=True)),
             yield_quantiles_g=dict(zip(QUANTILES, values, strict=False)),
         )
     return counts
 
 
-def sorted_yields(made: Realisations, mode: ModeName) -> FloatArray:
+def sorted_yields(realisations: Realisations, mode: ModeName) -> FloatArray:
     """Return the yield accelerations of a mode, rising [g]; those unstable at rest count as 0.
 
     Locked blocks, which no horizontal acceleration moves, are left out.
     """
-    here = made.is_block & (made.stability.mode_code == MODES.index(mode))
-    k = made.stability.yield_acceleration[here]
+    k = realisations.stability.yield_acceleration[realisations.of_mode(mode)]
     return np.sort(np.maximum(k[k < math.inf], 0.0))
 
 
-def cumulative_counts(made: Realisations, mode: ModeName, pga_g: FloatArray) -> NDArray[np.int64]:
+def cumulative_counts(
+    realisations: Realisations, mode: ModeName, pga_g: FloatArray
+) -> NDArray[np.int64]:
     """Return the number of blocks of a mode whose yield acceleration is not above PGA.
 
     These are counts of blocks, not shares of their mode: the curves of two modes may be compared.
 
     Args:
-        made: the realisations.
+        realisations: the realisations.
         mode: name of the mode.
         pga_g: accelerations [g], shape (m,).
     """
-    return np.searchsorted(sorted_yields(made, mode), pga_g, side="right").astype(np.int64)
+    return np.searchsorted(sorted_yields(realisations, mode), pga_g, side="right").astype(np.int64)
 
 
-def crossings(made: Realisations) -> list[Crossing]:
+def crossings(realisations: Realisations) -> list[Crossing]:
     """Return where the cumulative counts of two modes cross, by rising PGA.
 
     A crossing lies between two ranges of PGA in which one mode and then the other leads by more
     than three standard errors of the difference; closer races are chance. Its own standard error
     is that of the difference of the counts, over the slope of the difference.
     """
-    yields = {mode: sorted_yields(made, mode) for mode in MODES}
-    found = [
+    yields = {mode: sorted_yields(realisations, mode) for mode in MODES}
+    all_crossings = [
         crossing
         for first, second in combinations(MODES, 2)
         if yields[first].size and yields[second].size
         for crossing in _between(first, yields[first], second, yields[second])
     ]
-    return sorted(found, key=lambda crossing: crossing.pga_g)
+    return sorted(all_crossings, key=lambda crossing: crossing.pga_g)
 
 
 def _between(first: ModeName, a: FloatArray, second: ModeName, b: FloatArray) -> list[Crossing]:
@@ -133,7 +134,7 @@ def _between(first: ModeName, a: FloatArray, second: ModeName, b: FloatArray) ->
     lead = count_a - count_b
     clear = np.flatnonzero(np.abs(lead) > _SIGNIFICANT * np.sqrt(count_a + count_b))
     turns = np.flatnonzero(np.diff(np.sign(lead[clear])))
-    found = []
+    result = []
     for i in turns:
         start, end = int(clear[i]), int(clear[i + 1])
         before = np.sign(lead[start])
@@ -141,7 +142,7 @@ def _between(first: ModeName, a: FloatArray, second: ModeName, b: FloatArray) ->
         steps = np.arange(start + 1, end + 1)
         turned = steps[np.sign(lead[steps]) != np.sign(lead[steps - 1])]
         middle = int(turned[turned.size // 2])
-        found.append(
+        result.append(
             Crossing(
                 below=first if before > 0 else second,
                 above=second if before > 0 else first,
@@ -150,7 +151,7 @@ def _between(first: ModeName, a: FloatArray, second: ModeName, b: FloatArray) ->
                 count=0.5 * float(count_a[middle] + count_b[middle]),
             )
         )
-    return found
+    return result
 
 
 def _error(k: FloatArray, total: NDArray[np.int64], lead: NDArray[np.int64], at: int) -> float:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.errors import InputError
+from rbfrag.fragility.model import checked_level
 from rbfrag.rockmasses.report import block_columns
-from rbfrag.rockmasses.shaking import OPEN, OUTCOMES, ShakenMass
+from rbfrag.rockmasses.shaking import AT_REST, OPEN, OUTCOMES, ShakenMass
 from rbfrag.solver.stability.modes import MODES, ModeName
 
 
@@ -32,15 +32,6 @@ def exact_interval(count: int, of: int, level: float) -> tuple[float, float]:
     return low, high
 
 
-def checked_level(level: float) -> float:
-    """Return a confidence level, or refuse what is none."""
-    if not isinstance(level, int | float) or not 0.0 < level < 1.0:
-        raise InputError(
-            f"level = {level!r}: a confidence level lies between 0 and 1, such as 0.95"
-        )
-    return level
-
-
 QUANTILES = (0.5, 0.95)
 """Quantiles of displacement that are reported."""
 
@@ -58,6 +49,15 @@ class Share:
     value: float
     low: float
     high: float
+
+    @classmethod
+    def of(cls, count: int, total: int, level: float) -> Share:
+        """Return the share of a count in a total."""
+        return cls(count / total, *exact_interval(count, total, level))
+
+    def as_dict(self) -> dict[str, float]:
+        """Return it under the keys of the JSON contract."""
+        return {"share": self.value, "ci_low": self.low, "ci_high": self.high}
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class ModeFailures:
     of_all: Share
     of_mode: Share | None
     open_of_all: float
-    displacement_m: Mapping[str, float] | None
+    displacement_m: dict[str, float] | None
 
     @property
     def fails(self) -> int:
@@ -117,51 +117,44 @@ class ScaleFailures:
 
 def failures(shaken: ShakenMass, level: float = 0.95) -> tuple[ScaleFailures, ...]:
     """Count what became of the blocks, scale by scale."""
-    made = shaken.made
-    found = []
-    for i, scale in enumerate(shaken.shaking.scales):
-        chosen: list[tuple[ModeName | None, NDArray[np.bool_]]] = [
-            (mode, made.is_block & (made.stability.mode_code == code))
-            for code, mode in enumerate(MODES)
-        ]
-        modes = {
-            mode: _counted(shaken, i, mode, here, level)
-            for mode, here in chosen
-            if mode is not None and here.any()
-        }
-        total = _counted(shaken, i, None, made.is_block, level)
-        found.append(ScaleFailures(scale, float(shaken.pga_g[i]), modes, total))
-    return tuple(found)
-
-
-def _counted(
-    shaken: ShakenMass, i: int, mode: ModeName | None, here: NDArray[np.bool_], level: float
-) -> ModeFailures:
-    count = int(np.count_nonzero(here))
-    by_code = np.bincount(shaken.code[i, here], minlength=len(OUTCOMES)).tolist()
-    outcomes = dict(zip(OUTCOMES, by_code, strict=True))
-    still = outcomes["at_rest"] + outcomes["unstable"] + outcomes["locked"]
-    thrown_at_rest = int(
-        np.count_nonzero(here & (shaken.code[i] == OUTCOMES.index("jump")) & ~shaken.moves[i])
+    realisations = shaken.realisations
+    chosen = {mode: realisations.of_mode(mode) for mode in MODES}
+    return tuple(
+        ScaleFailures(
+            scale,
+            float(shaken.pga_g[i]),
+            {
+                mode: _count(shaken, i, mode, blocks, level)
+                for mode, blocks in chosen.items()
+                if blocks.any()
+            },
+            _count(shaken, i, None, realisations.is_block, level),
+        )
+        for i, scale in enumerate(shaken.shaking.scales)
     )
-    n = shaken.made.n_blocks
-    to_the_end = here & ~np.isin(shaken.code[i], [OUTCOMES.index(name) for name in OPEN])
+
+
+def _count(
+    shaken: ShakenMass, i: int, mode: ModeName | None, chosen: NDArray[np.bool_], level: float
+) -> ModeFailures:
+    count = int(np.count_nonzero(chosen))
+    code = shaken.code[i]
+    by_code = np.bincount(code[chosen], minlength=len(OUTCOMES)).tolist()
+    outcomes = dict(zip(OUTCOMES, by_code, strict=True))
+    n = shaken.realisations.n_blocks
+    to_the_end = chosen & ~np.isin(code, [OUTCOMES.index(name) for name in OPEN])
     slid = shaken.displacement_m[i, to_the_end]
     slid = slid[np.isfinite(slid)]
     return ModeFailures(
         mode=mode,
         count=count,
         outcomes=outcomes,
-        moved=count - still - thrown_at_rest,
-        of_all=_share(outcomes["fails"], n, level),
-        of_mode=_share(outcomes["fails"], count, level) if count else None,
+        moved=int(np.count_nonzero(chosen & shaken.moves[i] & (code != AT_REST))),
+        of_all=Share.of(outcomes["fails"], n, level),
+        of_mode=Share.of(outcomes["fails"], count, level) if count else None,
         open_of_all=sum(outcomes[name] for name in OPEN) / n,
         displacement_m=_quantiles(slid) if slid.size else None,
     )
-
-
-def _share(count: int, of: int, level: float) -> Share:
-    return Share(count / of, *exact_interval(count, of, level))
 
 
 def _quantiles(values: NDArray[np.float64]) -> dict[str, float]:
@@ -171,7 +164,7 @@ def _quantiles(values: NDArray[np.float64]) -> dict[str, float]:
 
 
 def failures_as_dict(
-    shaken: ShakenMass, found: Sequence[ScaleFailures], level: float
+    shaken: ShakenMass, scales: Sequence[ScaleFailures], level: float
 ) -> dict[str, Any]:
     """Return the answer under the keys of the JSON contract."""
     shaking = shaken.shaking
@@ -188,21 +181,17 @@ def failures_as_dict(
                 "scale": each.scale,
                 "pga_g": each.pga_g,
                 "pgv_m_s": each.scale * shaking.motion.pgv_m_s,
-                "modes": {mode: _counts(counted) for mode, counted in each.modes.items()},
+                "modes": {mode: _counts(of_mode) for mode, of_mode in each.modes.items()},
                 "all": _counts(each.total),
             }
-            for each in found
+            for each in scales
         ],
     }
 
 
 def failure_warnings(shaken: ShakenMass) -> list[str]:
     """Return sentences about the motion, and about blocks with how many they are about."""
-    made = shaken.made
-    by_mode = {
-        mode: int((made.is_block & (made.stability.mode_code == code)).sum())
-        for code, mode in enumerate(MODES)
-    }
+    by_mode = {mode: int(shaken.realisations.of_mode(mode).sum()) for mode in MODES}
     return [
         *shaken.warnings,
         *(
@@ -212,26 +201,22 @@ def failure_warnings(shaken: ShakenMass) -> list[str]:
     ]
 
 
-def _counts(counted: ModeFailures) -> dict[str, Any]:
+def _counts(failures: ModeFailures) -> dict[str, Any]:
     return {
-        "count": counted.count,
-        **counted.outcomes,
-        "moved": counted.moved,
-        "open": counted.open,
-        "fails_of_all": _as_dict(counted.of_all),
-        "fails_of_mode": None if counted.of_mode is None else _as_dict(counted.of_mode),
-        "open_of_all": counted.open_of_all,
-        "displacement_m": None if counted.displacement_m is None else dict(counted.displacement_m),
+        "count": failures.count,
+        **failures.outcomes,
+        "moved": failures.moved,
+        "open": failures.open,
+        "fails_of_all": failures.of_all.as_dict(),
+        "fails_of_mode": None if failures.of_mode is None else failures.of_mode.as_dict(),
+        "open_of_all": failures.open_of_all,
+        "displacement_m": failures.displacement_m,
     }
-
-
-def _as_dict(share: Share) -> dict[str, float]:
-    return {"share": share.value, "ci_low": share.low, "ci_high": share.high}
 
 
 def outcome_columns(shaken: ShakenMass) -> dict[str, NDArray[Any]]:
     """Return the columns of the block table, one row a realisation and scale."""
-    columns = block_columns(shaken.made)
+    columns = block_columns(shaken.realisations)
     reason = columns.pop("reason")
     scales = np.array(shaken.shaking.scales)
     m, n = shaken.code.shape

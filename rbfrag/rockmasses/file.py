@@ -101,19 +101,19 @@ def rock_mass_of_tables(document: Mapping[str, object]) -> RockMass:
     Raises:
         InputError: they describe no rock mass; the message names the key.
     """
-    stated: dict[str, object] = {}
+    description: dict[str, object] = {}
     for name, content in document.items():
         if name not in _SECTIONS:
-            stated[name] = content
+            description[name] = content
             continue
         if not isinstance(content, dict):
             raise InputError(f"{name} = {content!r} is not a table: write [{name}] and its keys")
-        stated |= {f"{name}.{key}": value for key, value in content.items()}
-    return RockMass.of(stated)
+        description |= {f"{name}.{key}": value for key, value in content.items()}
+    return RockMass.of(description)
 
 
 def _from_csv(text: str) -> dict[str, object]:
-    stated: dict[str, object] = {}
+    description: dict[str, object] = {}
     header: list[str] = []
     for line, cells in enumerate(csv.reader(text.splitlines()), start=1):
         row = [cell.strip() for cell in cells]
@@ -126,10 +126,10 @@ def _from_csv(text: str) -> dict[str, object]:
             raise InputError(f"line {line}: {len(row)} cells under {len(header)} columns")
         keys = {name: cell for name, cell in zip(header, row, strict=False) if cell}
         variable = keys.pop("variable", "")
-        if variable in stated:
+        if variable in description:
             raise InputError(f"line {line}: {variable} is stated twice")
-        stated[variable] = _row(keys, variable, line)
-    return stated
+        description[variable] = _row(keys, variable, line)
+    return description
 
 
 def _header(row: list[str], line: int) -> list[str]:

@@ -14,6 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.rockmasses.distributions import Distribution
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
+from rbfrag.solver.stability.modes import MODES, STATES, ModeName, StateName
 
 FloatArray = NDArray[np.float64]
 
@@ -106,11 +107,11 @@ class RockMass:
     seed: int = SEED
 
     @classmethod
-    def of(cls, stated: Mapping[str, object]) -> RockMass:
+    def of(cls, description: Mapping[str, object]) -> RockMass:
         """Return the rock mass that a mapping describes.
 
         Args:
-            stated: keys such as ``base.dip_deg`` with a number or the keys of a
+            description: keys such as ``base.dip_deg`` with a number or the keys of a
                 :class:`~rbfrag.rockmasses.distributions.Distribution`; ``friction.phi_back_deg``,
                 ``block.size_factor``, ``block.kv``, ``block.back_fracture``, ``realisations``
                 and ``seed`` may be left out.
@@ -118,14 +119,14 @@ class RockMass:
         Raises:
             InputError: a key is missing, unknown or has an impossible value; it is named.
         """
-        for key in stated:
+        for key in description:
             if key not in VARIABLES and key not in _SETTINGS:
                 known = ", ".join((*VARIABLES, *_SETTINGS))
                 raise InputError(f"unknown key {key}: a rock mass knows {known}")
         variables: dict[str, Distribution] = {}
         for key, variable in VARIABLES.items():
-            if key in stated:
-                variables[key] = _law(key, variable, stated[key])
+            if key in description:
+                variables[key] = _law(key, variable, description[key])
             elif not math.isnan(variable.default):
                 variables[key] = Distribution("constant", location=variable.default)
             elif key != _BACK_FRICTION:
@@ -133,14 +134,14 @@ class RockMass:
                     f"{key} is missing: give a number, or a table such as "
                     "{ distribution = 'normal', mean = …, sd = … }"
                 )
-        back_fracture = stated.get("block.back_fracture", True)
+        back_fracture = description.get("block.back_fracture", True)
         if not isinstance(back_fracture, bool):
             raise InputError(f"block.back_fracture = {back_fracture!r}: use true or false")
         return cls(
             variables,
             back_fracture,
-            checked_count(stated.get("realisations", REALISATIONS), "realisations"),
-            checked_seed(stated.get("seed", SEED), "seed"),
+            checked_count(description.get("realisations", REALISATIONS), "realisations"),
+            checked_seed(description.get("seed", SEED), "seed"),
         )
 
     def draw(self, n: int, seed: int) -> dict[str, FloatArray]:
@@ -173,7 +174,7 @@ class RockMass:
         gamma = back_dip - beta
         reason = np.zeros(n, dtype=np.int8)
         # Slivers come last: where another reason holds there is no block to be one.
-        for code, fine in enumerate(
+        for code, valid in enumerate(
             (
                 drawn["base.spacing_m"] > 0.0,
                 drawn["back.spacing_m"] > 0.0,
@@ -185,10 +186,10 @@ class RockMass:
             ),
             start=1,
         ):
-            reason[~fine & (reason == 0)] = code
+            reason[~valid & (reason == 0)] = code
         possible = reason == 0
         blocks = BlockArray.from_fractures(np.where(possible, s1, np.nan), s2, gamma)
-        found = stability_arrays(
+        stability = stability_arrays(
             blocks,
             beta_deg=beta,
             phi_deg=phi,
@@ -196,8 +197,10 @@ class RockMass:
             kv=drawn["block.kv"],
             back_fracture=self.back_fracture,
         )
-        reason[possible & ((found.reason_code != 0) | ~(found.p2 > 0.0))] = len(IMPOSSIBLE) - 1
-        made = Realisations(
+        reason[possible & ((stability.reason_code != 0) | ~(stability.p2 > 0.0))] = (
+            len(IMPOSSIBLE) - 1
+        )
+        realisations = Realisations(
             rock_mass=self,
             seed=seed,
             beta_deg=beta,
@@ -208,13 +211,12 @@ class RockMass:
             phi_back_deg=phi_back,
             kv=drawn["block.kv"],
             blocks=blocks,
-            stability=found,
+            stability=stability,
             reason_code=reason,
         )
-        if made.n_blocks == 0:
-            why = "; ".join(f"{count} times {text}" for text, count in made.impossible.items())
-            raise InputError(f"none of {n} realisations is a block: {why}")
-        return made
+        if realisations.n_blocks == 0:
+            raise InputError(f"none of {n} realisations is a block: {realisations.why_impossible}")
+        return realisations
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,6 +261,13 @@ class Realisations:
         """Whether a realisation is a block."""
         return np.equal(self.reason_code, 0)
 
+    def of_mode(self, mode: ModeName, state: StateName | None = None) -> NDArray[np.bool_]:
+        """Return which realisations are blocks of a mode, in a state or in any, shape (n,)."""
+        chosen = self.is_block & (self.stability.mode_code == MODES.index(mode))
+        if state is not None:
+            chosen &= self.stability.state_code == STATES.index(state)
+        return np.asarray(chosen)
+
     @property
     def n_blocks(self) -> int:
         """Number of realisations that are blocks."""
@@ -271,9 +280,22 @@ class Realisations:
         return {text: c for text, c in zip(IMPOSSIBLE[1:], counts[1:], strict=True) if c}
 
     @property
+    def why_impossible(self) -> str:
+        """How many realisations are no block, and why, in words."""
+        return "; ".join(f"{count} times {text}" for text, count in self.impossible.items())
+
+    @property
     def reason(self) -> NDArray[np.object_]:
         """Why a realisation is no block, as text; empty for one that is."""
         return np.array(IMPOSSIBLE, dtype=object)[self.reason_code]
+
+    def refuse_vertical(self) -> None:
+        """Refuse a rock mass that states a vertical acceleration, which comes with a motion."""
+        if np.any(self.kv != 0.0):
+            raise InputError(
+                "block.kv does not belong in a rock mass that is to be shaken: the vertical "
+                "acceleration comes with the motion; leave the key out"
+            )
 
     @property
     def kr_at_rest(self) -> FloatArray:
@@ -302,9 +324,9 @@ def _generator(seed: int, stream: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream,)))
 
 
-def _law(key: str, variable: Variable, stated: object) -> Distribution:
+def _law(key: str, variable: Variable, description: object) -> Distribution:
     try:
-        law = Distribution.of(stated, angle=key.endswith("_deg"))
+        law = Distribution.of(description, angle=key.endswith("_deg"))
     except InputError as error:
         raise InputError(f"{key}: {error}") from None
     for centre in law.centres:

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from rbfrag.rockmasses.counts import Crossing, ModeCount
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.rockmasses.scenario import Average, Scenario
-from rbfrag.solver.stability.modes import MODES, STABLE, STATES, TOPPLE, ModeName
+from rbfrag.solver.stability.modes import MODES, STATES, ModeName
 
 NEAR_LIMIT = 0.01
 """Share of impossible realisations above which the description is doubted."""
 
 
 def as_dict(
-    made: Realisations,
+    realisations: Realisations,
     counts: Mapping[ModeName, ModeCount],
     crossings: list[Crossing],
     answer: Scenario | None = None,
@@ -27,12 +27,12 @@ def as_dict(
 ) -> dict[str, Any]:
     """Return the answer under the keys of the JSON contract."""
     return {
-        "realisations": made.n,
-        "blocks": made.n_blocks,
-        "seed": made.seed,
-        "impossible": made.impossible,
-        "variables": {key: str(law) for key, law in made.rock_mass.variables.items()},
-        "back_fracture": made.rock_mass.back_fracture,
+        "realisations": realisations.n,
+        "blocks": realisations.n_blocks,
+        "seed": realisations.seed,
+        "impossible": realisations.impossible,
+        "variables": {key: str(law) for key, law in realisations.rock_mass.variables.items()},
+        "back_fracture": realisations.rock_mass.back_fracture,
         "modes": {
             mode: {
                 "count": count.count,
@@ -46,19 +46,14 @@ def as_dict(
         },
         "crossings": [
             {
-                "below": crossing.below,
-                "above": crossing.above,
-                "pga_g": crossing.pga_g,
-                "standard_error_g": crossing.standard_error_g
-                if math.isfinite(crossing.standard_error_g)
-                else None,
-                "count": crossing.count,
+                name: value if isinstance(value, str) or math.isfinite(value) else None
+                for name, value in vars(crossing).items()
             }
             for crossing in crossings
         ],
         "scenario": None if answer is None else _scenario(answer),
         "shaking": None if shaking is None else dict(shaking),
-        "warnings": _warnings(made, answer),
+        "warnings": _warnings(realisations, answer),
     }
 
 
@@ -88,29 +83,26 @@ def _scenario(answer: Scenario) -> dict[str, Any]:
 
 
 def _average(average: Average) -> dict[str, Any]:
-    return {
-        "covered": average.count,
-        "probability": average.probability,
-        "standard_error": average.standard_error,
-        "ci_low": average.ci_low,
-        "ci_high": average.ci_high,
-    }
+    values = dict(vars(average))
+    return {"covered": values.pop("count"), **values}
 
 
-def _warnings(made: Realisations, answer: Scenario | None) -> list[str]:
+def _warnings(realisations: Realisations, answer: Scenario | None) -> list[str]:
     warnings = [] if answer is None else list(answer.warnings)
-    bad = made.n - made.n_blocks
-    if bad > NEAR_LIMIT * made.n:
-        why = "; ".join(f"{count} times {text}" for text, count in made.impossible.items())
+    bad = realisations.n - realisations.n_blocks
+    if bad > NEAR_LIMIT * realisations.n:
         warnings.insert(
             0,
-            f"{bad} of {made.n} realisations are no block and are left out of all shares: {why}: "
+            f"{bad} of {realisations.n} realisations are no block and are left out of all shares: "
+            f"{realisations.why_impossible}: "
             "a lognormal or a truncated distribution may describe the measurements better",
         )
     return warnings
 
 
-def block_columns(made: Realisations, answer: Scenario | None = None) -> dict[str, NDArray[Any]]:
+def block_columns(
+    realisations: Realisations, answer: Scenario | None = None
+) -> dict[str, NDArray[Any]]:
     """Return the columns of the block table, one row a realisation.
 
     A realisation that is no block has a row, too: without mode, with weight 0 and its reason.
@@ -118,41 +110,41 @@ def block_columns(made: Realisations, answer: Scenario | None = None) -> dict[st
     ``yield_g`` is the yield of the governing mode.
 
     Args:
-        made: the realisations.
+        realisations: the realisations.
         answer: the answers to a scenario of theirs, which add the measures of the motion and
             ``probability, ci_low, ci_high, in_domain``.
     """
-    found, fine = made.stability, made.is_block
+    stability, is_block = realisations.stability, realisations.is_block
 
     def only_blocks(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.where(fine, values, np.nan)
+        return np.where(is_block, values, np.nan)
 
     columns: dict[str, NDArray[Any]] = {
-        "block_id": np.arange(1, made.n + 1),
-        "p2_1_s2": only_blocks(found.p2),
-        "kr": only_blocks(made.kr_at_rest),
-        "mode": _names(MODES, found.mode_code, fine),
-        "weight": fine.astype(np.float64),
+        "block_id": np.arange(1, realisations.n + 1),
+        "p2_1_s2": only_blocks(stability.p2),
+        "kr": only_blocks(realisations.kr_at_rest),
+        "mode": _names(MODES, stability.mode_code, is_block),
+        "weight": is_block.astype(np.float64),
     }
     if answer is not None:
         for name, value in answer.measures.items():
-            columns[name] = np.full(made.n, value)
+            columns[name] = np.full(realisations.n, value)
     columns |= {
-        "state": _names(STATES, found.state_code, fine),
-        "yield_g": only_blocks(found.yield_acceleration),
-        "ky": only_blocks(found.ky),
-        "alpha1_deg": only_blocks(made.blocks.alpha1_deg),
-        "alpha3_deg": only_blocks(made.blocks.alpha3_deg),
-        "gamma_deg": made.gamma_deg,
-        "beta_deg": made.beta_deg,
-        "phi_deg": made.phi_deg,
-        "phi_back_deg": made.phi_back_deg,
-        "s1_m": made.s1_m,
-        "s2_m": made.s2_m,
-        "r3_m": only_blocks(made.blocks.r3_m),
+        "state": _names(STATES, stability.state_code, is_block),
+        "yield_g": only_blocks(stability.yield_acceleration),
+        "ky": only_blocks(stability.ky),
+        "alpha1_deg": only_blocks(realisations.blocks.alpha1_deg),
+        "alpha3_deg": only_blocks(realisations.blocks.alpha3_deg),
+        "gamma_deg": realisations.gamma_deg,
+        "beta_deg": realisations.beta_deg,
+        "phi_deg": realisations.phi_deg,
+        "phi_back_deg": realisations.phi_back_deg,
+        "s1_m": realisations.s1_m,
+        "s2_m": realisations.s2_m,
+        "r3_m": only_blocks(realisations.blocks.r3_m),
     }
     if answer is None:
-        return columns | {"reason": made.reason}
+        return columns | {"reason": realisations.reason}
     return columns | {
         "probability": answer.probability,
         "ci_low": answer.ci_low,
@@ -163,17 +155,16 @@ def block_columns(made: Realisations, answer: Scenario | None = None) -> dict[st
 
 
 def toppling_blocks(
-    made: Realisations,
+    realisations: Realisations,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Return p² [1/s²] and k_r of the stable toppling blocks, and their share of all blocks."""
-    found = made.stability
-    chosen = made.is_block & (found.mode_code == TOPPLE) & (found.state_code == STABLE)
-    chosen &= made.kr_at_rest > 0.0
-    share = float(chosen.sum()) / max(made.n_blocks, 1)
-    return found.p2[chosen], made.kr_at_rest[chosen], share
+    stability = realisations.stability
+    chosen = realisations.of_mode("topple", "stable") & (realisations.kr_at_rest > 0.0)
+    share = float(chosen.sum()) / max(realisations.n_blocks, 1)
+    return stability.p2[chosen], realisations.kr_at_rest[chosen], share
 
 
 def _names(
-    names: tuple[str, ...], codes: NDArray[np.int8], fine: NDArray[np.bool_]
+    names: tuple[str, ...], codes: NDArray[np.int8], is_block: NDArray[np.bool_]
 ) -> NDArray[np.object_]:
-    return np.array([*names, ""], dtype=object)[np.where(fine, codes, -1)]
+    return np.array([*names, ""], dtype=object)[np.where(is_block, codes, -1)]

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import refusals
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import normal_half_width
+from rbfrag.fragility.model import checked_level
 from rbfrag.fragility.predict import Model, predict
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.stability.arrays import slumping_p2
-from rbfrag.solver.stability.modes import MODES, SLIDE, SLUMP, STABLE, TOPPLE, UNSTABLE, ModeName
+from rbfrag.solver.stability.modes import MODES, UNSTABLE, ModeName
 
 FloatArray = NDArray[np.float64]
 
@@ -29,61 +29,6 @@ MODELLED: tuple[ModeName, ...] = ("topple",)
 
 UNCOVERED = "no fragility model for this mode"
 LOCKED = "locked: no horizontal acceleration moves it in this mode"
-
-
-def other_modes(
-    made: Realisations,
-    measures: Mapping[str, float],
-    *,
-    displacement_m: float,
-    rotation_deg: float | None,
-    level: float,
-    db: str | PathLike[str] | None,
-) -> Iterator[tuple[ModeName, str, NDArray[np.bool_], PredictionArray]]:
-    """Yield, for sliding and for slumping, the model, which blocks it answers for, and how.
-
-    Args:
-        made: blocks of a rock mass.
-        measures: what is known of the motion; PGV, better with PGA.
-        displacement_m: how far is too far for a block that slides, down its base [m].
-        rotation_deg: rotation that is failure of a block that slumps [deg]; None past recovery.
-        level: confidence level of the intervals.
-        db: database of the models.
-    """
-    distance = positive(displacement_m, "displacement_m", "m")
-    if "pgv_m_s" not in measures:
-        raise InputError("models of sliding and slumping read PGV: give pgv_m_s (--pgv) too")
-    motion: dict[str, Any] = {
-        name: measures[name] for name in ("pgv_m_s", "pga_g") if name in measures
-    }
-    found = made.stability
-    stable = made.is_block & (found.state_code == STABLE)
-    k = found.yield_acceleration
-
-    slides = stable & (found.mode_code == SLIDE) & (k > 0.0)
-    if slides.any():
-        block = {"ky": k[slides], "beta_deg": made.beta_deg[slides]}
-        answers = predict(**block, displacement_m=distance, **motion, level=level, db=db)
-        assert isinstance(answers, PredictionArray)
-        yield "slide", answers.model, slides, answers
-
-    p2 = slumping_p2(
-        alpha1_deg=made.blocks.alpha1_deg,
-        alpha3_deg=made.blocks.alpha3_deg,
-        gamma_deg=made.gamma_deg,
-        r1_m=made.blocks.r1_m,
-        r3_m=made.blocks.r3_m,
-        beta_deg=made.beta_deg,
-        phi_deg=made.phi_deg,
-        phi_back_deg=made.phi_back_deg,
-    )
-    slumps = stable & (found.mode_code == SLUMP) & (k > 0.0) & np.isfinite(p2)
-    if slumps.any():
-        answers = predict(
-            ks=k[slumps], ps2=p2[slumps], rotation_deg=rotation_deg, **motion, level=level, db=db
-        )
-        assert isinstance(answers, PredictionArray)
-        yield "slump", answers.model, slumps, answers
 
 
 @dataclass(frozen=True)
@@ -172,7 +117,7 @@ class Scenario:
 
 
 def scenario(
-    made: Realisations,
+    realisations: Realisations,
     *,
     pgv_m_s: float | None = None,
     pga_g: float | None = None,
@@ -192,7 +137,7 @@ def scenario(
     no answer and are left out of every average; the answer says how many they are.
 
     Args:
-        made: blocks of a rock mass.
+        realisations: blocks of a rock mass.
         pgv_m_s: peak ground velocity of the horizontal component [m/s].
         pga_g: peak ground acceleration [g].
         tm_s: mean period [s].
@@ -211,104 +156,129 @@ def scenario(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    offered = {"pgv_m_s": pgv_m_s, "pga_g": pga_g, "tm_s": tm_s, "pgd_m": pgd_m}
-    measures = {name: float(value) for name, value in offered.items() if value is not None}
+    options = {"pgv_m_s": pgv_m_s, "pga_g": pga_g, "tm_s": tm_s, "pgd_m": pgd_m}
+    measures = {name: float(value) for name, value in options.items() if value is not None}
     for refusal in refusals(measures, measures):
         if refusal.holds:
             raise InputError(refusal.about(refusal.value))
     if not measures:
         raise InputError("a scenario needs a measure of the motion: give pgv_m_s, or others")
-    normal_half_width(level)
-    if np.any(made.kv != 0.0):
-        raise InputError(
-            "block.kv does not belong in a rock mass that is to be shaken: the vertical "
-            "acceleration comes with the motion; leave the key out"
-        )
-    found = made.stability
-    falls = made.is_block & (found.state_code == UNSTABLE)
-    asked = made.is_block & (found.mode_code == TOPPLE) & (found.state_code == STABLE)
+    checked_level(level)
+    realisations.refuse_vertical()
+    stability = realisations.stability
+    unstable = realisations.is_block & (stability.state_code == UNSTABLE)
+    topples = realisations.of_mode("topple", "stable")
 
-    probability, low, high = (np.full(made.n, np.nan) for _ in range(3))
-    in_domain = np.zeros(made.n, dtype=np.bool_)
-    reason = np.where(made.is_block, UNCOVERED, made.reason)
-    reason[made.is_block & np.isposinf(found.yield_acceleration)] = LOCKED
+    probability, low, high = (np.full(realisations.n, np.nan) for _ in range(3))
+    in_domain = np.zeros(realisations.n, dtype=np.bool_)
+    reason = np.where(realisations.is_block, UNCOVERED, realisations.reason)
+    reason[realisations.is_block & np.isposinf(stability.yield_acceleration)] = LOCKED
     for array in (probability, low, high):
-        array[falls] = 1.0
-    reason[falls] = "unstable"
+        array[unstable] = 1.0
+    reason[unstable] = "unstable"
+
+    def fill(blocks: NDArray[np.bool_], answers: PredictionArray) -> None:
+        probability[blocks], reason[blocks] = answers.probability, answers.reason
+        low[blocks], high[blocks] = answers.ci_low, answers.ci_high
+        in_domain[blocks] = answers.in_domain
+
     answer: PredictionArray | None = None
-    if asked.any():
+    if topples.any():
         chosen = find_model(model, measures, db)
-        predicted = predict(
-            found.p2[asked],
-            made.kr_at_rest[asked],
-            pgv_m_s=pgv_m_s,
-            pga_g=pga_g,
-            tm_s=tm_s,
-            pgd_m=pgd_m,
-            model=chosen,
-            level=level,
-        )
+        kr = realisations.kr_at_rest[topples]
+        shaking: dict[str, Any] = dict(measures)
+        predicted = predict(stability.p2[topples], kr, **shaking, model=chosen, level=level)
         assert isinstance(predicted, PredictionArray)
         answer = predicted
-        probability[asked] = answer.probability
-        low[asked], high[asked] = answer.ci_low, answer.ci_high
-        in_domain[asked], reason[asked] = answer.in_domain, answer.reason
+        fill(topples, answer)
 
     modelled: set[ModeName] = set(MODELLED)
     others: dict[ModeName, str] = {}
     if displacement_m is not None:
-        for mode, name, chosen_blocks, answers in other_modes(
-            made,
-            measures,
-            displacement_m=displacement_m,
-            rotation_deg=rotation_deg,
-            level=level,
-            db=db,
+        for mode, blocks, answers in _other_modes(
+            realisations, measures, displacement_m, rotation_deg, level, db
         ):
             modelled.add(mode)
-            others[mode] = name
-            probability[chosen_blocks] = answers.probability
-            low[chosen_blocks], high[chosen_blocks] = answers.ci_low, answers.ci_high
-            in_domain[chosen_blocks] = answers.in_domain
-            reason[chosen_blocks] = answers.reason
+            others[mode] = answers.model
+            fill(blocks, answers)
 
     covered = np.isfinite(probability)
     modes = []
-    for code, mode in enumerate(MODES):
-        here = made.is_block & (found.mode_code == code)
-        count = int(np.count_nonzero(here))
+    for mode in MODES:
+        blocks = realisations.of_mode(mode)
+        count = int(np.count_nonzero(blocks))
         if count:
             modes.append(
                 ScenarioMode(
                     mode=mode,
                     count=count,
-                    share=count / made.n_blocks,
+                    share=count / realisations.n_blocks,
                     has_model=mode in modelled,
-                    unstable=int(np.count_nonzero(here & falls)),
-                    covered=_average(here & covered, probability, low, high),
-                    in_domain=int(np.count_nonzero(here & in_domain)),
+                    unstable=int(np.count_nonzero(blocks & unstable)),
+                    covered=_average(blocks & covered, probability, low, high),
+                    in_domain=int(np.count_nonzero(blocks & in_domain)),
                 )
             )
-    missing = {m.mode: (m.count - m.covered.count) / made.n_blocks for m in modes}
+    missing = {m.mode: (m.count - m.covered.count) / realisations.n_blocks for m in modes}
     missing = {mode: share for mode, share in missing.items() if share > 0.0}
     return Scenario(
         measures=measures,
-        model=None if answer is None else answer.model,
-        term=None if answer is None else answer.term,
-        method=None if answer is None else answer.method,
+        model=getattr(answer, "model", None),
+        term=getattr(answer, "term", None),
+        method=getattr(answer, "method", None),
         level=level,
         modes=tuple(modes),
         covered=_average(covered, probability, low, high),
-        covered_share=int(np.count_nonzero(covered)) / made.n_blocks,
+        covered_share=int(np.count_nonzero(covered)) / realisations.n_blocks,
         uncovered_share=missing,
         probability=probability,
         ci_low=low,
         ci_high=high,
         in_domain=in_domain,
         reason=reason,
-        warnings=tuple(_warnings(missing, reason[asked], modelled)),
+        warnings=tuple(_warnings(missing, reason[topples], modelled)),
         other_models=others,
     )
+
+
+def _other_modes(
+    realisations: Realisations,
+    measures: Mapping[str, float],
+    displacement_m: float,
+    rotation_deg: float | None,
+    level: float,
+    db: str | PathLike[str] | None,
+) -> Iterator[tuple[ModeName, NDArray[np.bool_], PredictionArray]]:
+    """Yield, for sliding and for slumping, which blocks a model answers for, and its answers."""
+    distance = positive(displacement_m, "displacement_m", "m")
+    if "pgv_m_s" not in measures:
+        raise InputError("models of sliding and slumping read PGV: give pgv_m_s (--pgv) too")
+    motion: dict[str, Any] = {
+        name: measures[name] for name in ("pgv_m_s", "pga_g") if name in measures
+    }
+    blocks, k = realisations.blocks, realisations.stability.yield_acceleration
+    p2 = slumping_p2(
+        alpha1_deg=blocks.alpha1_deg,
+        alpha3_deg=blocks.alpha3_deg,
+        gamma_deg=realisations.gamma_deg,
+        r1_m=blocks.r1_m,
+        r3_m=blocks.r3_m,
+        beta_deg=realisations.beta_deg,
+        phi_deg=realisations.phi_deg,
+        phi_back_deg=realisations.phi_back_deg,
+    )
+    slides = realisations.of_mode("slide", "stable") & (k > 0.0)
+    slumps = realisations.of_mode("slump", "stable") & (k > 0.0) & np.isfinite(p2)
+    beta_deg = realisations.beta_deg[slides]
+    questions: tuple[tuple[ModeName, NDArray[np.bool_], dict[str, Any]], ...] = (
+        ("slide", slides, {"ky": k[slides], "beta_deg": beta_deg, "displacement_m": distance}),
+        ("slump", slumps, {"ks": k[slumps], "ps2": p2[slumps], "rotation_deg": rotation_deg}),
+    )
+    for mode, chosen, block in questions:
+        if chosen.any():
+            answers = predict(**block, **motion, level=level, db=db)
+            assert isinstance(answers, PredictionArray)
+            yield mode, chosen, answers
 
 
 def _average(

@@ -141,7 +141,7 @@ class BlockOutcomes:
     """What became of them, shapes (m, k).
 
     Args:
-        place: as asked.
+        place: as in :class:`BlocksToRun`.
         code: places in :data:`OUTCOMES`; ``at_rest`` where a block was not run.
         displacement_m: greatest displacement along the base; NaN where there is none to tell.
         rotation_rad: greatest rotation; NaN likewise.
@@ -224,7 +224,7 @@ class ShakingPlan:
     """What is known of the blocks without running any, and which ones have to be run.
 
     Args:
-        made: the realisations.
+        realisations: the realisations.
         shaking: the motion and its scales.
         limits: what counts as failure.
         code: places in :data:`OUTCOMES`, -1 for no block, shape (scales, n); ``at_rest`` where a
@@ -234,7 +234,7 @@ class ShakingPlan:
         warnings: sentences about the motion.
     """
 
-    made: Realisations
+    realisations: Realisations
     shaking: Shaking
     limits: FailureLimits
     code: NDArray[np.int8]
@@ -249,15 +249,15 @@ class ShakingPlan:
 
     def work(self, chunk: int = CHUNK) -> Iterator[BlocksToRun]:
         """Yield the blocks that are to be run, some at a time."""
-        made, places = self.made, self.places
+        realisations, places = self.realisations, self.places
         for start in range(0, places.size, chunk):
             at = places[start : start + chunk]
-            numbers = {name: getattr(made, name)[at] for name in _NUMBERS}
+            numbers = {name: getattr(realisations, name)[at] for name in _NUMBERS}
             yield BlocksToRun(
                 place=at,
-                mode_code=made.stability.mode_code[at],
-                numbers={**numbers, "yield_g": made.stability.yield_acceleration[at]},
-                back_fracture=made.rock_mass.back_fracture,
+                mode_code=realisations.stability.mode_code[at],
+                numbers={**numbers, "yield_g": realisations.stability.yield_acceleration[at]},
+                back_fracture=realisations.rock_mass.back_fracture,
                 moves=self.moves[:, at],
                 shaking=self.shaking,
                 limits=self.limits,
@@ -270,10 +270,10 @@ class ShakingPlan:
             answers: to all of :meth:`work`.
         """
         code = self.code.copy()
-        still = (self.code == AT_REST) | (self.code == LOCKED)
-        mode_code = self.made.stability.mode_code
-        displacement_m = np.where(still & (mode_code != TOPPLE), 0.0, np.nan)
-        rotation_rad = np.where(still & (mode_code != SLIDE), 0.0, np.nan)
+        at_rest = (self.code == AT_REST) | (self.code == LOCKED)
+        mode_code = self.realisations.stability.mode_code
+        displacement_m = np.where(at_rest & (mode_code != TOPPLE), 0.0, np.nan)
+        rotation_rad = np.where(at_rest & (mode_code != SLIDE), 0.0, np.nan)
         about: dict[tuple[int, str], int] = {}
         runs = 0
         for answer in answers:
@@ -314,7 +314,7 @@ class ShakenMass(ShakingPlan):
 
 
 def plan_shaking(
-    made: Realisations,
+    realisations: Realisations,
     motion: GroundMotion,
     *,
     scales: Sequence[float] = (1.0,),
@@ -328,7 +328,7 @@ def plan_shaking(
     samples, because k_h/(1 + k_v) is monotone between them.
 
     Args:
-        made: blocks of a rock mass.
+        realisations: blocks of a rock mass.
         motion: horizontal ground motion.
         scales: factors on the motion; each is taken once, in rising order.
         vertical: vertical motion of the same recording, upward positive; scaled likewise.
@@ -339,37 +339,34 @@ def plan_shaking(
         InputError: a scale that is not above zero, none at all or too many for the realisations,
             components that do not go together, or a rock mass that states a vertical acceleration.
     """
-    if np.any(made.kv != 0.0):
-        raise InputError(
-            "block.kv does not belong in a rock mass that is to be shaken: the vertical "
-            "acceleration comes with the motion; leave the key out"
-        )
+    realisations.refuse_vertical()
     wrong = [scale for scale in scales if not (math.isfinite(scale) and scale > 0.0)]
     if wrong or not len(scales):
-        said = f"scale {wrong[0]:g}" if wrong else "no scale"
-        raise InputError(f"{said}: give factors on the motion above 0, such as 0.5,1,2")
+        complaint = f"scale {wrong[0]:g}" if wrong else "no scale"
+        raise InputError(f"{complaint}: give factors on the motion above 0, such as 0.5,1,2")
     shaking = Shaking(motion, tuple(sorted(set(map(float, scales)))), vertical, polarity)
-    if made.n * len(shaking.scales) > MOST_OUTCOMES:
+    if realisations.n * len(shaking.scales) > MOST_OUTCOMES:
         raise InputError(
-            f"{made.n} realisations at {len(shaking.scales)} scales are more than {MOST_OUTCOMES} "
-            "blocks to keep: ask for fewer of either"
+            f"{realisations.n} realisations at {len(shaking.scales)} scales are more than "
+            f"{MOST_OUTCOMES} blocks to keep: ask for fewer of either"
         )
-    found = made.stability
-    k = found.yield_acceleration
-    stable = made.is_block & (found.state_code == mechanism.STABLE) & (k > 0.0) & np.isfinite(k)
-    locked = made.is_block & (found.state_code == mechanism.LOCKED)
+    stability = realisations.stability
+    k = stability.yield_acceleration
+    is_block, state = realisations.is_block, stability.state_code
+    stable = is_block & (state == mechanism.STABLE) & (k > 0.0) & np.isfinite(k)
+    locked = is_block & (state == mechanism.LOCKED)
     excitations = shaking.excitations()
-    code = np.full((len(excitations), made.n), AT_REST, dtype=np.int8)
+    code = np.full((len(excitations), realisations.n), AT_REST, dtype=np.int8)
     moves = np.zeros(code.shape, dtype=np.bool_)
     for i, one in enumerate(excitations):
         moves[i] = stable & (k < one.max_q)
-        code[i, made.is_block & ~stable] = UNSTABLE
+        code[i, is_block & ~stable] = UNSTABLE
         code[i, locked] = LOCKED
         if one.jump_node < one.w.size:
             code[i, (stable & ~moves[i]) | locked] = OUTCOMES.index("jump")
-        code[i, ~made.is_block] = NO_BLOCK
+        code[i, ~is_block] = NO_BLOCK
     return ShakingPlan(
-        made=made,
+        realisations=realisations,
         shaking=shaking,
         limits=FailureLimits() if limits is None else limits,
         code=code,
@@ -382,7 +379,7 @@ def plan_shaking(
 def _about_motion(
     motion: GroundMotion, vertical: GroundMotion | None, together: tuple[str, ...]
 ) -> tuple[str, ...]:
-    said = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion)), *together]
+    sentences = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion)), *together]
     if vertical is not None:
-        said += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
-    return tuple(said)
+        sentences += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
+    return tuple(sentences)

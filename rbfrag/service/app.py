@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from fastapi import FastAPI, HTTPException, Request, Response
+from fastapi import FastAPI, Request, Response
 from fastapi.concurrency import run_in_threadpool
+from fastapi.exceptions import RequestValidationError
 from fastapi.middleware.cors import CORSMiddleware
-from fastapi.openapi.utils import get_openapi
 from fastapi.staticfiles import StaticFiles
+from starlette.exceptions import HTTPException
 
 from rbfrag.errors import RbfragError
-from rbfrag.service import work
-from rbfrag.service.body import Bodies
-from rbfrag.service.documents import Problem
+from rbfrag.fragility.lookup import stored_rows
+from rbfrag.fragility.model_list import model_list
+from rbfrag.service import block, predict, uploads, work
+from rbfrag.service.documents import Health, ModelListed
 from rbfrag.service.guard import Guard
-from rbfrag.service.problem import problem, refused
-from rbfrag.service.request_records import Metrics, RequestLog
-from rbfrag.service.routes import block, hazard, motion, predict, rockmass, stored
+from rbfrag.service.problem import answer_error, documented
+from rbfrag.service.reading import Bodies, BoundedRoute
+from rbfrag.service.request_records import CONTENT_TYPE, Metrics
 from rbfrag.service.settings import Settings
 from rbfrag.service.work import WorkerPool
 from rbfrag.version import __version__
@@ -64,8 +65,7 @@ class PageFiles(StaticFiles):
 
 def make_app(settings: Settings) -> FastAPI:
     """Return the application."""
-    bodies = Bodies(settings)
-    pool = WorkerPool(settings.jobs, settings.time_limit_s)
+    pool = WorkerPool(settings.jobs, settings.time_limit)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001
@@ -74,6 +74,10 @@ def make_app(settings: Settings) -> FastAPI:
         yield
         await run_in_threadpool(pool.close)
 
+    async def on_error(request: Request, error: Exception) -> Response:
+        return answer_error(request, error, settings)
+
+    errors = (RbfragError, RequestValidationError, HTTPException, Exception)
     app = FastAPI(
         title="rbfrag",
         version=__version__,
@@ -85,75 +89,49 @@ def make_app(settings: Settings) -> FastAPI:
         redoc_url=None,
         redirect_slashes=False,
         lifespan=lifespan,
+        exception_handlers=dict.fromkeys(errors, on_error),
     )
-    for each in (
-        predict.router(settings, bodies, pool),
-        block.router(),
-        rockmass.router(settings, bodies, pool),
-        motion.router(bodies, pool),
-        hazard.router(settings, bodies, pool),
-        stored.router(settings),
-    ):
-        # one flat list: looking through routers in routers takes longer than an answer
-        app.router.routes.extend(each.routes)
-    document = _document(app)
-    app.openapi = lambda: document  # type: ignore[method-assign]
-    counts = Metrics([*document["paths"], "/v1/metrics", "/v1/openapi.json"])
-    app.router.routes.extend(stored.metrics_router(counts).routes)
+    app.state.bodies = Bodies(settings)
+    # straight to the application: a router that is included takes 10 µs more to find its route
+    app.router.route_class = BoundedRoute
+    predict.add_routes(app.router, settings, pool)
+    block.add_routes(app.router)
+    uploads.add_routes(app.router, settings, pool)
+
+    @app.get(
+        "/v1/models",
+        summary="The fitted models",
+        response_model=list[ModelListed],
+        responses=documented(401, 503),
+    )
+    async def models() -> Any:
+        """Return what `rbfrag models list --json` prints.
+
+        Where the service was given no database and there is none, these are the models that are
+        shipped with rbfrag.
+        """
+        # read anew each time, and from a server if there is one
+        return model_list(await run_in_threadpool(stored_rows, settings.db))
+
+    @app.get("/v1/healthz", summary="Whether the service answers")
+    async def healthz() -> Health:
+        """Return the version; this operation asks for no token."""
+        return Health(status="ok", version=__version__)
+
+    counts = Metrics([*app.openapi()["paths"], "/v1/metrics", "/v1/openapi.json"])
+
+    @app.get("/v1/metrics", include_in_schema=False)
+    async def metrics() -> Response:
+        """Return counts for Prometheus."""
+        return Response(counts.text(), headers={"content-type": CONTENT_TYPE})
+
     app.mount("/", PageFiles(), name="page")
-    app.add_middleware(Guard, settings=settings, metrics=counts, log=RequestLog())
-    if settings.allowed_origins:
+    app.add_middleware(Guard, settings=settings, metrics=counts)
+    if settings.allow_origin:
         app.add_middleware(
             CORSMiddleware,
-            allow_origins=settings.allowed_origins,
+            allow_origins=settings.allow_origin,
             allow_methods=["GET", "POST"],
             allow_headers=["Authorization", "Content-Type"],
         )
-
-    @app.exception_handler(RbfragError)
-    async def on_purpose(request: Request, error: RbfragError) -> Response:  # noqa: ARG001
-        return refused(error, settings)
-
-    @app.exception_handler(400)
-    async def unreadable(request: Request, error: HTTPException) -> Response:  # noqa: ARG001
-        return problem(400, "malformed", f"the form cannot be read: {error.detail}")
-
-    @app.exception_handler(404)
-    @app.exception_handler(405)
-    async def by_the_framework(request: Request, error: HTTPException) -> Response:
-        return not_served(request, error)
-
-    @app.exception_handler(Exception)
-    async def by_mistake(request: Request, error: Exception) -> Response:  # noqa: ARG001
-        return problem(
-            500,
-            "mistake",
-            "a mistake in rbfrag itself; what happened is in the log of the service",
-        )
-
     return app
-
-
-def not_served(request: Request, error: HTTPException) -> Response:
-    """Return the answer to a path or a method that is not served."""
-    status = error.status_code
-    words = HTTPStatus(status).phrase.lower()
-    return problem(
-        status,
-        words.replace(" ", "-"),
-        f"{request.method[:20]} {request.url.path[:200]}: {words}; see /v1/openapi.json",
-        error.headers,
-    )
-
-
-def _document(app: FastAPI) -> dict[str, Any]:
-    document = get_openapi(
-        title=app.title,
-        version=app.version,
-        summary=app.summary,
-        description=app.description,
-        routes=app.routes,
-    )
-    schemas = document["components"]["schemas"]
-    schemas[Problem.__name__] = Problem.model_json_schema()
-    return document

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class _Document(BaseModel):
-    model_config = ConfigDict(extra="forbid", protected_namespaces=())
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, protected_namespaces=())
 
 
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -24,12 +24,15 @@ class Problem(_Document):
     detail: str
 
 
-class ModelAnswer(_Document):
-    """The answer of one model that the measures suffice for."""
-
+class _Fitted(_Document):
     model: str
     term: str
     method: str
+
+
+class ModelAnswer(_Fitted):
+    """The answer of one model that the measures suffice for."""
+
     probability: float
     ci_low: float
     ci_high: float
@@ -38,7 +41,7 @@ class ModelAnswer(_Document):
 
 
 class PredictAnswer(_Document):
-    """Probability that one block fails: what `rbfrag predict --json` prints."""
+    """Probability that one block fails: what `rbfrag predict --json` prints, in its order."""
 
     kind: str
     probability: float
@@ -58,7 +61,7 @@ class PredictAnswer(_Document):
     answers: list[ModelAnswer]
 
 
-class PredictArrays(_Document):
+class PredictArrays(_Fitted):
     """Probabilities of many blocks or motions; null where the input cannot be used."""
 
     probability: list[float | None]
@@ -68,9 +71,6 @@ class PredictArrays(_Document):
     reason: list[str]
     kind: str
     level: float
-    model: str
-    term: str
-    method: str
     warnings: list[str]
 
 
@@ -231,14 +231,11 @@ class SiteRate(_Document):
     probability: float
 
 
-class HazardAnswer(_Document):
+class HazardAnswer(_Fitted):
     """Annual rates of toppling [1/a]: what `rbfrag hazard --json` prints."""
 
     years: float
     level: float
-    model: str
-    term: str
-    method: str
     imt: str
     warnings: list[str]
     site: str | None = None

@@ -8,7 +8,7 @@ from time import perf_counter
 from typing import Any
 
 from rbfrag.service.problem import problem
-from rbfrag.service.request_records import Metrics, RequestLog
+from rbfrag.service.request_records import Metrics, log_request
 from rbfrag.service.settings import Settings
 
 Message = MutableMapping[str, Any]
@@ -27,23 +27,13 @@ _HEADERS = [
 
 
 class Guard:
-    """An ASGI application around another that asks for the token, measures and logs.
+    """An ASGI application around another that asks for the token, measures and logs."""
 
-    Args:
-        app: the application.
-        settings: whom to answer.
-        metrics: where requests are counted.
-        log: where they are written down.
-    """
-
-    def __init__(
-        self, app: Application, settings: Settings, metrics: Metrics, log: RequestLog
-    ) -> None:
+    def __init__(self, app: Application, settings: Settings, metrics: Metrics) -> None:
         self._app = app
         self._bearer = None if settings.token is None else f"Bearer {settings.token}".encode()
-        self._hosts = {name.lower().encode() for name in settings.allowed_hosts}
+        self._hosts = {name.lower().encode() for name in settings.allow_host}
         self._metrics = metrics
-        self._log = log
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
         """Answer a request."""
@@ -73,7 +63,7 @@ class Guard:
         finally:
             elapsed_s = perf_counter() - start
             self._metrics.count(scope, status, elapsed_s)
-            self._log.write(scope, status, size, elapsed_s)
+            log_request(scope, status, size, elapsed_s)
 
     def _refusal(self, scope: Message) -> Any:
         if self._bearer is None and not self._hosts:

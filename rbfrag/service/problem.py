@@ -1,4 +1,4 @@
-"""What went wrong, as problem details (RFC 9457), and requests refused for what they are."""
+"""What went wrong, as problem details (RFC 9457): one handler for every error."""
 
 from __future__ import annotations
 
@@ -6,81 +6,64 @@ import json
 import logging
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from http import HTTPStatus
+from reprlib import Repr
+from typing import Any
 
-from fastapi import Response
+from fastapi import Request, Response
+from fastapi.exceptions import RequestValidationError
+from pydantic import BaseModel
+from starlette.exceptions import HTTPException
 
 from rbfrag.db.location import locate, reference_file
-from rbfrag.errors import DatabaseError, RbfragError, UnknownModelError
-from rbfrag.service.json_body import MalformedError
+from rbfrag.errors import DatabaseError, InputError, RbfragError, UnknownModelError
+from rbfrag.service.documents import Problem
 from rbfrag.service.settings import Settings
 
+MEDIA_TYPE = "application/problem+json"
 
-class RequestRefusedError(RbfragError):
-    """A request that the service does not take.
 
-    Args:
-        status: HTTP status of the answer.
-        kind: what kind of trouble, for programs.
-        detail: one paragraph for a person.
-        headers: further headers of the answer.
-    """
+class MalformedError(InputError):
+    """A body that is not what its type says."""
+
+
+class RequestRefusedError(HTTPException):
+    """A request that the service does not take; see :func:`problem`."""
 
     def __init__(
         self, status: int, kind: str, detail: str, headers: Mapping[str, str] | None = None
     ) -> None:
-        super().__init__(detail)
-        self.status = status
+        super().__init__(status, detail, headers)
         self.kind = kind
-        self.headers = dict(headers or {})
 
 
-def too_long(limit_bytes: int) -> RequestRefusedError:
-    """Return the refusal of a body beyond the limit."""
-    return RequestRefusedError(
-        413,
-        "too-long",
-        f"the body is longer than the {limit_bytes} bytes that this service takes",
-        # what still comes is not read
-        {"connection": "close"},
-    )
+BUSY = 503, "busy", "other requests are being worked on: ask again", {"retry-after": "5"}
+GONE = 400, "gone", "the connection was closed within the body"
+"""Nobody reads this: the client has gone."""
+
+_MEANING = {
+    400: "The request cannot be read.",
+    401: "The bearer token is missing or wrong.",
+    408: "The body came too slowly.",
+    413: "The body is longer than this service takes.",
+    415: "The body is of another type.",
+    422: "A value cannot be used; the detail says which and what to do.",
+    503: "The database cannot be read, or the service is busy.",
+}
 
 
-def too_slow(limit_s: float) -> RequestRefusedError:
-    """Return the refusal of a body that does not come."""
-    return RequestRefusedError(
-        408, "too-slow", f"the body took longer than {limit_s:g} s to come", {"connection": "close"}
-    )
+def documented(*statuses: int) -> dict[int | str, dict[str, Any]]:
+    """Return the problems of an operation as FastAPI describes further responses."""
+    content = {MEDIA_TYPE: {"schema": Problem.model_json_schema()}}
+    return {each: {"description": _MEANING[each], "content": content} for each in statuses}
 
 
-def busy() -> RequestRefusedError:
-    """Return the refusal of a request for which there is no time."""
-    return RequestRefusedError(
-        503, "busy", "other requests are being worked on: ask again", {"retry-after": "5"}
-    )
+READ = documented(401, 422, 503)
+"""Problems of an operation that is asked in its URL alone."""
 
-
-def too_much_work(limit_s: float) -> RequestRefusedError:
-    """Return the refusal of work beyond the limit."""
-    return RequestRefusedError(
-        422,
-        "time-limit",
-        f"the answer takes longer than the {limit_s:g} s that this service works on one request: "
-        "ask for less, ask the command line, or let the service be started with a longer "
-        "--time-limit",
-    )
-
-
-def gone() -> RequestRefusedError:
-    """Return the end of a request whose client has gone; nobody reads it."""
-    return RequestRefusedError(400, "gone", "the connection was closed within the body")
-
-
-MEDIA_TYPE = "application/problem+json"
-
-_URL = re.compile(r"\b(sqlite|postgres(ql)?)(\+\w+)?://[^\s;,]*")
-_OPTION = re.compile(r"(?<![\w-])--([a-z][a-z0-9]*(?:-[a-z0-9]+)*)")
+SENT = documented(400, 401, 408, 413, 415, 422, 503)
+"""Problems of an operation that is sent a body."""
 
 
 def problem(
@@ -104,27 +87,143 @@ def problem(
     return Response(body, status, dict(headers or {}), MEDIA_TYPE)
 
 
-def refused(error: RbfragError, settings: Settings) -> Response:
-    """Return the answer to a request that raised an error on purpose.
+def answer_error(request: Request, error: Exception, settings: Settings) -> Response:
+    """Return the answer to a request that raised an error: the one handler of the service.
 
     Args:
+        request: what was asked.
         error: what was raised.
         settings: those of the service; the place of its database is left out of the words.
     """
+    if isinstance(error, RequestValidationError):
+        return _unusable(request, error)
     if isinstance(error, RequestRefusedError):
-        return problem(error.status, error.kind, str(error), error.headers)
+        return problem(error.status_code, error.kind, error.detail, error.headers)
+    if isinstance(error, HTTPException):
+        return _by_the_framework(request, error)
     if isinstance(error, DatabaseError):
         # its words may name files, hosts and users
         logging.getLogger(__name__).warning("%s", error)
+        words = "the database cannot be read; the log of the service says why"
+        return problem(503, "database", words)
+    if isinstance(error, RbfragError):
+        detail = in_parameters(str(error), settings)
+        if isinstance(error, MalformedError):
+            return problem(400, "malformed", detail)
+        kind = "unknown-model" if isinstance(error, UnknownModelError) else "input"
+        return problem(422, kind, detail)
+    words = "a mistake in rbfrag itself; what happened is in the log of the service"
+    return problem(500, "mistake", words)
+
+
+def _by_the_framework(request: Request, error: HTTPException) -> Response:
+    status = error.status_code
+    if status == 400:
+        return problem(400, "malformed", _unreadable(error))
+    words = HTTPStatus(status).phrase.lower()
+    return problem(
+        status,
+        words.replace(" ", "-"),
+        f"{request.method[:20]} {request.url.path[:200]}: {words}; see /v1/openapi.json",
+        error.headers,
+    )
+
+
+def _unreadable(error: HTTPException) -> str:
+    """Return why a body is not what its type says."""
+    cause = error.__cause__
+    if isinstance(cause, UnicodeDecodeError):
+        return f"byte {cause.start} of the body is not UTF-8 text"
+    if isinstance(cause, RecursionError):
+        return "the body is nested too deeply"
+    if isinstance(cause, ValueError):  # a number of thousands of digits
+        return f"the body is not JSON: {cause}"
+    return f"the form cannot be read: {error.detail}"
+
+
+_short = Repr()
+_short.maxstring = _short.maxother = 60
+
+
+def _unusable(request: Request, error: RequestValidationError) -> Response:
+    """Return the answer to values that do not suit the model of a query or a body."""
+    errors = error.errors()
+    # a name that is unknown explains one that is missing
+    first = next((each for each in errors if each["type"] == "extra_forbidden"), errors[0])
+    if first["type"] == "json_invalid":
+        before = error.body[: first["loc"][1]]
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+        why = f"line {line}, column {column}: {first['ctx']['error']}"
+        return problem(400, "malformed", f"the body is not JSON: {why}")
+    part, *place = first["loc"]
+    if not place:
+        if first["type"] == "missing":
+            return problem(400, "malformed", "the body is empty, and not JSON")
         return problem(
-            503, "database", "the database cannot be read; the log of the service says why"
+            422, "input", 'the body is a JSON object such as {"p2": 3, "kr": [0.1, 0.2]}'
         )
-    detail = in_parameters(str(error), settings)
-    if isinstance(error, MalformedError):
-        return problem(400, "malformed", detail)
-    if isinstance(error, UnknownModelError):
-        return problem(422, "unknown-model", detail)
-    return problem(422, "input", detail)
+    # where a field may be a number or a list, the deepest of its errors is that of what was meant
+    worst = max(
+        (each for each in errors if each["loc"][1] == place[0]),
+        key=lambda each: (len(each["loc"]), each["type"] not in ("float_type", "list_type")),
+    )
+    fields = _fields(request, part)
+    name = str(place[0])
+    if worst["type"] == "extra_forbidden":
+        known = ", ".join(fields)
+        return problem(422, "input", f"there is no parameter {name[:60]!r}; known are {known}")
+    if part == "body" and worst["type"] == "finite_number":
+        value = json.dumps(worst["input"])
+        words = f"{value} is no JSON number: give a finite one, or null for a missing one"
+        return problem(400, "malformed", words)
+    indices = "".join(f"[{each}]" for each in worst["loc"][2:] if isinstance(each, int))
+    described = fields[name].description or ""
+    return problem(422, "input", _sentence(name + indices, worst, described))
+
+
+def _fields(request: Request, part: str) -> Mapping[str, Any]:
+    """Return the fields of the model of a request's query or body, by name."""
+    dependant = request.scope["route"].dependant
+    parameters = dependant.body_params if part == "body" else dependant.query_params
+    model: type[BaseModel] = parameters[0].field_info.annotation
+    return model.model_fields
+
+
+_NO_NUMBER = "{name} = {shown} is not a number: {words}"
+_SENTENCES = {
+    "missing": "{name} is missing: {words}",
+    "string_too_short": "{name} is empty: {words}",
+    "string_too_long": "{name} is longer than {max_length} characters: {words}",
+    "too_short": "{name} is an empty list: give a number or a list of numbers",
+    "literal_error": "{name} is {shown}: write {expected}",
+    "bool_parsing": "{name} = {shown}: write true or false",
+    "float_parsing": _NO_NUMBER,
+    "float_type": _NO_NUMBER,
+    "int_parsing": "{name} = {shown} is not a whole number: {words}",
+    "string_type": "{name} = {shown} is not a text: {words}",
+    "string_pattern_mismatch": "{name} = {shown} is not a list of numbers such as 30,10,3,1",
+    "greater_than": "{name} = {plain} is not above {gt:g}: {words}",
+    "greater_than_equal": "{name} = {plain} is below {ge:g}: {words}",
+    "less_than": "{name} = {plain} is not below {lt:g}: {words}",
+    "finite_number": "{name} = {plain} is not a finite number: {words}",
+    "too_large": "{name} is too large for a number",
+}
+"""What is wrong with a value and what to do, by the type of pydantic's error."""
+
+
+def _sentence(name: str, error: Mapping[str, Any], words: str) -> str:
+    kind, value, limits = error["type"], error["input"], error.get("ctx", {})
+    if kind == "float_type" and type(value) is int:
+        kind = "too_large"
+    if kind == "literal_error":
+        limits = {"expected": limits["expected"].replace("'", "").replace(", ", " or ")}
+    form = _SENTENCES.get(kind, "{name} = {shown}: {msg}: {words}")
+    about = {"name": name, "shown": _short.repr(value), "plain": str(value)[:60], "words": words}
+    return form.format(**about, msg=error["msg"], **limits)
+
+
+_URL = re.compile(r"\b(sqlite|postgres(ql)?)(\+\w+)?://[^\s;,]*")
+_OPTION = re.compile(r"(?<![\w-])--([a-z][a-z0-9]*(?:-[a-z0-9]+)*)")
 
 
 def in_parameters(words: str, settings: Settings) -> str:
@@ -135,10 +234,10 @@ def in_parameters(words: str, settings: Settings) -> str:
     for place in _places(settings):
         words = words.replace(place, "the database")
     words = _URL.sub("the database", words)
-    return _OPTION.sub(lambda found: found[1].replace("-", "_"), words)
+    return _OPTION.sub(lambda option: option[1].replace("-", "_"), words)
 
 
-def _places(settings: Settings) -> list[str]:
+def _places(settings: Settings) -> Sequence[str]:
     place = os.fspath(locate(settings.db))
     places = [place, settings.db or place]
     if "://" not in place:

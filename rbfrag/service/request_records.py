@@ -9,8 +9,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from json.encoder import encode_basestring_ascii as _quoted
-from time import gmtime, strftime, time
-from typing import Any, TextIO
+from typing import Any
 
 from prometheus_client import (
     CONTENT_TYPE_LATEST,
@@ -54,27 +53,20 @@ class Metrics:
             buckets=_SECONDS,
             registry=self._registry,
         )
-
-        self._found: dict[tuple[str, str, int], tuple[Counter, Histogram]] = {}
+        self._counters: dict[tuple[str, str, int], tuple[Counter, Histogram]] = {}
 
     def count(self, scope: Mapping[str, Any], status: int, elapsed_s: float) -> None:
-        """Count one request.
-
-        Args:
-            scope: the request.
-            status: HTTP status of the answer.
-            elapsed_s: how long it took [s].
-        """
+        """Count one request, its HTTP status and how long it took [s]."""
         path, method = scope["path"], scope["method"]
         if path not in self._paths:
             path = "other" if status >= 400 or path.startswith("/v1/") else "page"
         if method not in _METHODS:
             method = "other"
-        found = self._found.get((path, method, status))
-        if found is None:
-            found = self._requests.labels(path, method, str(status)), self._seconds.labels(path)
-            self._found[path, method, status] = found
-        requests, seconds = found
+        counters = self._counters.get((path, method, status))
+        if counters is None:  # labels() takes 2 µs each time
+            counters = self._requests.labels(path, method, str(status)), self._seconds.labels(path)
+            self._counters[path, method, status] = counters
+        requests, seconds = counters
         requests.inc()
         seconds.observe(elapsed_s)
 
@@ -87,38 +79,17 @@ class Metrics:
         return generate_latest(registry)
 
 
-class RequestLog:
-    """Writes down what was asked and how it ended; not the query, which is the asker's.
-
-    Args:
-        stream: where to; None for standard error.
-    """
-
-    def __init__(self, stream: TextIO | None = None) -> None:
-        self._stream = stream
-        self._second, self._clock = 0, ""
-
-    def write(self, scope: Mapping[str, Any], status: int, size: int, elapsed_s: float) -> None:
-        """Write one line.
-
-        Args:
-            scope: the request.
-            status: HTTP status of the answer.
-            size: length of the answer [bytes].
-            elapsed_s: how long it took [s].
-        """
-        now = time()
-        second = int(now)
-        if second != self._second:
-            self._second = second
-            self._clock = strftime("%Y-%m-%dT%H:%M:%S", gmtime(second))
-        client = scope.get("client")
-        (self._stream or sys.stderr).write(
-            f'{{"time": "{self._clock}.{int(1e3 * (now - second)):03d}+00:00", "level": "info", '
-            f'"event": "request", "method": {_quoted(scope["method"])}, '
-            f'"path": {_quoted(scope["path"])}, "status": {status}, "bytes": {size}, '
-            f'"ms": {1e3 * elapsed_s:.3f}, "client": {_quoted(client[0] if client else "")}}}\n'
-        )
+def log_request(scope: Mapping[str, Any], status: int, size: int, elapsed_s: float) -> None:
+    """Write down what was asked and how it ended; not the query, which is the asker's."""
+    time = datetime.now(UTC).isoformat(timespec="milliseconds")
+    client = scope.get("client")
+    # written out: json.dumps takes 6 µs more, a twentieth of a request
+    sys.stderr.write(
+        f'{{"time": "{time}", "level": "info", "event": "request", '
+        f'"method": {_quoted(scope["method"])}, "path": {_quoted(scope["path"])}, '
+        f'"status": {status}, "bytes": {size}, "ms": {1e3 * elapsed_s:.3f}, '
+        f'"client": {_quoted(client[0] if client else "")}}}\n'
+    )
 
 
 class JsonFormatter(logging.Formatter):

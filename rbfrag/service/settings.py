@@ -5,7 +5,7 @@ from __future__ import annotations
 import ipaddress
 import os
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rbfrag.errors import InputError
@@ -15,32 +15,62 @@ from rbfrag.errors import InputError
 class Settings:
     """Where a service reads, whom it answers and how much it takes on.
 
+    Its fields are the options of `rbfrag serve`, which say what each means, and:
+
     Args:
-        db: database of the models: a path or an SQLAlchemy URL; None as for
-            :func:`rbfrag.predict`. It is only read.
-        token: the bearer token that a request must bring; None where none is asked for.
-        allowed_origins: origins of web pages elsewhere whose scripts may read answers.
-        allowed_hosts: names the service may be asked by; none for any.
-        body_limit_bytes: longest body of a request that is taken.
-        body_time_s: longest time [s] that a body may take to come.
-        row_limit: most blocks of one request.
-        time_limit_s: longest time [s] that an answer may take once its body is there.
         bodies_at_once: most requests with a body that a process works on; others wait.
-        jobs: number of processes that do long work beside each that answers.
-        early: start them with the service, and not when they are first needed.
+        early: start the processes for long work with the service, not when first needed.
+        token: the bearer token that a request must bring; None where none is asked for.
     """
 
     db: str | None = None
-    token: str | None = field(default=None, repr=False)
-    allowed_origins: tuple[str, ...] = ()
-    allowed_hosts: tuple[str, ...] = ()
-    body_limit_bytes: int = 16 * 1024**2
-    body_time_s: float = 30.0
+    host: str = "127.0.0.1"
+    port: int = 8000
+    workers: int = 1
+    token_file: str | None = None
+    allow_origin: tuple[str, ...] = ()
+    allow_host: tuple[str, ...] = ()
+    body_limit_mb: float = 16.0
+    body_time: float = 30.0
     row_limit: int = 100_000
-    time_limit_s: float = 60.0
+    time_limit: float = 60.0
+    jobs: int = 2
     bodies_at_once: int = 16
-    jobs: int = 1
     early: bool = False
+    token: str | None = field(default=None, repr=False)
+
+    @property
+    def body_limit_bytes(self) -> int:
+        """Longest body of a request that is taken."""
+        return int(1e6 * self.body_limit_mb)
+
+    def checked(self) -> Settings:
+        """Return the settings of a service that is started: with its token and its names.
+
+        Raises:
+            InputError: an option that cannot be, or other computers could ask without a token.
+        """
+        token = read_token(self.token_file)
+        if token is None and not is_loopback(self.host):
+            raise InputError(
+                f"--host {self.host}: other computers can ask there, so the service needs a token: "
+                f"put one into the environment variable {VARIABLE}, or into a file named by "
+                "--token-file"
+            )
+        if self.workers < 1:
+            raise InputError(f"--workers {self.workers}: at least one process answers")
+        if not 0 <= self.port <= 65535:
+            raise InputError(f"--port {self.port}: a port is a number from 0 to 65535")
+        for name in ("body_limit_mb", "body_time", "row_limit", "time_limit", "jobs"):
+            value = getattr(self, name)
+            if not 0.0 < value < float("inf"):
+                option = name.replace("_", "-")
+                raise InputError(f"--{option} {value:g}: give a number above zero")
+        hosts = tuple(self.allow_host)
+        if token is None:
+            # else a web page could ask by a name of its own that leads to this computer
+            hosts = ("localhost", "127.0.0.1", "[::1]", self.host, *hosts)
+        return replace(self, token=token, allow_host=hosts, early=True)
 
 
 VARIABLE = "RBFRAG_TOKEN"
@@ -82,12 +112,3 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
-
-
-def check_reach(host: str, token: str | None) -> None:
-    """Refuse to answer whoever can reach this computer."""
-    if token is None and not is_loopback(host):
-        raise InputError(
-            f"--host {host}: other computers can ask there, so the service needs a token: put one "
-            f"into the environment variable {VARIABLE}, or into a file named by --token-file"
-        )

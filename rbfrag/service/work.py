@@ -1,23 +1,30 @@
 """Long work in processes beside the one that answers, each task with a limit of time.
 
-A task takes numbers and texts, those of the parameters of its route, and returns JSON, so that
-nothing else travels between the processes.
+A task takes a body and the parameters of its operation, and returns JSON.
 """
 
 from __future__ import annotations
 
 import asyncio
+import json
 import multiprocessing
 import signal
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from fastapi import Request
+from fastapi import Request, Response
 from pebble import ProcessExpired, ProcessPool
 
 from rbfrag.errors import InputError, MotionFileError
-from rbfrag.service.json_body import MalformedError, json_text, read_json
-from rbfrag.service.problem import busy, gone, too_much_work
+from rbfrag.service.parameters import (
+    MEASURES,
+    CriticalQuery,
+    HazardQuery,
+    Reading,
+    RockmassQuery,
+    SpectrumQuery,
+)
+from rbfrag.service.problem import BUSY, GONE, MalformedError, RequestRefusedError
 
 if TYPE_CHECKING:
     from rbfrag.motions.ground_motion import GroundMotion
@@ -33,148 +40,138 @@ EXAMPLE = "time_s,acceleration_g\n" + "".join(
 """A made-up accelerogram, short enough for the documentation."""
 
 
+_ENCODER = json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+
+
+def json_text(document: object) -> bytes:
+    """Return a document as JSON."""
+    return _ENCODER.encode(document).encode("utf-8")
+
+
+def json_answer(text: bytes) -> Response:
+    """Return JSON that is written already as the answer to a request."""
+    return Response(text, media_type="application/json")
+
+
 def warm_up() -> None:
     """Load or compile the kernels, so that no request waits for that or is ended for it."""
-    spectrum(EXAMPLE.encode(), None, None, None, [3.0], "forward")
-    critical(EXAMPLE.encode(), None, None, None, 3.0, False, False, False)
+    spectrum(EXAMPLE.encode(), SpectrumQuery())
+    critical(EXAMPLE.encode(), CriticalQuery(p2=3.0))
 
 
 def rock_mass(
-    body: bytes,
-    form: Literal["toml", "json", "csv"],
-    measures: Mapping[str, float],
-    n: int | None,
-    seed: int | None,
-    model: str | None,
-    level: float | None,
-    row_limit: int,
-    db: str | None,
+    body: bytes, form: str, query: RockmassQuery, row_limit: int, db: str | None
 ) -> bytes:
-    """Return what `rbfrag rockmass --json` prints."""
+    """Return what `rbfrag rockmass --json` prints, for toml, json or csv."""
     from rbfrag.rockmasses.counts import crossings, mode_counts
-    from rbfrag.rockmasses.file import (
-        rock_mass_of_csv,
-        rock_mass_of_tables,
-        rock_mass_of_toml,
-    )
+    from rbfrag.rockmasses.file import rock_mass_of_csv, rock_mass_of_tables, rock_mass_of_toml
     from rbfrag.rockmasses.report import as_dict
     from rbfrag.rockmasses.scenario import scenario
 
     if form == "json":
-        document = read_json(body)
+        try:
+            document = json.loads(body, parse_constant=_no_number)
+        except (ValueError, RecursionError) as error:
+            raise MalformedError(f"the body is not JSON: {error}") from None
         if not isinstance(document, dict):
             raise InputError("the body is a JSON object with the tables base, back and friction")
         described = rock_mass_of_tables(document)
     else:
         described = (rock_mass_of_toml if form == "toml" else rock_mass_of_csv)(_text(body))
-    wanted = described.realisations if n is None else n
+    wanted = described.realisations if query.n is None else query.n
     if wanted > row_limit:
         raise InputError(
             f"{wanted} realisations are more than the {row_limit} of one request: ask for fewer "
             "with n"
         )
-    extra = "level" if model is None else "model"
+    measures, model, level = query.given(MEASURES), query.model, query.level
     if not measures and not (model is None and level is None):
         raise InputError(
-            f"{extra} goes with a measure of the motion: give pgv, pga and tm, or pgd and tm, too"
+            f"{'level' if model is None else 'model'} goes with a measure of the motion: give "
+            "pgv, pga and tm, or pgd and tm, too"
         )
-    made = described.realise(n, seed)
+    realisations = described.realise(query.n, query.seed)
     answer = None
     if measures:
-        level = 0.95 if level is None else level
-        answer = scenario(made, **measures, model=model, level=level, db=db)
-    return json_text(as_dict(made, mode_counts(made), crossings(made), answer))
+        answer = scenario(realisations, **measures, model=model, level=level or 0.95, db=db)
+    return json_text(
+        as_dict(realisations, mode_counts(realisations), crossings(realisations), answer)
+    )
 
 
-def spectrum(
-    body: bytes,
-    trace: int | None,
-    units: str | None,
-    dt_s: float | None,
-    p2: list[float],
-    polarity: str,
-) -> bytes:
+def _no_number(word: str) -> NoReturn:
+    raise ValueError(f"{word} is no number in JSON")
+
+
+def spectrum(body: bytes, query: SpectrumQuery) -> bytes:
     """Return what `rbfrag spectrum --json` prints."""
     from rbfrag.motions.polarity import POLARITIES
-    from rbfrag.motions.toppling_spectrum import spectrum_as_dict as as_dict
+    from rbfrag.motions.toppling_spectrum import spectrum_as_dict
 
-    ground = _motion(body, trace, units, dt_s)
-    asked = [each for each in POLARITIES if polarity in (each, "both")]
-    answers = [as_dict(ground.label, ground, p2, each) for each in asked]
+    ground = _motion(body, query)
+    answers = [
+        spectrum_as_dict(ground.label, ground, query.sizes(), each)
+        for each in POLARITIES
+        if query.polarity in (each, "both")
+    ]
     return json_text(answers[0] if len(answers) == 1 else answers)
 
 
-def critical(
-    body: bytes,
-    trace: int | None,
-    units: str | None,
-    dt_s: float | None,
-    p2: float,
-    reverse: bool,
-    linear: bool,
-    full_map: bool,
-) -> bytes:
+def critical(body: bytes, query: CriticalQuery) -> bytes:
     """Return what `rbfrag critical --json` prints."""
     from rbfrag.solver.reports import critical_as_dict
     from rbfrag.solver.search.critical import critical as search
 
+    (p2,), _ = query.toppling("p2")
     result = search(
-        _motion(body, trace, units, dt_s),
+        _motion(body, query),
         p2=p2,
-        polarity="reverse" if reverse else "forward",
-        linear=linear,
-        full_map=full_map,
+        polarity="reverse" if query.reverse else "forward",
+        full_map=query.map,
     )
-    return json_text(critical_as_dict(result, full_map=full_map))
+    return json_text(critical_as_dict(result, full_map=query.map))
 
 
-def hazard(
-    body: bytes,
-    imt: str | None,
-    site: str | None,
-    p2: float,
-    kr: float,
-    given: Mapping[str, Any],
-    db: str | None,
-) -> bytes:
+def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     """Return what `rbfrag hazard --json` prints."""
     from rbfrag.exchange.hazard_curves import hazard_curves_in, suited_curves
     from rbfrag.hazards.answer import hazard as answer
     from rbfrag.hazards.conversions import velocity_conversion
     from rbfrag.hazards.report import as_dict
-    from rbfrag.solver.quantity import positive
 
-    p2, kr = positive(p2, "p2", "1/s²"), positive(kr, "kr", "g")
-    convert = given.get("convert")
+    (p2, kr), remarks = query.toppling("p2", "kr")
     try:
-        found = hazard_curves_in(_text(body), FILE, imt=imt, site=site)
+        curves = hazard_curves_in(_text(body), FILE, imt=query.imt, site=query.site)
     except RecursionError:
         raise MalformedError("the body is nested too deeply") from None
+    convert = None if query.convert is None else velocity_conversion(query.convert)
     curves = suited_curves(
-        found,
-        with_mean_period=given.get("tm_s") is not None,
-        converted_period_s=None if convert is None else velocity_conversion(convert).period_s,
+        curves,
+        with_mean_period=query.tm is not None,
+        converted_period_s=None if convert is None else convert.period_s,
     )
-    rates = [answer(curve, p2, kr, **given, db=db) for curve in curves]
-    return json_text(as_dict(curves, [None], rates))
+    chosen = query.model_dump(include={"years", "level", "convert", "component", "model"})
+    rates = [answer(curve, p2, kr, tm_s=query.tm, **chosen, db=db) for curve in curves]
+    return json_text(as_dict(curves, [None], rates, remarks))
 
 
-def _motion(body: bytes, trace: int | None, units: str | None, dt_s: float | None) -> GroundMotion:
+def _motion(body: bytes, query: Reading) -> GroundMotion:
     from rbfrag.motions.recognise import motions_in
 
+    trace = query.trace
     try:
-        found = motions_in(body, "upload", units=units, dt_s=dt_s)
+        traces = motions_in(body, "upload", units=query.units, dt_s=query.dt)
     except MotionFileError as error:
         where = FILE if error.line is None else f"{FILE}, line {error.line}"
         raise InputError(f"{where}: {error.reason}") from None
     except RecursionError:
         raise MalformedError("the body is nested too deeply") from None
-    if trace is None and len(found) == 1:
-        return found[0]
-    if trace is not None and 0 <= trace < len(found):
-        return found[trace]
-    listed = ", ".join(f"{i} ({each.component})" for i, each in enumerate(found))
-    trouble = f"holds {len(found)} traces" if trace is None else f"has no trace {trace}"
+    if trace is None and len(traces) == 1:
+        return traces[0]
+    if trace is not None and 0 <= trace < len(traces):
+        return traces[trace]
+    listed = ", ".join(f"{i} ({each.component})" for i, each in enumerate(traces))
+    trouble = f"holds {len(traces)} traces" if trace is None else f"has no trace {trace}"
     raise InputError(f"{FILE} {trouble}: name one of  {listed}  as trace=0, for example")
 
 
@@ -193,12 +190,7 @@ TASKS_PER_PROCESS = 500
 
 
 class WorkerPool:
-    """Processes that work, started when they are first needed.
-
-    Args:
-        jobs: how many.
-        time_limit_s: longest time [s] that a task may take, its waiting included.
-    """
+    """Processes that work, started when they are first needed, each task with a limit of time."""
 
     def __init__(self, jobs: int, time_limit_s: float) -> None:
         self._jobs = jobs
@@ -219,13 +211,7 @@ class WorkerPool:
         return self._pool
 
     async def run(self, request: Request, function: Callable[..., bytes], *given: Any) -> bytes:
-        """Return what a function answers.
-
-        Args:
-            request: who wants to know, its body read; the work ends when the client goes.
-            function: a function of a module.
-            given: its arguments.
-        """
+        """Return what a function of a module answers; the work ends when the client goes."""
         future = self.open().schedule(function, args=given)
         answer = asyncio.wrap_future(future)
         left = asyncio.ensure_future(_disconnected(request))
@@ -235,10 +221,18 @@ class WorkerPool:
             if answer.done():
                 return answer.result()
             if left.done():
-                raise gone()
-            raise too_much_work(self._limit_s) if future.running() else busy()
+                raise RequestRefusedError(*GONE)
+            if not future.running():
+                raise RequestRefusedError(*BUSY)
+            raise RequestRefusedError(
+                422,
+                "time-limit",
+                f"the answer takes longer than the {self._limit_s:g} s that this service works on "
+                "one request: ask for less, ask the command line, or let the service be started "
+                "with a longer --time-limit",
+            )
         except ProcessExpired:
-            raise busy() from None
+            raise RequestRefusedError(*BUSY) from None
         finally:
             left.cancel()
             # ends the process, if it still works on it

@@ -28,7 +28,6 @@ def critical(
     displacement_m: float | None = None,
     vertical: GroundMotion | None = None,
     polarity: Polarity = "forward",
-    linear: bool = False,
     search_limit: float = SEARCH_LIMIT,
     full_map: bool = False,
     map_depth: float | None = None,
@@ -41,7 +40,8 @@ def critical(
     Toppling: the largest k_r/PGA that topples at `p2`. Sliding: the largest k_y/PGA that slides
     further than `displacement_m`. Slumping and confined toppling: the smallest factor on the record
     that brings `block` down, and the k/PGA that it means; nothing is proven of the factors between
-    those that were looked at.
+    those that were looked at. The options of all kinds stand in one signature, each under its name
+    in the contract; a kind refuses those of another.
 
     Args:
         motion: horizontal ground motion.
@@ -58,7 +58,6 @@ def critical(
             yours by cos(φ - β)/cos φ. 0 asks for the strength that first moves.
         vertical: vertical motion of the same recording, upward positive.
         polarity: ``forward`` or ``reverse``.
-        linear: toppling by the linear model, for verification only.
         search_limit: smallest k/PGA looked at.
         full_map: toppling: map every toppling and safe interval down to the limit, and look for
             islands.
@@ -73,7 +72,7 @@ def critical(
             a block of another mode or that no earthquake decides about, components that cannot be
             brought together.
     """
-    asked: dict[str, Any] = {
+    question: dict[str, Any] = {
         "p2": p2,
         "block": block,
         "beta_deg": beta_deg,
@@ -81,21 +80,20 @@ def critical(
         "phi_back_deg": phi_back_deg,
         "rotation_deg": rotation_deg,
         "displacement_m": displacement_m,
-        "linear": linear or None,
         "full_map": full_map or None,
         "map_depth": map_depth,
         "tolerance": tolerance,
         "scan_ratio": scan_ratio,
         "bracket": bracket,
     }
-    given = {name: value for name, value in asked.items() if value is not None}
+    given = {name: value for name, value in question.items() if value is not None}
     return kind_of(kind, given).critical(
         motion, vertical=vertical, polarity=polarity, search_limit=search_limit, **given
     )
 
 
 def kind_of(kind: str | None, given: Mapping[str, Any]) -> Kind:
-    """Return the model that a search was asked of, by name or by what it was given."""
+    """Return the model of a search, by name or by what is given."""
     if kind is not None:
         return model_of_kind(kind)
     if "p2" in given:
@@ -107,12 +105,12 @@ def kind_of(kind: str | None, given: Mapping[str, Any]) -> Kind:
     for name in ("beta_deg", "phi_deg"):
         if name not in given:
             raise InputError(f"{name} is missing: the mode of a block depends on dip and friction")
-    found = stability(
+    judged = stability(
         given["block"],
         beta_deg=given["beta_deg"],
         phi_deg=given["phi_deg"],
         phi_back_deg=given.get("phi_back_deg"),
     )
-    if found.state != "stable" or not 0.0 < found.yield_acceleration < math.inf:
-        raise InputError(f"the block is {found.state} in its mode: no earthquake decides about it")
-    return model_of_mode(found.mode)
+    if judged.state != "stable" or not 0.0 < judged.yield_acceleration < math.inf:
+        raise InputError(f"the block is {judged.state} in its mode: no earthquake decides about it")
+    return model_of_mode(judged.mode)

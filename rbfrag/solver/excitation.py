@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,19 @@ FloatArray = NDArray[np.float64]
 
 BLOCK = 16
 """Nodes per block of the table of maxima that rest is skipped by."""
+
+
+class Nodes(NamedTuple):
+    """An excitation as the kernel of the single run takes it; see :class:`Excitation`."""
+
+    time_s: FloatArray
+    interval_s: FloatArray
+    k_h: FloatArray
+    w: FloatArray
+    q: FloatArray
+    tail_min_q: FloatArray
+    block_max_q: FloatArray
+    jump_node: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,26 +77,34 @@ class Excitation:
         least value is at a node. Minus infinity where a jump is still to come: nothing is
         decided before it.
         """
-        padded = np.append(self.q, 0.0)
-        padded[self.jump_node : self.w.size] = -np.inf
-        return np.ascontiguousarray(np.minimum.accumulate(padded[::-1])[::-1][:-1])
+        filled = np.append(self.q, 0.0)
+        filled[self.jump_node : self.w.size] = -np.inf
+        return np.ascontiguousarray(np.minimum.accumulate(filled[::-1])[::-1][:-1])
 
     @cached_property
     def block_max_q(self) -> FloatArray:
         """Greatest q of each block of `BLOCK` nodes."""
         n = self.q.size
-        padded = np.full(-(-n // BLOCK) * BLOCK, -np.inf)
-        padded[:n] = self.q
-        largest: FloatArray = padded.reshape(-1, BLOCK).max(axis=1)
+        filled = np.full(-(-n // BLOCK) * BLOCK, -np.inf)
+        filled[:n] = self.q
+        largest: FloatArray = filled.reshape(-1, BLOCK).max(axis=1)
         return largest
+
+    @cached_property
+    def nodes(self) -> Nodes:
+        """What a kernel needs of all this."""
+        return Nodes(
+            self.time_s, self.interval_s, self.k_h, self.w, self.q, self.tail_min_q,
+            self.block_max_q, self.jump_node,
+        )  # fmt: skip
 
     @cached_property
     def block_min_q(self) -> FloatArray:
         """Least q of each block of `BLOCK` nodes."""
         n = self.q.size
-        padded = np.full(-(-n // BLOCK) * BLOCK, np.inf)
-        padded[:n] = self.q
-        least: FloatArray = padded.reshape(-1, BLOCK).min(axis=1)
+        filled = np.full(-(-n // BLOCK) * BLOCK, np.inf)
+        filled[:n] = self.q
+        least: FloatArray = filled.reshape(-1, BLOCK).min(axis=1)
         return least
 
     @cached_property
@@ -191,11 +213,11 @@ def _refuse_different_sampling(motion: GroundMotion, vertical: GroundMotion) -> 
 
 
 def motion_remarks(
-    motion: GroundMotion, vertical: GroundMotion | None, drive: Excitation
+    motion: GroundMotion, vertical: GroundMotion | None, excited: Excitation
 ) -> tuple[str, ...]:
     """Return the sentences about suspicious motions that an answer carries."""
     remarks = [*motion.remarks, *(flag.sentence for flag in quality_flags(motion))]
-    remarks += drive.warnings
+    remarks += excited.warnings
     if vertical is not None:
         remarks += [f"vertical: {flag.sentence}" for flag in quality_flags(vertical)]
     return tuple(remarks)

@@ -197,7 +197,7 @@ class Kind:
         """
         raise InputError(f"there is no search for the critical value of kind {self.kind}")
 
-    def cases(self, **asked: Any) -> tuple[Case, ...]:
+    def cases(self, **request: Any) -> tuple[Case, ...]:
         """Return the combinations of a campaign, whatever the motion.
 
         Raises:

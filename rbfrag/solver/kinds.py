@@ -15,12 +15,12 @@ from rbfrag.solver.stability.modes import ModeName
 @cache
 def models() -> dict[str, Kind]:
     """Return all models by kind."""
-    found: dict[str, Kind] = {}
+    by_name: dict[str, Kind] = {}
     for module in pkgutil.iter_modules(rbfrag.solver.models.__path__):
         model = getattr(import_module(f"rbfrag.solver.models.{module.name}"), "MODEL", None)
         if model is not None:
-            found[model.kind] = model
-    return found
+            by_name[model.kind] = model
+    return by_name
 
 
 def model_of_kind(kind: str) -> Kind:

@@ -12,7 +12,7 @@ from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism
-from rbfrag.solver.integrator.one_freedom.follow import Travel, follow
+from rbfrag.solver.integrator.one_freedom.follow import MotionHistory, follow
 from rbfrag.solver.kind import BlockOnPlanes, Kind, RunEnd, Runner, Shaking
 from rbfrag.solver.kinds import model_of_kind
 from rbfrag.solver.results import ModeChange, Outcome, Response, ResponseHistory
@@ -47,15 +47,15 @@ class MechanismKind(Kind):
         """Return a function that says how the block ends under an excitation."""
         mechanism = self._without_cohesion(site)
 
-        def run(drive: Excitation) -> RunEnd:
-            course = follow(mechanism, drive)
-            failed = course.outcome is Outcome.TOPPLED
+        def run(excited: Excitation) -> RunEnd:
+            end = follow(mechanism, excited)
+            failed = end.outcome is Outcome.TOPPLED
             return RunEnd(
-                outcome=course.outcome,
-                moved=course.started_s is not None,
-                peak_rad=course.peak if mechanism.rotates and not failed else None,
-                peak_displacement_m=None if failed else course.peak_displacement_m,
-                error=course.error,
+                outcome=end.outcome,
+                moved=end.started_s is not None,
+                peak_rad=end.peak if mechanism.rotates and not failed else None,
+                peak_displacement_m=None if failed else end.peak_displacement_m,
+                error=end.error,
                 about_block=mechanism.warnings,
             )
 
@@ -79,50 +79,50 @@ def mechanism_response(kind: str, mechanism: Mechanism, shaking: Shaking) -> Res
         mechanism: the block.
         shaking: the motion.
     """
-    drive = excitation(shaking.motion, shaking.vertical, shaking.polarity)
-    course = follow(mechanism, drive, travel=shaking.history)
-    failed = course.outcome is Outcome.TOPPLED
+    excited = excitation(shaking.motion, shaking.vertical, shaking.polarity)
+    run = follow(mechanism, excited, history=shaking.history)
+    failed = run.outcome is Outcome.TOPPLED
     turned = mechanism.rotates and not failed
     critical = mechanism.critical
     start = mechanism.first.pose(0.0).centroid_m
-    at_end = None if failed else course.pose
+    at_end = None if failed else run.pose
     return Response(
         kind=kind,
-        outcome=course.outcome,
-        peak_theta_n=course.peak / critical if turned and critical else None,
-        peak_theta_rad=course.peak if turned else None,
+        outcome=run.outcome,
+        peak_theta_n=run.peak / critical if turned and critical else None,
+        peak_theta_rad=run.peak if turned else None,
         critical_angle_deg=None if critical is None else math.degrees(critical),
-        started_s=course.started_s,
-        toppled_s=(course.certain_s or course.ended_s) if failed else None,
-        error_estimate=course.error,
-        steps=course.steps,
-        samples_moved=course.samples_moved,
-        samples_total=int(np.count_nonzero(drive.interval_s)),
+        started_s=run.started_s,
+        toppled_s=(run.certain_s or run.ended_s) if failed else None,
+        error_estimate=run.error,
+        steps=run.steps,
+        samples_moved=run.samples_moved,
+        samples_total=int(np.count_nonzero(excited.interval_s)),
         warnings=(
             *shaking.remarks,
-            *motion_remarks(shaking.motion, shaking.vertical, drive),
-            *course.sentences,
+            *motion_remarks(shaking.motion, shaking.vertical, excited),
+            *run.sentences,
         ),
-        history=_history(mechanism, drive, course.travel) if course.travel else None,
+        history=_history(mechanism, excited, run.history) if run.history else None,
         final_theta_rad=abs(at_end.turned_rad) if turned and at_end else None,
         displacement_m=at_end.displacement_m if at_end else None,
-        peak_displacement_m=None if failed else course.peak_displacement_m,
+        peak_displacement_m=None if failed else run.peak_displacement_m,
         centroid_displacement_m=math.dist(at_end.centroid_m, start) if at_end else None,
-        stopped_s=course.ended_s,
-        mode_changes=tuple(ModeChange(change.time_s, change.name) for change in course.changes),
+        stopped_s=run.ended_s,
+        mode_changes=tuple(ModeChange(change.time_s, change.name) for change in run.changes),
     )
 
 
-def _history(mechanism: Mechanism, drive: Excitation, travel: Travel) -> ResponseHistory:
+def _history(mechanism: Mechanism, excited: Excitation, history: MotionHistory) -> ResponseHistory:
     """Put the nodes of rest, which the kernel skips, back between those of motion."""
-    time_s, rate = travel.time_s, travel.rate
-    displacement = np.array([pose.displacement_m for pose in travel.poses])
-    centroid = np.array([pose.centroid_m for pose in travel.poses])
-    turned = np.array([pose.turned_rad for pose in travel.poses])
-    if drive.time_s[-1] > time_s[-1] and rate[-1] == 0.0:
-        rest = drive.time_s
+    time_s, rate = history.time_s, history.rate
+    displacement = np.array([pose.displacement_m for pose in history.poses])
+    centroid = np.array([pose.centroid_m for pose in history.poses])
+    turned = np.array([pose.turned_rad for pose in history.poses])
+    if excited.time_s[-1] > time_s[-1] and rate[-1] == 0.0:
+        rest = excited.time_s
     else:
-        rest = drive.time_s[drive.time_s < time_s[-1]]
+        rest = excited.time_s[excited.time_s < time_s[-1]]
     rest = rest[~np.isin(rest, time_s)]
     last = np.searchsorted(time_s, rest, side="right") - 1
     known = last >= 0
@@ -139,13 +139,13 @@ def _history(mechanism: Mechanism, drive: Excitation, travel: Travel) -> Respons
     at_s = np.concatenate([time_s, rest])[order]
     speed = np.concatenate([rate, np.zeros(rest.size)])[order]
     nothing = np.zeros_like(speed)
-    k_h = np.interp(at_s, drive.time_s, drive.k_h, right=0.0)
-    k_v = np.interp(at_s, drive.time_s, drive.w - 1.0, right=0.0)
+    k_h = np.interp(at_s, excited.time_s, excited.k_h, right=0.0)
+    k_v = np.interp(at_s, excited.time_s, excited.w - 1.0, right=0.0)
     # of a jump, the first entry at its time shows what was before
-    for jump in np.flatnonzero(drive.interval_s == 0.0):
-        first = int(np.searchsorted(at_s, drive.time_s[jump]))
-        if first + 1 < at_s.size and at_s[first] == at_s[first + 1] == drive.time_s[jump]:
-            k_h[first], k_v[first] = drive.k_h[jump], drive.w[jump] - 1.0
+    for jump in np.flatnonzero(excited.interval_s == 0.0):
+        first = int(np.searchsorted(at_s, excited.time_s[jump]))
+        if first + 1 < at_s.size and at_s[first] == at_s[first + 1] == excited.time_s[jump]:
+            k_h[first], k_v[first] = excited.k_h[jump], excited.w[jump] - 1.0
     return ResponseHistory(
         time_s=at_s,
         theta_rad=merged(np.abs(turned), 0.0),
@@ -156,7 +156,7 @@ def _history(mechanism: Mechanism, drive: Excitation, travel: Travel) -> Respons
         velocity_m_s=None if mechanism.rotates else speed,
         centroid_m=merged(centroid, start.centroid_m),
         turned_rad=merged(turned, 0.0),
-        strength_g=merged(travel.strength_g, mechanism.first.forward.threshold(0.0)),
+        strength_g=merged(history.strength_g, mechanism.first.forward.threshold(0.0)),
     )
 
 
@@ -208,25 +208,25 @@ def shaken_mechanism(
     model = model_of_kind(kind)
     if not isinstance(model, MechanismKind):
         raise InputError(f"kind {kind!r} is not one whose records are scaled")
-    found = stability(block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg)
-    if found.mode != model.mode:
+    judged = stability(block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg)
+    if judged.mode != model.mode:
         raise InputError(
-            f"the block is not of kind {kind}: its mode is {words_of_mode(found.mode)} (yield "
-            f"{found.yield_acceleration:.4g} g, {found.state})"
+            f"the block is not of kind {kind}: its mode is {words_of_mode(judged.mode)} (yield "
+            f"{judged.yield_acceleration:.4g} g, {judged.state})"
         )
-    if found.state != "stable" or not 0.0 < found.yield_acceleration < math.inf:
+    if judged.state != "stable" or not 0.0 < judged.yield_acceleration < math.inf:
         raise InputError(
-            f"the block is {found.state} in its mode, {words_of_mode(found.mode)} (yield "
-            f"{found.yield_acceleration:.4g} g): no earthquake decides about it"
+            f"the block is {judged.state} in its mode, {words_of_mode(judged.mode)} (yield "
+            f"{judged.yield_acceleration:.4g} g): no earthquake decides about it"
         )
     site = BlockOnPlanes(
         block=block,
-        beta_rad=math.radians(found.beta_deg),
-        phi_rad=math.radians(found.phi_deg),
-        phi_back_rad=math.radians(found.phi_back_deg),
+        beta_rad=math.radians(judged.beta_deg),
+        phi_rad=math.radians(judged.phi_deg),
+        phi_back_rad=math.radians(judged.phi_back_deg),
         back_fracture=True,
         cohesive=False,
-        yield_g=found.yield_acceleration,
+        yield_g=judged.yield_acceleration,
         settings={},
     )
     mechanism = model.mechanism(site)
@@ -236,18 +236,18 @@ def shaken_mechanism(
         mechanism=mechanism,
         yield_name=model.yield_name,
         yield_g=equation.threshold(0.0),
-        p2=equation.drive(0.0) / equation.inertia(0.0),
+        p2=equation.driving(0.0) / equation.inertia(0.0),
         leaves_g=_leaves_g(mechanism),
         most_rad=mechanism.first.highest if model.one_phase else math.inf,
-        remarks=found.warnings,
+        remarks=judged.warnings,
     )
 
 
 def _leaves_g(mechanism: Mechanism) -> float:
     """Return the least k_h above the yield at which a contact opens at rest."""
-    found = math.inf
+    leaves = math.inf
     for condition in mechanism.first.forward.conditions:
         per_k_h, per_w = condition.per_k_h(0.0), condition.per_w(0.0)
         if per_k_h < 0.0:
-            found = min(found, -per_w / per_k_h)
-    return found
+            leaves = min(leaves, -per_w / per_k_h)
+    return leaves

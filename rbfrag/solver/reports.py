@@ -147,11 +147,11 @@ def critical_as_dict(
 
 def map_rows(result: CriticalResult) -> list[dict[str, Any]]:
     """Return the map of outcomes, one row per interval of k_r/PGA, rising."""
-    found = result.intervals
+    intervals = result.intervals
     return [
         {"k_lo": low, "k_hi": high, "outcome": outcome}
         for low, high, outcome in zip(
-            found.k_lo.tolist(), found.k_hi.tolist(), found.outcome, strict=True
+            intervals.k_lo.tolist(), intervals.k_hi.tolist(), intervals.outcome, strict=True
         )
     ]
 

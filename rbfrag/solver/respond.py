@@ -33,7 +33,6 @@ def respond(
     vertical: GroundMotion | None = None,
     polarity: Polarity = "forward",
     kind: str | None = None,
-    linear: bool = False,
     two_way: bool = False,
     horizontal: bool = False,
     history: bool = False,
@@ -41,13 +40,14 @@ def respond(
     """Return what a block does under a ground motion.
 
     The block is given in one of three ways: `p2` and `kr` (it topples), `ky` (it slides), or
-    `block` with `beta_deg` and `phi_deg`, whose failure mode chooses the model.
+    `block` with `beta_deg` and `phi_deg`, whose failure mode chooses the model. It has more than
+    ten parameters, because scripts name each quantity that a user states; a kind refuses those of
+    another.
 
     Args:
         motion: horizontal ground motion.
         p2: frequency parameter p² of a toppling block [1/s²], > 0.
-        kr: its rocking acceleration coefficient k_r = tan(critical angle), > 0; with
-            `linear` the critical angle itself [rad].
+        kr: its rocking acceleration coefficient k_r = tan(critical angle), > 0.
         ky: yield acceleration coefficient tan(φ - β) of a block that slides, whatever its
             shape, on a plane that dips by `beta_deg` (default 0), > 0.
         block: shape and size.
@@ -61,7 +61,6 @@ def respond(
         polarity: ``forward`` (positive samples drive forward motion) or ``reverse``.
         kind: ``toppling``, ``sliding``, ``slumping`` or ``confined_toppling``; None for the
             model of the failure mode.
-        linear: toppling by the linear model, for verification against closed forms only.
         two_way: sliding up the base too, where the ground drives the block that way.
         horizontal: sliding without the factor cos(φ - β)/cos φ, as Newmark's horizontal block.
         history: keep the motion in time.
@@ -71,7 +70,7 @@ def respond(
             fails at rest or that nothing moves, an unknown kind or polarity, an option of
             another model, components that cannot be brought together.
     """
-    settings = {"linear": linear, "two_way": two_way, "horizontal": horizontal}
+    settings = {"two_way": two_way, "horizontal": horizontal}
     conditions = {
         "beta_deg": beta_deg,
         "phi_deg": phi_deg,
@@ -86,7 +85,7 @@ def respond(
         if beta_deg is None or phi_deg is None:
             name = "beta_deg" if beta_deg is None else "phi_deg"
             raise InputError(f"{name} is missing: the mode of a block depends on dip and friction")
-        found = stability(
+        judged = stability(
             block,
             beta_deg=beta_deg,
             phi_deg=phi_deg,
@@ -95,7 +94,7 @@ def respond(
             cohesion_pa=cohesion_pa,
             density_kg_m3=density_kg_m3,
         )
-        return _by_mode(block, found, kind, settings, Shaking(motion, vertical, polarity, history))
+        return _by_mode(block, judged, kind, settings, Shaking(motion, vertical, polarity, history))
     shaking = Shaking(motion, vertical, polarity, history)
     if ky is not None:
         if p2 is not None or kr is not None:
@@ -133,29 +132,29 @@ def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> Block
 
 def _by_mode(
     block: Block,
-    found: Stability,
+    judged: Stability,
     kind: str | None,
     settings: dict[str, bool],
     shaking: Shaking,
 ) -> Response:
     """Run the model that a block's mode calls for, or the one that was asked for."""
-    model = model_of_mode(found.mode) if kind is None else model_of_kind(kind)
-    _refuse_what_no_motion_decides(found)
-    remarks = found.warnings
-    if model.mode != found.mode:
+    model = model_of_mode(judged.mode) if kind is None else model_of_kind(kind)
+    _refuse_what_no_motion_decides(judged)
+    remarks = judged.warnings
+    if model.mode != judged.mode:
         remarks = (
             *remarks,
-            f"the mode of the block is {words_of_mode(found.mode)}: by it, {model.kind} is not "
+            f"the mode of the block is {words_of_mode(judged.mode)}: by it, {model.kind} is not "
             "what it would do",
         )
     site = BlockOnPlanes(
         block=block,
-        beta_rad=math.radians(found.beta_deg),
-        phi_rad=math.radians(found.phi_deg),
-        phi_back_rad=math.radians(found.phi_back_deg),
-        back_fracture=found.back_fracture,
-        cohesive=found.cohesion is not None,
-        yield_g=found.yield_acceleration if model.mode == found.mode else None,
+        beta_rad=math.radians(judged.beta_deg),
+        phi_rad=math.radians(judged.phi_deg),
+        phi_back_rad=math.radians(judged.phi_back_deg),
+        back_fracture=judged.back_fracture,
+        cohesive=judged.cohesion is not None,
+        yield_g=judged.yield_acceleration if model.mode == judged.mode else None,
         settings=_known(model, settings),
     )
     return model.respond(
@@ -210,16 +209,16 @@ def _known(model: Kind, settings: dict[str, bool]) -> dict[str, Any]:
     return given
 
 
-def _refuse_what_no_motion_decides(found: Stability) -> None:
-    k = found.yield_acceleration
-    if found.state == "locked":
+def _refuse_what_no_motion_decides(judged: Stability) -> None:
+    k = judged.yield_acceleration
+    if judged.state == "locked":
         raise InputError(
-            f"the block is locked in its mode, {words_of_mode(found.mode)}: no horizontal "
+            f"the block is locked in its mode, {words_of_mode(judged.mode)}: no horizontal "
             "acceleration moves it"
         )
-    if found.state == "unstable" or k <= 0.0:
-        name = {"topple": "k_r", "slide": "k_y", "slump": "k_s"}.get(found.mode, "k_ct")
+    if judged.state == "unstable" or k <= 0.0:
+        name = {"topple": "k_r", "slide": "k_y", "slump": "k_s"}.get(judged.mode, "k_ct")
         raise InputError(
-            f"the block is {found.state} at rest (mode {words_of_mode(found.mode)}, "
+            f"the block is {judged.state} at rest (mode {words_of_mode(judged.mode)}, "
             f"{name} = {k:.4g} g): no earthquake decides about it"
         )

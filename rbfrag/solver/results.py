@@ -214,7 +214,6 @@ class CriticalResult:
         kind: name of the model.
         p2: the block's frequency parameter p² [1/s²]; NaN for sliding, which has none.
         polarity: ``forward`` or ``reverse``.
-        linear: True for the linear verification model.
         pga_g: PGA of the horizontal motion [g].
         status: ``found``; ``below_limit`` (nothing topples down to `search_limit`);
             ``no_motion`` (no block down to the limit ever lifts); ``outside_model``.
@@ -247,7 +246,6 @@ class CriticalResult:
     kind: str
     p2: float
     polarity: Polarity
-    linear: bool
     pga_g: float
     status: Status
     search_limit: float

@@ -10,7 +10,7 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
-from rbfrag.solver.integrator.single_run import TOPPLED, Run, run_toppling
+from rbfrag.solver.integrator.single_run import HANDED, TOPPLED, Run, run_toppling
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import FloatArray, Outcome, Polarity, Response, ResponseHistory
@@ -18,7 +18,7 @@ from rbfrag.solver.results import FloatArray, Outcome, Polarity, Response, Respo
 OUTCOMES = (Outcome.STABLE, Outcome.TOPPLED, Outcome.UNDETERMINED, Outcome.JUMP)
 """Outcome of each kernel code."""
 
-_TO_THE_END = np.empty(0)
+_TO_THE_END = np.empty(0, HANDED)
 _NO_HISTORY = np.empty((4, 0))
 
 MOST_STEPS = 1e8
@@ -36,7 +36,6 @@ def respond(
     vertical: GroundMotion | None = None,
     polarity: Polarity = "forward",
     kind: str = "toppling",
-    linear: bool = False,
     history: bool = False,
 ) -> Response:
     """Return what a toppling block does under a ground motion.
@@ -44,12 +43,10 @@ def respond(
     Args:
         motion: horizontal ground motion.
         p2: frequency parameter p² of the block [1/s²], > 0.
-        kr: rocking acceleration coefficient k_r = tan(critical angle), > 0; with
-            `linear` the critical angle itself [rad].
+        kr: rocking acceleration coefficient k_r = tan(critical angle), > 0.
         vertical: vertical motion of the same recording, upward positive.
         polarity: ``forward`` (positive samples drive forward rotation) or ``reverse``.
         kind: name of the model, for the answer.
-        linear: the linear model, for verification against closed forms only.
         history: keep the motion in time.
 
     Raises:
@@ -60,11 +57,11 @@ def respond(
     """
     p2 = positive(p2, "p2", "1/s²")
     kr = positive(kr, "kr", "g")
-    drive = excitation(motion, vertical, polarity)
-    refuse_endless(drive, p2)
-    run = simulate(drive, p2=p2, kr=kr, linear=linear)
+    excited = excitation(motion, vertical, polarity)
+    refuse_endless(excited, p2)
+    run = simulate(excited, p2=p2, kr=kr)
     outcome = OUTCOMES[run.outcome]
-    theta_c = kr if linear else math.atan(kr)
+    theta_c = math.atan(kr)
     known = math.isfinite(run.peak_rad)
     return Response(
         kind=kind,
@@ -77,38 +74,42 @@ def respond(
         error_estimate=run.error_rad,
         steps=run.steps,
         samples_moved=run.samples_moved,
-        samples_total=int(np.count_nonzero(drive.interval_s)),
-        warnings=_warnings(motion, vertical, drive, outcome, run),
-        history=_history(drive, p2=p2, kr=kr, linear=linear) if history else None,
+        samples_total=int(np.count_nonzero(excited.interval_s)),
+        warnings=_warnings(motion, vertical, excited, outcome, run),
+        history=_history(excited, p2=p2, kr=kr) if history else None,
     )
 
 
 def simulate(
-    drive: Excitation,
+    excited: Excitation,
     *,
     p2: float,
     kr: float,
-    linear: bool = False,
     order: int = ORDER,
     ph_max: float = PH_MAX,
 ) -> Run:
     """Run the kernel once; `order` and `ph_max` are there for convergence studies."""
-    return Run(*_kernel_call(drive, kr, math.sqrt(p2), linear, order, ph_max, _NO_HISTORY))
-
-
-def runner(drive: Excitation, *, p2: float, linear: bool) -> Callable[[float], Run]:
-    """Return a function of k_r that runs the block of size p2 [1/s²] under one excitation."""
     p = math.sqrt(p2)
+    return Run(
+        *run_toppling(excited.nodes, kr, p, order, ph_max, _NO_HISTORY, _TO_THE_END, np.empty(9))
+    )
+
+
+def runner(excited: Excitation, *, p2: float) -> Callable[[float], Run]:
+    """Return a function of k_r that runs the block of size p2 [1/s²] under one excitation."""
+    nodes, p = excited.nodes, math.sqrt(p2)
 
     def run(kr: float) -> Run:
-        return Run(*_kernel_call(drive, kr, p, linear, ORDER, PH_MAX, _NO_HISTORY))
+        return Run(
+            *run_toppling(nodes, kr, p, ORDER, PH_MAX, _NO_HISTORY, _TO_THE_END, np.empty(9))
+        )
 
     return run
 
 
-def refuse_endless(drive: Excitation, p2: float) -> None:
+def refuse_endless(excited: Excitation, p2: float) -> None:
     """Refuse a block so small that one run would not end in reasonable time."""
-    steps = math.sqrt(p2) * float(drive.time_s[-1] - drive.time_s[0]) / PH_MAX
+    steps = math.sqrt(p2) * float(excited.time_s[-1] - excited.time_s[0]) / PH_MAX
     if steps > MOST_STEPS:
         raise InputError(
             f"p2 = {p2:g} 1/s² would take {steps:.1g} steps over this record: a block of 1 mm "
@@ -116,51 +117,22 @@ def refuse_endless(drive: Excitation, p2: float) -> None:
         )
 
 
-def _kernel_call(
-    drive: Excitation,
-    kr: float,
-    p: float,
-    linear: bool,
-    order: int,
-    ph_max: float,
-    history: np.ndarray,
-) -> tuple[int, float, float, float, float, int, int, int]:
-    return run_toppling(
-        drive.time_s,
-        drive.interval_s,
-        drive.k_h,
-        drive.w,
-        drive.q,
-        drive.tail_min_q,
-        drive.block_max_q,
-        drive.jump_node,
-        kr,
-        p,
-        linear,
-        order,
-        ph_max,
-        history,
-        _TO_THE_END,
-        np.empty((3, order + 1)),
-    )
-
-
-def _history(drive: Excitation, *, p2: float, kr: float, linear: bool) -> ResponseHistory:
+def _history(excited: Excitation, *, p2: float, kr: float) -> ResponseHistory:
     """Run again over the record and a stretch of rest after it, keeping every node."""
     p = math.sqrt(p2)
-    end = drive.time_s[-1]
+    end = excited.time_s[-1]
     n_tail = 400
     tail_s = end + TAIL_PERIODS / p * np.arange(1, n_tail + 1) / n_tail
     longer = Excitation(
-        time_s=np.concatenate([drive.time_s, [end], tail_s]),
-        interval_s=np.concatenate([drive.interval_s, [0.0], np.diff(tail_s, prepend=end)]),
-        k_h=np.concatenate([drive.k_h, np.zeros(n_tail + 1)]),
-        w=np.concatenate([drive.w, np.ones(n_tail + 1)]),
-        pga_g=drive.pga_g,
+        time_s=np.concatenate([excited.time_s, [end], tail_s]),
+        interval_s=np.concatenate([excited.interval_s, [0.0], np.diff(tail_s, prepend=end)]),
+        k_h=np.concatenate([excited.k_h, np.zeros(n_tail + 1)]),
+        w=np.concatenate([excited.w, np.ones(n_tail + 1)]),
+        pga_g=excited.pga_g,
     )
     # nodes, and at most a start, a peak and an impact twice in an interval
     store = np.empty((4, 7 * longer.time_s.size + 8))
-    run = Run(*_kernel_call(longer, kr, p, linear, ORDER, PH_MAX, store))
+    run = Run(*run_toppling(longer.nodes, kr, p, ORDER, PH_MAX, store, _TO_THE_END, np.empty(9)))
     store = store[:, : run.history_length]
     # The kernel skips rest. Its nodes are put back, as far as the record goes.
     at_node = store[3] >= 0.0
@@ -169,7 +141,7 @@ def _history(drive: Excitation, *, p2: float, kr: float, linear: bool) -> Respon
     moved = store[3, at_node].astype(np.int64)
     theta[moved] = store[1, at_node]
     rate[moved] = store[2, at_node]
-    shown = max(drive.time_s.size, int(moved[-1]) + 1) if moved.size else drive.time_s.size
+    shown = max(excited.time_s.size, int(moved[-1]) + 1) if moved.size else excited.time_s.size
     if run.outcome == TOPPLED and moved.size:
         shown = int(moved[-1]) + 1
     event = store[:3, ~at_node]
@@ -199,13 +171,13 @@ def _time_or_none(time_s: float) -> float | None:
 def _warnings(
     motion: GroundMotion,
     vertical: GroundMotion | None,
-    drive: Excitation,
+    excited: Excitation,
     outcome: Outcome,
     run: Run,
 ) -> tuple[str, ...]:
-    said = list(motion_remarks(motion, vertical, drive))
+    warnings = list(motion_remarks(motion, vertical, excited))
     if outcome is Outcome.UNDETERMINED:
-        said.append(outcome.advice)
+        warnings.append(outcome.advice)
     if outcome is Outcome.JUMP:
-        said.append(f"at {run.verdict_s:.3f} s: {outcome.advice}")
-    return tuple(said)
+        warnings.append(f"at {run.verdict_s:.3f} s: {outcome.advice}")
+    return tuple(warnings)

@@ -71,7 +71,7 @@ def test_reference_agrees_with_the_independent_integrator(records: Records) -> N
     seen = set()
     for case in choose_cases(records, 10):
         ours = reference(case)
-        other = integrate(case.drive.time_s, case.drive.k_h, None, p2=case.p2, kr=case.kr)
+        other = integrate(case.excitation.time_s, case.excitation.k_h, None, p2=case.p2, kr=case.kr)
         seen.add(other.outcome)
         assert ours.outcome == other.outcome
         if other.peak_rad is not None:
@@ -140,7 +140,7 @@ def test_cases_are_drawn_alike_and_lift_off(records: Records) -> None:
     first, again = choose_cases(records, 8, seed=3), choose_cases(records, 8, seed=3)
     assert [(c.p2, c.kr, c.polarity) for c in first] == [(c.p2, c.kr, c.polarity) for c in again]
     assert first[0].kr != choose_cases(records, 8, seed=4)[0].kr
-    assert all(c.drive.max_q > c.kr for c in first)
+    assert all(c.excitation.max_q > c.kr for c in first)
 
 
 def test_records_are_found_or_refused(
@@ -197,7 +197,7 @@ def test_command_prints_tables_writes_files_and_json(
             ["--times", "1", "--workers", "1", "--combinations", "12"],
             ["record-length", "workers"],
         ),
-        (start_up.main, ["--repeat", "1", "--no-cold"], ["start-up"]),
+        (start_up.main, ["--repeat", "1", "--no-cold"], ["start-up", "shell-start"]),
         (main_job.main, ["--jobs", "1", "--term", "pgv"], ["main-job"]),
         (search_times.main, ["--every", "9"], ["search-times"]),
         (

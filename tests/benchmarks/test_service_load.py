@@ -51,6 +51,6 @@ def test_what_wrk_does_not_print_is_said(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_ratios_are_of_pairs() -> None:
     ours = [Load(50.0, 1.0, 2.0, 0, 500, 200.0), Load(300.0, 1.0, 2.0, 0, 3000, 210.0)]
     other = [Load(100.0, 1.0, 2.0, 0, 1000, 100.0), Load(400.0, 1.0, 2.0, 0, 4000, 126.0)]
-    _, row, _ = table_rows(1, ours, other, other)
+    _, row, *_ = table_rows(1, [ours, other, other, other])
     # 50/100 and 300/400; by processor time 100/200 and 126/210
     assert row[-3:] == ["0.62", "0.50 to 0.75", "0.55"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rbfrag.db.content import content_digest
+from benchmarks.database_content import content_digest
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo

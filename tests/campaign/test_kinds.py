@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from sqlalchemy import Engine, select, update
 
+from benchmarks.database_content import table_rows_by_natural_key
 from rbfrag.campaign.resimulate import resimulate
 from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
 from rbfrag.db import schema
 from rbfrag.db.check.database import check_database
-from rbfrag.db.content import table_rows_by_natural_key
 from rbfrag.db.engine import open_database, opened_database
 from rbfrag.db.merge.databases import merge_databases
 from rbfrag.db.models import model_rows, save_model

@@ -82,7 +82,8 @@ def test_last_bits_count_here_but_not_from_elsewhere(
     again = _again(database)
     assert again.exact == 0
     assert any("kr_over_pga is" in finding.problem for finding in again.findings)
-    monkeypatch.setattr(rbfrag.campaign.resimulate, "made_on", lambda: "another machine")
+    module = rbfrag.campaign.resimulate
+    monkeypatch.setattr(module, "processor_and_compiler", lambda: "another machine")
     again = _again(database)
     assert (again.exact, again.within_error, again.findings) == (0, 8, ())
 
@@ -109,7 +110,8 @@ def test_a_wrong_value_is_found(
     database: Path, monkeypatch: pytest.MonkeyPatch, statement: Any, problem: str, elsewhere: bool
 ) -> None:
     if elsewhere:
-        monkeypatch.setattr(rbfrag.campaign.resimulate, "made_on", lambda: "another machine")
+        module = rbfrag.campaign.resimulate
+        monkeypatch.setattr(module, "processor_and_compiler", lambda: "another machine")
     with opened_database(database, read_only=True) as engine, engine.connect() as connection:
         row_id = connection.scalar(
             select(func.min(combination.c.id)).where(combination.c.status == "found")

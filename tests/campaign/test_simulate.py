@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from sqlalchemy import delete, func, select, update
 
+from benchmarks.database_content import content_digest
 from rbfrag.campaign.add_motions import add_motions
 from rbfrag.campaign.simulate import CampaignProgress, simulate
-from rbfrag.db.content import content_digest
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
 from rbfrag.db.outcome_maps import outcome_maps

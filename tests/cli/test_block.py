@@ -103,8 +103,8 @@ def test_table_for_people(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        (PLANES, "--alpha1 --alpha3 --r3"),
-        ((*ANGLES[:4], *PLANES), "given: --alpha1, --alpha3"),
+        (PLANES, "--alpha1, --alpha3 and --r3"),
+        ((*ANGLES[:4], *PLANES), "--r3 is missing"),
         ((*ANGLES, "--s1", "1", *PLANES), "--s1"),
         ((*ANGLES, "--polygon", "b.toml", *PLANES), "does not go with --polygon"),
         ((*ANGLES, "--phi", "35"), "--beta is missing"),
@@ -149,7 +149,7 @@ def test_respond_and_predict_from_a_block_file(shell: Shell, tmp_path: Path) -> 
         (("alpha1_deg = -10", "alpha1_deg = -40"), ["confined topple"]),
         (("beta_deg = 5", "beta_deg = 26"), ["unstable"]),
         (("beta_deg = 5", "beta_deg = 25"), ["yield 0 g"]),
-        (("beta_deg = 5\n", ""), ["beta_deg is missing"]),
+        (("beta_deg = 5\n", ""), ["beta_deg or --beta is missing"]),
         (("phi_deg = 35", "phi_deg = 35\nkv = 0.2"), ["kv"]),
     ],
 )

@@ -104,7 +104,10 @@ def test_a_rock_mass_is_the_mean_of_its_toppling_blocks(shell: Shell) -> None:
         (("--p2", "3", "--kr", "0.1", "--imt", "PGA"), "mean period with --tm"),
         (("--p2", "3", "--kr", "0.1", "--imt", "SA(1)"), "--imt SA(1)"),
         (("--p2", "3", "--kr", "0.1", "--levels", "2"), "at least 10"),
-        (("--p2", "3", "--kr", "0.1", "--blocks", "b.csv"), "not several of them"),
+        (
+            ("--p2", "3", "--kr", "0.1", "--blocks", "b.csv"),
+            "--blocks does not go with --p2: a block is described once",
+        ),
         (("--p2", "3"), "--kr is missing"),
         (("--blocks", "none.csv"), "no such file"),
         (("--blocks", "bad.csv"), "block A7 has p2_1_s2 = 3 and kr = -1"),

@@ -126,7 +126,9 @@ def test_refusals(
 def test_blocks_that_do_not_wait_are_refused(refuses: Callable[..., str], curve: Path) -> None:
     Path("blocks.csv").write_text("block_id,p2_1_s2,kr\nA7,3,-0.1\n")
     assert "block A7" in refuses("hazard", curve, "--blocks", "blocks.csv")
-    assert "not several of them" in refuses("hazard", curve, "--blocks", "blocks.csv", "--p2", "3")
+    assert "--blocks does not go with --p2" in refuses(
+        "hazard", curve, "--blocks", "blocks.csv", "--p2", "3"
+    )
 
 
 @pytest.mark.parametrize(("p2", "kr"), [("0", "0.1"), ("nan", "0.1"), ("3", "-0.1"), ("3", "inf")])

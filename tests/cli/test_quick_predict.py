@@ -19,13 +19,19 @@ PLAIN = [
     ["--p2=3", "--kr=.1", "--pgv=6e-1", "--json"],
     ["--json", "--pga", "0.5", "--tm", "0.5", "--kr", "0.1", "--p2", "3", "--pgv", "0.6"],
     ["--p2", "3", "--kr", "0.1", "--pgv", "60", "--level", "0.5"],
+    ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--model", "wls-pgv"],
+]
+OF_THE_REFERENCE = [
+    ["--ky", "0.1", "--displacement", "0.1", "--pgv", "0.6", "--kind", "sliding"],
+    ["--ks", "0.1", "--ps2", "3", "--rotation", "2", "--pgv", "0.6", "--json"],
+]
+REFUSED = [
     ["--p2", "3", "--kr", "0.1", "--pgv", "-0.6"],
     ["--p2", "3", "--kr", "0.1"],
     ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--model", "nobody"],
     ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--level", "95"],
     ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--db", "none.db"],
-    ["--ky", "0.1", "--displacement", "0.1", "--pgv", "0.6", "--kind", "sliding"],
-    ["--ks", "0.1", "--ps2", "3", "--rotation", "2", "--pgv", "0.6", "--json"],
+    ["--p2", "3", "--kr", "0.1", "--beta", "5", "--pgv", "0.6"],
 ]
 
 
@@ -36,16 +42,31 @@ def database(tmp_path, shell):
             save_model(connection, model_row(term))
 
 
+def same_answer(arguments, shell: Shell, capsys):
+    assert quick_predict(arguments) == 0
+    quick = capsys.readouterr()
+    full = shell("predict", *arguments)
+    assert quick.out == full.stdout != ""
+    assert quick.err == full.stderr
+
+
 @pytest.mark.parametrize("arguments", PLAIN, ids=" ".join)
 @pytest.mark.usefixtures("database")
-def test_the_same_answers_and_errors(arguments, shell: Shell, capsys):
-    status = quick_predict(arguments)
-    quick = capsys.readouterr()
-    assert status is not None
-    full = shell("predict", *arguments, expect=status)
-    assert quick.out == full.stdout
-    assert quick.err == full.stderr
-    assert quick.out or quick.err
+def test_the_same_answers(arguments, shell: Shell, capsys):
+    same_answer(arguments, shell, capsys)
+
+
+@pytest.mark.parametrize("arguments", OF_THE_REFERENCE, ids=" ".join)
+def test_the_same_answers_of_the_reference(arguments, shell: Shell, capsys):
+    same_answer(arguments, shell, capsys)
+
+
+@pytest.mark.parametrize("arguments", REFUSED, ids=" ".join)
+@pytest.mark.usefixtures("database")
+def test_what_is_refused_is_said_by_the_full_command(arguments, shell: Shell, capsys):
+    assert quick_predict(arguments) is None
+    assert capsys.readouterr() == ("", "")
+    assert shell("predict", *arguments, expect=2).stderr.startswith("rbfrag: ")
 
 
 @pytest.mark.parametrize(
@@ -70,7 +91,7 @@ def test_all_else_is_left_to_the_full_command(arguments):
 
 
 def test_every_quick_option_is_one_of_the_command():
-    command = typer.main.get_command(app).commands["predict"]  # type: ignore[attr-defined]
+    command = typer.main.get_command(app).get_command(None, "predict")  # type: ignore[attr-defined]
     known = {name for parameter in command.params for name in parameter.opts}
     assert {*NUMBERS, *NAMES, "--json"} <= known
 

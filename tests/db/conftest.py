@@ -84,7 +84,6 @@ def make_result() -> Callable[..., CriticalResult]:
             "kind": "toppling",
             "p2": p2,
             "polarity": "forward",
-            "linear": False,
             "pga_g": pga_g,
             "status": "found",
             "search_limit": 0.01,
@@ -132,7 +131,6 @@ def store_result() -> Callable[..., str]:
             p2=result.p2,
             settings=settings,
             numerics_version=version,
-            linear=result.linear,
         )
         record = CombinationRecord(
             natural_key=key,

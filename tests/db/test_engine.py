@@ -16,8 +16,8 @@ from sqlalchemy import Engine, func, select
 
 import rbfrag.db.location
 import rbfrag.db.upgrade
-from rbfrag.db.connect import database_label
-from rbfrag.db.engine import database_url, open_database, opened_database
+from rbfrag.db.connect import database_label, sqlalchemy_url
+from rbfrag.db.engine import open_database, opened_database
 from rbfrag.db.insert import insert_row
 from rbfrag.db.location import locate
 from rbfrag.db.schema import suite
@@ -70,7 +70,8 @@ class TestLocation:
         ],
     )
     def test_url(self, given: str | Path, url: str) -> None:
-        assert database_url(given) == url
+        found = sqlalchemy_url(locate(given))
+        assert found.render_as_string(hide_password=False) == url
 
     @pytest.mark.parametrize(
         "given",
@@ -85,7 +86,7 @@ class TestLocation:
     )
     def test_refused(self, given: str) -> None:
         with pytest.raises(InputError):
-            database_url(given)
+            sqlalchemy_url(locate(given))
 
 
 class TestCreation:

@@ -25,8 +25,9 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.keys import combination_key
 from rbfrag.db.merge.databases import merge_databases
 from rbfrag.db.motions import add_motion
-from rbfrag.db.queries import combination_table, outcome_grid, simulation_points
+from rbfrag.db.queries import combination_table, outcome_grid
 from rbfrag.db.rows import EarthquakeInfo
+from rbfrag.db.stored_combination import stored_combination
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.results import NUMERICS_VERSION, OutcomeIntervals, SearchPoints
@@ -89,7 +90,7 @@ def test_a_grid_beside_a_search(engine: Engine, store: Store) -> None:
         table = combination_table(connection)
         ids = table.combination_id[::-1]
         found = outcome_grid(connection, ids)
-        points = simulation_points(connection, int(ids[0]))
+        points = stored_combination(connection, table.natural_key[-1]).points
         assert check_database(connection) == []
     np.testing.assert_array_equal(found.k_over_pga, [GRID.kr_over_pga] * 2)
     np.testing.assert_array_equal(found.outcome, [[0.0, 0.0, np.nan, 1.0]] * 2)

@@ -12,11 +12,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import Engine, delete, func, select, true, update
 
+from benchmarks.database_content import CONTENT_TABLES, content_digest, table_rows_by_natural_key
 from rbfrag.db import schema
 from rbfrag.db.campaigns import start_campaign
 from rbfrag.db.check.database import check_database
 from rbfrag.db.check.maps import contradictions
-from rbfrag.db.content import CONTENT_TABLES, content_digest, table_rows_by_natural_key
 from rbfrag.db.engine import open_database, opened_database
 from rbfrag.db.insert import insert_if_new, insert_row, update_rows
 from rbfrag.db.keys import response_key

@@ -17,10 +17,10 @@ from sqlalchemy import Connection, Engine, create_engine, func, inspect, select,
 
 import rbfrag.db.upgrade
 import rbfrag.migrations
+from benchmarks.database_content import table_rows_by_natural_key
 from rbfrag.db.campaigns import start_campaign
 from rbfrag.db.check.database import check_database
 from rbfrag.db.connect import unchecked_engine
-from rbfrag.db.content import table_rows_by_natural_key
 from rbfrag.db.engine import open_database
 from rbfrag.db.location import REVISIONS, SCHEMA_REVISION, VERSION_TABLE
 from rbfrag.db.model_file import ModelRow

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from sqlalchemy import Engine
 
-from rbfrag.db.content import content_digest
+from benchmarks.database_content import content_digest
 from rbfrag.db.motions import add_motion
 from rbfrag.db.rows import EarthquakeInfo
-from rbfrag.db.spectra import spectrum_values, store_spectrum, stored_spectrum
+from rbfrag.db.spectra import spectrum_values, store_spectrum
 from rbfrag.motions.ground_motion import GroundMotion
 
 QUAKE = EarthquakeInfo("chi-chi-1999", magnitude=7.62, guessed=False)
@@ -27,13 +27,11 @@ def motion_id(engine: Engine, make_motion: Callable[..., GroundMotion]) -> int:
 
 def test_round_trip(engine: Engine, motion_id: int) -> None:
     with engine.begin() as connection:
-        assert store_spectrum(connection, motion_id, polarity="reverse", p2=P2, x_m_s=X) == 3
+        store_spectrum(connection, motion_id, polarity="reverse", p2=P2, x_m_s=X)
     with engine.connect() as connection:
-        p2, x = stored_spectrum(connection, motion_id, polarity="reverse")
-        assert p2.tolist() == [0.1 + 0.2, 3.0, 10.0]
-        assert x.tolist() == [0.5, 0.0, 1.0 / 3.0]
-        nothing, _ = stored_spectrum(connection, motion_id, polarity="forward")
-        assert nothing.shape == (0,)
+        assert spectrum_values(connection) == {
+            (motion_id, "reverse", p2): x for p2, x in zip(P2, X, strict=True)
+        }
         assert spectrum_values(connection, p2=[3.0, 10.0]) == {
             (motion_id, "reverse", 3.0): 0.0,
             (motion_id, "reverse", 10.0): 1.0 / 3.0,
@@ -44,11 +42,13 @@ def test_what_is_there_stays(engine: Engine, motion_id: int) -> None:
     with engine.begin() as connection:
         store_spectrum(connection, motion_id, polarity="forward", p2=[3.0], x_m_s=[0.5])
         more = np.array([3.0, 1.0])
-        made = store_spectrum(
+        store_spectrum(
             connection, motion_id, polarity="forward", p2=more, x_m_s=np.array([9.0, 0.25])
         )
-        assert made == 1
-        assert stored_spectrum(connection, motion_id, polarity="forward")[1].tolist() == [0.25, 0.5]
+        assert spectrum_values(connection) == {
+            (motion_id, "forward", 3.0): 0.5,
+            (motion_id, "forward", 1.0): 0.25,
+        }
 
 
 def test_versions_do_not_mix(engine: Engine, motion_id: int) -> None:

@@ -7,18 +7,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from sqlalchemy import Engine, func, select, update
 
-import rbfrag.db.table_columns
+from rbfrag.db import frames as table_frames
 from rbfrag.db import schema
 from rbfrag.db.data_dictionary import (
     data_dictionary,
     dictionary_as_json,
     dictionary_as_markdown,
 )
-from rbfrag.db.table_columns import TABLES, chosen_columns, column_batches, read_columns
+from rbfrag.db.frames import TABLES
 from rbfrag.errors import InputError
+from rbfrag.exchange.database_tables import read_table
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "data-dictionary.md"
 
@@ -72,31 +74,34 @@ class TestDictionary:
         assert PAGE.read_text(encoding="utf-8").endswith(dictionary_as_markdown())
 
 
-class TestColumns:
+def url(engine: Engine) -> str:
+    return engine.url.render_as_string(hide_password=False)
+
+
+class TestFrames:
     def test_numbers_texts_and_truths(self, filled: Engine) -> None:
-        with filled.connect() as connection:
-            found = read_columns(connection, "combination")
-            motions = read_columns(connection, "motion")
+        found = read_table("combination", db=url(filled))
         assert list(found) == [column.name for column in schema.combination.c]
-        assert {name: values.dtype.kind for name, values in found.items()} | {} == {
-            **dict.fromkeys(found, "O"),
-            **dict.fromkeys(("id", "campaign_id", "motion_id", "n_runs", "digest"), "i"),
-            **dict.fromkeys(("linear", "certified"), "b"),
+        assert found.dtypes.astype(str).to_dict() == {
+            **dict.fromkeys(found, str(pd.Series([""]).dtype)),
+            "reentrant": "object",
+            **dict.fromkeys(("id", "campaign_id", "motion_id", "n_runs", "digest"), "int64"),
+            **dict.fromkeys(("linear", "certified"), "bool"),
+            "vertical_motion_id": "Int64",
             **dict.fromkeys(
-                ("vertical_motion_id", "p2", "search_limit", "kr_over_pga", "lower", "upper", "kr",
-                 "y_m_s", "k_up_over_pga", "undecided", "island_width", "kr_over_pga_resolved"),
-                "f",
+                ("p2", "search_limit", "kr_over_pga", "lower", "upper", "kr", "y_m_s",
+                 "k_up_over_pga", "undecided", "island_width", "kr_over_pga_resolved"),
+                "float64",
             ),
         }  # fmt: skip
-        censored = found["status"] == "below_limit"
-        np.testing.assert_array_equal(np.isnan(found["kr"]), censored)
-        np.testing.assert_array_equal(found["id"], np.sort(found["id"]))
-        assert np.isnan(found["vertical_motion_id"]).all()
-        assert "samples" not in motions
+        assert (found["kr"].isna() == (found["status"] == "below_limit")).all()
+        assert found["id"].is_monotonic_increasing
+        assert found["vertical_motion_id"].isna().all()
+        assert "samples" not in read_table("motion", db=url(filled))
 
     def test_values_are_those_of_the_rows(self, filled: Engine) -> None:
+        columns = read_table("simulation", db=url(filled))
         with filled.connect() as connection:
-            columns = read_columns(connection, "simulation")
             rows = connection.execute(
                 select(schema.simulation).order_by(*schema.simulation.primary_key.columns)
             ).all()
@@ -110,33 +115,27 @@ class TestColumns:
             last = connection.scalar(select(func.max(schema.motion.c.id)))
             gone = update(schema.motion).where(schema.motion.c.id == last).values(samples=None)
             connection.execute(gone)
-            samples = read_columns(connection, "motion", arrays=True)["samples"]
+        samples = read_table("motion", db=url(filled), arrays=True)["samples"]
         np.testing.assert_array_equal(samples[0], make_motion(1).acceleration_g)
         assert samples[2] is None
 
     def test_batches_make_one_table(self, filled: Engine, monkeypatch: Any) -> None:
+        whole = read_table("simulation", db=url(filled))
+        monkeypatch.setattr(table_frames, "_ROWS", 4)
         with filled.connect() as connection:
-            whole = read_columns(connection, "simulation")
-            monkeypatch.setattr(rbfrag.db.table_columns, "_ROWS", 4)
-            columns = chosen_columns("simulation")
-            sizes = [
-                len(batch.values[0]) for batch in column_batches(connection, "simulation", columns)
-            ]
-            parts = read_columns(connection, "simulation")
-        assert sizes == [4, 4, 4, 4, 2]
-        for name, values in whole.items():
-            np.testing.assert_array_equal(values, parts[name])
+            frames = table_frames.frames(connection, "simulation", TABLES["simulation"].columns)
+            assert [len(frame) for frame in frames] == [4, 4, 4, 4, 2]
+        pd.testing.assert_frame_equal(read_table("simulation", db=url(filled)), whole)
 
     def test_chosen_columns_and_empty_tables(self, filled: Engine) -> None:
-        with filled.connect() as connection:
-            some = read_columns(connection, "motion", ["pga_g", "id", "pga_g"])
-            none = read_columns(connection, "response")
+        some = read_table("motion", db=url(filled), columns=["pga_g", "id", "pga_g"])
+        none = read_table("response", db=url(filled))
         assert list(some) == ["pga_g", "id"]
         assert none["kr"].shape == (0,)
         assert none["kr"].dtype == np.float64
 
-    def test_unknown_names_are_refused_with_those_there_are(self) -> None:
+    def test_unknown_names_are_refused_with_those_there_are(self, filled: Engine) -> None:
         with pytest.raises(InputError, match="no table 'motions'; there are: earthquake"):
-            chosen_columns("motions")
+            read_table("motions", db=url(filled))
         with pytest.raises(InputError, match="no column 'pga'; it has: id, recording_id"):
-            chosen_columns("motion", ["pga"])
+            read_table("motion", db=url(filled), columns=["pga"])

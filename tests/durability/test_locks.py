@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import os
+import socket
 import sqlite3
 import stat
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 from sqlalchemy import text
 
 import rbfrag.db.engine
+from benchmarks.database_content import content_digest
 from benchmarks.durability import campaign, digest, environment, stored
 from rbfrag.campaign.simulate import CampaignProgress, simulate
-from rbfrag.db.content import content_digest
 from rbfrag.db.engine import opened_database
 from rbfrag.db.merge.databases import merge_databases
 from rbfrag.errors import DatabaseBusyError, DatabaseFailedError
@@ -111,6 +113,16 @@ def test_a_server_that_gives_up_half_way(
     assert stored(on_server) == 8
     simulate(on_server, p2=P2, jobs=1)
     assert digest(on_server) == undisturbed
+
+
+def test_a_connection_that_breaks_without_a_word(on_server: str) -> None:
+    with opened_database(on_server) as engine, engine.connect() as connection:
+        connection.execute(text("SELECT 1"))
+        raw: Any = connection.connection.driver_connection
+        with socket.socket(fileno=os.dup(raw.fileno())) as wire:
+            wire.shutdown(socket.SHUT_RDWR)
+        with pytest.raises(DatabaseFailedError, match="what was finished is kept"):
+            connection.execute(text("SELECT 1"))
 
 
 def test_two_campaigns_at_once(

@@ -6,10 +6,10 @@ import random
 import shutil
 from pathlib import Path
 
+from benchmarks.database_content import table_rows_by_natural_key
 from benchmarks.durability import digest
 from rbfrag.campaign.simulate import CampaignProgress, simulate
 from rbfrag.db.check.database import check_database
-from rbfrag.db.content import table_rows_by_natural_key
 from rbfrag.db.engine import opened_database
 from tests.durability.conftest import MOTIONS, P2
 

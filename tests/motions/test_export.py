@@ -109,7 +109,7 @@ def test_processing_and_origin_are_kept(tmp_path: Path) -> None:
         ("# npts: 3", "# npts: 4", "4 samples, but 3 follow"),
         ("# npts: 3", "# npts: true", "npts 'true' cannot be used"),
         ("# npts: 3", "# points: 3", "no 'npts'"),
-        ("# dt_s: 0.01", "# dt_s: 0.02", "time 0.01 s is not 1 intervals of 0.02 s"),
+        ("# dt_s: 0.01", "# dt_s: 0.02", "time 0.01 s stands where 0.02 s was expected"),
         ("# dt_s: 0.01", "# dt_s: NaN", "dt_s 'NaN' cannot be used"),
         ("# dt_s: 0.01", f"# dt_s: 1{'0' * 400}", "cannot be used"),
         ("# dt_s: 0.01", "# dt_s: -0.01", "positive"),

@@ -98,7 +98,7 @@ Change = tuple[str, str]
         ("COSMOS V1c/V2c", ("      12 accel", "      13 accel"), ("13 samples", "12 follow")),
         ("COSMOS V1c/V2c", ("cm/sec2(04)", "counts(50)"), ("'counts'",)),
         ("COSMOS V1c/V2c", ("      10.000000", "    -999.000000"), ("-999.000000", "unknown")),
-        ("COSMOS V1c/V2c", ("      10.000000", "   10000.000000"), ("120 s", "approx 0")),
+        ("COSMOS V1c/V2c", ("      10.000000", "   10000.000000"), ("120 s", "says 0 s")),
         ("COSMOS V1c/V2c", ("Format=(1E15.6)", "Format=free"), ("no format",)),
         ("COSMOS V1c/V2c", ("acceleration pts", "velocity pts"), ("velocity",)),
         ("CDMG V1", ("POINTS =     12", "POINTS =     11"), ("11 samples", "12 follow")),

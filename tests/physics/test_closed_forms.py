@@ -1,4 +1,7 @@
-"""The linear model against its closed forms (section 6 of the theory; Gibson, 4.20).
+"""The linearised block against its closed forms (section 6 of the theory; Gibson, 4.20).
+
+They prove the event finder and the bound by excursions from rest, which
+`tests.physics.linear_block` shares with the product.
 
 c = critical angle over the amplitude, f = p times the duration of one lobe.
 """
@@ -9,14 +12,17 @@ import math
 from collections.abc import Callable
 from itertools import pairwise
 
+import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.results import CriticalResult, Outcome
-from rbfrag.solver.search.critical import critical
-from rbfrag.solver.toppling_run import respond
+from rbfrag.solver.excitation import excitation
+from rbfrag.solver.integrator.block_excitation import remaining_excitation
+from tests.physics import linear_block
 from tests.physics.pulses import rectangle, rectangular_cycle, sine_lobes, triangle
+from tests.solver import reference
+from tests.synthetic import shaking
 
 F = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 AMPLITUDE_G = 0.37
@@ -24,10 +30,11 @@ P2 = 7.3
 P = math.sqrt(P2)
 
 
-def critical_angle(motion: GroundMotion) -> CriticalResult:
-    result = critical(motion, p2=P2, linear=True, search_limit=1e-3)
-    assert result.status == "found"
-    return result
+def critical_ratio(motion: GroundMotion) -> float:
+    """Critical angle over the amplitude."""
+    found = linear_block.critical_angle(motion, p2=P2)
+    assert found is not None
+    return found / excitation(motion).pga_g
 
 
 def half_sine(f: float) -> float:
@@ -65,21 +72,25 @@ EXACT: dict[str, tuple[Callable[[float, float], GroundMotion], Callable[[float],
 @pytest.mark.parametrize("name", EXACT)
 def test_pulse_of_straight_lines(name: str, f: float) -> None:
     make, closed_form = EXACT[name]
-    result = critical_angle(make(f / P, AMPLITUDE_G))
-    assert result.kr_over_pga == pytest.approx(closed_form(f), rel=1e-9)
-    assert result.certified
+    pulse = make(f / P, AMPLITUDE_G)
+    assert critical_ratio(pulse) == pytest.approx(closed_form(f), rel=1e-9)
+    # the search begins at the same value, by one recursion over the record
+    greatest, _ = remaining_excitation(
+        pulse.interval_s, pulse.acceleration_g, P, np.empty(pulse.npts)
+    )
+    assert greatest / AMPLITUDE_G == pytest.approx(closed_form(f), rel=1e-12)
 
 
 @pytest.mark.parametrize("f", F)
 def test_half_sine_sampled(f: float) -> None:
-    result = critical_angle(sine_lobes(f / P, (AMPLITUDE_G,), 2000))
-    assert result.kr_over_pga == pytest.approx(half_sine(f), rel=1e-6)
+    found = critical_ratio(sine_lobes(f / P, (AMPLITUDE_G,), 2000))
+    assert found == pytest.approx(half_sine(f), rel=1e-6)
 
 
 @pytest.mark.parametrize("f", F)
 def test_one_cycle_sine_sampled(f: float) -> None:
-    result = critical_angle(sine_lobes(f / P, (AMPLITUDE_G, -AMPLITUDE_G), 3000))
-    assert result.kr_over_pga == pytest.approx(full_sine(f), rel=1e-6)
+    found = critical_ratio(sine_lobes(f / P, (AMPLITUDE_G, -AMPLITUDE_G), 3000))
+    assert found == pytest.approx(full_sine(f), rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -94,15 +105,14 @@ def test_one_cycle_sine_sampled(f: float) -> None:
 )
 def test_published_table(f: float, sine: float, triangular: float) -> None:
     assert half_sine(f) == pytest.approx(sine, abs=6e-9)
-    found = critical_angle(triangle(f / P, AMPLITUDE_G)).kr_over_pga
+    found = critical_ratio(triangle(f / P, AMPLITUDE_G))
     assert found == pytest.approx(triangular, abs=6e-9)
 
 
 def test_error_of_a_sampled_pulse_falls_with_the_square_of_the_interval() -> None:
     errors = []
     for samples in (50, 100, 200, 400):
-        found = critical_angle(sine_lobes(1.0 / P, (AMPLITUDE_G,), samples)).kr_over_pga
-        assert found is not None
+        found = critical_ratio(sine_lobes(1.0 / P, (AMPLITUDE_G,), samples))
         errors.append(abs(found / half_sine(1.0) - 1.0))
     orders = [math.log2(a / b) for a, b in pairwise(errors)]
     assert orders == pytest.approx([2.0] * 3, abs=0.1)
@@ -115,18 +125,42 @@ def test_peak_of_the_rectangular_cycle_at_its_critical_value(f: float) -> None:
     e = math.exp(f)
     limit = 1.0 + (e * e - math.sqrt(1.0 - 2.0 * e + 2.0 * e**3)) / (e - 1.0) ** 2
     distance = 1e-10
-    run = respond(
+    run = linear_block.respond(
         rectangular_cycle(f / P, AMPLITUDE_G),
         p2=P2,
         kr=AMPLITUDE_G * math.expm1(-f) ** 2 * (1.0 + distance),
-        linear=True,
     )
-    assert run.outcome is Outcome.STABLE
+    assert not run.toppled
     assert run.peak_theta_n == pytest.approx(limit, rel=1e-9 + 10.0 * distance * e * e)
 
 
 @pytest.mark.parametrize("amplitude_g", [1e-4, 0.05, 3.0])
 def test_linear_critical_ratio_does_not_depend_on_the_amplitude(amplitude_g: float) -> None:
-    found = critical_angle(triangle(1.3 / P, amplitude_g)).kr_over_pga
-    expected = critical_angle(triangle(1.3 / P, 1.0)).kr_over_pga
+    found = critical_ratio(triangle(1.3 / P, amplitude_g))
+    expected = critical_ratio(triangle(1.3 / P, 1.0))
     assert found == pytest.approx(expected, rel=1e-11)
+
+
+def test_responses_scale_with_the_amplitude() -> None:
+    motion = GroundMotion(shaking(2), 0.02)
+    kr = 0.8 * float(motion.acceleration_g.max())
+    one = linear_block.respond(motion, p2=5.0, kr=kr)
+    other = linear_block.respond(motion.scaled(0.01), p2=5.0, kr=0.01 * kr)
+    assert 0.0 < one.peak_theta_n < 1.0
+    assert other.peak_theta_n == pytest.approx(one.peak_theta_n, rel=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_runs_agree_with_the_reference_integrator(seed: int) -> None:
+    motion = GroundMotion(shaking(seed), 0.02)
+    drive = excitation(motion)
+    toppled = 0
+    for share in (0.15, 0.3, 0.6, 0.9):
+        kr = share * drive.max_q
+        found = linear_block.respond(motion, p2=20.0, kr=kr)
+        truth = reference.integrate(drive.time_s, drive.k_h, None, p2=20.0, kr=kr, linear=True)
+        assert found.toppled == (truth.outcome == "toppled")
+        toppled += found.toppled
+        if truth.peak_rad is not None:
+            assert found.peak_theta_n == pytest.approx(truth.peak_rad / kr, rel=1e-7, abs=1e-10)
+    assert toppled < 4

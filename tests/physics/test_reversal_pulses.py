@@ -16,6 +16,7 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
 from rbfrag.solver.results import CriticalResult, Outcome
 from rbfrag.solver.search.critical import critical
 from rbfrag.solver.toppling_run import respond
+from tests.physics.linear_block import critical_angle
 from tests.physics.pulses import rectangular_cycle, sine_lobes
 
 SAMPLES = 500
@@ -26,12 +27,12 @@ def reversal(r: float) -> GroundMotion:
     return sine_lobes(0.25, (1.0, -r) if r else (1.0,), SAMPLES)
 
 
-def found(motion: GroundMotion, p2: float, *, linear: bool = False) -> CriticalResult:
-    result = critical(motion, p2=p2, linear=linear)
+def found(motion: GroundMotion, p2: float) -> CriticalResult:
+    result = critical(motion, p2=p2)
     assert result.status == "found"
     assert result.kr_over_pga is not None
     assert result.upper is not None
-    # the proof covers max(q) max(-q) <= 1, here up to r = 1 in the non-linear model
+    # the proof covers max(q) max(-q) <= 1, here up to r = 1
     peaks = float(motion.acceleration_g.max() * -motion.acceleration_g.min())
     assert result.certified or peaks > 1.0
     assert result.upper - result.kr_over_pga < 1e-9
@@ -68,13 +69,13 @@ def test_reversal_that_brings_back_a_block_from_beyond_its_critical_angle() -> N
 
 def test_the_linear_critical_angle_lies_above_except_at_r_1_25() -> None:
     for r in (0.0, 0.35, 0.65, 1.0):
-        linear = found(reversal(r), 2.0, linear=True).kr
+        linear = critical_angle(reversal(r), p2=2.0)
         kr = found(reversal(r), 2.0).kr
         assert linear is not None
         assert kr is not None
         assert 0.0 < math.tan(linear) / kr - 1.0 < 0.18
         assert 0.0 < linear / math.atan(kr) - 1.0 < 0.016 + 1e-3
-    assert found(reversal(1.25), 2.0, linear=True).kr == pytest.approx(0.02316, abs=6e-6)
+    assert critical_angle(reversal(1.25), p2=2.0) == pytest.approx(0.02316, abs=6e-6)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +93,7 @@ def test_rectangular_full_cycle_of_1_g(
     # (4.21): lobes of 1/6 s
 
     wave = rectangular_cycle(1.0 / 6.0, 1.0)
-    linear = found(wave, p2, linear=True).kr
+    linear = critical_angle(wave, p2=p2)
     assert linear == pytest.approx(theta_c, abs=6e-5)
     assert linear is not None
     assert math.tan(linear) == pytest.approx(tan_ratio, abs=6e-5)
@@ -123,7 +124,6 @@ def test_linear_toppling_velocity_is_at_most_twice_pgv(
     samples: list[float], p2: float, dt_s: float
 ) -> None:
     motion = GroundMotion([*samples, 0.0], dt_s)  # type: ignore[arg-type]
-    result = critical(motion, p2=p2, linear=True)
-    if result.status == "found":
-        assert result.y_m_s is not None
-        assert result.y_m_s <= 2.0 * motion.pgv_m_s * (1.0 + 1e-9)
+    theta_c = critical_angle(motion, p2=p2, limit=0.01) if motion.pga_g else None
+    if theta_c is not None:
+        assert theta_c * G / math.sqrt(p2) <= 2.0 * motion.pgv_m_s * (1.0 + 1e-9)

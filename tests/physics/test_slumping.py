@@ -49,7 +49,7 @@ def coefficients(equation: Equation, theta: float) -> tuple[float, float, float]
     inertia = equation.inertia(theta)
     return (
         equation.threshold(theta),
-        equation.drive(theta) / inertia * 9.81 / G,
+        equation.driving(theta) / inertia * 9.81 / G,
         equation.braking(theta) / inertia,
     )
 

@@ -186,16 +186,16 @@ CASES: dict[str, tuple[Mechanism, Laws, Excitation]] = {
 @pytest.mark.parametrize("name", CASES)
 def test_work_balances_energy(name: str) -> None:
     mechanism, laws, drive = CASES[name]
-    course = follow(mechanism, drive, travel=True)
-    assert course.started_s is not None
-    travel = course.travel
+    run = follow(mechanism, drive, history=True)
+    assert run.started_s is not None
+    travel = run.history
     assert travel is not None
     here = np.ones(travel.time_s.size, dtype=bool)
-    if course.changes:
+    if run.changes:
         # up to the first standstill, after which the block rocks about its toe
-        here = travel.time_s <= course.changes[0].time_s
+        here = travel.time_s <= run.changes[0].time_s
     else:
-        assert course.outcome is Outcome.STABLE
+        assert run.outcome is Outcome.STABLE
     time, x, rate = travel.time_s[here], travel.x[here], travel.rate[here]
     h = np.diff(time)
     moving = (h > 0.0) & (np.diff(x) != 0.0)

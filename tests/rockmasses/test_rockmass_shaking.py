@@ -124,7 +124,7 @@ def four() -> ShakenMass:
 
 
 def test_every_block_is_what_it_would_be_alone(four: ShakenMass) -> None:
-    made, motion = four.made, record()
+    made, motion = four.realisations, record()
     outcomes: set[tuple[str, str]] = set()
     for j in np.flatnonzero(four.moves[1])[:150]:
         alone = respond(
@@ -153,7 +153,7 @@ def test_every_block_is_what_it_would_be_alone(four: ShakenMass) -> None:
 
 
 def test_the_fates_are_a_partition(four: ShakenMass) -> None:
-    made = four.made
+    made = four.realisations
     for i, each in enumerate(failures(four)):
         assert each.total.count == made.n_blocks < made.n
         assert sum(found.count for found in each.modes.values()) == made.n_blocks
@@ -181,15 +181,17 @@ def test_neither_seed_nor_pieces_leave_chance(four: ShakenMass) -> None:
 
 
 def test_a_stated_rotation_is_failure_before_recovery_is_lost(four: ShakenMass) -> None:
-    strict = shake(four.made, record(), scales=[1.5], limits=FailureLimits(rotation_deg=0.05))
-    slumps = four.made.is_block & (four.made.stability.mode == "slump")
+    strict = shake(
+        four.realisations, record(), scales=[1.5], limits=FailureLimits(rotation_deg=0.05)
+    )
+    slumps = four.realisations.is_block & (four.realisations.stability.mode == "slump")
     turned = four.rotation_rad[1] > math.radians(0.05)
     lax, now = four.code[1], strict.code[0]
     fails = OUTCOMES.index("fails")
     assert (now[slumps & turned] == fails).all()
     assert (lax[slumps & turned] != fails).any()
     # what a free topple or a slide does is judged as before
-    others = ~slumps & (four.made.stability.mode != "confined_topple")
+    others = ~slumps & (four.realisations.stability.mode != "confined_topple")
     assert np.array_equal(now[others], lax[others])
 
 
@@ -209,13 +211,15 @@ def test_thrown_off_by_the_vertical_motion() -> None:
 
 def test_the_table_has_a_row_for_each_block_and_scale(four: ShakenMass) -> None:
     columns = outcome_columns(four)
-    n = four.made.n
+    n = four.realisations.n
     assert {values.shape for values in columns.values()} == {(2 * n,)}
     assert columns["block_id"].tolist() == [*range(1, n + 1)] * 2
     assert set(columns["scale"][:n]) == {0.5}
     named = columns["fate"].reshape(2, n)
-    assert all(named[1, j] == OUTCOMES[four.code[1, j]] for j in np.flatnonzero(four.made.is_block))
-    assert set(named[:, ~four.made.is_block].ravel()) == {""}
+    assert all(
+        named[1, j] == OUTCOMES[four.code[1, j]] for j in np.flatnonzero(four.realisations.is_block)
+    )
+    assert set(named[:, ~four.realisations.is_block].ravel()) == {""}
 
 
 @pytest.mark.parametrize(

@@ -31,12 +31,71 @@ def test_every_operation_has_words_and_problems(client):
                 assert kind in answer["content"], (path, status)
 
 
+SENT = {"400", "401", "408", "413", "415", "422", "503"}
+
+
+def test_every_operation_documents_its_errors(client):
+    found = document(client)
+    assert not [name for name in found["components"]["schemas"] if "ValidationError" in name]
+    for path, operations in found["paths"].items():
+        for method, operation in operations.items():
+            problems = {each for each in operation["responses"] if each != "200"}
+            if path == "/v1/healthz":
+                assert not problems
+            elif path == "/v1/models":
+                assert problems == {"401", "503"}
+            else:
+                assert problems == (SENT if method == "post" else {"401", "422", "503"}), path
+            for status in problems:
+                schema = operation["responses"][status]["content"]["application/problem+json"]
+                assert schema["schema"]["required"] == ["type", "title", "status", "detail"]
+
+
+NO_UNIT = {"kr", "ky", "ks", "kind", "model", "level", "trace", "units", "n", "seed", "imt", "site",
+           "convert", "component", "polarity", "reverse", "map", "no_back"}  # fmt: skip
+
+
+def test_every_quantity_has_its_unit(client):
+    for operations in document(client)["paths"].values():
+        for operation in operations.values():
+            for parameter in operation.get("parameters", ()):
+                if parameter["name"] not in NO_UNIT:
+                    assert "[" in parameter["description"], parameter["name"]
+
+
+def test_a_null_in_a_body_is_as_if_left_out(client):
+    body = {"p2": 3, "kr": 0.1, "pgv": 0.6}
+    answer = client.post("/v1/predict", json={**body, "tm": None, "model": None})
+    assert answer.json() == client.post("/v1/predict", json=body).json()
+
+
+@pytest.mark.parametrize("kind", [None, "application/json", "application/x-www-form-urlencoded"])
+def test_a_body_of_rows_is_json_whatever_it_is_called(client, kind):
+    headers = {} if kind is None else {"content-type": kind}
+    body = '{"p2": 3, "kr": 0.1, "pgv": 0.6}'
+    assert client.post("/v1/predict", content=body, headers=headers).status_code == 200
+
+
+def test_a_refusal_is_short_whatever_was_asked(client):
+    for query in (
+        "x" * 3000,
+        "kr=" + "9" * 3000,
+        "kr=" + "x" * 3000,
+        "model=" + "x" * 3000,
+        "&".join(f"x{i}=1" for i in range(2000)),
+        "x" * 3000 + "=1&" + "x" * 3000 + "=2",
+    ):
+        answer = client.get(f"/v1/predict?p2=3&pgv=1&{query}")
+        assert answer.status_code == 422
+        assert len(answer.json()["detail"]) < 500
+
+
 def test_its_examples_are_answered(client):
     for path, operations in document(client)["paths"].items():
         operation = operations.get("get")
         if operation is not None:
-            query = {p["name"]: p["example"] for p in operation.get("parameters", ())
-                     if "example" in p}  # fmt: skip
+            query = {p["name"]: p["schema"]["examples"][0] for p in operation.get("parameters", ())
+                     if "examples" in p["schema"]}  # fmt: skip
             assert client.get(path, params=query).status_code == 200, path
 
 

@@ -7,8 +7,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import rbfrag
-from rbfrag.cli.commands.predict import answer_one
 from rbfrag.cli.output import show_prediction
+from rbfrag.fragility.predict import prediction_document
 
 KEYWORD = {"pgv": "pgv_m_s", "pga": "pga_g", "tm": "tm_s", "pgd": "pgd_m"}
 
@@ -17,7 +17,7 @@ def printed(capsys, database, values, **more):
     """What `rbfrag predict --json` prints."""
     given = {KEYWORD.get(name, name): value for name, value in values.items()}
     capsys.readouterr()
-    show_prediction(answer_one(given, **more, db=str(database)), json=True)
+    show_prediction(prediction_document(given, **more, db=str(database)), json=True)
     return json.loads(capsys.readouterr().out)
 
 
@@ -93,13 +93,13 @@ def test_a_list_says_which_element_cannot_be_used(client):
         ("p2=3&kr=0.1&kind=falls&pgv=0.6", "no falls model"),
         ("p2=3&kr=0&pgv=0.6", "kr = 0"),
         ("p2=3&kr=nan&pgv=0.6", "kr = nan"),
-        ("p2=3&kr=0.1&pgv=inf", "pgv_m_s = inf"),
+        ("p2=3&kr=0.1&pgv=inf", "pgv = inf"),
         ("p2=3&kr=0.1&pgv=0.6&pgv=0.7", "pgv is given twice"),
         ("p2=3&kr=0.1&pgv=0.6&pvg=0.7", "there is no parameter 'pvg'"),
         ("p2=3&kr=a tenth&pgv=0.6", "kr = 'a tenth' is not a number"),
         ("p2=3&kr=0.1&pgv=0.6&level=95", "level = 95"),
         ("p2=3&kr=0.1&pgv=0.6&model=", "model is empty"),
-        ("p2=3&kr=%ff&pgv=0.6", "not UTF-8"),
+        ("p2=3&kr=%ff&pgv=0.6", "kr = '\N{REPLACEMENT CHARACTER}' is not a number"),
     ],
 )
 def test_what_cannot_be_answered_is_refused_in_words(client, query, words):

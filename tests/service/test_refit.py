@@ -3,11 +3,12 @@
 from dataclasses import replace
 
 import pytest
+from fastapi import Request
 
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import load_model, save_model
 from rbfrag.errors import DatabaseFailedError
-from rbfrag.service.problem import in_parameters, refused
+from rbfrag.service.problem import answer_error, in_parameters
 from rbfrag.service.settings import Settings
 
 
@@ -54,6 +55,7 @@ def test_a_server_is_not_named_in_an_answer():
     told = Settings(db="postgresql://somebody:secret@db.example.org/rock")
     words = "there is no model 'x' in postgresql+psycopg://somebody:***@db.example.org/rock; it"
     assert in_parameters(words, told) == "there is no model 'x' in the database; it"
-    answer = refused(DatabaseFailedError("connection to db.example.org failed"), told)
+    failed = DatabaseFailedError("connection to db.example.org failed")
+    answer = answer_error(Request({"type": "http"}), failed, told)
     assert answer.status_code == 503
     assert b"example.org" not in answer.body

@@ -7,7 +7,7 @@ from fastapi.testclient import TestClient
 
 from rbfrag.errors import InputError
 from rbfrag.service.app import make_app
-from rbfrag.service.run import ServeOptions, listener
+from rbfrag.service.run import listener
 from rbfrag.service.settings import VARIABLE, Settings, read_token
 from tests.cli.conftest import Shell
 
@@ -54,16 +54,16 @@ def test_the_page_and_the_health_check_need_none(guarded):
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.0.2.1", "example.org"])
 def test_other_computers_need_a_token(host, monkeypatch):
     with pytest.raises(InputError, match="the service needs a token"):
-        ServeOptions(host=host).settings()
+        Settings(host=host).checked()
     monkeypatch.setenv(VARIABLE, TOKEN)
-    assert ServeOptions(host=host).settings().token == TOKEN
+    assert Settings(host=host).checked().token == TOKEN
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "::1", "localhost"])
 def test_this_computer_needs_none(host):
-    settings = ServeOptions(host=host).settings()
+    settings = Settings(host=host).checked()
     assert settings.token is None
-    assert {"localhost", "127.0.0.1", "[::1]"} <= set(settings.allowed_hosts)
+    assert {"localhost", "127.0.0.1", "[::1]"} <= set(settings.allow_host)
 
 
 def test_the_command_refuses_to_start_without_a_token(shell: Shell):
@@ -91,7 +91,7 @@ def test_a_token_comes_from_a_file(tmp_path):
     file = tmp_path / "token"
     file.write_text(f"{TOKEN}\n")
     assert read_token(str(file)) == TOKEN
-    assert TOKEN not in repr(ServeOptions(token_file=str(file)).settings())
+    assert TOKEN not in repr(Settings(token_file=str(file)).checked())
     for bad in ("", "short", "with a blank in between", "é" * 20):
         file.write_text(bad)
         with pytest.raises(InputError):
@@ -99,7 +99,7 @@ def test_a_token_comes_from_a_file(tmp_path):
 
 
 def test_a_service_without_a_token_is_asked_by_its_own_names_only(database):
-    settings = Settings(db=str(database), allowed_hosts=("localhost", "127.0.0.1", "[::1]"))
+    settings = Settings(db=str(database), allow_host=("localhost", "127.0.0.1", "[::1]"))
     client = TestClient(make_app(settings))
     for host in ("localhost", "localhost:8000", "127.0.0.1:8000", "[::1]:8000", "LOCALHOST"):
         assert client.get(PATH, headers={"host": host}).status_code == 200
@@ -111,7 +111,7 @@ def test_pages_elsewhere_may_not_read_answers_unless_they_are_named(database):
     asking = {"origin": "https://maps.example.org"}
     closed = TestClient(make_app(Settings(db=str(database))))
     assert "access-control-allow-origin" not in closed.get(PATH, headers=asking).headers
-    named = Settings(db=str(database), token=TOKEN, allowed_origins=("https://maps.example.org",))
+    named = Settings(db=str(database), token=TOKEN, allow_origin=("https://maps.example.org",))
     client = TestClient(make_app(named))
     before = {**asking, "access-control-request-method": "POST",
               "access-control-request-headers": "authorization"}  # fmt: skip

@@ -1,4 +1,4 @@
-"""Worker processes on this machine."""
+"""Who does the work of a campaign: processes of this machine, or a cluster."""
 
 from __future__ import annotations
 
@@ -6,19 +6,60 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from functools import partial
 from multiprocessing.connection import wait as wait_for_end
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from rbfrag.errors import WorkFailedError
+from rbfrag.campaign.executors.dask import connected, run_on_cluster
+from rbfrag.errors import InputError, WorkFailedError
+from rbfrag.solver.integrator.compiled import callbacks, on_compilation
 
 W = TypeVar("W")
 R = TypeVar("R")
 
 QUEUED_PER_WORKER = 2
-"""Pieces handed out ahead of each worker: enough to keep it busy, little enough for memory."""
+"""Chunks handed out ahead of each worker: enough to keep it busy, little enough for memory."""
+
+
+CLUSTER = "a cluster"
+"""Stands for the processor where workers are elsewhere: nobody's bits are promised then."""
+
+
+def check_workers(jobs: int | None, scheduler: str | None) -> None:
+    """Refuse an impossible number of workers, or two answers to who does the work."""
+    if jobs is not None and jobs < 1:
+        raise InputError(f"--jobs must be at least 1, not {jobs}")
+    if jobs is not None and scheduler is not None:
+        raise InputError("--jobs counts local workers, --scheduler names others: give one of them")
+
+
+@contextmanager
+def executor(
+    run_work: Callable[[W], R], jobs: int | None, scheduler: str | None
+) -> Iterator[Callable[[Iterator[W], int], Iterator[R]]]:
+    """Offer, for a ``with`` block, a function that does work and yields answers in any order.
+
+    The function takes the work and the number of its chunks.
+
+    Args:
+        run_work: does one chunk of work; a function of a module, which workers can find.
+        jobs: worker processes; None for one per processor.
+        scheduler: address of a Dask scheduler whose workers take their place.
+    """
+    if scheduler is None:
+        yield lambda work, chunks: run_locally(
+            run_work,
+            work,
+            min(jobs or os.cpu_count() or 1, chunks),
+            after_a_death="what was finished is stored: run the same command again to go on",
+        )
+        return
+    with connected(scheduler) as client:
+        yield lambda work, _: run_on_cluster(client, run_work, work)
 
 
 def run_locally(
@@ -26,12 +67,12 @@ def run_locally(
 ) -> Iterator[R]:
     """Yield the answers as they come, from worker processes or, for one worker, from here.
 
-    Work is fetched as it is handed out, and no more than three pieces a worker are under way:
+    Work is fetched as it is handed out, and no more than three chunks a worker are under way:
     a writer that is slower than the workers holds them up instead of filling the memory.
 
     Args:
-        do: what is done to each piece of work; a function of a module.
-        work: the pieces.
+        do: what is done to each chunk of work; a function of a module.
+        work: the chunks.
         workers: number of processes.
         after_a_death: what to do next when a worker process has died.
     """
@@ -40,7 +81,9 @@ def run_locally(
         return
     # spawn: the same on every system, and no lock or connection is inherited half-way
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=prepare)
+    pool = ProcessPoolExecutor(
+        workers, mp_context=context, initializer=prepare, initargs=(callbacks, context.Lock())
+    )
     running: set[Future[R]] = set()
     try:
         for item in work:
@@ -62,14 +105,26 @@ def run_locally(
         pool.shutdown(wait=True, cancel_futures=True)
 
 
+def _call_once(callback: Callable[[], None], first: Any) -> None:
+    if first is None or first.acquire(block=False):  # and never gives back
+        callback()
+
+
 def _results(finished: set[Future[R]]) -> Iterator[R]:
     # Each is let go before the next is waited for.
     while finished:
         yield finished.pop().result()
 
 
-def prepare() -> None:
-    """Leave Ctrl-C to the main process, and end with it however it ends."""
+def prepare(tell: Sequence[Callable[[], None]] = (), first: Any = None) -> None:
+    """Leave Ctrl-C to the main process, and end with it however it ends.
+
+    Args:
+        tell: functions of a module that the first worker to compile a kernel calls.
+        first: the lock that only this one gets.
+    """
+    for callback in tell:
+        on_compilation(partial(_call_once, callback, first))
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:

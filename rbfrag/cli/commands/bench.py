@@ -4,41 +4,30 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from rbfrag.cli.output import print_json, print_pairs, print_table
 from rbfrag.cli.parameters import options
+from rbfrag.cli.parameters.stack import option, stacked
 
 EXAMPLE = "Example:  rbfrag bench --quick"
 
 
+@stacked
 def bench(
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Fewer cases and settings: under a minute.")
-    ] = False,
-    records: Annotated[
-        str | None,
-        typer.Option(
-            "--records",
-            metavar="PATH",
-            help="Accelerogram file or folder to measure on. Default: the folder in "
-            "RBFRAG_TEST_RECORDS, else the sample records of rbfrag[samples], else analytic "
-            "pulses.",
-        ),
-    ] = None,
-    out: Annotated[
-        str | None,
-        typer.Option(
-            "--out",
-            metavar="FOLDER",
-            help="Folder for the tables as CSV and, with matplotlib, work-precision.svg.",
-        ),
-    ] = None,
+    *,
+    quick: bool = option("Fewer cases and settings: under a minute.", False),
+    records: str | None = option(
+        "Accelerogram file or folder to measure on. Default: the folder in "
+        "RBFRAG_TEST_RECORDS, else the sample records of rbfrag[samples], else analytic "
+        "pulses.",
+        metavar="PATH",
+    ),
+    out: str | None = option(
+        "Folder for the tables as CSV and, with matplotlib, work-precision.svg.", metavar="FOLDER"
+    ),
     json: options.Json = False,
 ) -> None:
-    """Measure speed against error beside general ODE solvers, on the same runs.
+    """Measure speed against error beside general ODE solvers.
 
     Every method runs the same blocks under the same records, in turns, and is compared with
     an extended-precision reference. Then come the critical search and the scaling with the

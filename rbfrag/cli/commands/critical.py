@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from rbfrag.cli.output import print_json, print_pairs, print_table, print_warnings
+from rbfrag.cli.output import (
+    check_files,
+    print_json,
+    print_pairs,
+    print_table,
+    print_warnings,
+    say_when_compiling,
+)
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.motion import find_motion, find_vertical
+from rbfrag.cli.parameters.block import WAYS, ShapeOptions
+from rbfrag.cli.parameters.motion import find_shaking
+from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.cli.parameters.values import number_list
 from rbfrag.errors import InputError
+from rbfrag.solver.described import TAKEN_TO_TOPPLE
 
 if TYPE_CHECKING:
     from rbfrag.motions.ground_motion import GroundMotion
@@ -43,110 +51,79 @@ SLIDING_STATUS = {
 }
 
 
+@stacked
 def critical(
+    *,
     motion: options.Motion,
-    p2: Annotated[
-        float | None,
-        typer.Option("--p2", help="Toppling: frequency parameter p² of the block [1/s²]."),
-    ] = None,
-    kind: Annotated[
-        str | None,
-        typer.Option(
-            "--kind",
-            help="toppling, sliding, slumping or confined_toppling. Default: toppling with --p2, "
-            "the kind of the failure mode with --block.",
-        ),
-    ] = None,
-    block: Annotated[
-        str | None,
-        typer.Option(
-            "--block",
-            metavar="FILE",
-            help="Block file (.toml or .csv) with beta_deg and phi_deg. Slumping and confined "
-            "toppling: the factor on the record that brings it down is searched.",
-        ),
-    ] = None,
-    rotation: Annotated[
-        float | None,
-        typer.Option(
-            "--rotation",
-            help="Slumping and confined toppling: rotation that counts as failure [deg]. Default: "
-            "failure past recovery.",
-        ),
-    ] = None,
-    displacement: Annotated[
-        str | None,
-        typer.Option(
-            "--displacement",
-            metavar="LIST",
-            help="Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.",
-        ),
-    ] = None,
-    vertical: options.Vertical = None,
-    reverse: options.Reverse = False,
-    linear: options.Linear = False,
-    full_map: Annotated[
-        bool,
-        typer.Option(
-            "--map",
-            help="Map the toppling and safe intervals of k_r/PGA down to 0.01, borders to 1e-4.",
-        ),
-    ] = False,
-    plot: Annotated[
-        str | None,
-        typer.Option(
-            "--plot",
-            metavar="FILE",
-            help="Draw the map, peak rotations, bracket and upper bound (.png, .pdf, .svg). "
-            "Makes the whole map, as --map does, borders to 1e-7.",
-        ),
-    ] = None,
-    units: options.Units = None,
-    dt: options.Dt = None,
+    shape: ShapeOptions,
+    direction: options.Direction,
+    reading: options.Reading,
+    p2: float | None = option("Toppling: frequency parameter p² of the block [1/s²]."),
+    kind: str | None = option(
+        "toppling, sliding, slumping or confined_toppling. Default: toppling with --p2, "
+        "the kind of the failure mode of a shape."
+    ),
+    rotation: float | None = option(
+        "Slumping and confined toppling: rotation that counts as failure [deg]. Default: "
+        "failure past recovery."
+    ),
+    displacement: str | None = option(
+        "Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.", metavar="LIST"
+    ),
+    full_map: bool = option(
+        "Map the toppling and safe intervals of k_r/PGA down to 0.01, borders to 1e-4.",
+        False,
+        word="--map",
+    ),
+    plot: str | None = option(
+        "Draw the map, peak rotations, bracket and upper bound (.png, .pdf, .svg). "
+        "Makes the whole map, as --map does, borders to 1e-7.",
+        metavar="FILE",
+    ),
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
     """Find the critical block of one accelerogram, with its bracket.
 
-    Toppling: the largest k_r/PGA that topples at --p2. Sliding: the largest k_y/PGA that slides
-    further than --displacement. Slumping and confined toppling: the smallest factor on the record
-    that brings the block of --block down.
+    Toppling: the largest k_r/PGA that topples at --p2, or at the p2 of a shape. Sliding: the
+    largest k_y/PGA that slides further than --displacement. Slumping and confined toppling: the
+    smallest factor on the record that brings the block down.
     """
     from rbfrag.solver.critical import critical as search
     from rbfrag.solver.reports import critical_as_dict
     from rbfrag.solver.results import MAP_DEPTH
 
+    of_shape = _searched_block(shape, kind)
+    model = _chosen_kind(kind, of_shape, displacement)
     given = {
-        "--p2": p2 is not None,
-        "--linear": linear,
+        "--p2": p2 is not None or "p2" in of_shape,
         "--map": full_map,
         "--plot": plot is not None,
-        "--block": block is not None,
+        "--block": "block" in of_shape,
         "--rotation": rotation is not None,
         "--displacement": displacement is not None,
     }
-    of_file = {} if block is None else _block_of_file(block)
-    model = _chosen_kind(kind, of_file, displacement)
     _refuse_options_of_other_kinds(model, given)
-    polarity: Polarity = "reverse" if reverse else "forward"
-    if plot is not None:
-        from rbfrag.plots.canvas import plot_path
-
-        plot_path(plot)
-    ground = find_motion(motion, db=db, units=units, dt_s=dt)
-    upward, remarks = find_vertical(vertical, ground, db=db, units=units, dt_s=dt)
+    check_files(plot=plot)
+    ground, upward, remarks = find_shaking(motion, direction, db=db, reading=reading)
+    if "p2" in of_shape:
+        remarks.append(TAKEN_TO_TOPPLE)
+    say_when_compiling()
     if "displacement_m" in model.search_options:
         distances = None if displacement is None else number_list(displacement, "--displacement")
-        _slides(model.kind, ground, upward, polarity, distances, remarks, json=json)
+        _slides(model.kind, ground, upward, direction.polarity, distances, remarks, json=json)
         return
-    options: dict[str, Any] = {"p2": p2, "rotation_deg": rotation, "linear": linear, **of_file}
+    settings: dict[str, Any] = {"p2": p2, "rotation_deg": rotation, **of_shape}
     if "full_map" in model.search_options:
-        options["full_map"] = full_map or plot is not None
-        options["map_depth"] = MAP_DEPTH if plot is None else FINE_ENOUGH_TO_DRAW
+        settings["full_map"] = full_map or plot is not None
+        settings["map_depth"] = MAP_DEPTH if plot is None else FINE_ENOUGH_TO_DRAW
     try:
-        result = search(ground, kind=model.kind, vertical=upward, polarity=polarity, **options)
+        result = search(
+            ground, kind=model.kind, vertical=upward, polarity=direction.polarity, **settings
+        )
     except InputError as error:
-        raise InputError(f"{block}: {error}" if block else str(error)) from None
+        file = shape.block or shape.polygon
+        raise InputError(f"{file}: {error}" if file else str(error)) from None
     if plot is not None:
         from rbfrag.plots.islands import plot_islands
 
@@ -166,7 +143,6 @@ def critical(
 
 SEARCH_OPTION = {
     "--p2": "p2",
-    "--linear": "linear",
     "--map": "full_map",
     "--plot": "full_map",
     "--block": "block",
@@ -176,51 +152,54 @@ SEARCH_OPTION = {
 """What an option is called by the kinds that understand it."""
 
 
-def _chosen_kind(kind: str | None, of_file: dict[str, Any], displacement: str | None) -> Kind:
+def _chosen_kind(kind: str | None, of_shape: dict[str, Any], displacement: str | None) -> Kind:
     from rbfrag.solver.critical import kind_of
     from rbfrag.solver.kinds import model_of_kind, model_of_mode
 
     if kind is not None:
         model = model_of_kind(kind)
-        if model.search_needs == "block" and not of_file:
+        if model.search_needs == "block" and "block" not in of_shape:
             raise InputError(
                 f"--block is missing: shape, friction and dip of a block decide about {kind}; "
-                "give a block file with beta_deg and phi_deg"
+                f"describe it by {WAYS}, with --beta and --phi"
             )
         return model
-    if of_file:
-        return kind_of(None, of_file)
+    if of_shape:
+        return kind_of(None, of_shape)
     return model_of_mode("topple" if displacement is None else "slide")
 
 
 def _refuse_options_of_other_kinds(model: Kind, given: dict[str, bool]) -> None:
     from rbfrag.solver.kinds import models
 
-    for option, is_given in given.items():
-        if is_given and SEARCH_OPTION[option] not in model.search_options:
-            name = SEARCH_OPTION[option]
+    for word, is_given in given.items():
+        if is_given and SEARCH_OPTION[word] not in model.search_options:
+            name = SEARCH_OPTION[word]
             owners = [kind for kind, its in models().items() if name in its.search_options]
             raise InputError(
-                f"{option} goes with --kind {' and '.join(owners)}, not with {model.kind}"
+                f"{word} goes with --kind {' and '.join(owners)}, not with {model.kind}"
             )
     if model.search_needs == "p2" and not (given["--p2"] or given["--block"]):
         raise InputError("--p2 is missing: the critical block is searched for one p² [1/s²]")
 
 
-def _block_of_file(path: str) -> dict[str, Any]:
-    """Return the options of a search that a block file holds."""
-    from rbfrag.solver.block.file import read_block
+def _searched_block(shape: ShapeOptions, kind: str | None) -> dict[str, Any]:
+    """Return the keywords of a search that a shape gives."""
+    from rbfrag.solver.kinds import model_of_kind
 
-    file = read_block(path)
-    conditions: dict[str, Any] = dict(file.conditions)
-    for name in ("beta_deg", "phi_deg"):
-        if name not in conditions:
-            raise InputError(f"{path}: {name} is missing: the mode of a block depends on it")
+    described = shape.described()
+    if described is None:
+        return {}
+    if described.only_topples and (kind is None or model_of_kind(kind).search_needs == "p2"):
+        return {"p2": described.block.p2}
+    block, conditions = described.on_planes()
     for name, nothing in (("kv", 0.0), ("cohesion_pa", 0.0), ("back_fracture", True)):
         if conditions.pop(name, nothing) != nothing:
-            raise InputError(f"{path}: {name} does not go with a search in time: leave it out")
+            raise InputError(
+                f"{described.origin}{name} does not go with a search in time: leave it out"
+            )
     conditions.pop("density_kg_m3", None)
-    return {"block": file.block, **conditions}
+    return {"block": block, **conditions}
 
 
 def _slides(
@@ -238,26 +217,31 @@ def _slides(
     from rbfrag.solver.models.sliding import KY_OVER_PGA, THRESHOLDS_M, sliding_displacements
     from rbfrag.solver.reports import critical_as_dict
 
-    found = [
+    results = [
         critical_as_dict(
             search(ground, kind=kind, displacement_m=d, vertical=upward, polarity=polarity)
         )
         for d in distances or THRESHOLDS_M
     ]
     curve = sliding_displacements(ground, vertical=upward, polarity=polarity)
-    warnings = [*remarks, *found[0]["warnings"]]
+    warnings = [*remarks, *results[0]["warnings"]]
     rows = [
         {"ky_over_pga": k, "displacement_m": None if d != d else d}
         for k, d in zip(KY_OVER_PGA, curve.tolist(), strict=True)
     ]
     if json:
-        document = {**found[0], "warnings": warnings, "thresholds": found, "displacements": rows}
+        document = {
+            **results[0],
+            "warnings": warnings,
+            "thresholds": results,
+            "displacements": rows,
+        }
         print_json(document)
         return
     names = ("displacement_m", "ky_over_pga", "ky", "lower", "upper", "status", "n_runs")
-    print_pairs({name: found[0][name] for name in ("kind", "polarity", "pga_g")})
-    print_table(names, [[each[name] for name in names] for each in found])
-    for status in dict.fromkeys(each["status"] for each in found):
+    print_pairs({name: results[0][name] for name in ("kind", "polarity", "pga_g")})
+    print_table(names, [[each[name] for name in names] for each in results])
+    for status in dict.fromkeys(each["status"] for each in results):
         print(f"{status}: {SLIDING_STATUS[status]}")
     print("\non a base that dips, times cos(phi - beta)/cos(phi):")
     print_table(tuple(rows[0]), [list(row.values()) for row in rows])

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import sys
 from dataclasses import asdict
-from typing import Annotated
 
 import typer
 
-from rbfrag.cli.output import print_json, print_pairs, print_table
+from rbfrag.cli.output import print_json, print_pairs, print_table, say_when_compiling
 from rbfrag.cli.parameters import options
+from rbfrag.cli.parameters.stack import argument, command_group, option, stacked
 
-app = typer.Typer(
-    help="Upgrade, describe, check, export and merge databases.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    epilog="Example:  rbfrag db info",
+app = command_group(
+    "Upgrade, describe, check, export and merge databases.",
+    "Example:  rbfrag db info",
 )
 
 
@@ -40,37 +38,34 @@ def info(db: options.Db = None, json: options.Json = False) -> None:
     from rbfrag.db.queries import database_info
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        found = database_info(connection)
+        content = database_info(connection)
     if json:
-        print_json(asdict(found))
+        print_json(asdict(content))
         return
     print_pairs(
         {
-            "schema": found.revision,
-            "dialect": found.dialect,
-            "numerics": found.numerics_versions,
-            "default model": found.default_model,
+            "schema": content.revision,
+            "dialect": content.dialect,
+            "numerics": content.numerics_versions,
+            "default model": content.default_model,
         }
     )
     print()
-    print_table(("table", "rows"), found.rows.items())
-    if found.combinations_by_status:
+    print_table(("table", "rows"), content.rows.items())
+    if content.combinations_by_status:
         print()
-        print_table(("combinations", "number"), found.combinations_by_status.items())
+        print_table(("combinations", "number"), content.combinations_by_status.items())
 
 
 @app.command("check", epilog="Example:  rbfrag db check --sample 100 --seed 7")
+@stacked
 def check(
+    *,
     db: options.Db = None,
-    sample: Annotated[
-        int,
-        typer.Option(
-            "--sample",
-            min=0,
-            help="Combinations to compute again, chosen at random; 0 leaves this out.",
-        ),
-    ] = 20,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the random choice.")] = 0,
+    sample: int = option(
+        "Combinations to compute again, chosen at random; 0 leaves this out.", 20, min=0
+    ),
+    seed: int = option("Seed of the random choice.", 0),
     json: options.Json = False,
 ) -> None:
     """Look for damage: the file, references, samples, keys, brackets, maps, and a random sample
@@ -84,6 +79,7 @@ def check(
         if sample:
             from rbfrag.campaign.resimulate import resimulate
 
+            say_when_compiling()
             again = resimulate(connection, sample=sample, seed=seed)
             findings += again.findings
     if json:
@@ -93,7 +89,7 @@ def check(
         print_json(
             {
                 "sound": not findings,
-                "findings": [asdict(found) for found in findings],
+                "findings": [asdict(finding) for finding in findings],
                 "resimulated": computed,
             }
         )
@@ -107,7 +103,7 @@ def check(
             print_table(
                 ("table", "row", "problem"), [(f.table, f.row, f.problem) for f in findings]
             )
-            for advice in dict.fromkeys(found.advice for found in findings):
+            for advice in dict.fromkeys(finding.advice for finding in findings):
                 print(f"to do: {advice}")
         else:
             print("sound: nothing is wrong with this database")
@@ -116,23 +112,16 @@ def check(
 
 
 @app.command("export", epilog="Example:  rbfrag db export --out tables --tables motion,combination")
+@stacked
 def export(
-    out: Annotated[
-        str,
-        typer.Option(
-            "--out",
-            metavar="DIR",
-            help="Folder to make: a file for each table, and the data dictionary.",
-        ),
-    ],
+    *,
+    out: str = option(
+        "Folder to make: a file for each table, and the data dictionary.", ..., metavar="DIR"
+    ),
     db: options.Db = None,
-    format: Annotated[str, typer.Option("--format", help="parquet or csv.")] = "parquet",
-    tables: Annotated[
-        str | None, typer.Option("--tables", help="Only these, with commas between.")
-    ] = None,
-    arrays: Annotated[
-        bool, typer.Option("--arrays", help="Include samples [g] and histories (Parquet only).")
-    ] = False,
+    format: str = option("parquet or csv.", "parquet"),
+    tables: str | None = option("Only these, with commas between."),
+    arrays: bool = option("Include samples [g] and histories (Parquet only).", False),
     json: options.Json = False,
 ) -> None:
     """Write the tables as Parquet or CSV, with a data dictionary of every column and unit."""
@@ -148,14 +137,12 @@ def export(
 
 
 @app.command("merge", epilog="Example:  rbfrag db merge theirs.db --db ours.db")
+@stacked
 def merge(
-    other: Annotated[
-        str,
-        typer.Argument(
-            metavar="OTHER",
-            help="Database to read: a path or an SQLAlchemy URL. It is not changed.",
-        ),
-    ],
+    *,
+    other: str = argument(
+        "Database to read: a path or an SQLAlchemy URL. It is not changed.", metavar="OTHER"
+    ),
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:

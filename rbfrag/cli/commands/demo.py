@@ -5,24 +5,26 @@ from __future__ import annotations
 import shlex
 import time
 from pathlib import Path
-from typing import Annotated
 
 import typer
+
+from rbfrag.cli.parameters.stack import option, stacked
 
 EXAMPLE = "Example:  rbfrag demo"
 
 
+@stacked
 def demo(
+    *,
     context: typer.Context,
-    folder: Annotated[
-        str, typer.Option("--folder", help="Folder that the results are written to.")
-    ] = ".",
+    folder: str = option("Folder that the results are written to.", "."),
 ) -> None:
-    """Run the whole chain: records, responses, campaign, fit, prediction, two pictures.
+    """Run the whole chain from records to a prediction.
 
-    The records are the 18 samples that come with the extra rbfrag[samples]; without them
-    analytic pulses take their place. Every command is printed before it runs. Leaves
-    rbfrag-demo.db, rbfrag-demo-response.png and rbfrag-demo-fit.png.
+    That is records, responses, campaign, fit, prediction and two pictures. The records are the
+    18 samples that come with the extra rbfrag[samples]; without them analytic pulses take their
+    place. Every command is printed before it runs. Leaves rbfrag-demo.db,
+    rbfrag-demo-response.png and rbfrag-demo-fit.png.
     """
     from rbfrag.errors import InputError
     from rbfrag.motions.sample_motions import demo_motions
@@ -32,8 +34,8 @@ def demo(
         raise InputError(f"--folder: there is no folder {home}; make it first")
     database = home / "rbfrag-demo.db"
     response_png, fit_png = home / "rbfrag-demo-response.png", home / "rbfrag-demo-fit.png"
-    for leftover in ("", "-wal", "-shm"):
-        database.with_name(database.name + leftover).unlink(missing_ok=True)
+    for suffix in ("", "-wal", "-shm"):
+        database.with_name(database.name + suffix).unlink(missing_ok=True)
     started = time.perf_counter()
     records, sentence = demo_motions(home)
     print(sentence)

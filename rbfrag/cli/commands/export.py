@@ -2,137 +2,78 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import typer
 
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import toppling_blocks
+from rbfrag.cli.parameters.block import BlocksOptions
+from rbfrag.cli.parameters.stack import command_group, option, stacked
 from rbfrag.errors import InputError
 
-app = typer.Typer(
-    help="Write fragility functions for other tools.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    epilog="Example:  rbfrag export nrml --p2 3 --kr 0.1 --out block.xml",
+app = command_group(
+    "Write fragility functions for other tools.",
+    "Example:  rbfrag export nrml --p2 3 --kr 0.1 --out block.xml",
 )
-
-Blocks = Annotated[
-    str | None,
-    typer.Option(
-        "--blocks",
-        metavar="FILE",
-        help="Block table (.csv, .parquet) with block_id, p2_1_s2 [1/s²] and kr; one function a "
-        "block.",
-    ),
-]
-
-RockMass = Annotated[
-    str | None,
-    typer.Option(
-        "--rockmass",
-        metavar="FILE",
-        help="Rock mass file (.toml, .csv): one function, the mean over its toppling blocks.",
-    ),
-]
-
-Imt = Annotated[str, typer.Option("--imt", help="Measure of the function: PGV, or PGA with --tm.")]
-
-Levels = Annotated[
-    int, typer.Option("--levels", help="Number of levels of a function that is not lognormal.")
-]
-
-Name = Annotated[
-    str, typer.Option("--name", help="Identifier of the one block or of the rock mass.")
-]
 
 Out = Annotated[str, typer.Option("--out", help="File to write.")]
 
 
+@dataclass(frozen=True, kw_only=True)
+class FunctionOptions(BlocksOptions):
+    """The blocks, one function each, and what a function is of."""
+
+    name: str = option("Identifier of the one block or of the rock mass.", "block")
+    imt: str = option("Measure of the function: PGV, or PGA with --tm.", "PGV")
+    tm: options.Tm = None
+    levels: int = option("Number of levels of a function that is not lognormal.", 80)
+    model: options.Model = None
+    db: options.Db = None
+
+    def functions(self) -> tuple[list[Any], tuple[str, ...], list[str]]:
+        """Return the functions, name, term and method of their model, and warnings."""
+        from rbfrag.exchange.block_fragility import block_functions
+
+        measures = {"PGV": "pgv_m_s", "PGA": "pga_g"}
+        if self.imt.upper() not in measures:
+            raise InputError(f"--imt {self.imt}: use PGV, or PGA with --tm")
+        table, is_class, remarks = self.toppling_blocks(name=self.name)
+        functions, about = block_functions(
+            [self.name] if is_class else list(table["block_id"]), table["p2_1_s2"], table["kr"],
+            measures[self.imt.upper()], one_class=is_class, tm_s=self.tm, levels=self.levels,
+            model=self.model, db=self.db,
+        )  # fmt: skip
+        return functions, about, list(remarks)
+
+
 @app.command("nrml", epilog="Example:  rbfrag export nrml --blocks blocks.csv --out blocks.xml")
-def nrml(
-    out: Out,
-    p2: options.P2OrFile = None,
-    kr: options.KrOrFile = None,
-    block: options.BlockFile = None,
-    blocks: Blocks = None,
-    rockmass: RockMass = None,
-    name: Name = "block",
-    imt: Imt = "PGV",
-    tm: options.Tm = None,
-    levels: Levels = 80,
-    model: options.Model = None,
-    db: options.Db = None,
-    json: options.Json = False,
-) -> None:
+@stacked
+def nrml(out: Out, blocks: FunctionOptions, json: options.Json = False) -> None:
     """Write an OpenQuake fragility model, NRML 0.5 (.xml); PGV is in cm/s there."""
     from rbfrag.exchange.nrml import nrml_text
     from rbfrag.files import output_path, write_text
 
     target = output_path(out, (".xml",), "NRML file")
-    made, about, warnings = _functions(
-        p2, kr, block, blocks, rockmass, name, imt, tm, levels, model, db
-    )
-    write_text(nrml_text(made, description=_sentence(about, tm)), target)
-    _tell(str(target), made, about, warnings, json)
+    functions, about, warnings = blocks.functions()
+    write_text(nrml_text(functions, description=_sentence(about, blocks.tm)), target)
+    _tell(str(target), functions, about, warnings, json)
 
 
 @app.command(
     "pelicun", epilog="Example:  rbfrag export pelicun --p2 3 --kr 0.1 --out fragility.csv"
 )
-def pelicun(
-    out: Out,
-    p2: options.P2OrFile = None,
-    kr: options.KrOrFile = None,
-    block: options.BlockFile = None,
-    blocks: Blocks = None,
-    rockmass: RockMass = None,
-    name: Name = "block",
-    imt: Imt = "PGV",
-    tm: options.Tm = None,
-    levels: Levels = 80,
-    model: options.Model = None,
-    db: options.Db = None,
-    json: options.Json = False,
-) -> None:
+@stacked
+def pelicun(out: Out, blocks: FunctionOptions, json: options.Json = False) -> None:
     """Write a fragility table of pelicun and SimCenter (.csv); PGV is in m/s (mps) there."""
     from rbfrag.exchange.pelicun_table import pelicun_text
     from rbfrag.files import output_path, write_text
 
     target = output_path(out, (".csv",), "fragility table")
-    made, about, warnings = _functions(
-        p2, kr, block, blocks, rockmass, name, imt, tm, levels, model, db
-    )
-    write_text(pelicun_text(made), target)
-    _tell(str(target), made, about, warnings, json)
-
-
-def _functions(
-    p2: float | None,
-    kr: float | None,
-    block: str | None,
-    blocks: str | None,
-    rockmass: str | None,
-    name: str,
-    imt: str,
-    tm: float | None,
-    levels: int,
-    model: str | None,
-    db: str | None,
-) -> tuple[list[Any], tuple[str, ...], list[str]]:
-    from rbfrag.exchange.block_fragility import block_functions
-
-    measures = {"PGV": "pgv_m_s", "PGA": "pga_g"}
-    if imt.upper() not in measures:
-        raise InputError(f"--imt {imt}: use PGV, or PGA with --tm")
-    measure = measures[imt.upper()]
-    table, is_class, remarks = toppling_blocks(p2, kr, block, blocks, rockmass, name=name)
-    made, about = block_functions(
-        [name] if is_class else list(table["block_id"]), table["p2_1_s2"], table["kr"], measure,
-        one_class=is_class, tm_s=tm, levels=levels, model=model, db=db,
-    )  # fmt: skip
-    return made, about, list(remarks)
+    functions, about, warnings = blocks.functions()
+    write_text(pelicun_text(functions), target)
+    _tell(str(target), functions, about, warnings, json)
 
 
 def _sentence(about: tuple[str, ...], tm: float | None) -> str:
@@ -141,13 +82,13 @@ def _sentence(about: tuple[str, ...], tm: float | None) -> str:
 
 
 def _tell(
-    path: str, made: list[Any], about: tuple[str, ...], warnings: list[str], json: bool
+    path: str, functions: list[Any], about: tuple[str, ...], warnings: list[str], json: bool
 ) -> None:
-    errors = [function.grid_error for function in made if function.grid_error is not None]
+    errors = [function.grid_error for function in functions if function.grid_error is not None]
     document = {
         "file": path,
-        "functions": len(made),
-        "lognormal": sum(function.is_lognormal for function in made),
+        "functions": len(functions),
+        "lognormal": sum(function.is_lognormal for function in functions),
         "largest_grid_error": max(errors, default=0.0),
         "model": about[0],
         "term": about[1],

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.output import cell, print_json, print_pairs, print_table, print_warnings
 from rbfrag.cli.parameters import options
+from rbfrag.cli.parameters.stack import option, stacked
 
 if TYPE_CHECKING:
     from rbfrag.fragility.fit.report import FitReport
@@ -15,100 +15,76 @@ if TYPE_CHECKING:
 EXAMPLE = "Example:  rbfrag fit --term pgv"
 
 
+@dataclass(frozen=True, kw_only=True)
+class Data:
+    """What is fitted."""
+
+    suite: options.Suite = None
+    vertical: str = option("Combinations without vertical motion, with it, or both.", "without")
+    doubtful_pgd: bool = option(
+        "Let pgd_tm read the PGD of records flagged final_velocity or "
+        "final_displacement, which it leaves out otherwise.",
+        False,
+    )
+
+
+@stacked
 def fit(
-    term: Annotated[
-        str,
-        typer.Option(
-            "--term",
-            help="Intensity term [m/s]: pgv; pga_tm = PGA g Tm/(2 pi); pgd_tm = 2 pi PGD/Tm; "
-            "pgv_pga and pgv_pga_tm: PGV with PGA (and Tm); xp: the toppling spectrum X(p).",
-            show_default=False,
-        ),
-    ],
-    kind: Annotated[
-        str,
-        typer.Option(
-            "--kind",
-            help="What the blocks do: toppling; slumping or sliding, on the terms pgv and pgv_pga; "
-            "or another kind that campaigns store.",
-        ),
-    ] = "toppling",
-    rotation: Annotated[
-        float | None,
-        typer.Option(
-            "--rotation",
-            help="Slumping: rotation that counts as failure [deg]. Default: failure past recovery.",
-            show_default=False,
-        ),
-    ] = None,
-    method: Annotated[
-        str | None,
-        typer.Option(
-            "--method",
-            show_default=False,
-            help="Blocks known by p² and kr. Of critical values: wls (weighted least squares, the "
-            "dissertation's), lognormal (with censored motions). Of outcomes: logistic, weibull, "
-            "bounded; of outcomes on xp: record, power. Default: wls. Sliding: displacement; "
-            "slumping: capacity.",
-        ),
-    ] = None,
-    suite: options.Suite = None,
-    vertical: Annotated[
-        str,
-        typer.Option("--vertical", help="Combinations without vertical motion, with it, or both."),
-    ] = "without",
-    free_m: Annotated[
-        bool,
-        typer.Option(
-            "--free-m",
-            help="Estimate the exponent M of y = k_r g/p^M instead of M = 1 (lognormal, logistic).",
-        ),
-    ] = False,
-    doubtful_pgd: Annotated[
-        bool,
-        typer.Option(
-            "--doubtful-pgd",
-            help="Let pgd_tm read the PGD of records flagged final_velocity or "
-            "final_displacement, which it leaves out otherwise.",
-        ),
-    ] = False,
-    name: Annotated[
-        str | None,
-        typer.Option("--name", help="Name of the model. Default: method-term.", show_default=False),
-    ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the bootstrap by earthquake.")] = 0,
-    replace: Annotated[
-        bool, typer.Option("--replace", help="Replace a stored model of the same name.")
-    ] = False,
+    *,
+    term: str = option(
+        "Intensity term [m/s]: pgv; pga_tm = PGA g Tm/(2 pi); pgd_tm = 2 pi PGD/Tm; "
+        "pgv_pga and pgv_pga_tm: PGV with PGA (and Tm); xp: the toppling spectrum X(p).",
+        ...,
+        show_default=False,
+    ),
+    data: Data,
+    kind: str = option(
+        "What the blocks do: toppling; slumping or sliding, on the terms pgv and pgv_pga; "
+        "or another kind that campaigns store.",
+        "toppling",
+    ),
+    rotation: float | None = option(
+        "Slumping: rotation that counts as failure [deg]. Default: failure past recovery.",
+        show_default=False,
+    ),
+    method: str | None = option(
+        "Blocks known by p² and kr. Of critical values: wls (weighted least squares, the "
+        "dissertation's), lognormal (with censored motions). Of outcomes: logistic, weibull, "
+        "bounded; of outcomes on xp: record, power. Default: wls. Sliding: displacement; "
+        "slumping: capacity.",
+        show_default=False,
+    ),
+    free_m: bool = option(
+        "Estimate the exponent M of y = k_r g/p^M instead of M = 1 (lognormal, logistic).", False
+    ),
+    name: str | None = option("Name of the model. Default: method-term.", show_default=False),
+    seed: int = option("Seed of the bootstrap by earthquake.", 0),
+    replace: bool = option("Replace a stored model of the same name.", False),
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Fit a fragility model to the stored critical values or outcomes and store it.
+    """Fit a fragility model to stored critical values or outcomes.
 
-    The first model of a kind becomes its default (rbfrag models default NAME changes it).
+    The model is stored; the first of a kind becomes its default (rbfrag models default NAME
+    changes it).
     """
-    from rbfrag.db.engine import opened_database
-    from rbfrag.db.models import save_model
-    from rbfrag.fragility.fit.fitting import fit as run
-    from rbfrag.fragility.fit.report import FitReport
-    from rbfrag.fragility.model import FragilityModel
+    from rbfrag.fragility.fit.stored import fit as run
 
     report = run(
         db,
         kind=kind,
         term=term,
         method=method,
-        suite=suite,
-        vertical=vertical,  # type: ignore[arg-type]
+        suite=data.suite,
+        vertical=data.vertical,  # type: ignore[arg-type]
         name=name,
         seed=seed,
         estimate_m=free_m,
-        doubtful_pgd=doubtful_pgd,
+        doubtful_pgd=data.doubtful_pgd,
         rotation_deg=rotation,
+        replace=replace,
     )
-    with opened_database(db) as engine, engine.begin() as connection:
-        row = save_model(connection, report.model.row, replace=replace)
-    print_report(FitReport.from_model(FragilityModel.from_row(row)), json=json)
+    print_report(report, json=json)
 
 
 def print_report(report: FitReport, *, json: bool) -> None:

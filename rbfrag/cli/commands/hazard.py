@@ -2,93 +2,57 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
-
-import typer
+from dataclasses import dataclass
+from typing import Any
 
 from rbfrag.cli.output import check_files, print_json, print_pairs, print_table, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import toppling_blocks
+from rbfrag.cli.parameters.block import BlocksOptions
+from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 
 EXAMPLE = "Example:  rbfrag hazard pgv-curve.csv --p2 3 --kr 0.1 --component rotd50 --years 50"
 
 
+@dataclass(frozen=True, kw_only=True)
+class CurveOptions:
+    """What a hazard curve means."""
+
+    imt: str | None = option("Intensity measure of the curve: PGV, PGA, 'SA(1.0)'.")
+    site: str | None = option("Site of the file: its number from 1 on, or its name.")
+    tm: options.Tm = None
+    convert: str | None = option(
+        "Published conversion of a spectral acceleration to PGV: newmark_hall_1982 "
+        "(SA(1)) or bommer_alarcon_2006 (SA(0.5))."
+    )
+    component: str | None = option(
+        "What the curve's horizontal component means: single, geometric_mean, rotd50 or larger."
+    )
+
+
+@stacked
 def hazard(
-    curve: Annotated[
-        str,
-        typer.Argument(
-            metavar="CURVE",
-            help="Hazard curve: OpenQuake CSV, USGS NSHM JSON, or CSV of two columns whose header "
-            "names their units (pgv_m_s,annual_rate).",
-        ),
-    ],
-    p2: options.P2OrFile = None,
-    kr: options.KrOrFile = None,
-    block: options.BlockFile = None,
-    blocks: Annotated[
-        str | None,
-        typer.Option(
-            "--blocks",
-            metavar="FILE",
-            help="Block table (.csv, .parquet) with p2_1_s2 [1/s²] and kr, one answer a row.",
-        ),
-    ] = None,
-    rockmass: Annotated[
-        str | None,
-        typer.Option(
-            "--rockmass",
-            metavar="FILE",
-            help="Rock mass file (.toml, .csv): the rate of a block drawn from its stable toppling "
-            "blocks.",
-        ),
-    ] = None,
-    imt: Annotated[
-        str | None,
-        typer.Option("--imt", help="Intensity measure of the curve: PGV, PGA, 'SA(1.0)'."),
-    ] = None,
-    site: Annotated[
-        str | None,
-        typer.Option("--site", help="Site of the file: its number from 1 on, or its name."),
-    ] = None,
-    years: Annotated[
-        float, typer.Option("--years", help="Period of the probability [years].")
-    ] = 50.0,
-    tm: options.Tm = None,
-    convert: Annotated[
-        str | None,
-        typer.Option(
-            "--convert",
-            help="Published conversion of a spectral acceleration to PGV: newmark_hall_1982 "
-            "(SA(1)) or bommer_alarcon_2006 (SA(0.5)).",
-        ),
-    ] = None,
-    component: Annotated[
-        str | None,
-        typer.Option(
-            "--component",
-            help="What the curve's horizontal component means: single, geometric_mean, rotd50 or "
-            "larger.",
-        ),
-    ] = None,
-    model: options.Model = None,
-    level: options.Level = 0.95,
-    out: Annotated[
-        str | None, typer.Option("--out", help="Write one row a block and site (.csv, .parquet).")
-    ] = None,
-    plot: Annotated[
-        str | None,
-        typer.Option(
-            "--plot", help="Draw which shaking the rate of one block comes from (.png, .pdf, .svg)."
-        ),
-    ] = None,
-    db: options.Db = None,
+    *,
+    curve: str = argument(
+        "Hazard curve: OpenQuake CSV, USGS NSHM JSON, or CSV of two columns whose header "
+        "names their units (pgv_m_s,annual_rate).",
+        metavar="CURVE",
+    ),
+    blocks: BlocksOptions,
+    meaning: CurveOptions,
+    answering: options.Answering,
+    years: float = option("Period of the probability [years].", 50.0),
+    out: str | None = option("Write one row a block and site (.csv, .parquet)."),
+    plot: str | None = option(
+        "Draw which shaking the rate of one block comes from (.png, .pdf, .svg)."
+    ),
     json: options.Json = False,
 ) -> None:
-    """Print the annual rate at which a block topples, and the probability in a period of years.
+    """Print the annual rate at which a block topples.
 
-    The fragility is integrated over the hazard curve. A PGA curve needs --tm, a spectral
-    acceleration --convert.
+    The fragility is integrated over the hazard curve, and the probability in a period of years
+    follows. A PGA curve needs --tm, a spectral acceleration --convert. The block is backed by a
+    slope; a free-standing one fails at weaker shaking.
     """
     from rbfrag.exchange.block_table import write_block_table
     from rbfrag.exchange.hazard_curves import read_hazard_curves, suited_curves
@@ -97,33 +61,36 @@ def hazard(
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot)
-    table, is_class, remarks = toppling_blocks(p2, kr, block, blocks, rockmass)
+    table, is_class, remarks = blocks.toppling_blocks()
     names = list(table["block_id"])
     curves = suited_curves(
-        read_hazard_curves(curve, imt=imt, site=site),
-        with_mean_period=tm is not None,
-        converted_period_s=None if convert is None else velocity_conversion(convert).period_s,
+        read_hazard_curves(curve, imt=meaning.imt, site=meaning.site),
+        with_mean_period=meaning.tm is not None,
+        converted_period_s=None
+        if meaning.convert is None
+        else velocity_conversion(meaning.convert).period_s,
     )
     if plot is not None and (len(curves) > 1 or len(names) > 1):
         raise InputError(
             "--plot draws one block at one site: choose them with --site, --p2 and --kr"
         )
-    found = [
+    answers = [
         answer(
-            one, table["p2_1_s2"], table["kr"], tm_s=tm, convert=convert, component=component,
-            years=years, model=model, level=level, db=db, one_class=is_class,
+            one, table["p2_1_s2"], table["kr"], tm_s=meaning.tm, convert=meaning.convert,
+            component=meaning.component, years=years, model=answering.model,
+            level=answering.level, db=answering.db, one_class=is_class,
         )
         for one in curves
     ]  # fmt: skip
     if out is not None:
-        from rbfrag.exchange.rate_table import rate_columns
+        from rbfrag.exchange.hazard_curves import rate_columns
 
-        write_block_table(rate_columns(curves, table, found), out)
+        write_block_table(rate_columns(curves, table, answers), out)
     if plot is not None:
         from rbfrag.plots.hazard import plot_contribution
 
-        plot_contribution(curves[0], found[0], plot)
-    document = as_dict(curves, names, found, remarks)
+        plot_contribution(curves[0], answers[0], plot)
+    document = as_dict(curves, names, answers, remarks)
     if json:
         print_json(document)
         return
@@ -139,21 +106,21 @@ def hazard(
         if document["annual_rate"] > 0.0:
             print(f"once in {1.0 / document['annual_rate']:.4g} years on average")
             print()
-            print_table(["from", "to", "share_%"], _shares(found[0], curves[0]))
+            print_table(["from", "to", "share_%"], _shares(answers[0], curves[0]))
     print_warnings(warnings)
 
 
-def _shares(found: Any, curve: Any) -> list[list[object]]:
+def _shares(answer: Any, curve: Any) -> list[list[object]]:
     """Return which shaking the rate comes from, between the levels of the curve."""
-    unit = {"pgv_m_s": "m/s"}.get(found.measure, "g")
+    unit = {"pgv_m_s": "m/s"}.get(answer.measure, "g")
     levels, imt = curve.levels, curve.imt
-    parts = found.contribution[0].reshape(levels.size - 1, -1).sum(axis=1) / found.annual_rate[0]
+    parts = answer.contribution[0].reshape(levels.size - 1, -1).sum(axis=1) / answer.annual_rate[0]
     rows: list[list[object]] = [
         [f"{imt} {low:.3g}", f"{high:.3g} {unit}", round(100.0 * share, 1)]
         for low, high, share in zip(levels[:-1], levels[1:], parts.tolist(), strict=True)
         if share >= 5e-4
     ]
-    beyond = found.above[0] / found.annual_rate[0]
+    beyond = answer.above[0] / answer.annual_rate[0]
     if beyond >= 5e-4:
         rows.append([f"{imt} {levels[-1]:.3g}", "beyond", round(100.0 * float(beyond), 1)])
     return rows

@@ -8,12 +8,11 @@ import typer
 
 from rbfrag.cli.output import print_json, print_table
 from rbfrag.cli.parameters import options
+from rbfrag.cli.parameters.stack import command_group
 
-app = typer.Typer(
-    help="List, show and choose fitted fragility models.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    epilog="Example:  rbfrag models show wls-pgv",
+app = command_group(
+    "List, show and choose fitted fragility models.",
+    "Example:  rbfrag models show wls-pgv",
 )
 
 Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the model.")]
@@ -74,12 +73,12 @@ def check(db: options.Db = None, json: options.Json = False) -> None:
     from rbfrag.fragility.fit.check import check_models
 
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        found = check_models(connection, model_rows(connection))
+        checks = check_models(connection, model_rows(connection))
     if json:
-        print_json([each.as_dict() for each in found])
+        print_json([each.as_dict() for each in checks])
     else:
         print_table(
-            ("model", "data", "remark"), [(each.name, each.state, each.remark) for each in found]
+            ("model", "data", "remark"), [(each.name, each.state, each.remark) for each in checks]
         )
-    if any(each.state in ("changed", "unreadable") for each in found):
+    if any(each.state in ("changed", "unreadable") for each in checks):
         raise typer.Exit(1)

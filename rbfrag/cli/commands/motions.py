@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
-from rbfrag.cli.output import print_json, print_pairs, print_table, print_warnings
+from rbfrag.cli.output import ProgressBar, print_json, print_pairs, print_table, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion, stored_row
+from rbfrag.cli.parameters.stack import argument, command_group, option, stacked
 
 if TYPE_CHECKING:
     from rbfrag.db.rows import MotionRow
@@ -20,41 +21,29 @@ STORED_LABELS = (
 )  # fmt: skip
 """What the database knows of a motion better than its samples do."""
 
-app = typer.Typer(
-    help="Add, list, show and export accelerograms.",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    epilog="Example:  rbfrag motions add records/ --metadata records/MANIFEST.csv",
+app = command_group(
+    "Add, list, show and export accelerograms.",
+    "Example:  rbfrag motions add records/ --metadata records/MANIFEST.csv",
 )
 
 
 @app.command("add", epilog="Example:  rbfrag motions add records/ --metadata records/META.csv")
+@stacked
 def add(
-    paths: Annotated[
-        list[str], typer.Argument(metavar="PATHS...", help="Files, or folders to search.")
-    ],
-    suite: Annotated[
-        str | None, typer.Option("--suite", help="Put the motions into this suite.")
-    ] = None,
-    metadata: Annotated[
-        str | None,
-        typer.Option(
-            "--metadata",
-            metavar="CSV",
-            help="Table with the columns file, trace_index, event_id, units, is_vertical, "
-            "companion_group, magnitude, processing (only file must be there). Files are named "
-            "relative to the table's folder.",
-        ),
-    ] = None,
-    raw: Annotated[
-        bool,
-        typer.Option(
-            "--raw", help="Store every record as its file has it; uncorrected ones are flagged."
-        ),
-    ] = False,
+    *,
+    paths: list[str] = argument("Files, or folders to search.", metavar="PATHS..."),
+    reading: options.Reading,
+    suite: str | None = option("Put the motions into this suite."),
+    metadata: str | None = option(
+        "Table with the columns file, trace_index, event_id, units, is_vertical, "
+        "companion_group, magnitude, processing (only file must be there). Files are named "
+        "relative to the table's folder.",
+        metavar="CSV",
+    ),
+    raw: bool = option(
+        "Store every record as its file has it; uncorrected ones are flagged.", False
+    ),
     allow_partial: options.AllowPartial = False,
-    units: options.Units = None,
-    dt: options.Dt = None,
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
@@ -71,22 +60,18 @@ def add(
     """
     from rbfrag.campaign.add_motions import add_motions
 
-    def show(done: int, total: int) -> None:
-        if sys.stderr.isatty():
-            end = "\n" if done == total else ""
-            print(f"\r\x1b[Kmotions add: {done}/{total} files", end=end, file=sys.stderr)
-
-    report = add_motions(
-        paths,
-        db=db,
-        suite=suite,
-        metadata=metadata,
-        units=units,
-        dt_s=dt,
-        raw=raw,
-        allow_partial=allow_partial,
-        on_file=show,
-    )
+    with ProgressBar("motions add", "files", on_lines=False) as bar:
+        report = add_motions(
+            paths,
+            db=db,
+            suite=suite,
+            metadata=metadata,
+            units=reading.units,
+            dt_s=reading.dt,
+            raw=raw,
+            allow_partial=allow_partial,
+            on_file=bar.show,
+        )
     if json:
         print_json(report.as_dict())
     else:
@@ -131,18 +116,18 @@ def list_motions(
 
 
 @app.command("show", epilog="Example:  rbfrag motions show record.AT2")
+@stacked
 def show(
     motion: options.Motion,
+    reading: options.Reading,
     allow_partial: options.AllowPartial = False,
-    units: options.Units = None,
-    dt: options.Dt = None,
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
     """Show one motion: a file as it is, or a stored one by its id."""
     from rbfrag.motions.quality import quality_flags
 
-    ground = find_motion(motion, db=db, units=units, dt_s=dt, allow_partial=allow_partial)
+    ground = find_motion(motion, db=db, reading=reading, allow_partial=allow_partial)
     flags = quality_flags(ground)
     document: dict[str, Any] = {
         "name": ground.label,
@@ -183,39 +168,31 @@ def show(
 
 
 @app.command("export", epilog="Example:  rbfrag motions export 1 2 --out two.csv")
+@stacked
 def export(
-    motions: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="MOTION...",
-            help="Accelerograms: files, FILE#INDEX for one trace of several, or database ids.",
-        ),
-    ],
-    out: Annotated[str, typer.Option("--out", metavar="FILE", help="File to write.")],
-    file_format: Annotated[
-        str | None,
-        typer.Option(
-            "--format",
-            help="csv (several motions, every label) or at2 (one motion). Default: what FILE ends "
-            "in.",
-        ),
-    ] = None,
+    *,
+    motions: options.Motions,
+    reading: options.Reading,
+    out: str = option("File to write.", ..., metavar="FILE"),
+    file_format: str | None = option(
+        "csv (several motions, every label) or at2 (one motion). Default: what FILE ends in.",
+        word="--format",
+    ),
     allow_partial: options.AllowPartial = False,
-    units: options.Units = None,
-    dt: options.Dt = None,
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
     """Write motions into a file from which they are read back bit for bit."""
     from rbfrag.motions.export import export_motions
 
-    found = [
-        find_motion(text, db=db, units=units, dt_s=dt, allow_partial=allow_partial)
-        for text in motions
+    records = [
+        find_motion(text, db=db, reading=reading, allow_partial=allow_partial) for text in motions
     ]
-    written = export_motions(found, out, file_format=file_format)
+    written = export_motions(records, out, file_format=file_format)
     if json:
-        print_json({"file": out, "format": written, "sha256": [motion.sha256 for motion in found]})
+        print_json(
+            {"file": out, "format": written, "sha256": [motion.sha256 for motion in records]}
+        )
         return
     print(out)
 

@@ -2,32 +2,49 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated
 
 import typer
 
-from rbfrag.cli.output import print_warnings
+from rbfrag.cli.output import print_warnings, say_when_compiling
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.motion import find_motion, find_vertical
+from rbfrag.cli.parameters.block import BlockOptions, NoBack
+from rbfrag.cli.parameters.motion import find_motion, find_shaking
+from rbfrag.cli.parameters.stack import command_group, option, stacked
 
-app = typer.Typer(
-    help="Draw models, data, spectra, responses and failure modes (.png, .pdf, .svg).",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    epilog="Example:  rbfrag plot fit --out fit.png",
+app = command_group(
+    "Draw models, data, spectra, responses and failure modes.",
+    "Example:  rbfrag plot fit --out fit.png",
 )
 
 Out = Annotated[str, typer.Option("--out", help="File to write: .png, .pdf or .svg.")]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Held:
+    """What lines of equal probability are drawn for."""
+
+    p2: float | None = option(
+        "Frequency parameter p² [1/s²] of the blocks drawn. Default: the middle of the "
+        "fitted range."
+    )
+    pga: float | None = option(
+        "PGA [g] of the motions drawn. Default: in proportion to PGV, by the middle of "
+        "the fitted range."
+    )
+    tm: float | None = option(
+        "Mean period [s] of the motions drawn. Default: the middle of the fitted range."
+    )
+
+
 @app.command("fit", epilog="Example:  rbfrag plot fit --model wls-pgv --out fit.png")
+@stacked
 def plot_fit(
+    *,
     out: Out,
-    model: Annotated[
-        str | None,
-        typer.Option("--model", help="Name of the model. Default: the database's default."),
-    ] = None,
-    log: Annotated[bool, typer.Option("--log", help="Logarithmic axes.")] = False,
+    model: str | None = option("Name of the model. Default: the database's default."),
+    log: bool = option("Logarithmic axes.", False),
     db: options.Db = None,
 ) -> None:
     """Draw the data of a fit with its 2.5 %, 50 % and 97.5 % failure lines and histograms."""
@@ -58,19 +75,15 @@ def plot_fit(
     "chart",
     epilog="Example:  rbfrag plot chart --model bounded-pgv_pga --p2 3 --pga 0.4 --out chart.pdf",
 )
+@stacked
 def plot_chart(
+    *,
     out: Out,
-    model: Annotated[
-        str | None,
-        typer.Option(
-            "--model",
-            help="Model of PGV, PGA*Tm, PGD/Tm, or PGV with PGA (and Tm). Default: the one that "
-            "answers for PGV.",
-        ),
-    ] = None,
-    p2: options.HeldP2 = None,
-    pga: options.HeldPga = None,
-    tm: options.HeldTm = None,
+    held: Held,
+    model: str | None = option(
+        "Model of PGV, PGA*Tm, PGD/Tm, or PGV with PGA (and Tm). Default: the one that "
+        "answers for PGV."
+    ),
     db: options.Db = None,
 ) -> None:
     """Draw lines of equal probability of toppling over intensity and block, to read by hand.
@@ -83,33 +96,27 @@ def plot_chart(
 
     given = ["pgv_m_s"] if model is None else ["pgv_m_s", "pga_g", "tm_s", "pgd_m"]
     chosen = find_model(model, given, db)
-    draw(chosen, out, held_measures(chosen, p2=p2, pga_g=pga, tm_s=tm))
+    draw(chosen, out, held_measures(chosen, p2=held.p2, pga_g=held.pga, tm_s=held.tm))
     print(out)
 
 
 @app.command(
     "curve", epilog="Example:  rbfrag plot curve --p2 3 --kr 0.1 --pga 0.4 --out curve.png"
 )
+@stacked
 def plot_curve(
-    p2: options.P2,
-    kr: options.Kr,
+    *,
     out: Out,
+    block: BlockOptions,
     pga: options.Pga = None,
     tm: options.Tm = None,
-    model: Annotated[
-        str | None,
-        typer.Option("--model", help="Name of the model. Default: the best for what is given."),
-    ] = None,
+    model: str | None = option("Name of the model. Default: the best for what is given."),
     level: options.Level = 0.95,
-    beside: Annotated[
-        str | None,
-        typer.Option(
-            "--beside",
-            metavar="FILE",
-            help="Fragilities of the same measure to compare with: NRML 0.4 or 0.5 (.xml), or a "
-            "pelicun table (.csv).",
-        ),
-    ] = None,
+    beside: str | None = option(
+        "Fragilities of the same measure to compare with: NRML 0.4 or 0.5 (.xml), or a "
+        "pelicun table (.csv).",
+        metavar="FILE",
+    ),
     db: options.Db = None,
 ) -> None:
     """Draw the fragility curve of one block over PGV, with its confidence band.
@@ -119,6 +126,7 @@ def plot_curve(
     from rbfrag.fragility.lookup import find_model
     from rbfrag.plots.curve import plot_curve as draw
 
+    p2, kr, remarks = block.toppling()
     held = {name: value for name, value in (("pga_g", pga), ("tm_s", tm)) if value is not None}
     varied = ["pgv_m_s"] if model is None else ["pgv_m_s", "pga_g", "pgd_m", "xp_m_s"]
     chosen = find_model(model, [*varied, *held], db)
@@ -128,6 +136,7 @@ def plot_curve(
 
         others = of_measure(beside, chosen.term.inputs[0])
     draw(chosen, p2, kr, out, fixed=held, level=level, beside=others)
+    print_warnings(remarks)
     print(out)
 
 
@@ -145,15 +154,14 @@ def plot_sensitivity(out: Out, suite: options.Suite = None, db: options.Db = Non
 
 
 @app.command("calibration", epilog="Example:  rbfrag plot calibration --out calibration.png")
+@stacked
 def plot_calibration(
+    *,
     out: Out,
-    model: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--model", help="Stored model; may be given up to four times. Default: the default."
-        ),
-    ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the draws of earthquakes.")] = 0,
+    model: list[str] | None = option(
+        "Stored model; may be given up to four times. Default: the default."
+    ),
+    seed: int = option("Seed of the draws of earthquakes.", 0),
     db: options.Db = None,
 ) -> None:
     """Draw predicted probabilities beside the shares that toppled, earthquakes left out in turn.
@@ -194,15 +202,14 @@ def plot_vertical(out: Out, suite: options.Suite = None, db: options.Db = None) 
 
 
 @app.command("spectrum", epilog="Example:  rbfrag plot spectrum 1 5 --polarity both --out x.png")
+@stacked
 def plot_spectrum(
+    *,
     motions: options.Motions,
     out: Out,
-    p2: Annotated[
-        str, typer.Option("--p2", help="The figure spans at least these p² [1/s²].")
-    ] = "0.1,30",
+    reading: options.Reading,
+    p2: str = option("The figure spans at least these p² [1/s²].", "0.1,30"),
     polarity: options.Polarity = "both",
-    units: options.Units = None,
-    dt: options.Dt = None,
     db: options.Db = None,
 ) -> None:
     """Draw the toppling spectra of motions over the size of the block, with PGV beside them."""
@@ -212,41 +219,33 @@ def plot_spectrum(
 
     sizes, wanted = number_list(p2, "--p2"), polarities(polarity)
     plot_path(out)
-    found = [find_motion(text, db=db, units=units, dt_s=dt) for text in motions]
-    draw(found, out, polarities=wanted, p2=sizes)
+    records = [find_motion(text, db=db, reading=reading) for text in motions]
+    draw(records, out, polarities=wanted, p2=sizes)
     print(out)
 
 
 @app.command("response", epilog="Example:  rbfrag plot response 1 --p2 3 --kr 0.1 --out a.png")
+@stacked
 def plot_response(
     motion: options.Motion,
-    p2: options.P2,
-    kr: options.Kr,
     out: Out,
-    vertical: options.Vertical = None,
-    reverse: options.Reverse = False,
-    linear: options.Linear = False,
-    units: options.Units = None,
-    dt: options.Dt = None,
+    block: BlockOptions,
+    direction: options.Direction,
+    reading: options.Reading,
     db: options.Db = None,
 ) -> None:
     """Draw acceleration against k_r(theta), and theta over the critical angle, in time."""
     from rbfrag.plots.response import plot_response as draw
     from rbfrag.solver.toppling_run import respond
 
-    ground = find_motion(motion, db=db, units=units, dt_s=dt)
-    upward, remarks = find_vertical(vertical, ground, db=db, units=units, dt_s=dt)
+    p2, kr, about = block.toppling()
+    ground, upward, remarks = find_shaking(motion, direction, db=db, reading=reading)
+    say_when_compiling()
     response = respond(
-        ground,
-        p2=p2,
-        kr=kr,
-        vertical=upward,
-        polarity="reverse" if reverse else "forward",
-        linear=linear,
-        history=True,
+        ground, p2=p2, kr=kr, vertical=upward, polarity=direction.polarity, history=True
     )
-    draw(response, out, p2=p2, kr=kr, linear=linear, reverse=reverse, title=ground.label)
-    print_warnings(remarks)
+    draw(response, out, p2=p2, kr=kr, reverse=direction.reverse, title=ground.label)
+    print_warnings([*about, *remarks])
     print(out)
 
 
@@ -254,36 +253,24 @@ def plot_response(
     "modes",
     epilog="Example:  rbfrag plot modes --phi 40 --beta 20 --rockmass mass.toml --out a.png",
 )
+@stacked
 def plot_modes(
-    phi: Annotated[float, typer.Option("--phi", help="Friction angle of the base [deg].")],
+    *,
+    phi: float = option("Friction angle of the base [deg].", ...),
     out: Out,
-    beta: Annotated[
-        float, typer.Option("--beta", help="Dip of the base for the yield accelerations [deg].")
-    ] = 0.0,
-    phi_back: Annotated[
-        float | None,
-        typer.Option(
-            "--phi-back", help="Friction angle of the back plane [deg]. Default: that of the base."
-        ),
-    ] = None,
-    no_back: Annotated[
-        bool, typer.Option("--no-back", help="There is no fracture behind the blocks.")
-    ] = False,
-    blocks: Annotated[
-        str | None,
-        typer.Option(
-            "--blocks",
-            metavar="FILE",
-            help="Show the blocks of a table (.csv, .parquet) with alpha1_deg and alpha3_deg, "
-            "as  rbfrag rockmass --out  writes it.",
-        ),
-    ] = None,
-    rockmass: Annotated[
-        str | None,
-        typer.Option(
-            "--rockmass", metavar="FILE", help="Show the blocks of a rock mass file (.toml, .csv)."
-        ),
-    ] = None,
+    beta: float = option("Dip of the base for the yield accelerations [deg].", 0.0),
+    phi_back: float | None = option(
+        "Friction angle of the back plane [deg]. Default: that of the base."
+    ),
+    no_back: NoBack = False,
+    blocks: str | None = option(
+        "Show the blocks of a table (.csv, .parquet) with alpha1_deg and alpha3_deg, "
+        "as  rbfrag rockmass --out  writes it.",
+        metavar="FILE",
+    ),
+    rockmass: str | None = option(
+        "Show the blocks of a rock mass file (.toml, .csv).", metavar="FILE"
+    ),
 ) -> None:
     """Draw failure modes and yield accelerations over the block angles alpha1 and alpha3."""
     from rbfrag.cli.parameters.block import charted_blocks

@@ -2,226 +2,152 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any
-
-import typer
+from dataclasses import dataclass
+from typing import Any
 
 from rbfrag.cli.output import print_json, print_pairs, print_warnings, show_prediction
 from rbfrag.cli.parameters import options
+from rbfrag.cli.parameters.block import WAYS, BlockOptions, option_of
+from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.errors import InputError
+from rbfrag.solver.described import numbers_of_kind
 
 EXAMPLE = "Example:  rbfrag predict --p2 3 --kr 0.1 --pgv 0.6 --json"
 
 
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """How a block fails, and the numbers of one that does not topple."""
+
+    kind: str | None = option(
+        "How the block fails: toppling, slumping or sliding. Default: what the block is "
+        "given by, --p2, --ks or --ky."
+    )
+    ky: float | None = option(
+        "Sliding: yield acceleration coefficient tan(phi - beta), with --beta."
+    )
+    displacement: float | None = option("Sliding: the displacement that is too far [m].")
+    ks: float | None = option("Slumping: yield acceleration coefficient k_s, with --ps2.")
+    ps2: float | None = option("Slumping: frequency parameter p_s² at rest [1/s²].")
+    rotation: float | None = option(
+        "Slumping: rotation that counts as failure [deg]; there must be a model of it. "
+        "Default: failure past recovery."
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """The accelerogram itself."""
+
+    motion: str | None = option(
+        "The accelerogram itself, instead of its measures: a file, FILE#INDEX or a "
+        "database id. Its toppling spectrum answers, for both polarities and their mean.",
+        metavar="MOTION",
+    )
+    polarity: str = option("With --motion: forward, reverse, or both where unknown.", "both")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A table of blocks, and one of answers."""
+
+    batch: str | None = option(
+        "Block table (.csv or .parquet) with columns p2_1_s2 and kr (or height_m and "
+        "width_m; or ky and displacement_m; or ks and ps2_1_s2) and any of pgv_m_s, pga_g, "
+        "tm_s, pgd_m; what is the same for all rows may be an option.",
+        metavar="FILE",
+    )
+    out: str | None = option(
+        "With --batch: table to write, the same columns with probability, ci_low, "
+        "ci_high, in_domain and reason.",
+        metavar="FILE",
+    )
+
+
+@stacked
 def predict(
-    p2: options.P2OrFile = None,
-    kr: options.KrOrFile = None,
-    block: Annotated[
-        str | None,
-        typer.Option(
-            "--block",
-            metavar="FILE",
-            help="Block file (.toml or .csv) with beta_deg and phi_deg, instead of numbers; "
-            "refused unless its mode is that of the kind.",
-        ),
-    ] = None,
-    kind: Annotated[
-        str | None,
-        typer.Option(
-            "--kind",
-            help="How the block fails: toppling, slumping or sliding. Default: what the block is "
-            "given by, --p2, --ks or --ky.",
-        ),
-    ] = None,
-    ky: Annotated[
-        float | None,
-        typer.Option("--ky", help="Sliding: yield acceleration coefficient tan(phi - beta)."),
-    ] = None,
-    beta: Annotated[
-        float | None,
-        typer.Option(
-            "--beta", help="Sliding, with --ky: dip of the base, out of the slope positive [deg]."
-        ),
-    ] = None,
-    displacement: Annotated[
-        float | None,
-        typer.Option("--displacement", help="Sliding: the displacement that is too far [m]."),
-    ] = None,
-    ks: Annotated[
-        float | None,
-        typer.Option("--ks", help="Slumping: yield acceleration coefficient k_s, with --ps2."),
-    ] = None,
-    ps2: Annotated[
-        float | None,
-        typer.Option("--ps2", help="Slumping: frequency parameter p_s² at rest [1/s²]."),
-    ] = None,
-    rotation: Annotated[
-        float | None,
-        typer.Option(
-            "--rotation",
-            help="Slumping: rotation that counts as failure [deg]; there must be a model of it. "
-            "Default: failure past recovery.",
-        ),
-    ] = None,
-    pgv: options.Pgv = None,
-    pga: options.Pga = None,
-    tm: options.Tm = None,
-    pgd: options.Pgd = None,
-    motion: Annotated[
-        str | None,
-        typer.Option(
-            "--motion",
-            metavar="MOTION",
-            help="The accelerogram itself, instead of its measures: a file, FILE#INDEX or a "
-            "database id. Its toppling spectrum answers, for both polarities and their mean.",
-        ),
-    ] = None,
-    polarity: Annotated[
-        str,
-        typer.Option("--polarity", help="With --motion: forward, reverse, or both where unknown."),
-    ] = "both",
-    batch: Annotated[
-        str | None,
-        typer.Option(
-            "--batch",
-            metavar="FILE",
-            help="Block table (.csv or .parquet) with columns p2_1_s2 and kr (or ky and "
-            "displacement_m; or ks and ps2_1_s2) and any of pgv_m_s, pga_g, tm_s, pgd_m; what is "
-            "the same for all rows may be an option.",
-        ),
-    ] = None,
-    out: Annotated[
-        str | None,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            help="With --batch: table to write, the same columns with probability, ci_low, "
-            "ci_high, in_domain and reason.",
-        ),
-    ] = None,
-    model: options.Model = None,
-    level: options.Level = 0.95,
-    units: options.Units = None,
-    dt: options.Dt = None,
-    db: options.Db = None,
+    block: BlockOptions,
+    failure: Failure,
+    measures: options.Measures,
+    record: Record,
+    reading: options.Reading,
+    table: Table,
+    answering: options.Answering,
     json: options.Json = False,
 ) -> None:
-    """Print the probability that a block fails, with its confidence interval.
+    """Print the probability that a block fails, with its interval.
 
     What is known of the motion decides which model answers: PGV; PGV and PGA; these and Tm; or
     the motion itself. Where the measures suffice for several terms, each is answered.
+
+    Toppling answers are for blocks backed by a slope; free-standing blocks fail at weaker
+    shaking.
     """
-    options_given = {
-        "p2": p2, "kr": kr, "ky": ky, "beta_deg": beta, "displacement_m": displacement, "ks": ks,
-        "ps2": ps2, "pgv_m_s": pgv, "pga_g": pga, "tm_s": tm, "pgd_m": pgd,
+    numbers = {
+        "p2": block.p2, "kr": block.kr, "ky": failure.ky, "displacement_m": failure.displacement,
+        "ks": failure.ks, "ps2": failure.ps2,
     }  # fmt: skip
-    given = {name: value for name, value in options_given.items() if value is not None}
-    asked: dict[str, Any] = {
-        "kind": kind, "rotation_deg": rotation, "model": model, "level": level, "db": db
+    given = {name: value for name, value in numbers.items() if value is not None}
+    given |= measures.given()
+    question: dict[str, Any] = {
+        "rotation_deg": failure.rotation, "model": answering.model, "level": answering.level,
+        "db": answering.db,
     }  # fmt: skip
-    if batch is not None or out is not None:
-        if block is not None or motion is not None:
-            raise InputError("--batch FILE describes the blocks: leave out --block and --motion")
-        _predict_table(batch, out, given, asked, json=json)
+    if table.batch is not None and table.out is not None:
+        from rbfrag.exchange.batch import predict_table
+
+        if block.beta is not None:
+            given["beta_deg"] = block.beta
+        summary = predict_table(table.batch, table.out, given=given, kind=failure.kind, **question)
+        _show_summary(summary, json=json)
         return
-    document = answer_one(
-        given, block=block, motion=motion, polarity=polarity, units=units, dt=dt, **asked
-    )
+    from rbfrag.fragility.predict import prediction_document
+
+    remarks = _complete(given, block, failure.kind)
+    if record.motion is not None:
+        from rbfrag.cli.parameters.motion import find_motion
+
+        question["motion"] = find_motion(record.motion, db=answering.db, reading=reading)
+        question["polarity"] = record.polarity
+    document = prediction_document(given, kind=failure.kind, remarks=remarks, **question)
     show_prediction(document, json=json)
 
 
-def answer_one(
-    given: Mapping[str, float],
-    *,
-    block: str | None = None,
-    kind: str | None = None,
-    rotation_deg: float | None = None,
-    motion: str | None = None,
-    polarity: str = "both",
-    model: str | None = None,
-    level: float = 0.95,
-    units: str | None = None,
-    dt: float | None = None,
-    db: str | None = None,
-) -> dict[str, Any]:
-    """Return the JSON document of one block.
+def _complete(given: dict[str, float], block: BlockOptions, kind: str | None) -> tuple[str, ...]:
+    """Add what the shape of a block says of it, and refuse a block of which something is missing.
 
-    Args:
-        given: block and measures of the motion, by the names of :func:`rbfrag.predict`.
-        block: a block file instead of the block's numbers.
-        kind: how the block fails.
-        rotation_deg: rotation that counts as failure [deg].
-        motion: the accelerogram itself: a file, ``FILE#INDEX`` or a database id.
-        polarity: forward, reverse or both; with `motion`.
-        model: name of a stored model.
-        level: confidence level of the interval.
-        units: unit of a text file of the motion.
-        dt: sampling interval of such a file [s].
-        db: database.
+    Returns:
+        Warnings about the block.
     """
     from rbfrag.fragility.lookup import block_of
-    from rbfrag.fragility.predict import prediction_document
 
-    asked, record = dict(given), None
     remarks: tuple[str, ...] = ()
-    described = block_of(asked)
-    if block is not None:
-        from rbfrag.cli.parameters.block import block_of_file
-
-        values, remarks = block_of_file(block, described.kind if kind is None else kind)
-        for name in values:
-            if name in asked:
-                raise InputError(
-                    f"{_option(name)} does not go with --block: the file describes the block"
-                )
-        asked |= values
-        described = block_of(asked)
-    missing = [name for name in described.names if name not in asked]
-    if missing and kind in (None, described.kind):
+    known_by = block_of(given)
+    shape = block.described()
+    if shape is not None:
+        values, remarks = numbers_of_kind(shape, known_by.kind if kind is None else kind)
+        if doubled := [name for name in values if name in given]:
+            raise InputError(
+                f"{option_of(doubled[0])} does not go with a shape, which describes the block"
+            )
+        given |= values
+        known_by = block_of(given)
+    elif block.beta is not None:
+        given["beta_deg"] = block.beta
+        known_by = block_of(given)
+    missing = [name for name in known_by.names if name not in given]
+    if missing and kind in (None, known_by.kind):
         raise InputError(
-            f"{_option(missing[0])} is missing: a block of kind {described.kind} is given by "
-            f"{' and '.join(map(_option, described.names))}, or by --block FILE"
+            f"{option_of(missing[0])} is missing: a block of kind {known_by.kind} is given by "
+            f"{' and '.join(map(option_of, known_by.names))}, or by {WAYS}"
         )
-    if motion is not None:
-        from rbfrag.cli.parameters.motion import find_motion
-
-        record = find_motion(motion, db=db, units=units, dt_s=dt)
-    return prediction_document(
-        asked,
-        kind=kind,
-        rotation_deg=rotation_deg,
-        motion=record,
-        polarity=polarity,
-        model=model,
-        level=level,
-        db=db,
-        remarks=remarks,
-    )
+    return remarks
 
 
-def _option(name: str) -> str:
-    return {"displacement_m": "--displacement", "beta_deg": "--beta"}.get(name, f"--{name}")
-
-
-def _predict_table(
-    batch: str | None,
-    out: str | None,
-    given: dict[str, float],
-    asked: dict[str, Any],
-    *,
-    json: bool,
-) -> None:
-    from rbfrag.exchange.batch import predict_table
-
-    if batch is None or out is None:
-        raise InputError(
-            "--batch and --out go together: --batch FILE names the blocks, --out FILE the answers"
-        )
-    summary = predict_table(batch, out, given=given, **asked)
+def _show_summary(summary: dict[str, Any], *, json: bool) -> None:
     warnings = summary.pop("warnings")
     if json:
         print_json({**summary, "warnings": warnings})
         return
     print_pairs(summary)
-    print_warnings(warnings)  # type: ignore[arg-type]
+    print_warnings(warnings)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
-
-import typer
+from dataclasses import dataclass
+from typing import Any
 
 from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import toppling_blocks
+from rbfrag.cli.parameters.block import BlocksOptions
+from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 
 EXAMPLE = "Example:  rbfrag shakemap grid.xml --p2 3 --kr 0.1 --out map.geojson --plot map.png"
@@ -16,63 +16,38 @@ EXAMPLE = "Example:  rbfrag shakemap grid.xml --p2 3 --kr 0.1 --out map.geojson 
 SUFFIXES = (".geojson", ".json", ".csv", ".parquet", ".gpkg")
 
 
+@dataclass(frozen=True, kw_only=True)
+class MapOptions:
+    """What a ShakeMap means."""
+
+    uncertainty: str | None = option(
+        "uncertainty.xml of the same map: the answer is integrated over it.", metavar="FILE"
+    )
+    component: str = option(
+        "What the map's measures mean: larger (ShakeMap's default), rotd50, "
+        "geometric_mean or single.",
+        "larger",
+    )
+    allow_partial: bool = option("Read a grid that has not its declared size.", False)
+
+
+@stacked
 def shakemap(
-    grid: Annotated[str, typer.Argument(metavar="GRID.xml", help="ShakeMap grid, version 3 or 4.")],
-    out: Annotated[
-        str,
-        typer.Option("--out", help="File to write: .geojson, .csv, .parquet or .gpkg (extra gis)."),
-    ],
-    p2: options.P2OrFile = None,
-    kr: options.KrOrFile = None,
-    block: options.BlockFile = None,
-    blocks: Annotated[
-        str | None,
-        typer.Option(
-            "--blocks",
-            metavar="FILE",
-            help="Blocks (.csv, .parquet, .geojson) with p2_1_s2 [1/s²] and kr: with lon and lat "
-            "[deg] one answer a block, without them a class that stands at every node.",
-        ),
-    ] = None,
-    rockmass: Annotated[
-        str | None,
-        typer.Option(
-            "--rockmass",
-            metavar="FILE",
-            help="Rock mass file (.toml, .csv): its stable toppling blocks stand at every node.",
-        ),
-    ] = None,
-    n: Annotated[int, typer.Option("--n", help="Number of realisations of the rock mass.")] = 200,
-    uncertainty: Annotated[
-        str | None,
-        typer.Option(
-            "--uncertainty",
-            metavar="FILE",
-            help="uncertainty.xml of the same map: the answer is integrated over it.",
-        ),
-    ] = None,
-    component: Annotated[
-        str,
-        typer.Option(
-            "--component",
-            help="What the map's measures mean: larger (ShakeMap's default), rotd50, "
-            "geometric_mean or single.",
-        ),
-    ] = "larger",
-    allow_partial: Annotated[
-        bool, typer.Option("--allow-partial", help="Read a grid that has not its declared size.")
-    ] = False,
-    plot: Annotated[
-        str | None, typer.Option("--plot", help="Draw the map (.png, .pdf, .svg).")
-    ] = None,
-    model: options.Model = None,
-    level: options.Level = 0.95,
-    db: options.Db = None,
+    *,
+    grid: str = argument("ShakeMap grid, version 3 or 4.", metavar="GRID.xml"),
+    out: str = option("File to write: .geojson, .csv, .parquet or .gpkg (extra gis).", ...),
+    blocks: BlocksOptions,
+    meaning: MapOptions,
+    answering: options.Answering,
+    n: int = option("Number of realisations of the rock mass.", 200),
+    plot: str | None = option("Draw the map (.png, .pdf, .svg)."),
     json: options.Json = False,
 ) -> None:
-    """Write the probability that blocks topple at every node of a ShakeMap, or at each block.
+    """Write the probability that blocks topple across a ShakeMap.
 
-    PGV and PGA of the map are used together where a model knows both.
+    One block, a table without lon and lat, or a rock mass stands at every node; a table with lon
+    and lat [deg] is answered block by block. PGV and PGA of the map are used together where a
+    model knows both. Blocks are backed by a slope; free-standing ones fail at weaker shaking.
     """
     import numpy as np
 
@@ -83,13 +58,15 @@ def shakemap(
 
     target = output_path(out, SUFFIXES, "map")
     check_files(plot=plot)
-    meaning = component_named(component)
-    found_blocks, _, remarks = toppling_blocks(p2, kr, block, blocks, rockmass, n=n)
-    shaken = read_shakemap(grid, uncertainty=uncertainty, allow_partial=allow_partial)
+    component = component_named(meaning.component)
+    class_blocks, _, remarks = blocks.toppling_blocks(n=n)
+    shaken = read_shakemap(
+        grid, uncertainty=meaning.uncertainty, allow_partial=meaning.allow_partial
+    )
     warnings = [*remarks, *shaken.warnings]
-    own = "lon" in found_blocks
+    own = "lon" in class_blocks
     if own:
-        lon, lat = found_blocks["lon"], found_blocks["lat"]
+        lon, lat = class_blocks["lon"], class_blocks["lat"]
         fields, on_map = at_places(shaken, lon, lat)
         if not on_map.all():
             warnings.append(
@@ -113,9 +90,9 @@ def shakemap(
     if not on_map.any():
         raise InputError(f"{grid}: none of the blocks lies on the map")
     warnings.append(
-        f"the map's measures are taken as {meaning.title}; Beyer and Bommer (2006) relate them to "
-        "one component"
-        if meaning.name != "single"
+        f"the map's measures are taken as {component.title}; Beyer and Bommer (2006) relate them "
+        "to one component"
+        if component.name != "single"
         else "the map is taken to be of one component"
     )
     picked = {name: None if values is None else values[on_map] for name, values in fields.items()}
@@ -124,11 +101,11 @@ def shakemap(
     assert pga is not None
     answer = site_probability(
         pgv, pga,
-        found_blocks["p2_1_s2"][on_map] if own else found_blocks["p2_1_s2"],
-        found_blocks["kr"][on_map] if own else found_blocks["kr"],
-        component=meaning, weight=None if own else found_blocks.get("weight"), own_block=own,
+        class_blocks["p2_1_s2"][on_map] if own else class_blocks["p2_1_s2"],
+        class_blocks["kr"][on_map] if own else class_blocks["kr"],
+        component=component, weight=None if own else class_blocks.get("weight"), own_block=own,
         std_ln_pgv=picked["std_ln_pgv"], std_ln_pga=picked["std_ln_pga"],
-        model=model, level=level, db=db,
+        model=answering.model, level=answering.level, db=answering.db,
     )  # fmt: skip
 
     def placed(values: Any, empty: Any = np.nan) -> Any:
@@ -138,7 +115,7 @@ def shakemap(
 
     columns: dict[str, Any] = {}
     if own:
-        columns["block_id"] = found_blocks["block_id"]
+        columns["block_id"] = class_blocks["block_id"]
     columns |= {
         "lon": lon,
         "lat": lat,
@@ -164,7 +141,7 @@ def shakemap(
         "model": answer.model,
         "term": answer.term,
         "method": answer.method,
-        "level": level,
+        "level": answering.level,
         "uncertainty_integrated": fields["std_ln_pgv"] is not None,
     }
     _write(columns, {**document, "warnings": warnings}, target)
@@ -175,7 +152,7 @@ def shakemap(
         size = "" if event.magnitude is None else f", M {event.magnitude:g}"
         plot_shakemap(
             lon, lat, columns["probability"], plot,
-            title=f"{name}{size}\n{_what(found_blocks, own)}; model {answer.model}",
+            title=f"{name}{size}\n{_what(class_blocks, own)}; model {answer.model}",
             epicentre=None if event.lon is None or event.lat is None else (event.lon, event.lat),
             shape=(shaken.rows, shaken.columns) if shaken.is_whole and not own else None,
         )  # fmt: skip

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal, cast
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, cast
 
-import typer
-
-from rbfrag.cli.output import ProgressLine, print_json, print_pairs, print_warnings
+from rbfrag.cli.output import (
+    ProgressBar,
+    print_json,
+    print_pairs,
+    print_warnings,
+    say_when_compiling,
+)
 from rbfrag.cli.parameters import options
+from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.cli.parameters.values import number_list
 
 if TYPE_CHECKING:
@@ -20,87 +26,60 @@ RECOVERY = "recovery"
 """What stands for failure past recovery in a list of rotations."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Workers:
+    """Who does the work."""
+
+    jobs: options.Jobs = None
+    scheduler: str | None = option(
+        "Dask scheduler whose workers take the place of local ones, tcp://host:8786.", metavar="URL"
+    )
+
+
+@stacked
 def simulate(
+    *,
+    workers: Workers,
     suite: options.Suite = None,
-    kind: Annotated[
-        str, typer.Option("--kind", help="What the blocks do: toppling, slumping or sliding.")
-    ] = "toppling",
-    p2: Annotated[
-        str | None,
-        typer.Option(
-            "--p2",
-            help="Toppling: frequency parameters p² [1/s²], separated by commas. Default: "
-            "30,10,3,1,0.3,0.1.",
-        ),
-    ] = None,
-    rotation: Annotated[
-        str | None,
-        typer.Option(
-            "--rotation",
-            metavar="LIST",
-            help="Slumping: rotations that count as failure [deg], and the word recovery for "
-            "failure past recovery. Default: 2,recovery.",
-        ),
-    ] = None,
-    displacement: Annotated[
-        str | None,
-        typer.Option(
-            "--displacement",
-            metavar="LIST",
-            help="Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.",
-        ),
-    ] = None,
-    vertical: Annotated[
-        str,
-        typer.Option(
-            "--vertical",
-            metavar="without|with|both",
-            help="Horizontal motions alone, with the vertical one of their recording, or both.",
-        ),
-    ] = "without",
-    full_map: Annotated[
-        bool,
-        typer.Option(
-            "--map",
-            help="Toppling and slumping: store the intervals of strength that fail and that do "
-            "not, too.",
-        ),
-    ] = False,
-    grid: Annotated[
-        str | None,
-        typer.Option(
-            "--grid",
-            metavar="N|LIST",
-            help="Toppling: run more blocks than the outcome grid holds: N of them, from 0.99 PGA "
-            "down to 0.01 PGA in equal ratios, or at the k_r/PGA of a list.",
-        ),
-    ] = None,
-    store_responses: Annotated[
-        str | None,
-        typer.Option(
-            "--store-responses",
-            metavar="LIST",
-            help="Toppling: keep the motion in time of these blocks, some 300 kB each: k_r/PGA "
-            "values, or the word critical for the critical block of each combination.",
-        ),
-    ] = None,
-    jobs: Annotated[
-        int | None, typer.Option("--jobs", help="Worker processes. Default: one per processor.")
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            "--scheduler",
-            metavar="URL",
-            help="Dask scheduler whose workers take the place of local ones, tcp://host:8786.",
-        ),
-    ] = None,
+    kind: str = option("What the blocks do: toppling, slumping or sliding.", "toppling"),
+    p2: str | None = option(
+        "Toppling: frequency parameters p² [1/s²], separated by commas. Default: 30,10,3,1,0.3,0.1."
+    ),
+    rotation: str | None = option(
+        "Slumping: rotations that count as failure [deg], and the word recovery for "
+        "failure past recovery. Default: 2,recovery.",
+        metavar="LIST",
+    ),
+    displacement: str | None = option(
+        "Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.", metavar="LIST"
+    ),
+    vertical: str = option(
+        "Horizontal motions alone, with the vertical one of their recording, or both.",
+        "without",
+        metavar="without|with|both",
+    ),
+    full_map: bool = option(
+        "Toppling and slumping: store the intervals of strength that fail and that do not, too.",
+        False,
+        word="--map",
+    ),
+    grid: str | None = option(
+        "Toppling: run more blocks than the outcome grid holds: N of them, from 0.99 PGA "
+        "down to 0.01 PGA in equal ratios, or at the k_r/PGA of a list.",
+        metavar="N|LIST",
+    ),
+    store_responses: str | None = option(
+        "Toppling: keep the motion in time of these blocks, some 300 kB each: k_r/PGA "
+        "values, or the word critical for the critical block of each combination.",
+        metavar="LIST",
+    ),
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Store critical values and outcomes of every motion x vertical x polarity x block.
+    """Store critical values and outcomes of every motion and block.
 
-    Of toppling the critical block of each p2 and the outcomes of a grid of blocks; with --kind
+    A combination is a motion, without or with its vertical one, in one polarity, and a block. Of
+    toppling the critical block of each p2 and the outcomes of a grid of blocks; with --kind
     slumping, the factor on each record that brings each block of a documented family down; with
     --kind sliding, the strengths that slide stated displacements.
 
@@ -109,23 +88,27 @@ def simulate(
     """
     from rbfrag.campaign.simulate import simulate as run
 
-    with ProgressLine("simulate", "combinations") as line:
+    say_when_compiling()
+    with ProgressBar("simulate", "combinations") as bar:
+
+        def show(progress: CampaignProgress) -> None:
+            before = f"{progress.resumed} stored before" if progress.resumed else ""
+            bar.show(progress.done, progress.total, before)
+
         summary = run(
             db,
             kind=kind,
             suite=suite,
-            p2=None if p2 is None else number_list(p2, "--p2"),
+            p2=_numbers(p2, "--p2"),
             rotations_deg=None if rotation is None else _rotations(rotation),
-            displacements_m=None
-            if displacement is None
-            else number_list(displacement, "--displacement"),
+            displacements_m=_numbers(displacement, "--displacement"),
             vertical=cast("Vertical", vertical),  # any other word is refused
             grid=None if grid is None else _grid(grid),
             store_responses=None if store_responses is None else _blocks(store_responses),
             full_map=full_map,
-            jobs=jobs,
-            scheduler=scheduler,
-            on_progress=lambda progress: _show(line, progress),
+            jobs=workers.jobs,
+            scheduler=workers.scheduler,
+            on_progress=show,
         )
     report = summary.as_dict()
     if json:
@@ -136,8 +119,8 @@ def simulate(
     print_pairs(report)
 
 
-def _show(line: ProgressLine, progress: CampaignProgress) -> None:
-    line.show(progress, f"{progress.resumed} stored before" if progress.resumed else "")
+def _numbers(text: str | None, option: str) -> list[float] | None:
+    return None if text is None else number_list(text, option)
 
 
 def _rotations(text: str) -> list[float | None]:

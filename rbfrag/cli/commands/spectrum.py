@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.output import check_files, print_json, print_table, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion
+from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.cli.parameters.values import number_list
 from rbfrag.cli.parameters.values import polarities as polarities_of
 
@@ -20,40 +19,32 @@ if TYPE_CHECKING:
 EXAMPLE = "Example:  rbfrag spectrum record.AT2 --polarity both --plot spectrum.png"
 
 
+@stacked
 def spectrum(
+    *,
     motions: options.Motions,
-    p2: Annotated[
-        str, typer.Option("--p2", help="Frequency parameters p² [1/s²], separated by commas.")
-    ] = "30,10,3,1,0.3,0.1",
+    reading: options.Reading,
+    p2: str = option("Frequency parameters p² [1/s²], separated by commas.", "30,10,3,1,0.3,0.1"),
     polarity: options.Polarity = "forward",
-    csv: Annotated[
-        str | None, typer.Option("--csv", help="Write the values (.csv or .parquet).")
-    ] = None,
-    plot: Annotated[
-        str | None,
-        typer.Option(
-            "--plot", help="Draw the spectra over p², with PGV beside them (.png, .pdf, .svg)."
-        ),
-    ] = None,
-    units: options.Units = None,
-    dt: options.Dt = None,
+    csv: str | None = option("Write the values (.csv or .parquet)."),
+    plot: str | None = option("Draw the spectra over p², with PGV beside them (.png, .pdf, .svg)."),
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Compute the toppling spectrum X(p) [m/s]: what a motion can topple of any size.
+    """Compute the toppling spectrum X(p): what a motion can topple.
 
-    No block with a toppling velocity k_r g/p more than 2 % above X(p) topples. With --json, one
-    motion in one polarity is an object, several are a list of such objects.
+    X(p) is in m/s. No block with a toppling velocity k_r g/p more than 2 % above X(p) topples.
+    With --json, one motion in one polarity is an object, several are a list of such objects.
     """
     from rbfrag.exchange.block_table import write_block_table
     from rbfrag.motions.toppling_spectrum import spectrum_as_dict as as_dict
 
     sizes, polarities = number_list(p2, "--p2"), polarities_of(polarity)
     check_files(table=csv, plot=plot)
-    found = [find_motion(text, db=db, units=units, dt_s=dt) for text in motions]
+    records = [find_motion(text, db=db, reading=reading) for text in motions]
     answers = [
         as_dict(text, ground, sizes, each)
-        for text, ground in zip(motions, found, strict=True)
+        for text, ground in zip(motions, records, strict=True)
         for each in polarities
     ]
     if csv is not None:
@@ -61,7 +52,7 @@ def spectrum(
     if plot is not None:
         from rbfrag.plots.spectrum import plot_spectrum
 
-        plot_spectrum(found, plot, polarities=polarities, p2=sizes)
+        plot_spectrum(records, plot, polarities=polarities, p2=sizes)
     if json:
         print_json(answers[0] if len(answers) == 1 else answers)
         return

@@ -1,12 +1,15 @@
-"""The blocks of a command: two numbers, a file that describes one, a table, or a rock mass."""
+"""The blocks of a command: numbers, a shape, a file that describes one, a table, a rock mass."""
 
 from __future__ import annotations
 
-import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
+import typer
+
+from rbfrag.cli.parameters.stack import option
 from rbfrag.errors import InputError
-from rbfrag.fragility.methods import TOPPLING_BLOCK
+from rbfrag.solver.described import DescribedBlock, describe, numbers_of_kind
 
 if TYPE_CHECKING:
     import numpy as np
@@ -14,99 +17,139 @@ if TYPE_CHECKING:
 
     from rbfrag.rockmasses.joint_sets import RockMass
 
+WAYS = (
+    "--height and --width, or by --alpha1, --alpha3 and --r3, or by --s1, --s2 and --gamma, or by "
+    "--block or --polygon FILE"
+)
+"""How a shape is given."""
 
-def toppling_block(
-    p2: float | None, kr: float | None, block: str | None
-) -> tuple[float, float, tuple[str, ...]]:
-    """Return p2 [1/s²], k_r and warnings.
+_Number = float | None
 
-    Raises:
-        InputError: an option is missing or given twice, or the block does not topple; the
-            message names the mode that governs instead.
-    """
-    if block is None:
-        if p2 is None or kr is None:
-            missing = "--p2" if p2 is None else "--kr"
-            raise InputError(
-                f"{missing} is missing: a block is given by --p2 and --kr, or by --block FILE"
-            )
-        return p2, kr, ()
-    if p2 is not None or kr is not None:
-        extra = "--kr" if p2 is None else "--p2"
-        raise InputError(f"{extra} does not go with --block: the file describes the block")
-    values, remarks = block_of_file(block, TOPPLING_BLOCK.kind)
-    return values["p2"], values["kr"], remarks
+NoBack = Annotated[bool, typer.Option("--no-back", help="There is no fracture behind the block.")]
 
 
-def block_of_file(path: str, kind: str) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return what predictions read of the block of a file, by name, and warnings.
+@dataclass(frozen=True, kw_only=True)
+class ShapeOptions:
+    """A block by its shape, and its planes."""
 
-    Args:
-        path: a block file that states beta_deg and phi_deg.
-        kind: how the block is asked to fail.
+    height: _Number = option(
+        "Height of a rectangular block, perpendicular to its base [m], with --width."
+    )
+    width: _Number = option("Width of a rectangular block along its base [m].")
+    dip: _Number = option("Dip of the base of a rectangular block [deg], its --beta. Default: 0.")
+    alpha1: _Number = option("Angle of the heel [deg], with --alpha3 and --r3.")
+    alpha3: _Number = option("Angle of the toe [deg].")
+    r3: _Number = option("Distance from centroid to toe [m].")
+    s1: _Number = option("Spacing of the base fractures [m], with --s2 and --gamma.")
+    s2: _Number = option("Spacing of the back fractures [m].")
+    gamma: _Number = option("Dip of the back plane less dip of the base [deg].")
+    block: str | None = option(
+        "Block file (.toml or .csv); what it states about the planes may be given anew by options.",
+        metavar="FILE",
+    )
+    polygon: str | None = option(
+        "File with the outline of a block (.csv or .toml), read as --block is.", metavar="FILE"
+    )
+    beta: _Number = option("Dip of the base, out of the slope positive [deg].")
+    phi: _Number = option(
+        "Friction angle of the base [deg]; only a rectangle is taken to topple without."
+    )
+    phi_back: _Number = option("Friction angle of the back plane [deg]. Default: that of the base.")
+    no_back: NoBack = False
 
-    Raises:
-        InputError: the block is of another mode, or no earthquake decides about it.
-    """
-    from rbfrag.solver.block.file import read_block
-    from rbfrag.solver.kinds import model_of_kind
-    from rbfrag.solver.mechanism import shaken_mechanism
-    from rbfrag.solver.stability.modes import words_of_mode
-    from rbfrag.solver.stability.single import stability
+    def described(self, **conditions: float | None) -> DescribedBlock | None:
+        """Return the block, or None where no option says anything of its shape.
 
-    model = model_of_kind(kind)
-    if not model.parameters:
-        raise InputError(f"there is no fragility model of kind {kind}")
-    file = read_block(path)
-    conditions = dict(file.conditions)
-    for name in ("beta_deg", "phi_deg"):
-        if name not in conditions:
-            raise InputError(
-                f"{path}: {name} is missing: how the block fails depends on dip and friction"
-            )
-    if conditions.pop("kv", 0.0) != 0.0:
-        raise InputError(
-            f"{path}: kv does not belong in a block that is to be shaken: the vertical "
-            "acceleration comes with the motion; leave the line out"
+        Args:
+            conditions: further keywords of `rbfrag.stability` that were given, or None.
+        """
+        lengths = ("height", "width", "dip", "alpha1", "alpha3", "r3", "s1", "s2", "gamma")
+        return describe(
+            {name: getattr(self, name) for name in lengths},
+            {
+                "beta_deg": self.beta,
+                "phi_deg": self.phi,
+                "phi_back_deg": self.phi_back,
+                "back_fracture": False if self.no_back else None,
+                **conditions,
+            },
+            file=self.block or self.polygon,
+            spell=option_of,
         )
-    found = stability(file.block, **conditions)
-    if found.mode != model.mode:
-        raise InputError(
-            f"{path}: its mode is {words_of_mode(found.mode)} (yield "
-            f"{found.yield_acceleration:.4g} g, {found.state}), and the {kind} model says nothing "
-            "about it; see  rbfrag block --polygon FILE"
-        )
-    if found.state != "stable" or found.yield_acceleration <= 0.0:
-        raise InputError(
-            f"{path}: the block is {found.state} in {words_of_mode(found.mode)} (yield "
-            f"{found.yield_acceleration:.4g} g): no earthquake decides about it"
-        )
-    if "ps2" in model.parameters:
-        for name, nothing in (("cohesion_pa", 0.0), ("back_fracture", True)):
-            if conditions.pop(name, nothing) != nothing:
-                raise InputError(f"{path}: {name} does not go with {kind}: leave it out")
-        conditions.pop("density_kg_m3", None)
-        try:
-            shaken = shaken_mechanism(file.block, kind=kind, **conditions)
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
-        values = {"ks": shaken.yield_g, "ps2": shaken.p2}
-        if math.isfinite(shaken.leaves_g):
-            values["leaves_g"] = shaken.leaves_g
-        return values, shaken.remarks
-    values = {
-        "p2": file.block.p2,
-        "kr": found.yield_acceleration,
-        "ky": found.yield_acceleration,
-    }
-    values = {name: value for name, value in values.items() if name in model.parameters}
-    if "ky" in values:
-        if conditions.get("cohesion_pa"):
-            raise InputError(
-                f"{path}: cohesion_pa does not go with {kind}: the first slip breaks it"
-            )
-        values["beta_deg"] = found.beta_deg
-    return values, found.warnings
+
+
+@dataclass(frozen=True, kw_only=True)
+class NumberOptions:
+    """A toppling block by two numbers."""
+
+    p2: _Number = option("Frequency parameter p² of the block [1/s²], with --kr.")
+    kr: _Number = option(
+        "Rocking acceleration coefficient k_r = tan(critical angle) [g], with --p2."
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlockOptions(ShapeOptions, NumberOptions):
+    """A block by numbers or by its shape."""
+
+    def toppling(self) -> tuple[float, float, tuple[str, ...]]:
+        """Return p2 [1/s²], k_r and warnings.
+
+        Raises:
+            InputError: an option is missing, or the block does not topple; the message names the
+                mode that governs instead.
+        """
+        from rbfrag.fragility.methods import TOPPLING_BLOCK
+
+        described = self.described()
+        if described is None:
+            if self.p2 is None or self.kr is None:
+                missing = "--p2" if self.p2 is None else "--kr"
+                raise InputError(
+                    f"{missing} is missing: a block is given by --p2 and --kr, or by {WAYS}"
+                )
+            return self.p2, self.kr, ()
+        values, remarks = numbers_of_kind(described, TOPPLING_BLOCK.kind)
+        return values["p2"], values["kr"], remarks
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlocksOptions(BlockOptions):
+    """One block, or many."""
+
+    blocks: str | None = option(
+        "Table of blocks (.csv, .parquet, .geojson) with p2_1_s2 [1/s²] and kr, or "
+        "height_m and width_m [m] (and dip_deg); one answer a row.",
+        metavar="FILE",
+    )
+    rockmass: str | None = option(
+        "Rock mass file (.toml, .csv): the mean over its stable toppling blocks.", metavar="FILE"
+    )
+
+    def toppling_blocks(self, *, n: int | None = None, name: str | None = None) -> TopplingBlocks:
+        """Return the blocks that the options describe.
+
+        Args:
+            n: number of realisations of the rock mass; None for what its file says.
+            name: identifier of a single block.
+        """
+        import numpy as np
+
+        if self.blocks is not None:
+            from rbfrag.exchange.block_table import waiting_blocks
+
+            return TopplingBlocks(waiting_blocks(self.blocks), False, ())
+        if self.rockmass is not None:
+            return _of_rock_mass(self.rockmass, n)
+        from rbfrag.solver.quantity import positive
+
+        p2, kr, remarks = self.toppling()
+        columns = {
+            "block_id": [name],
+            "p2_1_s2": np.array([positive(p2, "p2", "1/s²")]),
+            "kr": np.array([positive(kr, "kr", "g")]),
+        }
+        return TopplingBlocks(columns, False, remarks)
 
 
 class TopplingBlocks(NamedTuple):
@@ -124,60 +167,24 @@ class TopplingBlocks(NamedTuple):
     remarks: tuple[str, ...]
 
 
-def toppling_blocks(
-    p2: float | None,
-    kr: float | None,
-    block: str | None,
-    blocks: str | None,
-    rockmass: str | None,
-    *,
-    n: int | None = None,
-    name: str | None = None,
-) -> TopplingBlocks:
-    """Return the blocks that one of four options or pairs of options describes.
+def option_of(name: str) -> str:
+    """Return what a name is called on the command line."""
+    return "--" + name.removesuffix("_deg").removesuffix("_m").replace("_", "-")
 
-    Args:
-        p2: the option --p2.
-        kr: the option --kr.
-        block: the option --block, a block file.
-        blocks: the option --blocks, a table or GeoJSON points.
-        rockmass: the option --rockmass, a rock mass file.
-        n: number of realisations of the rock mass; None for what its file says.
-        name: identifier of a single block.
-    """
-    import numpy as np
 
-    alone = p2 is not None or kr is not None or block is not None
-    if (blocks is not None) + (rockmass is not None) + alone > 1:
-        raise InputError(
-            "give one of --p2 with --kr, --block, --blocks and --rockmass, not several of them"
-        )
-    if blocks is not None:
-        from rbfrag.exchange.block_table import waiting_blocks
+def _of_rock_mass(path: str, n: int | None) -> TopplingBlocks:
+    from rbfrag.rockmasses.file import read_rock_mass
+    from rbfrag.rockmasses.report import toppling_blocks as stable_topples
 
-        return TopplingBlocks(waiting_blocks(blocks), False, ())
-    if rockmass is not None:
-        from rbfrag.rockmasses.file import read_rock_mass
-        from rbfrag.rockmasses.report import toppling_blocks as stable_topples
-
-        p2s, krs, share = stable_topples(read_rock_mass(rockmass).realise(n, None))
-        if krs.size == 0:
-            raise InputError(f"{rockmass}: no block of it topples: there is no model for them")
-        remark = (
-            f"the answer is the mean over {krs.size} stable toppling blocks, "
-            f"{100.0 * share:.3g} % of the rock mass; the others have no part in it"
-        )
-        columns = {"block_id": ["rock mass"], "p2_1_s2": p2s, "kr": krs}
-        return TopplingBlocks(columns, True, (remark,))
-    from rbfrag.solver.quantity import positive
-
-    one_p2, one_kr, remarks = toppling_block(p2, kr, block)
-    columns = {
-        "block_id": [name],
-        "p2_1_s2": np.array([positive(one_p2, "p2", "1/s²")]),
-        "kr": np.array([positive(one_kr, "kr", "g")]),
-    }
-    return TopplingBlocks(columns, False, remarks)
+    p2s, krs, share = stable_topples(read_rock_mass(path).realise(n, None))
+    if krs.size == 0:
+        raise InputError(f"{path}: no block of it topples: there is no model for them")
+    remark = (
+        f"the answer is the mean over {krs.size} stable toppling blocks, "
+        f"{100.0 * share:.3g} % of the rock mass; the others have no part in it"
+    )
+    columns = {"block_id": ["rock mass"], "p2_1_s2": p2s, "kr": krs}
+    return TopplingBlocks(columns, True, (remark,))
 
 
 class ChartedBlocks(NamedTuple):
@@ -206,8 +213,6 @@ def charted_blocks(
         phi_back: that of the back plane [deg]; None for the same.
         no_back: whether the chart has no back fracture.
     """
-    if blocks is not None and rockmass is not None:
-        raise InputError("--blocks does not go with --rockmass: show one of them")
     warnings: list[str] = []
     names = ("alpha1_deg", "alpha3_deg")
     if blocks is not None:

@@ -5,19 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rbfrag.cli.parameters.options import Direction, Reading
+
 if TYPE_CHECKING:
     from rbfrag.db.rows import MotionRow
     from rbfrag.db.vertical_pairs import VerticalPair
     from rbfrag.motions.ground_motion import GroundMotion
 
+AS_STATED = Reading()
+
 
 def find_motion(
-    text: str,
-    *,
-    db: str | None,
-    units: str | None = None,
-    dt_s: float | None = None,
-    allow_partial: bool = False,
+    text: str, *, db: str | None, reading: Reading = AS_STATED, allow_partial: bool = False
 ) -> GroundMotion:
     """Return the motion that a MOTION argument means.
 
@@ -25,8 +24,7 @@ def find_motion(
         text: a path, ``path#index``, or the id of a stored motion. A number that is also the
             name of an existing file means the file.
         db: where ids are looked up.
-        units: unit of a text file that does not state it.
-        dt_s: sampling interval [s] of a text file without a time column.
+        reading: what a text file leaves open.
         allow_partial: read a file whose header states another number of samples than follow.
     """
     if _is_id(text):
@@ -37,7 +35,7 @@ def find_motion(
             return load_motion(connection, int(text))
     from rbfrag.motions.recognise import read_motion
 
-    return read_motion(text, units=units, dt_s=dt_s, allow_partial=allow_partial)
+    return read_motion(text, units=reading.units, dt_s=reading.dt, allow_partial=allow_partial)
 
 
 def stored_row(text: str, *, db: str | None) -> tuple[MotionRow, VerticalPair | None] | None:
@@ -66,32 +64,29 @@ def _is_id(text: str) -> bool:
     return text.isascii() and text.isdigit() and not Path(text).exists()
 
 
-def find_vertical(
-    text: str | None,
-    horizontal: GroundMotion,
-    *,
-    db: str | None,
-    units: str | None = None,
-    dt_s: float | None = None,
-) -> tuple[GroundMotion | None, list[str]]:
-    """Return the vertical motion that `--vertical` means, upward, and what to warn of.
+def find_shaking(
+    text: str, direction: Direction, *, db: str | None, reading: Reading
+) -> tuple[GroundMotion, GroundMotion | None, list[str]]:
+    """Return the motion that a MOTION argument means, its vertical one, and what to warn of.
 
     Args:
-        text: as for :func:`find_motion`, or None.
-        horizontal: the motion it is to go with.
+        text: as for :func:`find_motion`.
+        direction: names the vertical motion, upward positive.
         db: as for :func:`find_motion`.
-        units: likewise.
-        dt_s: likewise.
+        reading: likewise.
     """
-    if text is None:
-        return None, []
+    horizontal = find_motion(text, db=db, reading=reading)
+    if direction.vertical is None:
+        return horizontal, None, []
     from rbfrag.motions.direction import companion
 
-    found = find_motion(text, db=db, units=units, dt_s=dt_s)
+    upward = find_motion(direction.vertical, db=db, reading=reading)
     warnings = []
-    if found.is_vertical is False:
-        warnings.append(f"{text} is the horizontal component {found.component} by its own header")
-    vertical = companion(horizontal, found)
-    if vertical is not found:
+    if upward.is_vertical is False:
+        warnings.append(
+            f"{direction.vertical} is the horizontal component {upward.component} by its own header"
+        )
+    vertical = companion(horizontal, upward)
+    if vertical is not upward:
         warnings.append(vertical.remarks[-1])
-    return vertical, warnings
+    return horizontal, vertical, warnings

@@ -1,20 +1,20 @@
-"""Stored combinations against their inputs, their brackets and what was simulated."""
+"""Stored combinations and histories against their inputs, their brackets and what was simulated."""
 
 from __future__ import annotations
 
 import itertools
 import json
 import math
-from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from typing import Any
 
-from sqlalchemy import Connection, Row, RowMapping, Select, select
+from sqlalchemy import Connection, RowMapping, func, select
 
 from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
 from rbfrag.db.check.maps import interval_problems
-from rbfrag.db.keys import key_of_row
-from rbfrag.db.schema import campaign, combination, motion, outcome_interval, simulation
+from rbfrag.db.keys import key_of_row, response_key
+from rbfrag.db.rows import Interval, Point
+from rbfrag.db.schema import campaign, combination, motion, response, vertical, with_motions
+from rbfrag.db.stored_combination import intervals_of, points_of
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 # What a few roundings of a product and a quotient can do.
@@ -25,31 +25,13 @@ _ROUNDING_OF_SUMS = 1e-9
 
 _ROWS_AT_ONCE = 500
 
+_SERIES = ("time_s", "theta_rad", "theta_dot_rad_s", "k_h", "k_v")
+_BLOCK_OF_RESPONSE = ("polarity", "kind", "p2", "kr", "numerics_version", "linear")
+
 
 def check_combinations(connection: Connection) -> Iterator[Finding]:
     """Yield what is wrong with combinations, their intervals and their simulations."""
-    query = _query()
-    last = 0
-    while True:
-        rows = (
-            connection.execute(query.where(combination.c.id > last).limit(_ROWS_AT_ONCE))
-            .mappings()
-            .all()
-        )
-        if not rows:
-            return
-        last = rows[-1]["id"]
-        ids = (rows[0]["id"], last)
-        intervals = _children(connection, outcome_interval, ids)
-        points = _children(connection, simulation, ids)
-        for row in rows:
-            for problem in _problems(row, intervals[row["id"]], points[row["id"]]):
-                yield Finding("combination", str(row["id"]), problem, COMPUTE_AGAIN)
-
-
-def _query() -> Select[Any]:
-    vertical = motion.alias("vertical")
-    return (
+    query = (
         select(
             combination,
             motion.c.pga_g,
@@ -58,32 +40,25 @@ def _query() -> Select[Any]:
             vertical.c.samples_sha256.label("vertical_sha256"),
             campaign.c.numerics_version.label("campaign_numerics"),
         )
-        .select_from(
-            combination.join(motion, motion.c.id == combination.c.motion_id)
-            .outerjoin(vertical, vertical.c.id == combination.c.vertical_motion_id)
-            .outerjoin(campaign, campaign.c.id == combination.c.campaign_id)
-        )
+        .select_from(with_motions(combination).outerjoin(campaign))
         .order_by(combination.c.id)
     )
-
-
-def _children(
-    connection: Connection, table: Any, ids: tuple[int, int]
-) -> defaultdict[int, list[Row[Any]]]:
-    own = [column for column in table.c if column.name != "combination_id"]
-    query = (
-        select(table.c.combination_id, *own)
-        .where(table.c.combination_id.between(*ids))
-        .order_by(table.c.combination_id, own[0])
-    )
-    by_id: defaultdict[int, list[Row[Any]]] = defaultdict(list)
-    for row in connection.execute(query):
-        by_id[row.combination_id].append(row)
-    return by_id
+    last = 0
+    while True:
+        some = query.where(combination.c.id > last).limit(_ROWS_AT_ONCE)
+        rows = connection.execute(some).mappings().all()
+        if not rows:
+            return
+        last = rows[-1]["id"]
+        ids = [row["id"] for row in rows]
+        intervals, points = intervals_of(connection, ids), points_of(connection, ids)
+        for row in rows:
+            for problem in _problems(row, intervals[row["id"]], points[row["id"]]):
+                yield Finding("combination", str(row["id"]), problem, COMPUTE_AGAIN)
 
 
 def _problems(
-    row: RowMapping, intervals: Sequence[Row[Any]], points: Sequence[Row[Any]]
+    row: RowMapping, intervals: Sequence[Interval], points: Sequence[Point]
 ) -> Iterator[str]:
     yield from _key_problems(row)
     if row["campaign_numerics"] not in (None, row["numerics_version"]):
@@ -158,7 +133,7 @@ def fails_by_outcome(settings: str) -> bool:
         return True  # its own finding
 
 
-def displacement_problems(row: RowMapping, points: Sequence[Row[Any]]) -> Iterator[str]:
+def displacement_problems(row: RowMapping, points: Sequence[Point]) -> Iterator[str]:
     """Yield what cannot be of blocks that slide: displacements fall with strength.
 
     Args:
@@ -181,3 +156,36 @@ def displacement_problems(row: RowMapping, points: Sequence[Row[Any]]) -> Iterat
         for k, d in slid:
             if d > 0.0 and k >= row["kr_over_pga"]:
                 yield f"a block of ky/PGA {k!r} slides, yet none moves from {row['kr_over_pga']!r}"
+
+
+def check_responses(connection: Connection) -> Iterator[Finding]:
+    """Yield histories whose key is not the hash of their inputs, or of another length."""
+    lengths = [func.length(response.c[name]).label(name) for name in _SERIES]
+    query = (
+        select(
+            response.c.id,
+            response.c.natural_key,
+            response.c.npts,
+            *(response.c[name] for name in _BLOCK_OF_RESPONSE),
+            motion.c.samples_sha256,
+            motion.c.dt_s,
+            vertical.c.samples_sha256.label("vertical_sha256"),
+            *lengths,
+        )
+        .select_from(with_motions(response))
+        .order_by(response.c.id)
+    )
+    for row in connection.execute(query).mappings():
+        expected = response_key(
+            motion_sha256=row["samples_sha256"],
+            dt_s=row["dt_s"],
+            vertical_sha256=row["vertical_sha256"],
+            **{name: row[name] for name in _BLOCK_OF_RESPONSE},
+        )
+        if expected != row["natural_key"]:
+            problem = "its natural key is not the hash of its inputs"
+            yield Finding("response", str(row["id"]), problem, COMPUTE_AGAIN)
+        for name in _SERIES:
+            if row[name] != 8 * row["npts"]:
+                problem = f"{name} holds {row[name]} bytes, not 8 x {row['npts']}"
+                yield Finding("response", str(row["id"]), problem, COMPUTE_AGAIN)

@@ -8,10 +8,9 @@ from collections.abc import Iterator
 from sqlalchemy import Connection, Double, LargeBinary, exists, or_, select
 from sqlalchemy.sql.elements import ColumnElement
 
-from rbfrag.db.check.combinations import check_combinations
+from rbfrag.db.check.combinations import check_combinations, check_responses
 from rbfrag.db.check.finding import FIT_AGAIN, RESTORE, Finding
 from rbfrag.db.check.motions import check_motions, check_spectra
-from rbfrag.db.check.responses import check_responses
 from rbfrag.db.insert import table_digests
 from rbfrag.db.schema import earthquake, fragility_model, metadata, motion, recording
 
@@ -29,18 +28,18 @@ def check_database(connection: Connection) -> list[Finding]:
     refers to, the digest of each row, numbers that are not finite, and the models. Makes no
     simulation.
     """
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if connection.dialect.name == "sqlite":
-        found += _check_sqlite_file(connection)
-    found += check_numbers(connection)
-    found += check_digests(connection)
-    found += check_motions(connection)
-    found += check_spectra(connection)
-    found += _check_unused(connection)
-    found += check_combinations(connection)
-    found += check_responses(connection)
-    found += _check_models(connection)
-    return found
+        findings += _check_sqlite_file(connection)
+    findings += check_numbers(connection)
+    findings += check_digests(connection)
+    findings += check_motions(connection)
+    findings += check_spectra(connection)
+    findings += _check_unused(connection)
+    findings += check_combinations(connection)
+    findings += check_responses(connection)
+    findings += _check_models(connection)
+    return findings
 
 
 def _check_sqlite_file(connection: Connection) -> Iterator[Finding]:

@@ -14,14 +14,7 @@ FIT_AGAIN = "fit it again:  rbfrag fit --name NAME --replace"
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong.
-
-    Args:
-        table: where it is.
-        row: the row, as the database numbers or names it.
-        problem: what is wrong, in words.
-        advice: what to do next.
-    """
+    """One thing that is wrong, the row as the database numbers or names it, and what to do next."""
 
     table: str
     row: str

@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from typing import Any
 
-from sqlalchemy import Row, RowMapping
+from sqlalchemy import RowMapping
+
+from rbfrag.db.rows import Interval
 
 # k_r is divided by PGA and the limit was multiplied by it before.
 _ROUNDING = 1e-12
 
-# The critical block is taken up to this share of its k_r clear of the border.
+# The critical block is taken clear of the border by up to this part of its k_r.
 _CLEARANCE = 1.01e-8
 
 BORDER_ERROR = 1e-7
 """Relative error of a border that another processor's last bits can make."""
 
-Interval = tuple[float, float, str]
-"""Lower end, upper end [k_r/PGA] and outcome."""
-
 
 def interval_problems(
     row: RowMapping,
-    intervals: Sequence[Row[Any]],
+    intervals: Sequence[Interval],
     toppled: Sequence[float],
     stable: Sequence[float],
 ) -> Iterator[str]:
@@ -48,15 +46,15 @@ def interval_problems(
             if inside is not None and inside.outcome == other:
                 yield (
                     f"a simulation {word} at kr/PGA {k!r}, inside the interval "
-                    f"{inside.k_lo!r} to {inside.k_hi!r} that is {_said(other)}"
+                    f"{inside.k_lo!r} to {inside.k_hi!r} that is {_verb(other)}"
                 )
 
 
-def _said(outcome: str) -> str:
+def _verb(outcome: str) -> str:
     return "safe" if outcome == "safe" else "said to topple"
 
 
-def _cover_problems(row: RowMapping, intervals: Sequence[Row[Any]]) -> Iterator[str]:
+def _cover_problems(row: RowMapping, intervals: Sequence[Interval]) -> Iterator[str]:
     limit, bottom = row["search_limit"], intervals[0].k_lo
     if limit is not None and bottom < limit * (1.0 - _ROUNDING):
         yield f"its map begins at kr/PGA {bottom!r}, below the search limit {limit!r}"
@@ -75,7 +73,7 @@ def _cover_problems(row: RowMapping, intervals: Sequence[Row[Any]]) -> Iterator[
         yield f"its map ends at kr/PGA {top!r}, below K_up {k_up!r}"
 
 
-def _bracket_problems(row: RowMapping, intervals: Sequence[Row[Any]]) -> Iterator[str]:
+def _bracket_problems(row: RowMapping, intervals: Sequence[Interval]) -> Iterator[str]:
     topples = [interval for interval in intervals if interval.outcome == "topples"]
     highest = topples[-1].k_hi if topples else None
     if row["status"] != "found":
@@ -104,7 +102,7 @@ def _bracket_problems(row: RowMapping, intervals: Sequence[Row[Any]]) -> Iterato
             )
 
 
-def _holding(intervals: Sequence[Row[Any]], k: float) -> Row[Any] | None:
+def _holding(intervals: Sequence[Interval], k: float) -> Interval | None:
     """Return the interval with `k` strictly inside, if there is one."""
     for interval in intervals:
         if interval.k_lo * (1.0 + _ROUNDING) < k < interval.k_hi * (1.0 - _ROUNDING):

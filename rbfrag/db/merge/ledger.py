@@ -12,15 +12,7 @@ CONFLICTS_SHOWN = 5
 
 @dataclass(frozen=True)
 class Conflict:
-    """One thing that two databases say differently.
-
-    Args:
-        table: where.
-        row: what it is about, in words that mean the same in both databases.
-        column: what differs.
-        here: the value in the database that is merged into.
-        there: the value in the other.
-    """
+    """One thing that two databases say differently; `row` means the same in both of them."""
 
     table: str
     row: str
@@ -57,9 +49,9 @@ class Ledger:
 
     def conflict(self, table: str, row: str, column: str, here: object, there: object) -> None:
         """Note, once, that two values cannot both be kept."""
-        found = Conflict(table, row, column, here, there)
-        if found not in self.conflicts:
-            self.conflicts.append(found)
+        one = Conflict(table, row, column, here, there)
+        if one not in self.conflicts:
+            self.conflicts.append(one)
 
     def keep(self, table: str, row: str, column: str, here: object, there: object) -> None:
         """Note, once, that the value here stays, though the other differs."""

@@ -135,8 +135,8 @@ def _recording_id(target: Connection, theirs: RowMapping, ledger: Ledger) -> int
     values = {"earthquake_id": earthquake_id, "name": name, "station": theirs["station"]}
     if insert_if_new(target, recording, values):
         ledger.added["recording"] += 1
-    found: int = target.execute(select(recording.c.id).filter_by(**values)).scalar_one()
-    return found
+    row_id: int = target.execute(select(recording.c.id).filter_by(**values)).scalar_one()
+    return row_id
 
 
 def _is_taken(target: Connection, theirs: RowMapping) -> bool:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from sqlalchemy import Connection, RowMapping, Table, select
+from sqlalchemy import RowMapping, select
 
-from rbfrag.db.campaigns import GRID_MEETS_POINT, known_combinations
+from rbfrag.db.campaigns import (
+    GRID_MEETS_POINT,
+    INTERVAL_COLUMNS,
+    POINT_COLUMNS,
+    known_combinations,
+)
 from rbfrag.db.check.maps import BORDER_ERROR, contradictions
 from rbfrag.db.digest import NOT_DIGESTED
 from rbfrag.db.insert import insert_if_new, insert_row, insert_rows, update_rows
@@ -18,6 +22,7 @@ from rbfrag.db.keys import key_of_row
 from rbfrag.db.merge.ledger import Ledger, Merge
 from rbfrag.db.model_file import ModelRow, encode_model
 from rbfrag.db.models import model_rows
+from rbfrag.db.rows import Interval, Point
 from rbfrag.db.schema import (
     campaign,
     combination,
@@ -28,6 +33,7 @@ from rbfrag.db.schema import (
     simulation,
     toppling_spectrum,
 )
+from rbfrag.db.stored_combination import intervals_of, points_of
 
 _AT_ONCE = 500
 _COLUMNS = tuple(c.name for c in combination.c if c.name not in ("id", "digest"))
@@ -41,7 +47,6 @@ _VALUES = tuple(name for name in _COLUMNS if name not in (*_INPUTS, *_INCIDENTAL
 ROTATION_ERROR = 1e-6
 """Relative error of a rotation that another processor's last bits can make."""
 
-Point = tuple[float, float | None, str, float | None, int | None]
 AnyRow = RowMapping | Mapping[str, Any]
 
 
@@ -73,11 +78,11 @@ def merge_combinations(merge: Merge) -> None:
     last = 0
     while True:
         query = select(combination).where(combination.c.id > last).order_by(combination.c.id)
-        found = merge.source.execute(query.limit(_AT_ONCE)).mappings().all()
-        if not found:
+        portion = merge.source.execute(query.limit(_AT_ONCE)).mappings().all()
+        if not portion:
             return
-        last = found[-1]["id"]
-        rows = [{**row, "natural_key": _key_here(merge, row)} for row in found]
+        last = portion[-1]["id"]
+        rows = [{**row, "natural_key": _key_here(merge, row)} for row in portion]
         known = known_combinations(merge.target, (row["natural_key"] for row in rows))
         _add(merge, [row for row in rows if row["natural_key"] not in known])
         shared = [row for row in rows if row["natural_key"] in known]
@@ -102,15 +107,18 @@ def _add(merge: Merge, rows: Sequence[Mapping[str, Any]]) -> None:
     ledger.added["combination"] += len(rows)
     ids = known_combinations(target, (row["natural_key"] for row in rows))
     here = {row["id"]: ids[row["natural_key"]].id for row in rows}
-    for table in (outcome_interval, simulation):
-        names = _written(table)
-        children = [
-            (here[their_id], *child)
-            for their_id, of_it in _children(merge.source, table, list(here)).items()
-            for child in of_it
-        ]
-        insert_rows(target, table, names, children)
-        ledger.added[table.name] += len(children)
+    intervals = _moved(intervals_of(merge.source, list(here)), here)
+    insert_rows(target, outcome_interval, INTERVAL_COLUMNS, intervals)
+    ledger.added["outcome_interval"] += len(intervals)
+    points = _moved(points_of(merge.source, list(here)), here)
+    insert_rows(target, simulation, POINT_COLUMNS, points)
+    ledger.added["simulation"] += len(points)
+
+
+def _moved(
+    theirs: Mapping[int, Sequence[tuple[Any, ...]]], here: Mapping[int, int]
+) -> list[tuple[Any, ...]]:
+    return [(here[their_id], *row) for their_id, rows in theirs.items() for row in rows]
 
 
 def _motions_here(merge: Merge, row: AnyRow) -> dict[str, int | None]:
@@ -125,26 +133,9 @@ def _key_here(merge: Merge, row: AnyRow) -> str:
         return str(row["natural_key"])
     query = select(motion.c.id, motion.c.samples_sha256, motion.c.dt_s)
     rows = merge.source.execute(query.where(motion.c.id.in_([i for i in inputs if i]))).all()
-    shas = {found.id: merge.other_bits.get(found.id, found.samples_sha256) for found in rows}
-    (dt_s,) = {found.dt_s for found in rows if found.id == row["motion_id"]}
+    shas = {one.id: merge.other_bits.get(one.id, one.samples_sha256) for one in rows}
+    (dt_s,) = {one.dt_s for one in rows if one.id == row["motion_id"]}
     return key_of_row(row, shas[row["motion_id"]], dt_s, shas.get(row["vertical_motion_id"]))
-
-
-def _children(
-    connection: Connection, table: Table, ids: Sequence[int]
-) -> defaultdict[int, list[tuple[Any, ...]]]:
-    """Return the rows of a table that belong to combinations, in the order of its key."""
-    columns = [table.c[name] for name in _written(table)]
-    query = select(*columns).where(table.c.combination_id.in_(ids))
-    query = query.order_by(*table.primary_key.columns)
-    by_id: defaultdict[int, list[tuple[Any, ...]]] = defaultdict(list)
-    for combination_id, *rest in connection.execute(query):
-        by_id[combination_id].append(tuple(rest))
-    return by_id
-
-
-def _written(table: Table) -> tuple[str, ...]:
-    return tuple(column.name for column in table.c if column.name != "digest")
 
 
 def _compare(merge: Merge, rows: Sequence[Mapping[str, Any]], known: Mapping[str, int]) -> None:
@@ -153,9 +144,8 @@ def _compare(merge: Merge, rows: Sequence[Mapping[str, Any]], known: Mapping[str
     query = select(combination).where(combination.c.id.in_(our_ids))
     ours_by_key = {row["natural_key"]: row for row in target.execute(query).mappings()}
     their_ids = [row["id"] for row in rows]
-    maps = (_children(target, outcome_interval, our_ids),
-            _children(source, outcome_interval, their_ids))  # fmt: skip
-    runs = (_children(target, simulation, our_ids), _children(source, simulation, their_ids))
+    maps = intervals_of(target, our_ids), intervals_of(source, their_ids)
+    runs = points_of(target, our_ids), points_of(source, their_ids)
     more: list[tuple[object, ...]] = []
     intervals: list[tuple[object, ...]] = []
     for theirs in rows:
@@ -173,13 +163,13 @@ def _compare(merge: Merge, rows: Sequence[Mapping[str, Any]], known: Mapping[str
         ledger.within_error += not exact
         if there_map and not here_map:
             intervals += ((ours["id"], *interval) for interval in there_map)
-            found = {column: theirs[column] for column in _OF_A_MAP}
-            update_rows(target, combination, combination.c.id == ours["id"], found)
+            columns = {column: theirs[column] for column in _OF_A_MAP}
+            update_rows(target, combination, combination.c.id == ours["id"], columns)
         band = None if exact else _band(ours, theirs)
         points = (runs[0][ours["id"]], runs[1][theirs["id"]])
         more += ((ours["id"], *point) for point in _more_points(name, *points, band, ledger))
-    insert_rows(target, outcome_interval, _written(outcome_interval), intervals)
-    insert_rows(target, simulation, _written(simulation), more, on_conflict=GRID_MEETS_POINT)
+    insert_rows(target, outcome_interval, INTERVAL_COLUMNS, intervals)
+    insert_rows(target, simulation, POINT_COLUMNS, more, on_conflict=GRID_MEETS_POINT)
     ledger.added["outcome_interval"] += len(intervals)
     ledger.added["simulation"] += len(more)
 
@@ -188,8 +178,8 @@ def _within_error(
     name: str,
     ours: AnyRow,
     theirs: AnyRow,
-    here_map: Sequence[Any],
-    there_map: Sequence[Any],
+    here_map: Sequence[Interval],
+    there_map: Sequence[Interval],
     ledger: Ledger,
 ) -> bool:
     if ours["status"] != theirs["status"]:
@@ -228,16 +218,16 @@ def _band(ours: AnyRow, theirs: AnyRow) -> tuple[float, float] | None:
 
 def _more_points(
     name: str,
-    here: Sequence[Any],
-    there: Sequence[Any],
+    here: Sequence[Point],
+    there: Sequence[Point],
     band: tuple[float, float] | None,
     ledger: Ledger,
 ) -> list[Point]:
-    known: dict[float, Point] = {point[0]: point for point in here}
-    numbered: dict[int, Point] = {point[4]: point for point in here if point[4] is not None}
+    known = {point.kr_over_pga: point for point in here}
+    numbered = {point.grid: point for point in here if point.grid is not None}
     more: list[Point] = []
     for point in there:
-        k, theta, outcome, slid, number = point
+        k, number = point.kr_over_pga, point.grid
         # another processor may have given a block of the grid a strength of other last bits
         mine = known.get(k) if number is None else numbered.get(number, known.get(k))
         in_band = band is not None and band[0] <= k <= band[1]
@@ -245,19 +235,18 @@ def _more_points(
             if number is not None or not in_band:
                 more.append(point)
             continue
-        if number is not None and mine[4] is None:
-            more.append((*mine[:4], number))
-        _, our_theta, our_outcome, our_slid, _ = mine
-        if _differ(slid, our_slid):
+        if number is not None and mine.grid is None:
+            more.append(mine._replace(grid=number))
+        if _differ(point.displacement_m, mine.displacement_m):
             column = f"displacement_m at ky/PGA {k!r}"
-            ledger.conflict("simulation", name, column, our_slid, slid)
-        if outcome != our_outcome:
+            ledger.conflict("simulation", name, column, mine.displacement_m, point.displacement_m)
+        if point.outcome != mine.outcome:
             if not in_band:
                 column = f"the outcome at kr/PGA {k!r}"
-                ledger.conflict("simulation", name, column, our_outcome, outcome)
-        elif _differ(theta, our_theta):
+                ledger.conflict("simulation", name, column, mine.outcome, point.outcome)
+        elif _differ(point.theta_n, mine.theta_n):
             column = f"theta_n at kr/PGA {k!r}"
-            ledger.conflict("simulation", name, column, our_theta, theta)
+            ledger.conflict("simulation", name, column, mine.theta_n, point.theta_n)
     return more
 
 

@@ -45,12 +45,12 @@ class ModelCheck:
 
 def selection_of(row: ModelRow) -> dict[str, Any]:
     """Return what a fit was asked to read: suite, vertical motion, doubtful PGD, rotation."""
-    told = cast("Mapping[str, Any]", row.diagnostics)
+    diagnostics = cast("Mapping[str, Any]", row.diagnostics)
     return {
-        "suite": told.get("suite"),
-        "vertical": told.get("vertical", "without"),
-        "doubtful_pgd": bool(told.get("doubtful_pgd", False)),
-        "rotation_deg": told.get("rotation_deg"),
+        "suite": diagnostics.get("suite"),
+        "vertical": diagnostics.get("vertical", "without"),
+        "doubtful_pgd": bool(diagnostics.get("doubtful_pgd", False)),
+        "rotation_deg": diagnostics.get("rotation_deg"),
     }
 
 
@@ -82,7 +82,7 @@ def _check(
         return ModelCheck(row.name, "no data", str(error))
     if data.fingerprint == row.data_fingerprint:
         return ModelCheck(row.name, "unchanged", "")
-    then, now = row.diagnostics.get("n"), int(data.found.sum())
+    then, now = row.diagnostics.get("n"), int(data.observed.sum())
     counts = f"fitted to {then} critical values, {now} today" if then != now else "other values"
     return ModelCheck(row.name, "changed", f"{counts}: fit it again with  rbfrag fit --replace")
 
@@ -127,4 +127,4 @@ def held_out_of(connection: Connection, name: str | None, *, seed: int = 0) -> H
     )
     judged = fitted.data.judged
     bins = calibration_bins(judged, fitted.result.held_out, seed=seed)
-    return HeldOut(row.name, bins, fitted.result.scores, judged.words)
+    return HeldOut(row.name, bins, fitted.result.scores, judged.source)

@@ -60,7 +60,7 @@ def fit_lognormal(
     """
     form, names = method.forms[term.name], parameter_names(method, term, estimate_m=estimate_m)
     usable = (data.x > 0.0) & (data.y > 0.0)
-    rows, start = censored_line(*_line(form, names, _of(data, usable)), data.found[usable],
+    rows, start = censored_line(*_line(form, names, _of(data, usable)), data.observed[usable],
                                 data.event[usable])  # fmt: skip
     theta, _ = maximise(rows, start)
     # Olsen's parameters put the scatter last
@@ -104,7 +104,7 @@ def fit_lognormal(
         held_out[here] = probabilities(method, form, data, natural(part))[here]
     residual = np.full(data.x.size, np.nan)
     line = rows.values["y"] - rows.values["columns"] @ (theta[:-1] / theta[-1])
-    residual[usable] = np.where(rows.found, line, np.nan)
+    residual[usable] = np.where(rows.observed, line, np.nan)
     return method_result(
         data,
         estimates,
@@ -148,17 +148,17 @@ def fit_censored(data: FitData, method: Method, term: Term, *, seed: int) -> Met
     for event, part in others.items():
         here = data.event == event
         held_out[here] = probabilities(method, form, data, part)[here]
-    share = float(np.mean(~data.found))
+    censored = float(np.mean(~data.observed))
     warnings = [
-        f"{100 * share:.0f} % of the blocks leave their back plane, or stay, before they fail: "
+        f"{100 * censored:.0f} % of the blocks leave their back plane, or stay, before they fail: "
         "they count as failing under stronger motions than those"
     ]
     result = method_result(
         data, estimates, in_sample, held_out,
         warnings=warnings if method.block.criterion is not None else (),
     )  # fmt: skip
-    known_as = {name: result.scores[score] for name, score in _SCORES if score in result.scores}
-    return replace(result, scores={**result.scores, **known_as})
+    aliases = {name: result.scores[score] for name, score in _SCORES if score in result.scores}
+    return replace(result, scores={**result.scores, **aliases})
 
 
 def censored_rows(data: FitData, form: Form) -> CensoredNormal:
@@ -168,7 +168,7 @@ def censored_rows(data: FitData, form: Form) -> CensoredNormal:
         eta, slopes, log_sigma, sigma_slopes = form.eta(b.tolist(), values, arrays())
         return eta, log_sigma, slopes, sigma_slopes
 
-    return CensoredNormal(formula, data.values, data.found, data.event)
+    return CensoredNormal(formula, data.values, data.observed, data.event)
 
 
 def most_likely(rows: CensoredNormal, start: FloatArray) -> FloatArray:

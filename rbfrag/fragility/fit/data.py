@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 FEWEST_EVENTS = 3
-FEWEST_FOUND = 10
+FEWEST_OBSERVED = 10
 FEW_EVENTS = 10
 
 LEAST_Y0_OVER_PGV = 0.1
@@ -112,9 +112,9 @@ def kr_over_pga_of_grid(p2: ArrayLike, pgv_m_s: ArrayLike, pga_g: ArrayLike) -> 
         pgv_m_s: PGV [m/s], shape (n,).
         pga_g: PGA [g], shape (n,).
     """
-    pgv, ground = np.asarray(pgv_m_s), np.asarray(pga_g) * STANDARD_GRAVITY_M_S2
+    pgv, pga_m_s2 = np.asarray(pgv_m_s), np.asarray(pga_g) * STANDARD_GRAVITY_M_S2
     with np.errstate(divide="ignore", invalid="ignore"):
-        z = np.sqrt(np.asarray(p2)) * pgv / ground
+        z = np.sqrt(np.asarray(p2)) * pgv / pga_m_s2
     return np.asarray(z[..., None] * Y0_OVER_PGV)
 
 
@@ -143,10 +143,10 @@ def read_source(
     from rbfrag.db.queries import combination_table, outcome_grid
     from rbfrag.db.spectra import spectrum_values
 
-    asked = kind or block.kind
+    kind_read = kind or block.kind
     table = combination_table(
         connection,
-        kind=asked,
+        kind=kind_read,
         rotation_deg=rotation_deg,
         suite=suite,
         vertical=vertical,
@@ -161,7 +161,7 @@ def read_source(
         grid.k_over_pga,
         grid.outcome,
         grid.displacement_m,
-        np.array([_yield_g(asked, block or "{}") for block in table.block], dtype=np.float64),
+        np.array([_yield_g(kind_read, block or "{}") for block in table.block], dtype=np.float64),
     )
     if grid.outcome.shape[1] == 0 and block.strength == "kr":
         return FitSource(table, source.xp_m_s, *_nothing_known(table))
@@ -180,12 +180,14 @@ def _yield_g(kind: str, block: str) -> float:
     from rbfrag.solver.mechanism import shaken_mechanism
 
     try:
-        stated = json.loads(block)
-        if "s1_m" not in stated:
+        parameters = json.loads(block)
+        if "s1_m" not in parameters:
             return float("nan")
-        shape = Block.from_fractures(stated["s1_m"], stated["s2_m"], stated["gamma_deg"])
+        shape = Block.from_fractures(
+            parameters["s1_m"], parameters["s2_m"], parameters["gamma_deg"]
+        )
         return shaken_mechanism(
-            shape, kind=kind, beta_deg=stated["beta_deg"], phi_deg=stated["phi_deg"]
+            shape, kind=kind, beta_deg=parameters["beta_deg"], phi_deg=parameters["phi_deg"]
         ).yield_g
     except (ValueError, KeyError, InputError) as error:
         raise FitError(
@@ -202,7 +204,7 @@ class FitData:
         values: what formulas read at the point of failure, by name, shape (n,): measures of the
             shaking, the block's parameters, the intensity. For censored rows at the limit beyond
             which the block fails; NaN where nothing was searched.
-        found: False for censored rows.
+        observed: False for censored rows.
         event: number of the earthquake, shape (n,).
         event_names: the earthquakes by that number.
         motion: number of the motion, shape (n,).
@@ -220,7 +222,7 @@ class FitData:
 
     kind: str
     values: dict[str, FloatArray]
-    found: NDArray[np.bool_]
+    observed: NDArray[np.bool_]
     event: NDArray[np.intp]
     event_names: tuple[str, ...]
     motion: NDArray[np.int64]
@@ -248,7 +250,7 @@ class FitData:
     @property
     def censored(self) -> NDArray[np.bool_]:
         """Rows of which a limit is known alone, shape (n,)."""
-        return np.asarray(~self.found & np.isfinite(self.values.get("y_m_s", self.x)))
+        return np.asarray(~self.observed & np.isfinite(self.values.get("y_m_s", self.x)))
 
     @property
     def events(self) -> int:
@@ -271,7 +273,7 @@ class _Points:
     """Points and grid as one description of blocks gives them, before rows are chosen."""
 
     values: dict[str, FloatArray]
-    found: NDArray[np.bool_]
+    observed: NDArray[np.bool_]
     usable: NDArray[np.bool_]
     combination: NDArray[np.intp]
     order: FloatArray
@@ -315,13 +317,13 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
     chosen = order[points.usable[order]]
     own = own[chosen]
     names, event = np.unique(table.event_id[own].astype(str), return_inverse=True)
-    found = points.found[chosen]
+    observed = points.observed[chosen]
     values = {name: np.ascontiguousarray(v[chosen]) for name, v in points.values.items()}
     failed = np.ascontiguousarray(points.failed[chosen])
     data = FitData(
         kind=named,
         values=values,
-        found=found,
+        observed=observed,
         event=event.astype(np.intp),
         event_names=tuple(names.tolist()),
         motion=np.unique(table.motion_id[own], return_inverse=True)[1].astype(np.int64),
@@ -331,10 +333,10 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         outcomes=points.outcomes,
         domain=_domain({name: v[chosen] for name, v in points.ranges.items()}),
         n_total=int(table.p2.size),
-        n_excluded=int((points.found & ~np.isfinite(points.values["intensity_m_s"])).sum()),
+        n_excluded=int((points.observed & ~np.isfinite(points.values["intensity_m_s"])).sum()),
         n_outside_model=int((table.status == "outside_model").sum()),
         guessed_events=len(set(table.event_id[own][table.event_guessed[own]].tolist())),
-        fingerprint=_fingerprint(keys[chosen], names[event], values, found, failed, of_outcomes),
+        fingerprint=_fingerprint(keys[chosen], names[event], values, observed, failed, of_outcomes),
     )
     _refuse_thin(data, method, term)
     return data
@@ -349,11 +351,11 @@ def _fingerprint(
     keys: NDArray[np.str_],
     events: NDArray[np.str_],
     values: Mapping[str, FloatArray],
-    found: NDArray[np.bool_],
+    observed: NDArray[np.bool_],
     failed: FloatArray,
     of_outcomes: bool,
 ) -> str:
-    columns = np.column_stack([*values.values(), found]) + 0.0
+    columns = np.column_stack([*values.values(), observed]) + 0.0
     lines = [
         f"{key} {event}\t".encode() + row.tobytes()
         for key, event, row in zip(keys.tolist(), events.tolist(), columns, strict=True)
@@ -366,12 +368,12 @@ def _fingerprint(
 
 def _refuse_thin(data: FitData, method: Method, term: Term) -> None:
     of_outcomes = method.reads == "outcomes"
-    tells = (np.isfinite(data.failed) & data.read).any(axis=1) if of_outcomes else data.found
+    tells = (np.isfinite(data.failed) & data.read).any(axis=1) if of_outcomes else data.observed
     n = int(tells.sum())
-    if n < FEWEST_FOUND:
+    if n < FEWEST_OBSERVED:
         raise FitError(
-            f"{n} critical values were found among {data.n_total} combinations with the "
-            f"term {term.name}; a fit needs {FEWEST_FOUND}: simulate more motions or more blocks "
+            f"{n} critical values were found among {data.n_total} combinations with the term "
+            f"{term.name}; a fit needs {FEWEST_OBSERVED}: simulate more motions or more blocks "
             f"(rbfrag simulate --kind {data.kind})"
         )
     events = np.unique(data.event[tells]).size
@@ -381,7 +383,9 @@ def _refuse_thin(data: FitData, method: Method, term: Term) -> None:
             f"{FEWEST_EVENTS}, because points of one earthquake are not independent: add "
             "motions of other earthquakes, and name the events by  motions add --metadata"
         )
-    if any(not np.all(np.isfinite(v[data.found])) for n, v in data.values.items() if n == "y_m_s"):
+    if any(
+        not np.all(np.isfinite(v[data.observed])) for n, v in data.values.items() if n == "y_m_s"
+    ):
         raise FitError("a critical value is not finite: run  rbfrag db check")
     if np.ptp(data.x[tells]) == 0.0:
         raise FitError(
@@ -426,20 +430,20 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
             "the term xp needs the toppling spectrum X(p), which is stored for none of the "
             f"{x.size} combinations: run  rbfrag simulate  again, which adds it"
         )
-    p, ground = np.sqrt(table.p2), table.pga_g * STANDARD_GRAVITY_M_S2
-    found = table.status == "found"
+    p, pga_m_s2 = np.sqrt(table.p2), table.pga_g * STANDARD_GRAVITY_M_S2
+    observed = table.status == "found"
     status = table.status.astype(str)
-    limit = np.where(np.isin(status, _CENSORED), table.search_limit * ground / p, np.nan)
-    y = np.where(found, table.y_m_s, limit)
+    limit = np.where(np.isin(status, _CENSORED), table.search_limit * pga_m_s2 / p, np.nan)
+    y = np.where(observed, table.y_m_s, limit)
     readable = np.isin(status, ("found", *_CENSORED, "not_searched"))
     of_motion = {name: given[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *term.inputs))}
     of_motion |= {"tm_s": table.tm_s, "p2": table.p2, "p": p, "intensity_m_s": x}
     kr = source.k_over_pga * table.pga_g[:, None]
-    y0 = source.k_over_pga * (ground / p)[:, None]
+    y0 = source.k_over_pga * (pga_m_s2 / p)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         read = y0 >= LEAST_Y0_OVER_PGV * (1.0 - 1e-9) * table.pgv_m_s[:, None]
     read &= (y0 > 0.0) & np.isfinite(y0)
-    failed, words = source.judged_outcomes(y0, y)
+    failed, source_of_outcomes = source.judged_outcomes(y0, y)
     some = read.any(axis=0)
     of_outcomes = method.reads == "outcomes"
     ranges = {
@@ -451,17 +455,17 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     if "pgv_m_s" in term.inputs and "pga_g" in term.inputs:
         ranges["pgv_over_pga_s"] = _pulse_s(source)
     if not of_outcomes:
-        ranges = {name: np.where(found, v, np.nan) for name, v in ranges.items()}
+        ranges = {name: np.where(observed, v, np.nan) for name, v in ranges.items()}
     return _Points(
         values={**of_motion, "kr": y * p / STANDARD_GRAVITY_M_S2, "y_m_s": y},
-        found=found,
+        observed=observed,
         usable=defined & readable,
         combination=np.arange(x.size),
         order=np.zeros(x.size),
         blocks={**_column(of_motion), "kr": kr[:, some], "y_m_s": y0[:, some]},
         failed=failed[:, some],
         read=read[:, some],
-        outcomes=words,
+        outcomes=source_of_outcomes,
         ranges=ranges,
     )
 
@@ -471,9 +475,9 @@ def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
     table = source.table
     assert source.strength_g is not None
     strength = source.strength_g
-    found = table.status == "found"
-    known = (found | (table.status == "below_limit")) & (table.pgv_m_s > 0.0)
-    ratio = np.where(found, table.kr_over_pga, table.search_limit)
+    observed = table.status == "found"
+    known = (observed | (table.status == "below_limit")) & (table.pgv_m_s > 0.0)
+    ratio = np.where(observed, table.kr_over_pga, table.search_limit)
     per_pga = np.where(table.pga_g > 0.0, table.pgv_m_s, np.nan) / table.pga_g
     size = np.sqrt(table.p2)
     block = {method.block.strength: strength, str(method.block.size): table.p2, "p": size}
@@ -487,17 +491,17 @@ def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
 
     if not source.k_over_pga.shape[1]:
         source = FitSource(table, source.xp_m_s, k, np.full(k.shape, np.nan))
-    failed, words = source.judged_outcomes(k, ratio)
+    failed, source_of_outcomes = source.judged_outcomes(k, ratio)
     return _Points(
         values={**shaking(ratio, strength, per_pga), **block},
-        found=found,
+        observed=observed,
         usable=known & (ratio < 1.0),
         combination=np.arange(ratio.size),
         order=np.zeros(ratio.size),
         blocks={**shaking(k, strength[:, None], per_pga[:, None]), **_column(block)},
         failed=failed,
         read=np.isfinite(k),
-        outcomes=words,
+        outcomes=source_of_outcomes,
         ranges={
             "pgv_over_pga_s": _pulse_s(source),
             str(method.block.size): table.p2,
@@ -525,11 +529,11 @@ def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
     distances = np.broadcast_to(np.array(THRESHOLDS_M), (k.size, len(THRESHOLDS_M)))
     with np.errstate(invalid="ignore"):
         usable = (k < 1.0) & (values["pgv_m_s"] > 0.0) & np.isfinite(slid)
-        found = slid >= LEAST_DISPLACEMENT_M
+        observed = slid >= LEAST_DISPLACEMENT_M
         failed = (beyond[:, None] > distances).astype(np.float64)
     return _Points(
         values={**values, "displacement_m": beyond},
-        found=found,
+        observed=observed,
         usable=usable,
         combination=own,
         order=k,
@@ -541,7 +545,7 @@ def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
             "pgv_over_pga_s": _pulse_s(source)[own],
             "pgv_m_s": values["pgv_m_s"],
             "pga_g": values["pga_g"],
-            "displacement_m": np.where(found, beyond, np.nan),
+            "displacement_m": np.where(observed, beyond, np.nan),
             "k_over_pga": np.column_stack([k, np.ones(k.size)]),
         },
     )

@@ -94,7 +94,7 @@ def fit(
         raise InputError(f"seed = {seed}: give a whole number from 0 up")
     if name is not None and not name.strip():
         raise InputError("the name of the model is empty: give a name or leave it out")
-    asked: dict[str, Any] = {
+    selection: dict[str, Any] = {
         "suite": suite,
         "vertical": vertical,
         "doubtful_pgd": doubtful_pgd,
@@ -107,9 +107,9 @@ def fit(
 
         # reading takes no lock, so that a campaign may go on meanwhile
         with opened_database(source, read_only=True) as engine, engine.connect() as connection:
-            source = read_source(connection, chosen.block, kind=kind, **asked)
+            source = read_source(connection, chosen.block, kind=kind, **selection)
     elif not isinstance(source, FitSource):
-        source = read_source(source, chosen.block, kind=kind, **asked)
+        source = read_source(source, chosen.block, kind=kind, **selection)
     return fit_source(
         source,
         of_term,
@@ -118,7 +118,7 @@ def fit(
         name=name,
         seed=seed,
         estimate_m=estimate_m,
-        selection=asked,
+        selection=selection,
     ).report
 
 
@@ -131,10 +131,10 @@ def methods_of_kind(kind: str) -> tuple[Method, ...]:
     from rbfrag.solver.kinds import model_of_kind
 
     names = model_of_kind(kind).parameters
-    found = tuple(method for method in methods() if names and method.block.names == names)
-    if not found:
+    suited = tuple(method for method in methods() if names and method.block.names == names)
+    if not suited:
         raise InputError(f"there is no fragility model of kind {kind}: no method reads its block")
-    return found
+    return suited
 
 
 def method_of_kind(kind: str, name: str | None) -> Method:
@@ -172,7 +172,7 @@ def fit_source(
     Arguments as for :func:`fit`; `compared` says whether the model gets its table of least widths,
     for which those that know more are fitted too: a study of scores has no use for it.
     """
-    table, asked = source.table, dict(selection or {})
+    table, chosen = source.table, dict(selection or {})
     data = fit_data(source, method, term, kind=kind)
     options = {"estimate_m": True} if estimate_m else {}
     result: MethodResult = method.fitter()(data, method, term, seed=seed, **options)
@@ -181,7 +181,7 @@ def fit_source(
     correlations = log_correlations(table) if of_any_strength else {}
     of_outcomes = method.reads == "outcomes"
     row = ModelRow(
-        name=name or _name(method, term, data.kind, asked),
+        name=name or _name(method, term, data.kind, chosen),
         kind=data.kind,
         term=term.name,
         method=method.name,
@@ -191,7 +191,7 @@ def fit_source(
         data_fingerprint=data.fingerprint,
         diagnostics={
             "standard_errors": result.standard_errors,
-            "n": int(data.found.sum()),
+            "n": int(data.observed.sum()),
             "n_censored": int(data.censored.sum()),
             "events": _events(data, of_outcomes),
             "degrees_of_freedom": _events(data, of_outcomes) - 1,
@@ -207,10 +207,10 @@ def fit_source(
             "power_law": asdict(law) if law is not None else None,
             "log_correlations": correlations,
             "term_rank": list(correlations),
-            "suite": asked.get("suite"),
-            "doubtful_pgd": asked.get("doubtful_pgd", False),
-            "vertical": asked.get("vertical", "without"),
-            "rotation_deg": asked.get("rotation_deg"),
+            "suite": chosen.get("suite"),
+            "doubtful_pgd": chosen.get("doubtful_pgd", False),
+            "vertical": chosen.get("vertical", "without"),
+            "rotation_deg": chosen.get("rotation_deg"),
             **result.details,
         },
         created=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -253,8 +253,10 @@ def _name(method: Method, term: Term, kind: str, selection: Mapping[str, object]
 
 def _events(data: FitData, of_outcomes: bool) -> int:
     """Return the number of earthquakes with a critical value, or else with outcomes."""
-    told = data.found if data.found.any() or not of_outcomes else np.ones_like(data.found)
-    return int(np.unique(data.event[told]).size)
+    informative = (
+        data.observed if data.observed.any() or not of_outcomes else np.ones_like(data.observed)
+    )
+    return int(np.unique(data.event[informative]).size)
 
 
 def _with_floor(row: ModelRow, source: FitSource) -> ModelRow:

@@ -96,7 +96,7 @@ def fit_outcomes(
     )  # fmt: skip
     with np.errstate(invalid="ignore", divide="ignore"):
         median = median_y_m_s(form, method, b, data)
-        residual = np.where(data.found, np.log(data.y) - np.log(median), np.nan)
+        residual = np.where(data.observed, np.log(data.y) - np.log(median), np.nan)
     return method_result(
         data,
         estimates,
@@ -164,19 +164,21 @@ def outcome_rows(data: FitData, method: Method, term: Term, names: tuple[str, ..
 
 
 def median_y_m_s(form: Form, method: Method, b: FloatArray, data: FitData) -> FloatArray:
-    """Return the toppling velocity at which P = 1/2 for each row [m/s], by bisection."""
-    ns, parameters = arrays(), b.tolist()
-    low, high = np.full(data.x.size, -30.0), np.full(data.x.size, 10.0)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        y = np.exp(middle)
-        values = {**data.values, "y_m_s": y, "kr": y * data.values["p"] / STANDARD_GRAVITY_M_S2}
-        eta = form.eta(parameters, values, ns).eta
-        p = method.link.probability(np.clip(eta, -700.0, 700.0), ns)
+    """Return the toppling velocity at which P = 1/2 for each row [m/s]; NaN where there is none."""
+    from scipy.optimize.elementwise import find_root
+
+    def excess(ln_y: FloatArray, *columns: FloatArray) -> FloatArray:
+        values = dict(zip(data.values, columns, strict=True))
+        values["y_m_s"] = y = np.exp(ln_y)
+        values["kr"] = y * values["p"] / STANDARD_GRAVITY_M_S2
+        eta = form.eta(b.tolist(), values, arrays()).eta
+        p = method.link.probability(np.clip(eta, -700.0, 700.0), arrays())
         for bound in form.bounds:
             p = np.where(bound.holds(values), 0.0, p)
-        low, high = np.where(p >= 0.5, middle, low), np.where(p >= 0.5, high, middle)
-    return np.asarray(np.exp(0.5 * (low + high)))
+        return np.asarray(p - 0.5)
+
+    root = find_root(excess, (-30.0, 10.0), args=tuple(data.values.values()))
+    return np.asarray(np.exp(root.x))
 
 
 def natural_parameters(

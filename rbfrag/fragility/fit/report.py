@@ -55,40 +55,33 @@ class FitReport:
     def from_model(cls, model: FragilityModel) -> FitReport:
         """Return the report of a fitted or stored model."""
         row = model.row
-        told = cast("Mapping[str, Any]", row.diagnostics)
+        diagnostics = cast("Mapping[str, Any]", row.diagnostics)
         return cls(
             name=row.name,
             kind=row.kind,
             term=row.term,
             method=row.method,
             coefficients=dict(row.coefficients),
-            standard_errors=dict(told.get("standard_errors", {})),
-            n=int(told.get("n", 0)),
-            n_censored=int(told.get("n_censored", 0)),
-            events=int(told.get("events", 0)),
-            scores=dict(told.get("scores", {})),
-            warnings=tuple(told.get("warnings", ())),
-            details={key: value for key, value in told.items() if key not in _FIELDS},
+            standard_errors=dict(diagnostics.get("standard_errors", {})),
+            n=int(diagnostics.get("n", 0)),
+            n_censored=int(diagnostics.get("n_censored", 0)),
+            events=int(diagnostics.get("events", 0)),
+            scores=dict(diagnostics.get("scores", {})),
+            warnings=tuple(diagnostics.get("warnings", ())),
+            details={key: value for key, value in diagnostics.items() if key not in _FIELDS},
             model=model,
         )
 
     def as_dict(self) -> dict[str, object]:
         """Return the report under the keys of the JSON contract, and more."""
         row = self.model.row
+        fields = {name: value for name, value in vars(self).items() if name != "model"}
+        details = fields.pop("details")
         return {
-            "name": self.name,
-            "kind": self.kind,
-            "term": self.term,
-            "method": self.method,
+            **fields,
             "meaning": self.model.meaning,
-            "coefficients": dict(self.coefficients),
-            "standard_errors": dict(self.standard_errors),
-            "n": self.n,
-            "n_censored": self.n_censored,
-            "events": self.events,
-            "scores": dict(self.scores),
             "warnings": list(self.warnings),
-            **self.details,
+            **details,
             "covariance": [list(line) for line in row.covariance],
             "domain": {name: list(edges) for name, edges in row.domain.items()},
             "data_fingerprint": row.data_fingerprint,
@@ -130,13 +123,11 @@ def power_law(table: CombinationTable) -> PowerLaw | None:
     _, events = np.unique(table.event_id[used].astype(str), return_inverse=True)
     if used.sum() < 3 or events.max() < 1 or np.ptp(x[used]) == 0.0:
         return None
-    line, covariance, _ = clustered_line(
-        x[used], y[used], np.ones(int(used.sum())), events.astype(np.intp)
-    )
+    fit = clustered_line(x[used], y[used], np.ones(int(used.sum())), events.astype(np.intp))
     return PowerLaw(
-        exponent_m=float(line[1]),
-        exponent_m_se=math.sqrt(covariance[1, 1]),
-        constant_c=math.exp(line[0]),
+        exponent_m=float(fit.line[1]),
+        exponent_m_se=math.sqrt(fit.covariance[1, 1]),
+        constant_c=math.exp(fit.line[0]),
         n=int(used.sum()),
     )
 
@@ -147,7 +138,7 @@ def log_correlations(table: CombinationTable) -> dict[str, float]:
     All terms are judged on the same points: those for which every term is defined. A term
     without variation is left out.
     """
-    found = table.status == "found"
+    observed = table.status == "found"
     columns = {
         name: np.asarray(
             TERMS[name].intensity_m_s({key: getattr(table, key) for key in TERMS[name].inputs}),
@@ -156,7 +147,7 @@ def log_correlations(table: CombinationTable) -> dict[str, float]:
         for name in SINGLE_TERMS
     }
     with np.errstate(invalid="ignore"):
-        used = found & (table.y_m_s > 0.0)
+        used = observed & (table.y_m_s > 0.0)
         for values in columns.values():
             used &= np.isfinite(values) & (values > 0.0)
     ln_y = np.log(table.y_m_s[used])

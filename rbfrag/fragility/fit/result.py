@@ -103,7 +103,7 @@ def method_result(
         scores={**(scores or {}), **scores_of(judged, in_sample, held_out)},
         details={
             "degrees_of_freedom": estimates.degrees_of_freedom,
-            "judged_on": judged.words,
+            "judged_on": judged.source,
             "judged_outcomes": int(judged.known.sum()),
             "score_intervals": score_intervals(judged, held_out, seed=estimates.seed),
             "standard_error_kinds": dict.fromkeys(estimates.names, CLUSTERED),

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-Known = NDArray[np.bool_]
+Mask = NDArray[np.bool_]
 
 CLIP = 1e-4
 """Probabilities are clipped to this distance from 0 and 1 before the logarithm."""
@@ -30,43 +30,43 @@ class Judged:
         failed: 0 or 1, shape (n, m).
         known: where the outcome is known.
         event: number of each row's earthquake, shape (n,).
-        words: where the outcomes come from.
+        source: where the outcomes come from.
     """
 
     failed: FloatArray
-    known: Known
+    known: Mask
     event: NDArray[np.intp]
-    words: str
+    source: str
 
 
 def critical_outcomes(
-    critical: FloatArray, found: Known, strength: FloatArray
-) -> tuple[FloatArray, Known]:
+    critical: FloatArray, observed: Mask, strength: FloatArray
+) -> tuple[FloatArray, Mask]:
     """Return the outcomes that critical values give, 0 or 1, and where they are known.
 
     Args:
         critical: critical strength, for censored points the value it lies below, shape (n,).
-        found: False for censored points, shape (n,).
+        observed: False for censored points, shape (n,).
         strength: of the blocks, shape (n, m).
     """
     reached = critical[:, None] >= strength
-    known = (found[:, None] | ~reached) & (strength > 0.0)
-    return (reached & found[:, None]).astype(np.float64), known
+    known = (observed[:, None] | ~reached) & (strength > 0.0)
+    return (reached & observed[:, None]).astype(np.float64), known
 
 
-def log_loss(probability: FloatArray, outcome: FloatArray, known: Known) -> float:
+def log_loss(probability: FloatArray, outcome: FloatArray, known: Mask) -> float:
     """Return the mean log loss of the known outcomes."""
     p = np.clip(probability[known], CLIP, 1.0 - CLIP)
     hit = outcome[known] > 0.0
     return float(-np.mean(np.log(np.where(hit, p, 1.0 - p))))
 
 
-def brier(probability: FloatArray, outcome: FloatArray, known: Known) -> float:
+def brier(probability: FloatArray, outcome: FloatArray, known: Mask) -> float:
     """Return the Brier score, the mean squared error of the probability."""
     return float(np.mean((probability[known] - outcome[known]) ** 2))
 
 
-def sharpness(probability: FloatArray, known: Known) -> float:
+def sharpness(probability: FloatArray, known: Mask) -> float:
     """Return the mean of P (1 - P): what the Brier score would be of a calibrated model."""
     return float(np.mean(probability[known] * (1.0 - probability[known])))
 
@@ -85,10 +85,7 @@ class Calibration:
 
 
 def calibration(
-    probability: FloatArray,
-    outcome: FloatArray,
-    known: Known,
-    weights: FloatArray | None = None,
+    probability: FloatArray, outcome: FloatArray, known: Mask, weights: FloatArray | None = None
 ) -> Calibration:
     """Return intercept and slope of the outcomes on the clipped logit of the probability.
 
@@ -98,8 +95,8 @@ def calibration(
         known: where the outcome is known.
         weights: weight of each element, same shape; None for equal ones.
     """
-    from rbfrag.fragility.fit.likelihood import Binomial, maximise
-    from rbfrag.fragility.methods import LOGIT
+    from statsmodels.genmod.families import Binomial
+    from statsmodels.genmod.generalized_linear_model import GLM
 
     p = np.clip(probability[known], CLIP, 1.0 - CLIP)
     x, t = np.log(p / (1.0 - p)), outcome[known]
@@ -107,8 +104,8 @@ def calibration(
     if not 0.0 < w @ t < w.sum() or np.ptp(x) == 0.0:
         return Calibration(np.nan, np.nan)
     columns = np.column_stack([np.ones(x.size), x])
-    rows = Binomial(LOGIT, columns, t, w, np.zeros(x.size, dtype=np.intp))
-    b, _ = maximise(rows, np.array([0.0, 1.0]), tolerance=1e-15)
+    model = GLM(t, columns, family=Binomial(), var_weights=w)
+    b = model.fit(tol=1e-14).params
     return Calibration(float(b[0]), float(b[1]))
 
 
@@ -207,16 +204,18 @@ def calibration_bins(judged: Judged, held_out: FloatArray, *, seed: int = 0) -> 
 
     count, failures, expected = table(None), table(failed), table(p)
 
-    def share(chosen: NDArray[np.int64]) -> FloatArray:
+    def failed_fraction(chosen: NDArray[np.int64]) -> FloatArray:
         total = count[chosen].sum(axis=0)
         none = np.full(total.shape, np.nan)
-        found: FloatArray = np.divide(
+        fraction: FloatArray = np.divide(
             failures[chosen].sum(axis=0), total, out=none, where=total > 0
         )
-        return found
+        return fraction
 
     rng = np.random.default_rng(seed)
-    draws = [share(rng.integers(events.size, size=events.size)) for _ in range(REPLICATIONS)]
+    draws = [
+        failed_fraction(rng.integers(events.size, size=events.size)) for _ in range(REPLICATIONS)
+    ]
     total = count.sum(axis=0)
     kept = total >= FEWEST_BLOCKS
     low, high = np.nanquantile(np.array(draws)[:, kept], (0.025, 0.975), axis=0)

@@ -265,9 +265,9 @@ class Method:
 
     def fitter(self) -> Callable[..., Any]:
         """Return the function that fits it; numpy is loaded only here."""
-        module, _, function = self.fit.partition(":")
-        found: Callable[..., Any] = getattr(import_module(module), function)
-        return found
+        module, _, name = self.fit.partition(":")
+        function: Callable[..., Any] = getattr(import_module(module), name)
+        return function
 
 
 OF_CRITICAL = (
@@ -281,7 +281,7 @@ def method_names() -> tuple[str, ...]:
     """Return the names of all methods."""
     from pkgutil import iter_modules
 
-    return tuple(found.name for found in iter_modules(__path__))
+    return tuple(module.name for module in iter_modules(__path__))
 
 
 @lru_cache(maxsize=64)
@@ -291,12 +291,12 @@ def method_named(name: str) -> Method:
         raise _unknown(name)
     home = f"{__name__}.{name}"
     try:
-        found: Method = import_module(home).METHOD
+        method: Method = import_module(home).METHOD
     except ModuleNotFoundError as error:
         if error.name != home:
             raise
         raise _unknown(name) from None
-    return found
+    return method
 
 
 def methods() -> tuple[Method, ...]:

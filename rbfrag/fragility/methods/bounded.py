@@ -28,8 +28,8 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
 def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
-    share = v["y_m_s"] / (2.0 * v["intensity_m_s"])
-    f1, f2 = -ns.log(share), ns.log(1.0 - share)
+    ratio = v["y_m_s"] / (2.0 * v["intensity_m_s"])
+    f1, f2 = -ns.log(ratio), ns.log(1.0 - ratio)
     return Eta(b[0] + b[1] * f1 + b[2] * f2, (1.0, f1, f2))
 
 

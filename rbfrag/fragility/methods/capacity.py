@@ -12,15 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rbfrag.fragility.methods import (
-    NORMAL,
-    BlockParameters,
-    Bound,
-    Eta,
-    Form,
-    Method,
-    Numbers,
-)
+from rbfrag.fragility.methods import NORMAL, BlockParameters, Bound, Eta, Form, Method, Numbers
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 BLOCK = BlockParameters(

@@ -10,15 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from rbfrag.fragility.methods import (
-    NORMAL,
-    OF_CRITICAL,
-    TOPPLING_BLOCK,
-    Eta,
-    Form,
-    Method,
-    Numbers,
-)
+from rbfrag.fragility.methods import NORMAL, OF_CRITICAL, TOPPLING_BLOCK, Eta, Form, Method, Numbers
 
 
 def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:

@@ -27,16 +27,16 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
 def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
-    share = v["y_m_s"] / (2.0 * v["intensity_m_s"])
-    odds = ns.log((1.0 - share) / share)
-    return Eta(b[0] + b[1] * odds, (1.0, odds))
+    ratio = v["y_m_s"] / (2.0 * v["intensity_m_s"])
+    log_odds = ns.log((1.0 - ratio) / ratio)
+    return Eta(b[0] + b[1] * log_odds, (1.0, log_odds))
 
 
 def _pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     r = v["kr"] / v["pga_g"]
-    odds = ns.log((1.0 - r) / r)
+    log_odds = ns.log((1.0 - r) / r)
     log_z = ns.log(v["p"] * v["intensity_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
-    return Eta(b[0] + b[1] * odds + b[2] * log_z, (1.0, odds, log_z))
+    return Eta(b[0] + b[1] * log_odds + b[2] * log_z, (1.0, log_odds, log_z))
 
 
 def _pgv_pga_tm(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:

@@ -11,17 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from rbfrag.fragility.methods import (
-    NORMAL,
-    OF_CRITICAL,
-    TOPPLING_BLOCK,
-    Eta,
-    Form,
-    Method,
-    Numbers,
-)
+from rbfrag.fragility.methods import NORMAL, OF_CRITICAL, TOPPLING_BLOCK, Eta, Form, Method, Numbers
 
-NEGATIVE_SHARE_LIMIT = 0.025
+NEGATIVE_LIMIT = 0.025
 """Probability of a negative critical velocity above which a straight line is doubted."""
 
 
@@ -37,7 +29,7 @@ def variance_m2_s2(b: Sequence[float], x: Any) -> Any:
     return x * b[3] + b[2]
 
 
-def negative_share(b: Sequence[float], x: Any, ns: Numbers) -> Any:
+def negative_probability(b: Sequence[float], x: Any, ns: Numbers) -> Any:
     """Return the probability that the model gives to critical velocities below zero at x."""
     return ns.ndtr(-(mean_m_s(b, x) / ns.sqrt(variance_m2_s2(b, x))))
 
@@ -63,9 +55,9 @@ def _doubts(
 ) -> Iterator[tuple[Any, str, str]]:
     outside = "is outside the range where the straight-line normal model makes sense"
     yield (
-        negative_share(b, v["intensity_m_s"], ns) > NEGATIVE_SHARE_LIMIT,
+        negative_probability(b, v["intensity_m_s"], ns) > NEGATIVE_LIMIT,
         "intensity_m_s",
-        f"{outside}: there it gives more than {100 * NEGATIVE_SHARE_LIMIT:g} % probability "
+        f"{outside}: there it gives more than {100 * NEGATIVE_LIMIT:g} % probability "
         "to negative critical velocities",
     )
     yield (

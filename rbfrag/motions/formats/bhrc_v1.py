@@ -8,10 +8,10 @@ There is no sampling interval: it is duration / number of points.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
-from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.record_file import RecordFile
+from rbfrag.motions.text.record_file import RecordFile, Trace
 
 FORMAT = "BHRC V1"
 
@@ -27,46 +27,39 @@ _POINTS = re.compile(r"NO\.\s*OF POINTS\s*=\s*(\S+)", re.IGNORECASE)
 _DURATION = re.compile(r"DURATION\s*=\s*(\S+)", re.IGNORECASE)
 _UNIT = re.compile(r"UNITS ARE SECONDS AND\s+(g\s*/\s*10|\S+)", re.IGNORECASE)
 
-
-def recognises(head: str) -> bool:
-    """Return whether the first lines are those of a BHRC V1 file."""
-    return bool(_BLOCK.match(head))
+recognises = _BLOCK.match
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the components of a BHRC file in their order, with one recording id."""
-    return [_component(file, span, index) for index, span in enumerate(file.blocks(_BLOCK))]
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the components of a BHRC file in their order, with one recording id."""
+    for index, span in enumerate(file.blocks(_BLOCK)):
+        yield _component(file, span, f"component {index}")
 
 
-def _component(file: RecordFile, span: range, index: int) -> GroundMotion:
+def _component(file: RecordFile, span: range, name: str) -> Trace:
     points = file.find(span, _POINTS, "number of points")
-    npts = file.count(points, "number of points")
+    count = file.count(points, "number of points", name)
     duration = file.find(span, _DURATION, "duration")
     unit = file.find(span, _UNIT, "unit of acceleration")
-    factor = file.unit_in_g(unit)
-    dt = file.dt_of_duration(duration, npts)
+    dt = file.dt_of_duration(duration, count.number)
     first, rows = file.volume_1_data(span, unit.line)
     values = file.fixed_width(rows, first + 1, LAYOUT, "acceleration")
-    remarks = file.remarks(npts, values.size, points.line, f"component {index}")
-    if remarks:
-        remarks += (f"dt = {dt:g} s is the duration over the number of points of the header",)
-
     component = file.find(span, _COMPONENT, "line 'COMP'").text
     # L1, V2, T3: the letter is the axis, the number counts the channels
     axis = component.rstrip("0123456789")
-    azimuth = file.words(
+    azimuth = file.label(
         span, re.compile(rf"\bAzimuth\b.*\b{re.escape(axis)}\s+(\d+(?:\.\d+)?)", re.ASCII)
     )
-    return file.motion(
-        values * factor,
+    return Trace(
+        values,
         dt,
-        station=file.words(span, _STATION),
-        event=" ".join(file.words(span, _ORIGIN).split()),
-        component=component,
-        orientation_deg=azimuth_deg(azimuth),
-        is_vertical=is_vertical_name(axis),
+        unit,
+        count,
+        component,
+        station=file.label(span, _STATION),
+        event=" ".join(file.label(span, _ORIGIN).split()),
         recording=file.find(span, _RECORD, "name of the record").text,
-        trace_index=index,
-        remarks=remarks,
         is_corrected=False,
+        remark_if_partial=f"dt = {dt:g} s is the duration over the number of points of the header",
+        labels={"orientation_deg": azimuth_deg(azimuth), "is_vertical": is_vertical_name(axis)},
     )

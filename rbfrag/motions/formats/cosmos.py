@@ -12,22 +12,22 @@ differ. A file may hold several channels, and velocities and displacements, whic
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
-from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.file import field_layout, finite_number
-from rbfrag.motions.text.record_file import Field, RecordFile
+from rbfrag.motions.text.record_file import Field, RecordFile, Trace
 
 FORMAT = "COSMOS V1c/V2c"
 
 DT_MS_VALUE = 62
 """Place of the sampling interval in the real header, from 1."""
 
-DURATION_SHARE = 0.02
+DURATION_RATIO = 0.02
 DURATION_S = 2.0
 """How far the "approx" seconds may be from npts * dt; a wrong unit of dt is far beyond."""
 
-_BLOCK = re.compile(r"\s*[A-Za-z].*\(Format v\S* with\s*\d+ text lines\)", re.IGNORECASE)
+_BLOCK = re.compile(r"[^\S\n]*[A-Za-z].*\(Format v\S* with[^\S\n]*\d+ text lines\)", re.IGNORECASE)
 _REALS = re.compile(r"^(\s*\d+\s+Real-header values follow on.*)", re.IGNORECASE)
 _SERIES = re.compile(r"^(\s*\S+\s+\w+\s+pts,\s*approx.*)", re.IGNORECASE)
 _POINTS = re.compile(r"^\s*(\S+)\s+(\w+)\s+pts", re.IGNORECASE)
@@ -41,57 +41,55 @@ _CHANNEL = re.compile(r"^\s*Sta Chan\s+[^:]*:\s*([^(]*)", re.IGNORECASE)
 _SCNL = re.compile(r"<SCNL>\s*[^.\s]+\.([^.\s]+)\.")
 _RECORD = re.compile(r"^\|.*\bRcrdId:\s*(\S+)", re.IGNORECASE)
 
-
-def recognises(head: str) -> bool:
-    """Return whether the first line is that of a COSMOS file."""
-    return bool(_BLOCK.match(head.split("\n", 1)[0]))
+recognises = _BLOCK.match
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the accelerations of a COSMOS file in their order."""
-    motions: list[GroundMotion] = []
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the accelerations of a COSMOS file in their order."""
     others: list[str] = []
-    for span in file.blocks(_BLOCK):
+    spans = file.blocks(_BLOCK)
+    for span in spans:
         series = file.find(span, _SERIES, "line '... acceleration pts, ...'")
         quantity = _POINTS.search(series.text)
         if quantity and not quantity[2].lower().startswith("accel"):
             others.append(quantity[2])
-            continue
-        motions.append(_trace(file, span, series, len(motions)))
-    if not motions:
+        else:
+            yield _trace(file, span, series)
+    if len(others) == len(spans):
         raise file.error(f"the file holds {', '.join(others)}: the acceleration is needed")
-    return motions
 
 
-def _trace(file: RecordFile, span: range, series: Field, index: int) -> GroundMotion:
+def _trace(file: RecordFile, span: range, series: Field) -> Trace:
     here = range(series.line - 1, series.line)
-    npts = file.count(file.find(here, _POINTS, "number of points"), "number of points")
-    factor = file.unit_in_g(file.find(here, _UNIT, "unit of acceleration"))
+    count = file.count(file.find(here, _POINTS, "number of points"), "number of points")
+    unit = file.find(here, _UNIT, "unit of acceleration")
     header = range(span.start, series.line - 1)
     dt = file.agreed_dt(*_interval(file, header))
-    _check_duration(file, here, npts, dt)
+    if seconds := file.optional(here, _SECONDS):
+        file.refuse_other_duration(
+            count, dt, seconds, "correct the header", slack_s=DURATION_S, ratio=DURATION_RATIO
+        )
     ends = (at for at in span if at >= series.line and _END.match(file.lines[at]))
     data = file.data(series.line, next(ends, span.stop))
     values = file.fixed_width(data, series.line + 1, _layout(file, series), "acceleration")
-    remarks = file.remarks(npts, values.size, series.line)
-
-    direction = file.words(header, _CHANNEL)
-    component = file.words(header, _SCNL) or direction
-    vertical = is_vertical_name(direction)
-    record = file.words(header, _RECORD)
-    return file.motion(
-        values * factor,
+    direction = file.label(header, _CHANNEL)
+    component = file.label(header, _SCNL) or direction
+    azimuth, vertical = azimuth_deg(direction or component), is_vertical_name(direction)
+    if vertical is None:
+        vertical = is_vertical_name(component)
+    record = file.label(header, _RECORD)
+    return Trace(
+        values,
         dt,
-        station=file.words(header, _STATION),
-        event=file.words(header, _EVENT),
-        component=component,
-        orientation_deg=azimuth_deg(direction or component),
-        is_vertical=vertical if vertical is not None else is_vertical_name(component),
+        unit,
+        count,
+        component,
+        station=file.label(header, _STATION),
+        event=file.label(header, _EVENT),
         recording=_without(record, component) if record else None,
-        trace_index=index,
-        remarks=remarks,
+        start=file.label(header, _START),
         is_corrected=not file.lines[span.start].strip().lower().startswith("uncorrected"),
-        start=file.words(header, _START),
+        labels={"orientation_deg": azimuth, "is_vertical": vertical},
     )
 
 
@@ -111,19 +109,6 @@ def _interval(file: RecordFile, header: range) -> tuple[float, int]:
             f"{what} is {shown}, which means unknown: the record cannot be used", at + 1
         )
     return milliseconds / 1000.0, at + 1
-
-
-def _check_duration(file: RecordFile, here: range, npts: int, dt: float) -> None:
-    field = file.optional(here, _SECONDS)
-    if field is None:
-        return
-    seconds = finite_number(file.path, field.text, field.line, "approximate duration")
-    if abs(seconds - npts * dt) > DURATION_S + DURATION_SHARE * seconds:
-        raise file.error(
-            f"{npts} points at dt = {dt:g} s last {npts * dt:g} s, but the header says approx "
-            f"{field.text} s: correct the header",
-            field.line,
-        )
 
 
 def _layout(file: RecordFile, field: Field) -> tuple[int, int]:

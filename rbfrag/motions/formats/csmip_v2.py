@@ -13,11 +13,10 @@ they say. Channels of one file may differ in length. A block ends with ``/&``.
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from collections.abc import Iterator
 
-from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.file import field_layout
-from rbfrag.motions.text.record_file import Field, RecordFile
+from rbfrag.motions.text.record_file import Field, RecordFile, Trace
 
 FORMAT = "CSMIP/CDMG V2"
 
@@ -27,7 +26,10 @@ LAYOUT = (8, 10)
 """Fields a line and characters a field, where the file does not say."""
 
 _BLOCK = re.compile(r"corrected accelerogram\s+\S", re.IGNORECASE)
-_KIND = re.compile(r"^(?:\s*chan\s*\d|\s*\S+\s+points of instrument)", re.IGNORECASE | re.MULTILINE)
+_HEAD = re.compile(
+    _BLOCK.pattern + r"(?s:.)*^\s*(?:chan\s*\d|\S+\s+points of instrument)",
+    re.IGNORECASE | re.MULTILINE,
+)
 _RECORD = re.compile(r"^corrected accelerogram\s+(\S+)", re.IGNORECASE)
 _CHANNEL = re.compile(r"^\s*chan\s*\d+\s*:\s*(\S.*)", re.IGNORECASE)
 _STATION = re.compile(r"^station\s+(?:no|id)\.?\s*(\S+)", re.IGNORECASE)
@@ -38,51 +40,48 @@ _UNIT = re.compile(r"sec[.,\s]+(?:in\s+|\(\s*units:\s*)([a-z/0-9^*]+)", re.IGNOR
 _SERIES_END = re.compile(r"\s*(?:/&|\S+\s+points of )", re.IGNORECASE)
 _WIDE_GAP = re.compile(r"\s{2,}")
 
-
-def recognises(head: str) -> bool:
-    """Return whether the first lines are those of a CSMIP or CDMG V2 file."""
-    return bool(_BLOCK.match(head)) and bool(_KIND.search(head))
+recognises = _HEAD.match
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the channels of a V2 file in their order, with one recording id."""
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the channels of a V2 file in their order, with one recording id."""
     spans = file.blocks(_BLOCK)
     remarks = file.missing_channels(spans[0], len(spans))
-    channels = [_channel(file, span, index) for index, span in enumerate(spans)]
-    return [replace(channel, remarks=(*remarks, *channel.remarks)) for channel in channels]
+    for index, span in enumerate(spans):
+        yield _channel(file, span, f"channel {index}", remarks)
 
 
-def _channel(file: RecordFile, span: range, index: int) -> GroundMotion:
-    points = file.find(span, _POINTS, f"line 'points of accel data' in channel {index}")
-    npts = file.count(points, "number of points")
+def _channel(file: RecordFile, span: range, name: str, remarks: tuple[str, ...]) -> Trace:
+    points = file.find(span, _POINTS, f"line 'points of accel data' in {name}")
+    count = file.count(points, "number of points", name)
     here = range(points.line - 1, points.line)
     dt = file.dt(file.find(here, _INTERVAL, "sampling interval"))
-    factor = file.unit_in_g(file.find(here, _UNIT, "unit of acceleration"))
+    unit = file.find(here, _UNIT, "unit of acceleration")
     layout = field_layout(file.lines[points.line - 1]) or LAYOUT
     if not file.allow_partial and not any(file.lines[at].startswith(END) for at in span):
         raise file.error(
-            f"channel {index} does not end with a line {END}: the file is truncated; export the "
+            f"{name} does not end with a line {END}: the file is truncated; export the "
             "record again",
             span.stop,
         )
     ends = (at for at in span if at >= points.line and _SERIES_END.match(file.lines[at]))
     data = file.data(points.line, next(ends, span.stop))
     values = file.fixed_width(data, points.line + 1, layout, "acceleration")
-    remarks = file.remarks(npts, values.size, points.line, f"channel {index}")
 
     header = range(span.start, points.line - 1)
-    channel = file.find(header, _CHANNEL, f"line 'Chan' in channel {index}")
-    return file.motion(
-        values * factor,
+    channel = file.find(header, _CHANNEL, f"line 'Chan' in {name}")
+    return Trace(
+        values,
         dt,
+        unit,
+        count,
+        component=channel.text,
         station=_station(file, file.optional(header, _STATION)),
         event=_event(file, channel, header.stop),
-        component=channel.text,
         recording=file.find(header, _RECORD, "name of the record").text,
-        trace_index=index,
-        remarks=remarks,
+        start=file.label(header, _START),
         is_corrected=True,
-        start=file.words(header, _START),
+        remarks=remarks,
     )
 
 

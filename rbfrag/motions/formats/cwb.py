@@ -7,10 +7,17 @@ The columns are named by ``#DataSequence: Time U(+); N(+); E(+)`` and laid out b
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
-from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.file import field_layout
-from rbfrag.motions.text.record_file import Field, NamedFields, RecordFile
+from rbfrag.motions.text.record_file import (
+    Count,
+    Field,
+    NamedFields,
+    PrintedTimes,
+    RecordFile,
+    Trace,
+)
 
 FORMAT = "CWB dat"
 
@@ -22,14 +29,11 @@ _COLUMN = re.compile(r"([A-Z])\(\+\)")
 _DECIMALS = re.compile(r"F\d+\.(\d)", re.ASCII)
 _WORD = re.compile(r"[^\s.]+")
 
-
-def recognises(head: str) -> bool:
-    """Return whether the first lines are those of a CWB file."""
-    return bool(_HEAD.match(head))
+recognises = _HEAD.match
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the components of a file in the order of its columns, with one recording id."""
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the components of a file in the order of its columns, with one recording id."""
     lines = file.lines
     # one line within the header is blank
     first = max(at for at, line in enumerate(lines) if line.startswith(COMMENT)) + 1
@@ -41,42 +45,37 @@ def read(file: RecordFile) -> list[GroundMotion]:
     dt = file.agreed_dt(1.0 / frequency_hz, rate.line)
     unit = fields["AmplitudeUnit"]
     word = _WORD.match(unit.text)
-    factor = file.unit_in_g(Field(word[0] if word else unit.text, unit.line))
     components = _components(file, fields["DataSequence"])
-    layout, decimals = _layout(file, fields["Data"], 1 + len(components))
+    layout, last_digit_s = _layout(file, fields["Data"], 1 + len(components))
     table = file.fixed_table(file.data(first), first + 1, layout, "value")
     length = fields["RecordLength(sec)"]
     stated = file.positive(length, "record length") * frequency_hz
-    remarks = file.remarks(stated, table.shape[0], length.line)
-    file.refuse_other_times(table[:, 0], dt, decimals, first + 1, 1)
-    station = fields["StationCode"].text
-    return [
-        file.motion(
-            table[:, 1 + index] * factor,
+    for component, values in zip(components, table.T[1:], strict=True):
+        yield Trace(
+            values,
             dt,
-            station=station,
+            Field(word[0] if word else unit.text, unit.line),
+            Count(stated, length.line),
+            component,
+            times=PrintedTimes(table[:, 0], 1.000001 * last_digit_s, first + 1),
+            station=fields["StationCode"].text,
             event=fields.text("Origin Time"),
-            component=component,
-            trace_index=index,
-            remarks=remarks,
             is_corrected=False,
         )
-        for index, component in enumerate(components)
-    ]
 
 
 def _components(file: RecordFile, sequence: Field) -> list[str]:
-    found = _SEQUENCE.fullmatch(sequence.text)
-    if not found:
+    match = _SEQUENCE.fullmatch(sequence.text)
+    if not match:
         raise file.error(
             f"the columns {sequence.text!r} are not of the form Time U(+); N(+); E(+)",
             sequence.line,
         )
-    return _COLUMN.findall(found[1])
+    return _COLUMN.findall(match[1])
 
 
-def _layout(file: RecordFile, field: Field, columns: int) -> tuple[tuple[int, int], int]:
-    """Columns and characters a column of the printed format, and its decimals."""
+def _layout(file: RecordFile, field: Field, columns: int) -> tuple[tuple[int, int], float]:
+    """Columns and characters a column of the printed format, and its last digit."""
     layout, decimals = field_layout(field.text), _DECIMALS.search(field.text)
     if layout is None or decimals is None or layout[0] != columns:
         raise file.error(
@@ -84,4 +83,4 @@ def _layout(file: RecordFile, field: Field, columns: int) -> tuple[tuple[int, in
             f"as {columns}F10.3 would",
             field.line,
         )
-    return layout, int(decimals[1])
+    return layout, 10.0 ** -int(decimals[1])

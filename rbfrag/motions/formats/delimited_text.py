@@ -15,14 +15,16 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-
 from rbfrag.errors import InputError, MotionFileError
-from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.file import finite_number, read_text
-from rbfrag.motions.text.record_file import Field, FloatArray, RecordFile, positive_number
+from rbfrag.motions.text.file import read_text
+from rbfrag.motions.text.record_file import (
+    Field,
+    RecordFile,
+    Trace,
+    positive_number,
+)
 from rbfrag.motions.text.times import sampling_interval
-from rbfrag.motions.units import acceleration_unit, unit_in_g
+from rbfrag.motions.units import acceleration_unit
 
 FORMAT = "delimited text"
 
@@ -85,8 +87,8 @@ def recognises(head: str) -> bool:
     return all(map(_is_numeric, rows[: 1 if width <= 2 else 2]))
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the one motion of a delimited text file; such files state no number of samples."""
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the one trace of a delimited text file; such files state no number of samples."""
     lines = file.lines
     start = _first_data_line(lines)
     header = [
@@ -96,34 +98,33 @@ def read(file: RecordFile) -> list[GroundMotion]:
     ]
     rows = _rows(file, start)
     unit = _stated_unit(file, header)
-    if len(rows[0][1]) == 1:
-        samples = _numbers(file, rows, 0, "acceleration")
+    numbers = [number for number, _ in rows]
+    columns = [[fields[place] for _, fields in rows] for place in range(len(rows[0][1]))]
+    if len(columns) == 1:
+        samples = file.numbers(columns[0], lambda: numbers, "acceleration")
         _refuse_gaps(file, rows)
         dt, remark = _interval_of_list(file)
     else:
-        times = _numbers(file, rows, 0, "time")
-        samples = _numbers(file, rows, 1, "acceleration")
-        tokens = [fields[0].strip() for _, fields in rows]
-        numbers = [number for number, _ in rows]
+        times = file.numbers(columns[0], lambda: numbers, "time")
+        samples = file.numbers(columns[1], lambda: numbers, "acceleration")
+        tokens = [token.strip() for token in columns[0]]
         dt = sampling_interval(file.path, tokens, times, numbers, file.dt_s)
         first_s = float(times[0])
         remark = f"times in the file start at {first_s:g} s; here they start at 0"
         if first_s == 0.0:
             remark = ""
     event, station, component = _event_station_component(header)
-    factor = unit_in_g(unit)
-    return [
-        file.motion(
-            samples * factor if factor != 1.0 else samples,
-            dt,
-            station=station,
-            event=event,
-            component=component,
-            recording=f"{event} {station}" if event and station else "",
-            remarks=(remark,) if remark else (),
-            is_partial=False,
-        )
-    ]
+    yield Trace(
+        samples,
+        dt,
+        unit,
+        None,
+        component,
+        station=station,
+        event=event,
+        recording=f"{event} {station}" if event and station else "",
+        remarks=(remark,) if remark else (),
+    )
 
 
 def _mark(row: str) -> str | None:
@@ -194,23 +195,6 @@ def _rows(file: RecordFile, start: int) -> list[tuple[int, list[str]]]:
     return rows
 
 
-def _numbers(
-    file: RecordFile, rows: list[tuple[int, list[str]]], column: int, what: str
-) -> FloatArray:
-    tokens = [fields[column] for _, fields in rows]
-    try:
-        numbers = np.array(tokens, dtype=np.float64)
-    except ValueError:
-        numbers = np.array([np.nan])
-    # float() also reads 'nan', 'inf', '1_000' and digits of other scripts
-    numbers_only = all(token.isascii() and "_" not in token for token in tokens)
-    if not numbers_only or not np.isfinite(numbers).all():
-        return np.array(
-            [finite_number(file.path, fields[column].strip(), n, what) for n, fields in rows]
-        )
-    return numbers
-
-
 def _interval_of_list(file: RecordFile) -> tuple[float, str]:
     """Sampling interval of a list of accelerations, and a sentence on where it comes from."""
     path, dt_s = file.path, file.dt_s
@@ -247,62 +231,38 @@ def _indexed_interval(path: Path) -> tuple[float, str] | None:
     index = path.parent / INDEX
     if not index.is_file():
         return None
-    found: tuple[float, str] | None = None
+    entry: tuple[float, str] | None = None
     for number, line in enumerate(read_text(index).split("\n"), 1):
         fields = line.split()
         if len(fields) != 2 or fields[0] != path.name:
             continue
         dt = positive_number(index, Field(fields[1], number), "dt")
-        if found is not None and found[0] != dt:
+        if entry is not None and entry[0] != dt:
             raise MotionFileError(
                 index,
-                f"{path.name} has dt = {dt:g} s here, but {found[0]:g} s in {found[1]}: "
+                f"{path.name} has dt = {dt:g} s here, but {entry[0]:g} s in {entry[1]}: "
                 "keep one line",
                 line=number,
             )
-        found = found or (dt, f"{INDEX}, line {number}")
-    return found
+        entry = entry or (dt, f"{INDEX}, line {number}")
+    return entry
 
 
-def _stated_unit(file: RecordFile, header: Header) -> str:
-    """The standard name of the unit of acceleration, which is never guessed."""
-    units = file.units
+def _stated_unit(file: RecordFile, header: Header) -> Field | None:
+    """The unit of acceleration that the header states, once or alike several times."""
     _check_columns(file, header)
-    found: tuple[int, str, str] | None = None
-    unknown: tuple[int, str] | None = None
-    for number, spelling in _spellings(header):
-        try:
-            unit = acceleration_unit(spelling)
-        except InputError:
-            unknown = unknown or (number, spelling)
-            continue
-        if found is not None and found[2] != unit:
+    stated = [Field(spelling, number) for number, spelling in _spellings(header)]
+    known = [field for field in stated if _is_unit(field.text)]
+    for field in known[1:]:
+        if acceleration_unit(field.text) != acceleration_unit(known[0].text):
             raise file.error(
-                f"the header says {spelling}, but {found[1]} on line {found[0]}: correct it",
-                number,
+                f"the header says {field.text}, but {known[0].text} on line {known[0].line}: "
+                "correct it",
+                field.line,
             )
-        found = found or (number, spelling, unit)
-    if found is None and unknown is not None:
-        number, spelling = unknown
-        raise file.error(
-            f"the header gives the acceleration in {spelling!r}, which is no known unit: convert "
-            "the record to g, m/s2, cm/s2 or mm/s2",
-            number,
-        )
-    if found is None and units is None:
-        raise file.error(
-            "the file states no unit of acceleration, and it is never guessed: give it with "
-            "--units g, m/s2, cm/s2 or mm/s2",
-        )
-    if found is None:
-        assert units is not None
-        return acceleration_unit(units)
-    if units is not None and acceleration_unit(units) != found[2]:
-        raise file.error(
-            f"the header says {found[1]}, not {units}: leave --units out, or correct the header",
-            found[0],
-        )
-    return found[2]
+    if not stated:
+        file.require_units()
+    return next(iter(known or stated), None)
 
 
 def _event_station_component(header: Header) -> tuple[str, str, str]:

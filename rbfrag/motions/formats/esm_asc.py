@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
-from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.record_file import NamedFields, RecordFile
+from rbfrag.motions.text.record_file import NamedFields, RecordFile, Trace
 
 FORMAT = "ESM ASC"
 
 _HEAD = re.compile(r"EVENT_NAME:(?s:.)*^SAMPLING_INTERVAL_S:", re.MULTILINE)
 _KEY = re.compile(r"[A-Z][^:\s]*:")
 
-
-def recognises(head: str) -> bool:
-    """Return whether the first lines are those of an ESM file."""
-    return bool(_HEAD.match(head))
+recognises = _HEAD.match
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the one motion of a file."""
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the one trace of a file."""
     lines = file.lines
     first = next((at for at, line in enumerate(lines) if not _KEY.match(line)), len(lines))
     fields = NamedFields(file, range(first))
@@ -30,24 +27,17 @@ def read(file: RecordFile) -> list[GroundMotion]:
             fields["DATA_TYPE"].line,
         )
     dt = file.dt(fields["SAMPLING_INTERVAL_S"])
-    factor = file.unit_in_g(fields["UNITS"])
-    stated = fields["NDATA"]
-    npts = file.count(stated, "NDATA")
-    values = file.table(file.data(first), first + 1, 1, "acceleration")[:, 0]
-    remarks = file.remarks(npts, values.size, stated.line)
-    component = fields["STREAM"].text
-    return [
-        file.motion(
-            values * factor,
-            dt,
-            station=f"{fields.text('NETWORK')}.{fields['STATION_CODE'].text}".lstrip("."),
-            event=fields.text("EVENT_NAME") or fields.text("EVENT_ID"),
-            component=component,
-            remarks=remarks,
-            is_corrected=_is_corrected(fields.text("BASELINE_CORRECTION")),
-            start=fields.text("DATE_TIME_FIRST_SAMPLE_YYYYMMDD"),
-        )
-    ]
+    yield Trace(
+        file.table(file.data(first), first + 1, 1, "acceleration")[:, 0],
+        dt,
+        fields["UNITS"],
+        file.count(fields["NDATA"], "NDATA"),
+        component=fields["STREAM"].text,
+        station=f"{fields.text('NETWORK')}.{fields['STATION_CODE'].text}".lstrip("."),
+        event=fields.text("EVENT_NAME") or fields.text("EVENT_ID"),
+        start=fields.text("DATE_TIME_FIRST_SAMPLE_YYYYMMDD"),
+        is_corrected=_is_corrected(fields.text("BASELINE_CORRECTION")),
+    )
 
 
 def _is_corrected(baseline: str) -> bool | None:

@@ -7,11 +7,12 @@ by what they say, not by their line.
 
 from __future__ import annotations
 
+import math
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 
-from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.record_file import Field, RecordFile
+from rbfrag.motions.text.record_file import Field, RecordFile, Trace
 
 FORMAT = "GeoNet V2A"
 
@@ -30,74 +31,61 @@ _DT = re.compile(r"data at\s+(\S+)\s+sec intervals")
 _COMPONENT = re.compile(r"^Component\s+(\S+)")
 _PEAK = re.compile(r"^Acceleration:\s+peak\s+\S+\s+(\S+)")
 
+_HEAD = re.compile(_BLOCK.pattern + r"(?s:.)*Number of points")
 
-def recognises(head: str) -> bool:
-    """Return whether the first lines are those of a GeoNet V2A file."""
-    return bool(_BLOCK.match(head)) and "Number of points" in head
-
-
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the components of a V2A file in their order, with one recording id."""
-    return [_component(file, span, index) for index, span in enumerate(file.blocks(_BLOCK))]
+recognises = _HEAD.match
 
 
-def _component(file: RecordFile, span: range, index: int) -> GroundMotion:
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the components of a V2A file in their order, with one recording id."""
+    for index, span in enumerate(file.blocks(_BLOCK)):
+        yield _component(file, span, f"component {index}")
+
+
+def _component(file: RecordFile, span: range, name: str) -> Trace:
     header = range(span.start, min(span.start + TEXT_LINES, span.stop))
 
     def field(pattern: re.Pattern[str], what: str) -> Field:
-        return file.find(header, pattern, f"{what} of component {index}")
+        return file.find(header, pattern, f"{what} of {name}")
 
     recording = field(_BLOCK, "accelerogram name").text
     station = field(_SITE, "site").text
     component = field(_COMPONENT, "component").text
     points = field(_NPTS, "number of points")
-    npts = file.count(points, "number of points")
+    count = file.count(points, "number of points", name)
     dt = file.dt(field(_DT, "sampling interval"))
-    factor = file.unit_in_g(field(_PEAK, "peak acceleration with its unit"))
+    unit = field(_PEAK, "peak acceleration with its unit")
 
     first = span.start + TEXT_LINES + NUMERIC_LINES
     data = file.data(first, span.stop)
-    rows = -(-npts // LAYOUT[0])
+    rows = math.ceil(count.number / LAYOUT[0])
     # cut so short that no line lost among the accelerations can be the reason
     is_cut = file.allow_partial and span.stop == len(file.lines) and len(data) < 2 * rows
-    cut_remark: tuple[str, ...] = ()
     if is_cut:
-        _refuse_other_duration(file, header, points, npts, dt)
-        cut_remark = (f"the file ends before component {index} does",)
+        # where lines are missing, a wrong count would take velocities for accelerations
+        duration = file.find(header, _DURATION, "duration")
+        advice = "the number of points is wrong, and where the accelerations end is not known"
+        file.refuse_other_duration(count, dt, duration, advice, slack_s=2.0 * dt, ratio=0.0)
     elif len(data) != SERIES * rows:
         raise file.error(
-            f"the header of component {index} says {npts} points, which are {SERIES} x {rows} "
+            f"the header of {name} says {count.number} points, which are {SERIES} x {rows} "
             f"lines of data, but {len(data)} follow: the file is truncated or its header wrong",
-            points.line,
+            count.line,
         )
     values = file.fixed_width(data[:rows], first + 1, LAYOUT, "acceleration")
-    whole = file if is_cut else replace(file, allow_partial=False)
-    remarks = whole.remarks(npts, values.size, points.line, f"component {index}")
-    return file.motion(
-        values * factor,
+    if not is_cut:
+        replace(file, allow_partial=False).missing_samples(count, values.size)
+    return Trace(
+        values,
         dt,
-        station=station,
+        unit,
+        count,
+        component,
         # the file names its own trigger, not the earthquake
         event="",
-        component=component,
+        station=station,
         recording=recording,
-        trace_index=index,
-        remarks=(*remarks, *cut_remark),
-        is_partial=is_cut,
         is_corrected=True,
+        is_partial=is_cut,
+        remark_if_partial=f"the file ends before {name} does",
     )
-
-
-def _refuse_other_duration(
-    file: RecordFile, header: range, points: Field, npts: int, dt: float
-) -> None:
-    """Where lines are missing, a wrong count would take velocities for accelerations."""
-    duration = file.find(header, _DURATION, "duration")
-    seconds = file.positive(duration, "duration")
-    if abs(seconds - npts * dt) > 2.0 * dt:
-        raise file.error(
-            f"{npts} points at dt = {dt:g} s last {npts * dt:g} s, but the header says "
-            f"{duration.text} s: the number of points is wrong, and where the accelerations end "
-            "is not known",
-            points.line,
-        )

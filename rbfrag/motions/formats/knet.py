@@ -8,11 +8,11 @@ the borehole, 4 to 6 at the surface, each north-south, east-west, up-down.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
 
-from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.record_file import Field, FloatArray, RecordFile
+from rbfrag.motions.text.record_file import Count, Field, FloatArray, RecordFile, Trace
 
 FORMAT = "K-NET/KiK-net ASCII"
 
@@ -35,14 +35,11 @@ _BOREHOLE = frozenset({"1", "2", "3"})
 _HEAD = re.compile(r"Origin Time\b(?s:.)*^Sampling Freq\(Hz\)", re.MULTILINE)
 _SCALE = re.compile(r"([\d.]+)\s*\(\s*([^)\s]+)\s*\)\s*/\s*([\d.]+)", re.ASCII)
 
-
-def recognises(head: str) -> bool:
-    """Return whether the first lines are those of a K-NET or KiK-net file."""
-    return bool(_HEAD.match(head))
+recognises = _HEAD.match
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the one motion of a file."""
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the one trace of a file."""
     fields, first = _header(file)
 
     def field(name: str) -> Field:
@@ -54,13 +51,13 @@ def read(file: RecordFile) -> list[GroundMotion]:
     rate = Field(rate.text.removesuffix("Hz").strip(), rate.line)
     frequency_hz = file.positive(rate, "sampling frequency")
     dt = file.agreed_dt(1.0 / frequency_hz, rate.line)
-    gal = _scale_in_g(file, field("Scale Factor"))
+    scale, unit = _scale(file, field("Scale Factor"))
     counts = file.free_numbers(file.lines[first:], first + 1, "count")
     duration = field("Duration Time(s)")
     stated = file.positive(duration, "duration") * frequency_hz
-    partial = file.remarks(stated, counts.size, duration.line)
     _refuse_large(file, counts, first)
-    offset = float(counts.mean())
+    # a file without any is refused by its number of samples
+    offset = float(counts.mean()) if counts.size else 0.0
 
     direction = field("Dir.").text
     component, axis = _CHANNELS.get(direction, (direction, direction))
@@ -72,25 +69,25 @@ def read(file: RecordFile) -> list[GroundMotion]:
     if direction in _BOREHOLE:
         remarks.append("this is the borehole sensor, below the surface")
     recorded = fields.get("Record Time", field("Origin Time")).text
-    return [
-        file.motion(
-            (counts - offset) * gal,
-            dt,
-            station=station,
-            event=f"{field('Origin Time').text} JST",
-            component=component,
-            axis=axis,
-            recording=f"{station} {recorded}{' borehole' if direction in _BOREHOLE else ''}",
-            is_corrected=False,
-            start=recorded,
-            remarks=(*remarks, *partial),
-            is_partial=bool(partial),
-        )
-    ]
+    yield Trace(
+        counts - offset,
+        dt,
+        unit,
+        Count(stated, duration.line),
+        component,
+        scale,
+        station=station,
+        event=f"{field('Origin Time').text} JST",
+        axis=axis,
+        recording=f"{station} {recorded}{' borehole' if direction in _BOREHOLE else ''}",
+        start=recorded,
+        is_corrected=False,
+        remarks=tuple(remarks),
+    )
 
 
 def _refuse_large(file: RecordFile, counts: FloatArray, first: int) -> None:
-    if np.abs(counts).max() <= LARGEST_COUNT:
+    if np.abs(counts).max(initial=0.0) <= LARGEST_COUNT:
         return
     for at in range(first, len(file.lines)):
         for token in file.lines[at].split():
@@ -113,17 +110,17 @@ def _header(file: RecordFile) -> tuple[dict[str, Field], int]:
     raise file.error(f"the header does not end with {LAST_FIELD!r}: export the record again", 1)
 
 
-def _scale_in_g(file: RecordFile, field: Field) -> float:
-    found = _SCALE.fullmatch(field.text)
-    if not found:
+def _scale(file: RecordFile, field: Field) -> tuple[float, Field]:
+    """Units of acceleration a count, and the unit."""
+    match = _SCALE.fullmatch(field.text)
+    if not match:
         raise file.error(
             f"the scale factor {field.text!r} is not of the form 7845(gal)/8223790", field.line
         )
-    unit_in_g = file.unit_in_g(Field(found[2], field.line))
-    numerator = file.positive(Field(found[1], field.line), "scale factor's numerator")
-    denominator = file.positive(Field(found[3], field.line), "scale factor's denominator")
+    numerator = file.positive(Field(match[1], field.line), "scale factor's numerator")
+    denominator = file.positive(Field(match[3], field.line), "scale factor's denominator")
     if numerator > LARGEST_SCALE * denominator:
         raise file.error(
             f"the scale factor {field.text!r} is more than {LARGEST_SCALE:g} a count", field.line
         )
-    return numerator / denominator * unit_in_g
+    return numerator / denominator, Field(match[2], field.line)

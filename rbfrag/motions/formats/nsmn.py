@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
-from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.record_file import NamedFields, RecordFile
+from rbfrag.motions.text.record_file import NamedFields, RecordFile, Trace
 
 FORMAT = "AFAD NSMN text"
 
@@ -18,14 +18,11 @@ _HEAD = re.compile(
 _COLUMNS = re.compile(r"^\s*((?:(?:N-S|E-W|U-D)\s*)+)$")
 _UNIT = re.compile(r"PGA VALUES\s*\(([^)]*)\)", re.IGNORECASE)
 
-
-def recognises(head: str) -> bool:
-    """Return whether the first lines are those of an NSMN file."""
-    return bool(_HEAD.match(head))
+recognises = _HEAD.match
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the components of a file in the order of its columns, with one recording id."""
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the components of a file in the order of its columns, with one recording id."""
     header = range(min(HEADER_LINES, len(file.lines)))
     columns = file.find(header, _COLUMNS, "line 'N-S E-W U-D'")
     components = columns.text.split()
@@ -34,23 +31,18 @@ def read(file: RecordFile) -> list[GroundMotion]:
     header = range(columns.line - 1)
     fields = NamedFields(file, header)
     dt = file.dt(fields["SAMPLING INTERVAL (sec)"])
-    factor = file.unit_in_g(file.find(header, _UNIT, "unit of the PGA values"))
-    stated = fields["NUMBER OF DATA"]
-    npts = file.count(stated, "number of data")
+    unit = file.find(header, _UNIT, "unit of the PGA values")
+    count = file.count(fields["NUMBER OF DATA"], "number of data")
     rows = file.data(columns.line)
     table = file.table(rows, columns.line + 1, len(components), "acceleration")
-    remarks = file.remarks(npts, table.shape[0], stated.line)
-    station = fields["STATION ID"].text
-    return [
-        file.motion(
-            table[:, index] * factor,
+    for component, values in zip(components, table.T, strict=True):
+        yield Trace(
+            values,
             dt,
-            station=station,
+            unit,
+            count,
+            component,
+            station=fields["STATION ID"].text,
             event=fields.text("EARTHQUAKE DATE"),
-            component=component,
-            trace_index=index,
-            remarks=remarks,
             is_corrected=False,
         )
-        for index, component in enumerate(components)
-    ]

@@ -16,9 +16,7 @@ from collections.abc import Iterator
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.file import finite_number
-from rbfrag.motions.text.record_file import Field, RecordFile
-from rbfrag.motions.units import unit_in_g
+from rbfrag.motions.text.record_file import Field, RecordFile, Trace
 
 FORMAT = "PEER AT2"
 
@@ -38,39 +36,30 @@ _REMARK = re.compile(r"\([^()]*\)\s*$")
 
 
 def recognises(head: str) -> bool:
-    """Return whether the first lines are those of an AT2 file."""
-    lines = head.split("\n")[:HEADER_LINES]
-    return any(_NAMED.search(line) or _TRAILING.match(line) for line in lines)
+    """Return whether one of the first lines is that of an AT2 file with NPTS and DT."""
+    return _sampling(head.split("\n")) is not None
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the one motion of an AT2 file."""
-    lines = file.lines
-    at, npts_text, dt_text = _sampling(lines)
-    number = at + 1
-    npts = file.count(Field(npts_text, number), "NPTS")
-    dt = finite_number(file.path, dt_text, number, "DT")
-    if dt <= 0.0:
-        raise file.error(f"DT = {dt_text} s must be positive", number)
-    if file.dt_s is not None and file.dt_s != dt:
-        raise file.error(
-            f"the header says DT = {dt_text} s, not {file.dt_s:g}: leave --dt out", number
-        )
-    factor = _unit_in_g(file, lines[:at])
-    values = file.free_numbers(lines[at + 1 :], at + 2, "acceleration")
-    event, station, component = _names(lines[1] if at >= 2 else "")
-    return [
-        file.motion(
-            values * factor if factor != 1.0 else values,
-            dt,
-            station=station,
-            event=event,
-            component=component,
-            # an event alone would join records of all its stations
-            recording=f"{event} {station}" if event and station else "",
-            remarks=file.remarks(npts, values.size, number),
-        )
-    ]
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the one trace of an AT2 file."""
+    sampling = _sampling(file.lines)
+    assert sampling is not None, "parse() is called for recognised text only"
+    at, match = sampling
+    count = file.count(Field(match[1], at + 1), "NPTS")
+    dt = file.dt(Field(match[2], at + 1), "DT")
+    unit = _unit(file, file.lines[:at])
+    event, station, component = _names(file.lines[1] if at >= 2 else "")
+    yield Trace(
+        file.free_numbers(file.lines[at + 1 :], at + 2, "acceleration"),
+        dt,
+        unit,
+        count,
+        component,
+        station=station,
+        event=event,
+        # an event alone would join records of all its stations
+        recording=f"{event} {station}" if event and station else "",
+    )
 
 
 def write(motion: GroundMotion) -> Iterator[str]:
@@ -93,25 +82,23 @@ def write(motion: GroundMotion) -> Iterator[str]:
         yield "".join(f"{value:25.16E}" for value in samples[at : at + PER_LINE])
 
 
-def _sampling(lines: list[str]) -> tuple[int, str, str]:
+def _sampling(lines: list[str]) -> tuple[int, re.Match[str]] | None:
     for at, line in enumerate(lines[:HEADER_LINES]):
-        if found := _NAMED.search(line) or _TRAILING.match(line):
-            return at, found[1], found[2]
-    raise AssertionError("read() is called for recognised text only")
+        if match := _NAMED.search(line) or _TRAILING.match(line):
+            return at, match
+    return None
 
 
-def _unit_in_g(file: RecordFile, header: list[str]) -> float:
+def _unit(file: RecordFile, header: list[str]) -> Field | None:
     for number, line in enumerate(header, 1):
         quantity = _QUANTITY.search(line)
         if quantity and quantity[1].upper() != "ACCELERATION":
             raise file.error(
                 f"this is a {quantity[1].lower()} record: the acceleration (.AT2) is needed", number
             )
-        if found := _UNIT.search(line):
-            return file.unit_in_g(Field(found[1], number))
-    if file.units is None:
-        raise file.error("the header states no unit of acceleration: give it with --units g")
-    return unit_in_g(file.units)
+        if match := _UNIT.search(line):
+            return Field(match[1], number)
+    return None
 
 
 def _names(line: str) -> tuple[str, str, str]:

@@ -17,16 +17,16 @@ reads back as the same double.
 
 from __future__ import annotations
 
+import hashlib
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
-import numpy as np
-
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.record_file import Field, RecordFile
+from rbfrag.motions.text.record_file import Count, Field, PrintedTimes, RecordFile, Trace
 from rbfrag.motions.text.times import FIRST_YEAR
 
 FORMAT = "rbfrag CSV"
@@ -34,8 +34,8 @@ FORMAT = "rbfrag CSV"
 FIRST_LINE = "# rbfrag accelerogram 1"
 COLUMNS = "time_s,acceleration_g"
 
-TIME_SHARE = 1e-6
-"""Printed times may be off by this share of an interval: the file may have been rewritten."""
+TIME_ERROR = 1e-6
+"""Printed times may be off by this part of an interval: the file may have been rewritten."""
 
 _LABELS: Mapping[str, tuple[type, ...]] = {
     "station": (str,),
@@ -64,20 +64,13 @@ LARGEST_NUMBER = 1e12
 """No label is beyond it, and NaN is not below it."""
 
 
-def recognises(head: str) -> bool:
-    """Return whether the first line is that of rbfrag's own CSV."""
-    return head.startswith(FIRST_LINE)
+recognises = re.compile(FIRST_LINE).match
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the motions of a file as they were written, bit for bit."""
-    file.unit_in_g(Field("g", 1))
-    lines = file.lines
-    starts = [at for at, line in enumerate(lines) if line.startswith(FIRST_LINE)]
-    return [
-        _motion(file, range(start, end), index)
-        for index, (start, end) in enumerate(zip(starts, [*starts[1:], len(lines)], strict=True))
-    ]
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the motions of a file as they were written, bit for bit."""
+    for span in file.blocks(re.compile(FIRST_LINE)):
+        yield _motion(file, span)
 
 
 def write(motions: Sequence[GroundMotion]) -> Iterator[str]:
@@ -94,10 +87,10 @@ def write(motions: Sequence[GroundMotion]) -> Iterator[str]:
 
 
 def _labels(motion: GroundMotion) -> dict[str, object]:
-    found: dict[str, object] = {name: getattr(motion, name) for name in _LABELS}
-    found["start_time"] = None if motion.start_time is None else motion.start_time.isoformat()
-    found["remarks"] = list(motion.remarks)
-    kept = {name: value for name, value in found.items() if value not in (None, "", [])}
+    labels: dict[str, object] = {name: getattr(motion, name) for name in _LABELS}
+    labels["start_time"] = None if motion.start_time is None else motion.start_time.isoformat()
+    labels["remarks"] = list(motion.remarks)
+    kept = {name: value for name, value in labels.items() if value not in (None, "", [])}
     return {
         **kept,
         "dt_s": motion.dt_s,
@@ -106,50 +99,41 @@ def _labels(motion: GroundMotion) -> dict[str, object]:
     }
 
 
-def _motion(file: RecordFile, span: range, index: int) -> GroundMotion:
-    lines = file.lines
-    first = next((at for at in span if lines[at].strip() == COLUMNS), None)
+def _motion(file: RecordFile, span: range) -> Trace:
+    first = next((at for at in span if file.lines[at].strip() == COLUMNS), None)
     if first is None:
         raise file.error(f"no line {COLUMNS!r} follows: export the motion again", span.start + 1)
-    found = _header(file, range(span.start + 1, first))
-    missing = [name for name in ("dt_s", "npts") if name not in found]
+    header = _header(file, range(span.start + 1, first))
+    missing = [name for name in ("dt_s", "npts") if name not in header]
     if missing:
         raise file.error(f"the header has no {missing[0]!r}: export the motion again", first + 1)
-    dt = file.agreed_dt(found["dt_s"], first + 1)
+    dt = file.agreed_dt(header["dt_s"], first + 1)
     rows = [line.replace(",", " ", 1) for line in file.data(first + 1, span.stop)]
-    table = file.table(rows, first + 2, 2, "value")
-    times, samples = table[:, 0], table[:, 1]
-    remarks = file.remarks(found["npts"], samples.size, first + 1)
-    with np.errstate(over="ignore"):
-        late = np.flatnonzero(~(np.abs(times - dt * np.arange(times.size)) <= TIME_SHARE * dt))
-    if late.size:
-        at = int(late[0])
-        raise file.error(
-            f"time {times[at]:g} s is not {at} intervals of {dt:g} s: repair the line or export "
-            "the motion again",
-            first + 2 + at,
-        )
-    labels = {name: found[name] for name in _LABELS if name in found}
-    labels["remarks"] = (*map(str, found.get("remarks", ())), *remarks)
-    motion = GroundMotion(
-        samples,
-        dt,
-        source_file=file.path.name,
-        trace_index=index,
-        file_format=FORMAT,
-        **{**labels, "is_partial": bool(labels.get("is_partial") or remarks)},
-    )
-    if not remarks and found.get("samples_sha256", motion.sha256) != motion.sha256:
+    times_s, samples = file.table(rows, first + 2, 2, "value").T
+    sha256 = hashlib.sha256(samples.astype("<f8").tobytes()).hexdigest()
+    if samples.size == header["npts"] and header.get("samples_sha256", sha256) != sha256:
         raise file.error(
             "the samples are not those that were written (their sha256 differs): export the "
             "motion again, or remove the line samples_sha256 if they were changed on purpose",
             first + 1,
         )
-    return motion
+    labels: dict[str, Any] = {"recording": "", "orientation_deg": None, "is_vertical": None}
+    labels |= {name: header[name] for name in _LABELS if name in header}
+    return Trace(
+        samples,
+        dt,
+        Field("g", 1),
+        Count(header["npts"], first + 1),
+        component="",
+        times=PrintedTimes(times_s, TIME_ERROR * dt, first + 2),
+        remarks=tuple(map(str, labels.pop("remarks", ()))),
+        is_partial=labels.pop("is_partial", False),
+        labels=labels,
+    )
 
 
 def _header(file: RecordFile, span: range) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    fields: dict[str, Any] = {}
     for at in span:
         name, colon, written = file.lines[at].removeprefix("#").partition(":")
         name = name.strip()
@@ -164,8 +148,8 @@ def _header(file: RecordFile, span: range) -> dict[str, Any]:
             raise file.error(
                 f"{name} {written.strip()[:40]!r} cannot be used: export the motion again", at + 1
             )
-        found[name] = usable
-    return found
+        fields[name] = usable
+    return fields
 
 
 def _usable(name: str, value: object) -> Any:
@@ -185,8 +169,8 @@ def _usable(name: str, value: object) -> Any:
 
 def _time(text: str) -> datetime | None:
     try:
-        found = datetime.fromisoformat(text)
+        time = datetime.fromisoformat(text)
     except ValueError:
         return None
     # far enough from the first year for zeros before the first sample
-    return None if found.tzinfo or found.year < FIRST_YEAR else found
+    return None if time.tzinfo or time.year < FIRST_YEAR else time

@@ -10,12 +10,12 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.record_file import RecordFile
+from rbfrag.motions.text.record_file import Count, RecordFile, Trace
 
 FORMAT = "SimCenter event JSON"
 
@@ -23,14 +23,11 @@ _HEAD = re.compile(r'\s*\{(?s:.)*"Events"\s*:(?s:.)*"timeSeries"\s*:')
 _CONSTANT = re.compile(r"\b(?:NaN|Infinity)\b")
 _IS_VERTICAL = {1: False, 3: True}
 
-
-def recognises(head: str) -> bool:
-    """Return whether the first lines are JSON with events and time series."""
-    return bool(_HEAD.match(head))
+recognises = _HEAD.match
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the time series of all events in their order."""
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the time series of all events in their order."""
     try:
         content = json.loads(file.text)
     except json.JSONDecodeError as error:
@@ -39,8 +36,8 @@ def read(file: RecordFile) -> list[GroundMotion]:
         ) from None
     except (ValueError, RecursionError):
         raise file.error("this is no JSON that can be read: export the event again") from None
-    factor = file.stated_unit_in_g()
-    motions: list[GroundMotion] = []
+    file.require_units("files of this format state")
+    index = 0
     for number, event in enumerate(_list(file, content, "Events", "the file")):
         here = f"event {number}"
         dof_of = {
@@ -51,26 +48,25 @@ def read(file: RecordFile) -> list[GroundMotion]:
         for series in _list(file, event, "timeSeries", here):
             # whose lines can be told: keys of a later event may stand anywhere
             first = number == 0
-            motions.append(_trace(file, event, series, len(motions), dof_of, factor, first=first))
-    if not motions:
+            yield _trace(file, event, series, f"time series {index}", dof_of, first=first)
+            index += 1
+    if not index:
         raise file.error("the file holds no event with a time series")
-    return motions
 
 
 def _trace(
     file: RecordFile,
     event: dict[str, Any],
     series: object,
-    index: int,
+    what: str,
     dof_of: dict[Any, Any],
-    factor: float,
     *,
     first: bool,
-) -> GroundMotion:
+) -> Trace:
     if not isinstance(series, dict):
-        raise file.error(f"time series {index} is no JSON object")
+        raise file.error(f"{what} is no JSON object")
     component = str(series.get("name", ""))
-    what = f"time series {index} ({component})"
+    what += f" ({component})"
     data = series.get("data")
     if not isinstance(data, list):
         raise file.error(f"{what} has no list 'data'")
@@ -85,10 +81,7 @@ def _trace(
     line = _line(file, "numSteps") if first else None
     steps = event.get("numSteps", len(data))
     counted = isinstance(steps, int) and not isinstance(steps, bool) and steps > 0
-    remarks: tuple[str, ...] = ()
-    if counted and steps != len(data) and file.allow_partial:
-        remarks = file.remarks(steps, len(data), line or 1, what)
-    elif not counted or steps != len(data):
+    if not counted or (steps != len(data) and not file.allow_partial):
         raise file.error(
             f"numSteps says {str(steps)[:40]}, but {what} has {len(data)} values: the file is "
             "truncated or numSteps is wrong; export the event again, or read what there is with "
@@ -106,16 +99,16 @@ def _trace(
     dt = file.agreed_dt(float(intervals[0]), line)
     name = str(event.get("name", ""))
     dof = dof_of.get(component)
-    return file.motion(
-        np.array(data, dtype=np.float64) * factor,
+    vertical = _IS_VERTICAL.get(dof) if isinstance(dof, int) else None
+    return Trace(
+        np.array(data, dtype=np.float64),
         dt,
+        None,
+        Count(steps, line or 1, what),
+        component,
         event=name,
-        component=component,
-        orientation_deg=None,
-        is_vertical=_IS_VERTICAL.get(dof) if isinstance(dof, int) else None,
         recording=name or file.path.stem,
-        trace_index=index,
-        remarks=remarks,
+        labels={"orientation_deg": None, "is_vertical": vertical},
     )
 
 
@@ -131,10 +124,10 @@ def _is_number(value: object) -> bool:
 def _list(
     file: RecordFile, owner: object, key: str, where: str, *, required: bool = True
 ) -> list[Any]:
-    found = owner.get(key, None if required else []) if isinstance(owner, dict) else None
-    if not isinstance(found, list):
+    value = owner.get(key, None if required else []) if isinstance(owner, dict) else None
+    if not isinstance(value, list):
         raise file.error(f"{where} has no list {key!r}: export the event again")
-    return found
+    return value
 
 
 def _line(file: RecordFile, key: str) -> int | None:

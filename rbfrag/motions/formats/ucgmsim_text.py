@@ -7,9 +7,9 @@ line. Observed records are in g and simulated ones often in cm/s², and no file 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
-from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.text.record_file import Field, RecordFile
+from rbfrag.motions.text.record_file import Field, RecordFile, Trace
 
 FORMAT = "GeoNet text (.000/.090/.ver)"
 
@@ -21,31 +21,26 @@ _HEAD = re.compile(
     re.ASCII,
 )
 
-
-def recognises(head: str) -> bool:
-    """Return whether two names stand above a line of eight numbers."""
-    return bool(_HEAD.match(head))
+recognises = _HEAD.match
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the one motion of a file.
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the one trace of a file.
 
     The stem of its name, which the three components share, is the recording id: the file names
     no event.
     """
     head = _HEAD.match(file.text)
-    assert head is not None, "read() is called for recognised text only"
-    npts = file.count(Field(head["npts"], 2), "number of points")
+    assert head is not None, "parse() is called for recognised text only"
+    count = file.count(Field(head["npts"], 2), "number of points")
     dt = file.dt(Field(head["dt"], 2))
-    factor = file.stated_unit_in_g()
-    values = file.free_numbers(file.lines[2:], 3, "acceleration")
-    return [
-        file.motion(
-            values * factor,
-            dt,
-            station=head["station"],
-            component=head["component"],
-            recording=file.path.stem,
-            remarks=file.remarks(npts, values.size, 2),
-        )
-    ]
+    file.require_units("files of this format state")
+    yield Trace(
+        file.free_numbers(file.lines[2:], 3, "acceleration"),
+        dt,
+        None,
+        count,
+        head["component"],
+        station=head["station"],
+        recording=file.path.stem,
+    )

@@ -8,10 +8,10 @@ laid out by ``FORMATO DATOS ... : 3F10.4``.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
-from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.file import field_layout
-from rbfrag.motions.text.record_file import Field, NamedFields, RecordFile
+from rbfrag.motions.text.record_file import Field, NamedFields, RecordFile, Trace
 
 FORMAT = "UNAM standard file"
 
@@ -20,31 +20,32 @@ _DATA = re.compile(r"DATOS DE ACELERACION")
 _RULE = re.compile(r"[-+=*]{10,}\s*")
 _UNIT = re.compile(r"[^\s(]+")
 
-
-def recognises(head: str) -> bool:
-    """Return whether the first lines are those of a UNAM standard file."""
-    return bool(_HEAD.search(head))
+recognises = _HEAD.search
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the channels of a file in the order of its columns, with one recording id."""
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the channels of a file in the order of its columns, with one recording id."""
     top, first = _data_starts(file)
     fields = NamedFields(file, range(top))
 
     orientation = fields["ORIENTACION C1-C6"]
     components = _slashed(orientation.text) + _slashed(fields.text("ORIENTACION C7-C12"))
-    channels = file.count(fields["NUMERO DE CANALES"], "number of channels")
+    channels = file.count(fields["NUMERO DE CANALES"], "number of channels").number
     if len(components) != channels or not all(components):
         raise file.error(
             f"the header says {channels} channels, but orients {len(components)}", orientation.line
         )
     unit = fields["UNIDADES DE LOS DATOS"]
     word = _UNIT.match(unit.text)
-    factor = file.unit_in_g(Field(word[0] if word else unit.text, unit.line))
+    unit = Field(word[0] if word else unit.text, unit.line)
     dt = file.dt(_same(file, fields["INTERVALO DE MUESTREO, C1-C6"], "sampling interval"))
     stated = _same(file, fields["NUM. TOTAL DE MUESTRAS, C1-C6"], "number of samples")
-    npts = file.count(stated, "number of samples")
-    _check_duration(file, fields, npts, dt)
+    count = file.count(stated, "number of samples")
+    if fields.text("DURACION DEL REGISTRO (s), C1-C6"):
+        # a decimated file may state the interval of the instrument, not its own
+        duration = _same(file, fields["DURACION DEL REGISTRO (s), C1-C6"], "duration")
+        advice = "check the sampling interval"
+        file.refuse_other_duration(count, dt, duration, advice, slack_s=dt, ratio=0.01)
 
     layout = fields["FORMATO DATOS"]
     per_line, width = field_layout(layout.text) or (0, 0)
@@ -54,24 +55,21 @@ def read(file: RecordFile) -> list[GroundMotion]:
         )
     rows = file.data(first)
     table = file.fixed_table(rows, first + 1, (per_line, width), "acceleration")
-    remarks = file.remarks(npts, table.shape[0], stated.line)
     station = fields["CLAVE DE LA ESTACION"].text
     event = f"{fields.text('FECHA DEL SISMO')} {fields.text('HORA EPICENTRO')}".strip()
-    return [
-        file.motion(
-            table[:, index] * factor,
+    for component, values in zip(components, table.T, strict=True):
+        yield Trace(
+            values,
             dt,
+            unit,
+            count,
+            component,
             station=station,
             event=event,
-            component=component,
             # rumbo;orientacion: the azimuth, then the axis of the instrument
             axis=component.split(";")[0].strip(),
-            trace_index=index,
-            remarks=remarks,
             is_corrected=False,
         )
-        for index, component in enumerate(components)
-    ]
 
 
 def _data_starts(file: RecordFile) -> tuple[int, int]:
@@ -98,17 +96,3 @@ def _same(file: RecordFile, field: Field, what: str) -> Field:
     if len(set(values)) != 1:
         raise file.error(f"the channels differ in their {what}: {field.text}", field.line)
     return Field(values[0], field.line)
-
-
-def _check_duration(file: RecordFile, fields: NamedFields, npts: int, dt: float) -> None:
-    """A decimated file may state the interval of the instrument, not its own."""
-    if not fields.text("DURACION DEL REGISTRO (s), C1-C6"):
-        return
-    field = _same(file, fields["DURACION DEL REGISTRO (s), C1-C6"], "duration")
-    seconds = file.positive(field, "duration")
-    if abs(seconds - npts * dt) > 0.01 * seconds + dt:
-        raise file.error(
-            f"{npts} samples at dt = {dt:g} s last {npts * dt:g} s, but the header says "
-            f"{field.text} s: check the sampling interval",
-            field.line,
-        )

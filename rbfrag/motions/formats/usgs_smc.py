@@ -8,10 +8,10 @@ fields of 10 characters with one-digit exponents, and touch: ``-1.9234E+0-3.1562
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
-from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.text.file import MOST_DIGITS, holds_integers
-from rbfrag.motions.text.record_file import Field, RecordFile
+from rbfrag.motions.text.record_file import Field, RecordFile, Trace
 
 FORMAT = "USGS SMC"
 
@@ -33,19 +33,15 @@ _STATION = re.compile(r"^\s*station\s*=\s*(.*?)\s*component\s*=", re.IGNORECASE)
 _COMPONENT = re.compile(r"component\s*=\s*(\S.*)", re.IGNORECASE)
 _EVENT = re.compile(r"^\s*(\d{4}\s+\d{1,2}\s+\d{1,2}\s+\d{4}\s.*)", re.ASCII)
 
-
-def recognises(head: str) -> bool:
-    """Return whether the first lines are those of an SMC file."""
-    return bool(_HEAD.match(head))
+recognises = _HEAD.match
 
 
-def read(file: RecordFile) -> list[GroundMotion]:
-    """Return the one motion of a file."""
+def parse(file: RecordFile) -> Iterator[Trace]:
+    """Yield the one trace of a file."""
     lines = file.lines
     kind = _HEAD.match(file.text)
     if kind and kind[1] != "ACCELEROGRAM":
         raise file.error(f"this is a record of {kind[1].lower()}: the acceleration is needed", 1)
-    factor = file.unit_in_g(Field(UNIT, 1))
     top = next(
         (
             at
@@ -58,7 +54,7 @@ def read(file: RecordFile) -> list[GroundMotion]:
         raise file.error("the file has no integer header: export it again", 1)
     comments = _integer(file, top, COMMENTS_VALUE)
     stated = _value(file, top, NPTS_VALUE, INTEGERS, INTEGER_WIDTH)
-    npts = file.count(stated, "number of samples")
+    count = file.count(stated, "number of samples")
     rate = _value(file, top + INTEGER_LINES, RATE_VALUE, REALS, REAL_WIDTH)
     dt = file.agreed_dt(1.0 / file.positive(rate, "samples per second"), rate.line)
     above = top + INTEGER_LINES + REAL_LINES
@@ -70,20 +66,17 @@ def read(file: RecordFile) -> list[GroundMotion]:
                 at + 1,
             )
     values = file.fixed_width(file.data(first), first + 1, LAYOUT, "acceleration")
-    remarks = file.remarks(npts, values.size, stated.line)
-
     header = range(top)
-    return [
-        file.motion(
-            values * factor,
-            dt,
-            station=" ".join(file.words(header, _STATION).split()),
-            event=" ".join(file.words(header, _EVENT).split()),
-            component=file.find(header, _COMPONENT, "line 'component ='").text,
-            remarks=remarks,
-            is_corrected=_is_corrected(lines[0]),
-        )
-    ]
+    yield Trace(
+        values,
+        dt,
+        Field(UNIT, 1),
+        count,
+        component=file.find(header, _COMPONENT, "line 'component ='").text,
+        station=" ".join(file.label(header, _STATION).split()),
+        event=" ".join(file.label(header, _EVENT).split()),
+        is_corrected=_is_corrected(lines[0]),
+    )
 
 
 def _is_corrected(kind: str) -> bool | None:

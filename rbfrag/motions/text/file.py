@@ -73,10 +73,10 @@ def cut_number(text: str) -> str:
         return ""
     words = _BETWEEN_NUMBERS.split(text[-_TAIL:])[1:]
     *others, last = words[-_COMPARED - 1 :] or [""]
-    found = {_DECIMALS.fullmatch(word) for word in set(others)}
-    if len(others) < _COMPARED or len(found) < _DISTINCT or None in found:
+    matches = {_DECIMALS.fullmatch(word) for word in set(others)}
+    if len(others) < _COMPARED or len(matches) < _DISTINCT or None in matches:
         return ""
-    shapes = {(len(word[1]), len(word[2] or "")) for word in found if word}
+    shapes = {(len(word[1]), len(word[2] or "")) for word in matches if word}
     ((decimals, exponent),) = shapes if len(shapes) == 1 else {(0, 0)}
     if decimals < _FEWEST_DECIMALS:
         return ""
@@ -98,29 +98,17 @@ def without_blank_end(lines: Sequence[str]) -> Sequence[str]:
     return lines[:end]
 
 
-def field_layout(text: str, default: tuple[int, int] | None = None) -> tuple[int, int] | None:
-    """Return fields a line and characters a field of a Fortran format such as ``(8F10.6)``.
-
-    Args:
-        text: a line that may have a format in it.
-        default: what to return if it has none.
-    """
-    found = _FORTRAN.search(text)
-    if not found:
-        return default
-    per_line, width = int(found[1]), int(found[2])
-    return (per_line, width) if per_line and width else default
+def field_layout(text: str) -> tuple[int, int] | None:
+    """Return fields a line and characters a field of a Fortran format such as ``(8F10.6)``."""
+    match = _FORTRAN.search(text)
+    if not match:
+        return None
+    per_line, width = int(match[1]), int(match[2])
+    return (per_line, width) if per_line and width else None
 
 
 def finite_number(path: Path, text: str, line: int, what: str) -> float:
-    """Return one number of a file, or refuse it with its line.
-
-    Args:
-        path: for messages.
-        text: the number as the file has it.
-        line: 1-based line number.
-        what: what the number is.
-    """
+    """Return one number of a file, or refuse it with its line, from 1."""
     if _NUMBER.fullmatch(text):
         value = float(text)
         if math.isfinite(value):

@@ -1,26 +1,24 @@
-"""One record's file as a reader sees it: its lines, and what the caller states of it.
+"""One record's file as its format's parser sees it, and the traces that the parser returns.
 
-What every reader has to do is done here: fields are found by what they say, the header's unit,
-sampling interval and number of samples agreed with the caller's, samples read, labels put together.
+Fields are found by what they say; counts, intervals and numbers are read or refused with their
+line. What all traces go through (unit, missing samples, labels) is done once, in
+:mod:`rbfrag.motions.recognise`.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
-from datetime import datetime
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.errors import InputError, MotionFileError
-from rbfrag.motions.direction import azimuth_deg, is_vertical_name
-from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.errors import MotionFileError
 from rbfrag.motions.text.file import (
     MOST_DIGITS,
     finite_number,
@@ -28,13 +26,8 @@ from rbfrag.motions.text.file import (
     shown,
     without_blank_end,
 )
-from rbfrag.motions.text.times import first_sample_time
-from rbfrag.motions.units import acceleration_unit, unit_in_g
 
 FloatArray = NDArray[np.float64]
-
-TENTH_OF_G = re.compile(r"g\s*/\s*10", re.IGNORECASE)
-"""The unit of the uncorrected (volume 1) formats of the 1970s."""
 
 SAME_DT = 1e-9
 """Intervals that differ by less were computed from different fields of one header; relative."""
@@ -52,12 +45,71 @@ LONGEST_LINE = 1000
 _CHANNELS = re.compile(r"\(\s*(\d{1,3})\s+chns\s+of", re.IGNORECASE | re.ASCII)
 
 
-@dataclass(frozen=True)
-class Field:
+class Field(NamedTuple):
     """A header field: its value as the file has it, and its line, from 1."""
 
     text: str
     line: int
+
+
+class Count(NamedTuple):
+    """The number of samples that a header states, and its line.
+
+    A product of duration and frequency may be rounded. `of` says whose samples, where a file
+    holds several traces.
+    """
+
+    number: float
+    line: int
+    of: str = ""
+
+
+class PrintedTimes(NamedTuple):
+    """Times [s] beside the samples, `per_line` a line; one may be `tolerance_s` off its place."""
+
+    times_s: FloatArray
+    tolerance_s: float
+    first_line: int
+    per_line: int = 1
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One trace as its format's parser returns it.
+
+    Args:
+        values: samples, in `unit` times `scale`.
+        dt_s: sampling interval [s].
+        unit: the unit as the header spells it; None where the caller must state it.
+        count: number of samples by the header; None where it states none.
+        times: printed times that `dt_s` must reproduce.
+        component: its name; direction and sense are what it says, or else what `axis` says.
+        axis: a name that says more of the direction.
+        recording: id that the components of a recording share; None for event and station.
+        start: text with the time of the first sample.
+        remarks: what else a user should see.
+        is_partial: True where more is missing than `count` tells.
+        remark_if_partial: what a user should see besides where samples are missing.
+        labels: labels of a motion that the file holds as such, before all that is derived.
+    """
+
+    values: FloatArray
+    dt_s: float
+    unit: Field | None
+    count: Count | None
+    component: str
+    scale: float = 1.0
+    times: PrintedTimes | None = None
+    station: str = ""
+    event: str = ""
+    axis: str | None = None
+    recording: str | None = None
+    start: str = ""
+    is_corrected: bool | None = None
+    remarks: tuple[str, ...] = ()
+    is_partial: bool = False
+    remark_if_partial: str = ""
+    labels: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -67,7 +119,6 @@ class RecordFile:
     Args:
         path: for labels and messages.
         text: the file's text.
-        file_format: name of the format, as motions keep it.
         units: unit of acceleration that the caller states, or None.
         dt_s: sampling interval that the caller states [s], or None.
         allow_partial: True to read a file whose header states another number of samples than
@@ -76,7 +127,6 @@ class RecordFile:
 
     path: Path
     text: str
-    file_format: str = ""
     units: str | None = None
     dt_s: float | None = None
     allow_partial: bool = False
@@ -95,25 +145,25 @@ class RecordFile:
     def optional(self, span: range, pattern: re.Pattern[str]) -> Field | None:
         """Return the first match's group 1 among the lines of a span of indices, or None."""
         for at in span:
-            if found := pattern.search(self.lines[at][:LONGEST_LINE]):
-                return Field(found[1].strip(), at + 1)
+            if match := pattern.search(self.lines[at][:LONGEST_LINE]):
+                return Field(match[1].strip(), at + 1)
         return None
 
-    def words(self, span: range, pattern: re.Pattern[str]) -> str:
+    def label(self, span: range, pattern: re.Pattern[str]) -> str:
         """Return the first match's group 1 among the lines of a span; empty where there is none."""
-        found = self.optional(span, pattern)
-        return found.text if found else ""
+        field = self.optional(span, pattern)
+        return field.text if field else ""
 
     def find(self, span: range, pattern: re.Pattern[str], what: str) -> Field:
         """Return the first match's group 1 among the lines of a span, which must have it."""
-        found = self.optional(span, pattern)
-        if found is None:
+        field = self.optional(span, pattern)
+        if field is None:
             raise self.error(
                 f"the header has no {what}: the file is truncated or its header damaged; export "
                 "the record again",
                 span.start + 1,
             )
-        return found
+        return field
 
     def blocks(self, first: re.Pattern[str]) -> list[range]:
         """Return the spans that begin with a line that `first` matches and end at the next."""
@@ -125,15 +175,15 @@ class RecordFile:
         ends = [*starts[1:], len(self.lines)]
         return [range(start, end) for start, end in zip(starts, ends, strict=True)]
 
-    def missing_channels(self, span: range, found: int) -> tuple[str, ...]:
+    def missing_channels(self, span: range, channels: int) -> tuple[str, ...]:
         """Return a remark if the file holds fewer channels than its first block says.
 
         Some agencies split a recording into one file a channel, so that this is no error.
         """
-        stated = self.words(span, _CHANNELS)
-        if not stated or int(stated) <= found:
+        stated = self.label(span, _CHANNELS)
+        if not stated or int(stated) <= channels:
             return ()
-        return (f"the header says {stated} channels, but the file holds {found}",)
+        return (f"the header says {stated} channels, but the file holds {channels}",)
 
     # what header and caller must agree on
 
@@ -141,36 +191,21 @@ class RecordFile:
         """Return a field's number, which must be above zero."""
         return positive_number(self.path, field, what)
 
-    def count(self, field: Field, what: str) -> int:
-        """Return a whole number of at least 1 that a field states."""
+    def count(self, field: Field, what: str, of: str = "") -> Count:
+        """Return the number of samples that a field states, a whole number of at least 1."""
         digits = field.text.removesuffix(".")
         # int() refuses thousands of digits in words of its own
         if digits.isascii() and digits.isdigit() and len(digits) < MOST_DIGITS and int(digits) > 0:
-            return int(digits)
+            return Count(int(digits), field.line, of)
         raise self.error(f"{what} {shown(field.text)} is not a count of samples", field.line)
 
-    def unit_in_g(self, field: Field) -> float:
-        """Return how many g the header's unit is; g/10 is known besides the usual units."""
-        unit: str | None = None
-        if not TENTH_OF_G.fullmatch(field.text):
-            try:
-                unit = acceleration_unit(field.text)
-            except InputError as error:
-                raise self.error(str(error), field.line) from None
-        if self.units is not None and acceleration_unit(self.units) != unit:
-            raise self.error(
-                f"the header says {field.text}, not {self.units}: leave --units out", field.line
-            )
-        return 0.1 if unit is None else unit_in_g(unit)
-
-    def stated_unit_in_g(self) -> float:
-        """Return how many g the caller's unit is, for formats that state none."""
+    def require_units(self, states: str = "the file states") -> None:
+        """Refuse a file that states no unit of acceleration unless the caller states it."""
         if self.units is None:
             raise self.error(
-                "files of this format state no unit of acceleration, and it is never guessed: give "
-                "it with --units g, m/s2, cm/s2 or mm/s2"
+                f"{states} no unit of acceleration, and it is never guessed: give it with --units "
+                "g, m/s2, cm/s2 or mm/s2"
             )
-        return unit_in_g(self.units)
 
     def dt(self, field: Field, what: str = "dt") -> float:
         """Return the sampling interval [s] that a field states."""
@@ -186,7 +221,7 @@ class RecordFile:
             )
         return dt
 
-    def dt_of_duration(self, duration: Field, npts: int) -> float:
+    def dt_of_duration(self, duration: Field, npts: float) -> float:
         """Return the shortest decimal dt [s] with which npts samples last the printed duration."""
         seconds = self.positive(duration, "record length")
         _, _, decimals = duration.text.partition(".")
@@ -199,26 +234,37 @@ class RecordFile:
             dt = seconds / npts
         return self.agreed_dt(dt, duration.line)
 
-    def remarks(self, stated: float, found: int, line: int, what: str = "") -> tuple[str, ...]:
-        """Return a remark if the header states another number of samples than follow, or refuse it.
+    def refuse_other_duration(
+        self, count: Count, dt: float, stated: Field, advice: str, *, slack_s: float, ratio: float
+    ) -> None:
+        """Refuse a file whose samples do not last as long as its header says.
 
-        Args:
-            stated: samples by the header; a product of duration and frequency may be rounded.
-            found: samples that follow. A file without any is refused in any case.
-            line: 1-based line that states the number.
-            what: whose samples, when the file holds several traces.
+        The two may differ by `slack_s` and the `ratio` of what is stated: some headers round.
         """
-        if found and abs(stated - found) <= ROUNDING * found:
-            return ()
-        says = f"the header{f' of {what}' if what else ''} says {stated:.12g} samples, but {found} "
-        if found and self.allow_partial:
-            return (
-                f"{says}follow: the record is partial, and which samples are missing is not told",
+        seconds = finite_number(self.path, stated.text, stated.line, "duration")
+        lasting = count.number * dt
+        if abs(seconds - lasting) > slack_s + ratio * seconds:
+            raise self.error(
+                f"{count.number:.12g} samples at dt = {dt:g} s last {lasting:g} s, but the header "
+                f"says {stated.text} s: {advice}",
+                stated.line,
             )
+
+    def missing_samples(self, count: Count, npts: int) -> str:
+        """Return a remark if not as many samples follow as the header states, or refuse the file.
+
+        A file without any is refused in any case.
+        """
+        if npts and abs(count.number - npts) <= ROUNDING * npts:
+            return ""
+        whose = f"the header{f' of {count.of}' if count.of else ''}"
+        says = f"{whose} says {count.number:.12g} samples, but {npts} follow:"
+        if npts and self.allow_partial:
+            return f"{says} the record is partial, and which samples are missing is not told"
         raise self.error(
-            f"{says}follow: the file is truncated or its header is wrong; export the record again, "
-            "or read what there is with --allow-partial",
-            line,
+            f"{says} the file is truncated or its header is wrong; export the record again, or "
+            "read what there is with --allow-partial",
+            count.line,
         )
 
     # samples
@@ -250,29 +296,38 @@ class RecordFile:
 
     def free_numbers(self, rows: Sequence[str], first_line: int, what: str) -> FloatArray:
         """Return blank-separated numbers of rows, of which the first is this line, from 1."""
-        tokens = " ".join(rows).split()
+
+        def lines() -> list[int]:
+            return [line for line, row in enumerate(rows, first_line) for _ in row.split()]
+
+        return self.numbers(" ".join(rows).split(), lines, what)
+
+    def numbers(
+        self, tokens: Sequence[str], lines: Callable[[], Sequence[int]], what: str
+    ) -> FloatArray:
+        """Return the numbers that are printed as tokens; `lines` gives the line of each, from 1."""
         try:
             numbers = np.array(tokens, dtype=np.float64)
         except ValueError:
             numbers = np.array([np.nan])
-        # numpy also reads 'nan', 'inf' and '1_000', which no instrument writes
-        if not np.isfinite(numbers).all() or any("_" in token for token in tokens):
-            return np.array(
-                [
-                    finite_number(self.path, token, number, what)
-                    for number, row in enumerate(rows, first_line)
-                    for token in row.split()
-                ]
-            )
-        return numbers
+        # numpy also reads 'nan', 'inf', '1_000' and digits of other scripts
+        printed = all(token.isascii() and "_" not in token for token in tokens)
+        if printed and np.isfinite(numbers).all():
+            return numbers
+        return np.array(
+            [
+                finite_number(self.path, token.strip(), line, what)
+                for token, line in zip(tokens, lines(), strict=True)
+            ]
+        )
 
     def table(self, rows: Sequence[str], first_line: int, columns: int, what: str) -> FloatArray:
         """Return blank-separated columns of numbers, shape (rows, columns)."""
         for number, row in enumerate(rows, first_line):
-            found = len(row.split())
-            if found != columns:
+            width = len(row.split())
+            if width != columns:
                 raise self.error(
-                    f"the line has {found} values, not {columns} as the header says: repair the "
+                    f"the line has {width} values, not {columns} as the header says: repair the "
                     "line or export the record again",
                     number,
                 )
@@ -332,68 +387,27 @@ class RecordFile:
             )
         return numbers.reshape(-1, layout[0])
 
-    def refuse_other_times(
-        self, times_s: FloatArray, dt: float, decimals: int, first_line: int, per_line: int
-    ) -> None:
-        """Refuse printed times [s] that the sampling interval does not reproduce.
+    def refuse_other_times(self, times: PrintedTimes, dt: float, samples: int) -> None:
+        """Refuse printed times that the sampling interval [s] does not reproduce.
 
         A missing or doubled row shows so.
         """
-        expected = times_s[0] + dt * np.arange(times_s.size)
-        # the first time is rounded as well
-        off = np.flatnonzero(np.abs(times_s - expected) > (1.0 + 1e-6) * 10.0**-decimals)
+        printed, tolerance, first_line, per_line = times
+        if printed.size != samples:
+            raise self.error(
+                "the last time has no acceleration: the file is truncated",
+                first_line + samples // per_line,
+            )
+        with np.errstate(over="ignore"):
+            expected = printed[0] + dt * np.arange(printed.size)
+            off = np.flatnonzero(~(np.abs(printed - expected) <= tolerance))
         if off.size:
             at = int(off[0])
             raise self.error(
-                f"time {times_s[at]:g} s stands where {expected[at]:g} s was expected with the "
+                f"time {printed[at]:g} s stands where {expected[at]:g} s was expected with the "
                 f"header's dt of {dt:g} s: repair the line or export the record again",
                 first_line + at // per_line,
             )
-
-    def motion(
-        self,
-        samples_g: FloatArray,
-        dt: float,
-        *,
-        component: str,
-        axis: str | None = None,
-        recording: str | None = None,
-        start: str = "",
-        remarks: tuple[str, ...] = (),
-        **labels: Any,
-    ) -> GroundMotion:
-        """Return a motion with the labels that all formats have.
-
-        Args:
-            samples_g: accelerations [g].
-            dt: sampling interval [s].
-            component: its name; direction and sense are what it says, or else what `axis` says.
-            axis: a name that says more of the direction.
-            recording: id that the components of a recording share; None for event and station.
-            start: text with the time of the first sample.
-            remarks: a motion with remarks is partial, unless `is_partial` says otherwise.
-            labels: other labels of :class:`GroundMotion`.
-        """
-        if recording is None:
-            recording = f"{labels.get('event', '')} {labels.get('station', '')}".strip()
-        name = component if axis is None else axis
-        time: datetime | None = first_sample_time(start) if start else None
-        return GroundMotion(
-            samples_g,
-            dt,
-            component=component,
-            recording=recording,
-            source_file=self.path.name,
-            file_format=self.file_format,
-            remarks=remarks,
-            **{
-                "orientation_deg": azimuth_deg(name),
-                "is_vertical": is_vertical_name(name),
-                "is_partial": bool(remarks),
-                "start_time": time,
-                **labels,
-            },
-        )
 
 
 def positive_number(path: Path, field: Field, what: str) -> float:
@@ -417,17 +431,17 @@ class NamedFields:
 
     def __getitem__(self, name: str) -> Field:
         """Return the field of this name, or else the first whose name begins so."""
-        found = self._find(name)
-        if found is None:
+        field = self._find(name)
+        if field is None:
             raise self._file.error(f"the header has no {name!r}: export the record again", line=1)
-        if not found.text:
-            raise self._file.error(f"the header's {name!r} is empty", found.line)
-        return found
+        if not field.text:
+            raise self._file.error(f"the header's {name!r} is empty", field.line)
+        return field
 
     def text(self, name: str) -> str:
         """Return a field's text; empty where the header has none."""
-        found = self._find(name)
-        return found.text if found else ""
+        field = self._find(name)
+        return field.text if field else ""
 
     def _find(self, name: str) -> Field | None:
         if name in self._fields:

@@ -22,13 +22,13 @@ SINGLE_PRECISION = 2.0**-23
 """Many loggers count time in single precision and print more digits than it has; relative."""
 
 LARGEST_NOISE = 0.01
-"""No more than this share of a step is put down to single precision."""
+"""No more than this part of a step is put down to single precision."""
 
 FINE = 0.1
-"""Times rounded by less than this share of a step show each row, wherever they start."""
+"""Times rounded by less than this part of a step show each row, wherever they start."""
 
 RARE = 0.05
-"""Steps other than the usual one come from rounding only if more than this share of them do."""
+"""Steps other than the usual one come from rounding only if more than this part of them do."""
 
 MOST_DIGITS = 17
 
@@ -68,21 +68,21 @@ def first_sample_time(text: str) -> datetime | None:
             first) or ``20230206_011729.868``. An impossible date, or that of a clock that was
             never set, is none.
     """
-    found = next((match for form in _FORMS if (match := form.search(text))), None)
-    if found is None:
+    match = next((match for form in _FORMS if (match := form.search(text))), None)
+    if match is None:
         return None
-    year = int(found["year"])
-    if len(found["year"]) == 2:
+    year = int(match["year"])
+    if len(match["year"]) == 2:
         year += 2000 if year < CENTURY_TURNS_AT else 1900
     try:
         time = datetime(
             year,
-            int(found["month"]),
-            int(found["day"]),
-            int(found["hour"]),
-            int(found["minute"]),
-            int(found["second"]),
-            int(f"{found['fraction'] or '':0<6.6}"),
+            int(match["month"]),
+            int(match["day"]),
+            int(match["hour"]),
+            int(match["minute"]),
+            int(match["second"]),
+            int(f"{match['fraction'] or '':0<6.6}"),
         )
     except ValueError:
         return None
@@ -106,9 +106,9 @@ def sampling_interval(
         path: for messages.
         tokens: the times as printed, shape (n,).
         times_s: the same as numbers [s].
-        line_numbers: their 1-based lines, shape (n,).
-        stated_dt_s: interval that the caller states [s], or None. It is used if it reproduces
-            the times, and refused otherwise.
+        line_numbers: their 1-based lines.
+        stated_dt_s: interval that the caller states [s]: used if it reproduces the times, and
+            refused otherwise.
     """
     count = len(tokens)
     if count == 1:
@@ -120,21 +120,21 @@ def sampling_interval(
             )
         return stated_dt_s
     column = _Column(times_s, _tolerance(tokens, times_s))
-    found = column.shortest_decimal()
-    if found is None:
+    dt_s = column.shortest_decimal()
+    if dt_s is None:
         column = column.allowing_single_precision()
-        found = column.shortest_decimal()
-    if found is None and column.is_fine():
+        dt_s = column.shortest_decimal()
+    if dt_s is None and column.is_fine():
         column.start_is_exact = False
-        found = column.shortest_decimal()
-    if found is None:
+        dt_s = column.shortest_decimal()
+    if dt_s is None:
         raise _unequal(path, tokens, times_s, column.tolerance_s, line_numbers)
     if stated_dt_s is None:
-        return found
+        return dt_s
     if not column.reproduced_by(stated_dt_s):
         raise MotionFileError(
             path,
-            f"the time column has dt = {found:g} s, not {stated_dt_s:g}: leave --dt out",
+            f"the time column has dt = {dt_s:g} s, not {stated_dt_s:g}: leave --dt out",
             line=line_numbers[1],
         )
     return stated_dt_s

@@ -67,10 +67,10 @@ def in_chunks(
     ]
     flat_out = [array.reshape(-1) for array in outputs]
     for start in range(0, size, CHUNK):
-        piece = slice(start, start + CHUNK)
-        found = formula(*(x if isinstance(x, float) else x[piece] for x in flat_in))
-        for target, values in zip(flat_out, found, strict=True):
-            target[piece] = values
+        part = slice(start, start + CHUNK)
+        chunk_values = formula(*(x if isinstance(x, float) else x[part] for x in flat_in))
+        for target, values in zip(flat_out, chunk_values, strict=True):
+            target[part] = values
 
 
 CodeArray = NDArray[np.int8]

@@ -41,9 +41,9 @@ class Contacts(NamedTuple):
 class Block:
     """A two-dimensional block of unit thickness that rests on a base and against a back plane.
 
-    Make one with :meth:`from_angles`, :meth:`from_fractures` or :meth:`from_polygon`, which
-    refuse what is no block. The base frame has x down the base and y out of it. Contact 1
-    is the heel, 2 the upper end of the back edge, 3 the toe.
+    Make one with :meth:`rectangle`, :meth:`from_angles`, :meth:`from_fractures` or
+    :meth:`from_polygon`, which refuse what is no block. The base frame has x down the base and y
+    out of it. Contact 1 is the heel, 2 the upper end of the back edge, 3 the toe.
 
     Args:
         alpha1_deg: angle of the heel, from the inward normal of the base through the centroid
@@ -79,6 +79,27 @@ class Block:
     inertia_m2: float
     outline: tuple[Point, ...]
     is_parallelogram: bool
+
+    @classmethod
+    def rectangle(cls, height_m: float, width_m: float) -> Block:
+        """Return a rectangular block.
+
+        Its critical angle on a level base is atan(width/height), and p² = 3g/(4 r3) with
+        r3 = √(height² + width²)/2. Like every block it is backed by a slope: a free-standing one
+        rocks on both corners and fails at weaker shaking.
+
+        Args:
+            height_m: height, perpendicular to the base plane [m], above 0.
+            width_m: width along the base plane [m], above 0.
+
+        Raises:
+            InputError: a value that is not above zero.
+        """
+        height_m = positive(height_m, "height_m", "m")
+        width_m = positive(width_m, "width_m", "m")
+        t3 = width_m / height_m
+        alpha3_deg = math.degrees(math.atan(t3))
+        return _parallelogram(-alpha3_deg, alpha3_deg, -t3, t3, 0.5 * height_m, 90.0)
 
     @classmethod
     def from_angles(cls, alpha1_deg: float, alpha3_deg: float, r3_m: float) -> Block:
@@ -158,23 +179,23 @@ class Block:
             InputError: the polygon is not simple or runs clockwise, or a contact does not lie
                 on its plane; the message says which and by how much.
         """
-        found = polygon_contacts(vertices_m, heel, back, toe, gamma_deg)
-        t1 = found.heel[0] / -found.heel[1]
-        t3 = found.toe[0] / -found.toe[1]
+        contacts = polygon_contacts(vertices_m, heel, back, toe, gamma_deg)
+        t1 = contacts.heel[0] / -contacts.heel[1]
+        t3 = contacts.toe[0] / -contacts.toe[1]
         return cls(
             alpha1_deg=math.degrees(math.atan(t1)),
             alpha3_deg=math.degrees(math.atan(t3)),
-            gamma_deg=found.gamma_deg,
+            gamma_deg=contacts.gamma_deg,
             tan_alpha1=t1,
             tan_alpha3=t3,
-            cot_gamma=found.cot_gamma,
-            heel=found.heel,
-            back=found.back,
-            toe=found.toe,
-            lowest_on_back=found.lowest_on_back,
-            area_m2=found.properties.area_m2,
-            inertia_m2=found.properties.inertia_m2,
-            outline=found.outline,
+            cot_gamma=contacts.cot_gamma,
+            heel=contacts.heel,
+            back=contacts.back,
+            toe=contacts.toe,
+            lowest_on_back=contacts.lowest_on_back,
+            area_m2=contacts.properties.area_m2,
+            inertia_m2=contacts.properties.inertia_m2,
+            outline=contacts.outline,
             is_parallelogram=False,
         )
 

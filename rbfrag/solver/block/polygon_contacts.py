@@ -135,11 +135,12 @@ def _on_back_plane(
     sine = 1.0 / math.sqrt(1.0 + cot * cot)
     x0, y0 = points[back]
     off = [sine * ((x - x0) + (y - y0) * cot) for x, y in points]
-    behind = min(range(len(points)), key=lambda i: off[i])
-    if off[behind] < -tolerance:
+    furthest = min(range(len(points)), key=lambda i: off[i])
+    if off[furthest] < -tolerance:
         raise InputError(
             f"the back contact (vertex {back}) does not lie on a back plane at gamma_deg = "
-            f"{gamma_deg:.10g}: vertex {behind} would stand {-off[behind]:.4g} m inside the rock "
+            f"{gamma_deg:.10g}: vertex {furthest} would stand {-off[furthest]:.4g} m inside the "
+            "rock "
             f"behind that plane; the tolerance is {tolerance:.4g} m ({CONTACT_TOLERANCE:g} of the "
             "block's size)"
         )

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.excitation import Excitation, Nodes
 from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.single_run import run_toppling
-from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
+from rbfrag.solver.integrator.single_run import HANDED, run_toppling
+from rbfrag.solver.integrator.taylor import PH_MAX
 from rbfrag.solver.integrator.vectorised import run_batch
 
 FloatArray = NDArray[np.float64]
@@ -46,57 +46,33 @@ class Runs:
 
 @kernel
 def run_blocks(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    jump_node: int,
+    nodes: Nodes,
     kr: FloatArray,
     p: FloatArray,
-    linear: bool,
     order: int,
     ph_max: float,
     whole: IntArray,
     real: FloatArray,
 ) -> None:
-    """Run one block after another over one record.
-
-    Args:
-        time_s: as in :func:`rbfrag.solver.integrator.single_run.run_toppling`; likewise up to
-            `jump_node`.
-        kr: rocking acceleration coefficients, shape (m,).
-        p: frequency parameters [1/s], shape (m,).
-        linear: the linear verification model.
-        order: degree of the Taylor step.
-        ph_max: greatest p·h of one step.
-        whole: filled with outcome, steps and samples moved, shape (3, m).
-        real: filled with peak, start, verdict and error, shape (4, m).
-    """
-    nothing = np.empty((4, 0))
-    to_the_end = np.empty(0)
-    work = np.empty((3, order + 1))
+    """Run one block after another over one record; arguments as of `run_batch`."""
+    # made once for all blocks: the coefficients of a step, and neither history nor hand-over
+    u = np.empty(9)
+    no_rows = np.empty((4, 0))
+    to_the_end = np.empty(0, HANDED)
     for j in range(kr.size):
         (
             whole[0, j], real[0, j], real[1, j], real[2, j], real[3, j],
             whole[1, j], whole[2, j], _,
-        ) = run_toppling(
-            time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, jump_node, kr[j], p[j],
-            linear, order, ph_max, nothing, to_the_end, work,
-        )  # fmt: skip
+        ) = run_toppling(nodes, kr[j], p[j], order, ph_max, no_rows, to_the_end, u)  # fmt: skip
 
 
-def simulate_many(drive: Excitation, *, p2: ArrayLike, kr: ArrayLike, linear: bool = False) -> Runs:
+def simulate_many(excitation: Excitation, *, p2: ArrayLike, kr: ArrayLike) -> Runs:
     """Run many blocks under one excitation.
 
     Args:
-        drive: the excitation.
+        excitation: the excitation.
         p2: frequency parameters p² [1/s²], > 0.
-        kr: rocking acceleration coefficients k_r (linear: critical angles [rad]), > 0; broadcast
-            with `p2`.
-        linear: the linear model.
+        kr: rocking acceleration coefficients k_r > 0; broadcast with `p2`.
 
     Returns:
         Arrays of the common shape; each block has exactly the numbers that
@@ -117,23 +93,16 @@ def simulate_many(drive: Excitation, *, p2: ArrayLike, kr: ArrayLike, linear: bo
             raise InputError(
                 f"{name} must be positive finite numbers, not {float(values[wrong].flat[0]):g}"
             )
+    # kernels take flat arrays of one memory order: one compilation, whatever the caller's shape
     shape = sizes.shape
     flat_kr = np.ascontiguousarray(strengths).reshape(-1)
     whole = np.empty((3, flat_kr.size), dtype=np.int64)
     real = np.empty((4, flat_kr.size))
-    arrays = (
-        drive.time_s, drive.interval_s, drive.k_h, drive.w, drive.q, drive.tail_min_q,
-        drive.block_max_q,
-    )  # fmt: skip
     p = np.sqrt(sizes).reshape(-1)
-    if linear:
-        run_blocks(*arrays, drive.jump_node, flat_kr, p, True, ORDER, PH_MAX, whole, real)
-    else:
-        run_batch(*arrays, drive.jump_node, flat_kr, p, PH_MAX, whole, real)
-    theta_c = flat_kr if linear else np.arctan(flat_kr)
+    run_batch(excitation.nodes, flat_kr, p, PH_MAX, whole, real)
     return Runs(
         outcome=whole[0].reshape(shape),
-        theta_n=(real[0] / theta_c).reshape(shape),
+        theta_n=(real[0] / np.arctan(flat_kr)).reshape(shape),
         peak_rad=real[0].reshape(shape),
         started_s=real[1].reshape(shape),
         verdict_s=real[2].reshape(shape),

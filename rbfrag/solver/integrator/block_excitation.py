@@ -1,4 +1,4 @@
-"""The ground under one size of block, as the kernels of the critical search take it."""
+"""The excitation of one size of block, as the kernels of the critical search take it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 
 
 @kernel
-def linear_drive(
+def remaining_excitation(
     interval_s: FloatArray, k_h: FloatArray, p: float, remaining: FloatArray
 ) -> tuple[float, int]:
     """Fill what of the drive is still to come; return its maximum and the node after it.
@@ -34,13 +34,16 @@ def linear_drive(
     decay = 0.0
     remaining[k_h.size - 1] = 0.0
     for i in range(interval_s.size - 1, -1, -1):
+        # records are sampled evenly: one exponential serves them
         if interval_s[i] != h:
             h = interval_s[i]
             decay = math.exp(-p * h)
+        # backwards in closed form over an interval: G' = p (G - k_h), k_h a straight line
         if h > 0.0:
             slope = (k_h[i + 1] - k_h[i]) / h
             rest = g - k_h[i + 1] - slope / p  # times exp(-p (t_end - t))
             # G turns where slope + p rest exp(-p (t_end - t)) = 0
+            # G is greatest where G = k_h on a rise (docs/theory/toppling-spectrum.md)
             if slope > 0.0 and rest < 0.0:
                 faded = -slope / (p * rest)
                 if decay < faded <= 1.0:
@@ -62,7 +65,7 @@ SPAN_LEVELS = 3
 """Lengths of span in use at a time: near an event only short ones fit."""
 
 
-class Ground(NamedTuple):
+class BlockExcitation(NamedTuple):
     """One excitation and one p².
 
     Args:
@@ -76,17 +79,14 @@ class Ground(NamedTuple):
         remaining: what of the drive is to come (`rbfrag.solver.integrator.block_excitation`), shape
             (n,).
         remaining_max: greatest of it.
-        still_node: node after that.
+        remaining_max_node: node after it.
         spans: rows of `rbfrag.solver.integrator.spans`, of one length after the other.
         span_length: intervals of a span, by falling length, shape (levels,).
         span_row: row at which each length begins, shape (levels,).
         span_ph: greatest p·T of a span.
         p: frequency parameter [1/s].
         ph_max: greatest p·h of one step.
-        linear: the linear model.
-        u: work, shape (9,).
-        us: work, shape (9,), linear model only.
-        uc: work, shape (9,), linear model only.
+        u: coefficients of the last step, shape (9,).
     """
 
     time_s: FloatArray
@@ -98,66 +98,60 @@ class Ground(NamedTuple):
     block_max_q: FloatArray
     remaining: FloatArray
     remaining_max: float
-    still_node: int
+    remaining_max_node: int
     spans: FloatArray
     span_length: IntArray
     span_row: IntArray
     span_ph: float
     p: float
     ph_max: float
-    linear: bool
     u: FloatArray
-    us: FloatArray
-    uc: FloatArray
 
 
 def block_excitation(
-    drive: Excitation, *, p2: float, linear: bool, span_ph: float = SPAN_PH
-) -> Ground:
+    excitation: Excitation, *, p2: float, span_ph: float = SPAN_PH
+) -> BlockExcitation:
     """Bring together what the kernels need.
 
     Args:
-        drive: the excitation; 1 + k_v > 0 throughout.
+        excitation: the excitation; 1 + k_v > 0 throughout.
         p2: frequency parameter p² [1/s²].
-        linear: the linear model, which is integrated without spans.
         span_ph: greatest p·T of a span.
     """
     p = math.sqrt(p2)
-    remaining = np.empty(drive.q.size)
-    greatest, node = linear_drive(drive.interval_s, drive.k_h, p, remaining)
+    remaining = np.empty(excitation.q.size)
+    greatest, node = remaining_excitation(excitation.interval_s, excitation.k_h, p, remaining)
+    # spans pay only while p·T stays below that for which their error is bounded
     lengths: list[int] = []
-    if not linear and drive.interval_s.size:
-        usual_s = float(drive.time_s[-1] - drive.time_s[0]) / drive.interval_s.size
+    if excitation.interval_s.size:
+        usual_s = float(excitation.time_s[-1] - excitation.time_s[0]) / excitation.interval_s.size
         lengths = [m for m in LENGTHS if m * usual_s * p <= span_ph][:SPAN_LEVELS]
-    tables = [_spans(drive, length) for length in lengths]
-    return Ground(
-        time_s=drive.time_s,
-        interval_s=drive.interval_s,
-        k_h=drive.k_h,
-        w=drive.w,
-        q=drive.q,
-        tail_min_q=drive.tail_min_q,
-        block_max_q=drive.block_max_q,
+    tables = [_spans(excitation, length) for length in lengths]
+    return BlockExcitation(
+        time_s=excitation.time_s,
+        interval_s=excitation.interval_s,
+        k_h=excitation.k_h,
+        w=excitation.w,
+        q=excitation.q,
+        tail_min_q=excitation.tail_min_q,
+        block_max_q=excitation.block_max_q,
         remaining=remaining,
         remaining_max=greatest,
-        still_node=node,
+        remaining_max_node=node,
         spans=np.concatenate([np.empty((0, COLUMNS)), *tables]),
         span_length=np.array(lengths, dtype=np.int64),
         span_row=np.cumsum([0, *(len(table) for table in tables)])[:-1].astype(np.int64),
         span_ph=span_ph,
         p=p,
         ph_max=PH_MAX,
-        linear=linear,
         u=np.empty(9),
-        us=np.empty(9),
-        uc=np.empty(9),
     )
 
 
-def _spans(drive: Excitation, length: int) -> FloatArray:
-    rows = drive.span_tables.get(length)
+def _spans(excitation: Excitation, length: int) -> FloatArray:
+    rows = excitation.span_tables.get(length)
     if rows is None:
-        rows = np.empty((drive.interval_s.size // length, COLUMNS))
-        fill_spans(drive.interval_s, drive.k_h, drive.w, length, rows)
-        drive.span_tables[length] = rows
+        rows = np.empty((excitation.interval_s.size // length, COLUMNS))
+        fill_spans(excitation.interval_s, excitation.k_h, excitation.w, length, rows)
+        excitation.span_tables[length] = rows
     return rows

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
 from numba import njit
+from numba.core import event
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.registry import CPUDispatcher
 from numba.core.types import unliteral
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+# nothing calls kernels as C callbacks: the wrapper for that is left out
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
+_BARE: dict[str, Any] = {"_nrt": False}
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -28,12 +36,42 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     return _compile(function, {})
 
 
+def bare_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile like :func:`kernel` what makes no arrays of its own.
+
+    References to those that it is given are not counted then, which takes half of the time of a
+    short excursion. Of a kernel that makes arrays numba says "Require NRT"; it must not return
+    one that it was given either.
+    """
+    return _compile(function, _BARE)
+
+
+def inner_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile like :func:`bare_kernel` what only other kernels call.
+
+    The conversion of arguments from Python is left out, which takes a quarter of the time of
+    compilation where they hold the tables of a record. A call from Python is refused; tests take
+    `py_func`.
+    """
+    compiled = _compile(function, {**_BARE, "no_cpython_wrapper": True})
+    if isinstance(compiled, CPUDispatcher):
+        compiled.__class__ = _InnerKernel
+    return compiled
+
+
+class _InnerKernel(CPUDispatcher):
+    def __call__(self, *_args: Any, **_kwargs: Any) -> Any:
+        # there is no machine code to enter: without this the interpreter would crash
+        name = self.py_func.__name__
+        raise TypeError(f"{name} is called by other kernels only; from Python, call {name}.py_func")
+
+
 def fused_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile like :func:`kernel`, but let a product and a sum be rounded once (FMA).
+    """Compile like :func:`bare_kernel`, but let a product and a sum be rounded once (FMA).
 
     Faster, and more accurate if anything; the last bits then depend on the processor.
     """
-    return _compile(function, {"fastmath": {"contract"}})
+    return _compile(function, {**_BARE, "fastmath": {"contract"}})
 
 
 def within(function: Callable[P, R]) -> Callable[P, R]:
@@ -44,14 +82,76 @@ def within(function: Callable[P, R]) -> Callable[P, R]:
     return cast("Callable[P, R]", njit(inline="always", error_model="numpy")(function))
 
 
+def on_compilation(callback: Callable[[], None]) -> None:
+    """Have a function called once, when a kernel is first compiled and not read from disk.
+
+    Compilation takes seconds in which nothing else is seen: the command line says so.
+    """
+    callbacks.append(callback)
+    event.register("numba:compile", _Once(callback))  # type: ignore[no-untyped-call]
+
+
+callbacks: list[Callable[[], None]] = []
+"""What this process asked to be called on compilation, for workers that do its work."""
+
+
+class _Once(event.Listener):
+    def __init__(self, callback: Callable[[], None]) -> None:
+        self._callback: Callable[[], None] | None = callback
+
+    def on_start(self, event: Any) -> None:  # noqa: ARG002
+        callback, self._callback = self._callback, None
+        if callback is not None:
+            callback()
+
+    def on_end(self, event: Any) -> None:
+        """Nothing is to be done when the compiler ends."""
+
+
 def _compile(function: Callable[P, R], extra: dict[str, Any]) -> Callable[P, R]:
     options: dict[str, Any] = {**_OPTIONS, **extra}
     try:
         compiled = njit(cache=True, **options)(function)
     except RuntimeError:  # numba's "cannot cache function": no folder is writable
         compiled = njit(**options)(function)
+    _stamped_with_all_sources(compiled)
     _once_for_literals(compiled)
     return cast("Callable[P, R]", compiled)
+
+
+class _CacheFile(IndexDataCacheFile):
+    def _load_index(self) -> Any:
+        # numba reads what an older version of this package left before it looks at the stamp, and
+        # fails on a class that has another name now
+        try:
+            return super()._load_index()  # type: ignore[no-untyped-call]
+        except Exception:  # noqa: BLE001
+            return {}
+
+
+@cache
+def _stamp_of_sources() -> tuple[tuple[str, int, int], ...]:
+    """Name, time and size of every file of the solver."""
+    solver = Path(__file__).parents[1]
+    files = sorted(solver.rglob("*.py"))
+    return tuple((str(f.relative_to(solver)), *_time_and_size(f)) for f in files)
+
+
+def _time_and_size(file: Path) -> tuple[int, int]:
+    cached = file.stat()
+    return cached.st_mtime_ns, cached.st_size
+
+
+def _stamped_with_all_sources(compiled: Any) -> None:
+    """Let machine code on disk be out of date as soon as any file of the solver has changed.
+
+    numba looks at the kernel's own file alone, and would go on running what it had put into it
+    from another file that has changed since.
+    """
+    cached = getattr(compiled, "_cache", None)
+    if isinstance(cached, FunctionCache):  # not where no folder is writable
+        base = cached._impl.filename_base
+        cached._cache_file = _CacheFile(cached.cache_path, base, _stamp_of_sources())  # type: ignore[no-untyped-call]
 
 
 def _once_for_literals(compiled: Any) -> None:

@@ -1,74 +1,160 @@
-"""What happens inside one step: peaks, dips below zero, the impact."""
+"""Events: peaks, dips below zero and impacts inside a step, and motion past recovery."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.taylor import bracketed_root, rotation, value
+from rbfrag.solver.integrator.compiled import inner_kernel, within
+from rbfrag.solver.integrator.taylor import (
+    OF_ACCELERATION,
+    OF_RATE,
+    OF_ROTATION,
+    bracketed_root,
+    rotation,
+    value,
+)
 
 FloatArray = NDArray[np.float64]
 
 
-@kernel
+class Inside(NamedTuple):
+    """What happens inside one step.
+
+    Args:
+        impact: fraction of the step at which theta returns to 0, or -1.
+        peak: greatest maximum of theta before that, -1 where there is none.
+        peak_at: fraction of the step at which it is.
+        lowest: lowest minimum above zero, infinite where there is none.
+    """
+
+    impact: float
+    peak: float
+    peak_at: float
+    lowest: float
+
+
+@within
+def keeps_direction(u_start: float, v_start: float, u_end: float, v_end: float) -> bool:
+    """Whether U has one sign throughout a step; V = U' is taken as monotone in it.
+
+    U with the same sign at both ends is zero between them only if it turns there, that is if V
+    changes its sign, and if the tangent at the start reaches zero. (`&` instead of `and`: no
+    branches, so that a loop over runs becomes vector instructions.)
+    """
+    dips = (v_start < 0.0) & (v_end > 0.0) & (u_start + v_start <= 0.0)
+    rises = (v_start > 0.0) & (v_end < 0.0) & (u_start + v_start >= 0.0)
+    up = (u_start > 0.0) & (u_end > 0.0)
+    down = (u_start < 0.0) & (u_end < 0.0)
+    return (up & (not dips)) | (down & (not rises))
+
+
+@within
+def simple_turn(
+    theta: float,
+    theta_end: float,
+    u_start: float,
+    v_start: float,
+    u_end: float,
+    v_end: float,
+    peak: float,
+    drift: float,
+) -> bool:
+    """Whether a step above zero in which U may change its sign holds no event all the same.
+
+    Args:
+        theta: rotation at the start.
+        theta_end: rotation at the end.
+        u_start: U at the start.
+        v_start: its derivative there.
+        u_end: U at the end.
+        v_end: its derivative there.
+        peak: a maximum of theta counts above this one only; infinite to look for none.
+        drift: a minimum that is not above this rotation may be an impact.
+    """
+    # a concave arc is below its end tangents: so is its peak
+    rounds = (u_start > 0.0) & (v_start < 0.0) & (v_end < 0.0)
+    rounds = rounds & (min(theta + u_start, theta_end - u_end) <= peak)
+    # a convex arc is above them: so is its dip
+    bounces = (u_start <= 0.0) & (v_start > 0.0) & (v_end > 0.0)
+    bounces = bounces & (max(theta + u_start, theta_end - u_end) > drift)
+    return rounds | bounces
+
+
+@within
+def irrecoverable(rate: float, s: float, c: float, least_q: float, error: float) -> bool:
+    """Whether a block has toppled whatever comes, though its state errs by `error`.
+
+    Beyond its balance point (s < 0) and turning on, it falls as long as
+    tan(phi) < q; `least_q` is the least q from here on (docs/theory/toppling.md, "Events").
+    """
+    # at a quarter turn (c = 0) the test of q needs no tangent in this form
+    return (rate > error) & (s < 0.0) & (c * least_q - s > error * (1.0 - least_q))
+
+
+@within
+def upright_rate(s: float, c: float) -> float:
+    """Return theta'/p of the motion that comes to rest upright, the ground at rest.
+
+    By energy, 1 - cos(phi) = (theta'/p)²/2: a block that is faster falls over.
+    """
+    return 2.0 * math.sin(0.5 * math.atan2(s, c))
+
+
+@inner_kernel
 def examine_step(
     theta: float, u: FloatArray, order: int, theta_end: float, u_end: float, v_end: float
-) -> tuple[float, float, float, float]:
+) -> Inside:
     """Find what happens inside one step.
 
-    The step is cut at the turning points of theta into monotone stretches, so a peak and a
+    The step is cut at the turning points of theta into monotone stretches, so a peak and an
     impact in one step, or a dip below zero between two positive ends, are all seen.
-
-    Returns:
-        tau of the impact or -1; peak, -1 where theta has no maximum before the impact; tau
-        of the peak; lowest minimum above zero, infinite where there is none.
     """
     v_start = u[1]
     # a start from rest has U = 0: its direction is that of the acceleration
     u_start = u[0] if u[0] != 0.0 else v_start
+    # V is monotone: U has at most two zeros, one on either side of that of V
     first = -1.0
     second = -1.0
     if (v_start > 0.0 and v_end < 0.0) or (v_start < 0.0 and v_end > 0.0):
-        extremum = bracketed_root(2, theta, u, order, 0.0, 1.0)
+        # U turns: it may be zero on either side of its extremum
+        extremum = bracketed_root(OF_ACCELERATION, theta, u, order, 0.0, 1.0)
         u_mid = value(u, order, extremum)
         if (u_start > 0.0 and u_mid <= 0.0) or (u_start < 0.0 and u_mid >= 0.0):
-            first = bracketed_root(1, theta, u, order, 0.0, extremum)
+            first = bracketed_root(OF_RATE, theta, u, order, 0.0, extremum)
         if (u_mid > 0.0 and u_end <= 0.0) or (u_mid < 0.0 and u_end >= 0.0):
-            second = bracketed_root(1, theta, u, order, extremum, 1.0)
+            second = bracketed_root(OF_RATE, theta, u, order, extremum, 1.0)
     elif (u_start > 0.0 and u_end <= 0.0) or (u_start < 0.0 and u_end >= 0.0):
-        first = bracketed_root(1, theta, u, order, 0.0, 1.0)
+        first = bracketed_root(OF_RATE, theta, u, order, 0.0, 1.0)
 
     peak = -1.0
-    peak_tau = -1.0
+    peak_at = -1.0
     lowest = math.inf
     rising = u_start > 0.0
     left = 0.0
     theta_left = theta
+    ends = (first, second, 1.0)
     for stretch in range(3):
-        right = 1.0
-        if stretch == 0:
-            if first < 0.0:
-                continue
-            right = first
-        elif stretch == 1:
-            if second < 0.0:
-                continue
-            right = second
-        theta_right = theta_end if stretch == 2 else rotation(theta, u, order, right)
+        right = ends[stretch]
+        if right < 0.0:
+            continue
+        at_end = stretch == 2
+        theta_right = theta_end if at_end else rotation(theta, u, order, right)
         if rising:
-            if stretch < 2 and theta_right > peak:
+            if not at_end and theta_right > peak:
                 peak = theta_right
-                peak_tau = right
+                peak_at = right
         elif theta_right <= 0.0:
-            if theta_left <= 0.0:
-                return left, peak, peak_tau, lowest
-            return bracketed_root(0, theta, u, order, left, right), peak, peak_tau, lowest
-        elif stretch < 2:
+            # a stretch that begins at 0 and falls is an impact at its beginning
+            if theta_left > 0.0:
+                left = bracketed_root(OF_ROTATION, theta, u, order, left, right)
+            return Inside(left, peak, peak_at, lowest)
+        elif not at_end:
             lowest = min(lowest, theta_right)
         rising = not rising
         left = right
         theta_left = theta_right
-    return -1.0, peak, peak_tau, lowest
+    return Inside(-1.0, peak, peak_at, lowest)

@@ -8,90 +8,75 @@ A position in a record is a pair (interval i, fraction tau in [0, 1]); node i is
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.solver.integrator.block_excitation import Ground
-from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.spans import span_step
-from rbfrag.solver.integrator.taylor import (
-    bracketed_root,
-    fill_coefficients,
-    lean_step,
-    rotation,
-    turn,
-    value,
+from rbfrag.solver.integrator.block_excitation import BlockExcitation
+from rbfrag.solver.integrator.compiled import inner_kernel, within
+from rbfrag.solver.integrator.events import (
+    examine_step,
+    irrecoverable,
+    keeps_direction,
+    simple_turn,
+    upright_rate,
 )
+from rbfrag.solver.integrator.spans import span_step
+from rbfrag.solver.integrator.state import Place, State, StepExcitation, at_rest, excitation_over
+from rbfrag.solver.integrator.taylor import ORDER, lean_step, turn, value
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 IMPACT, TOPPLED, IN_AIR, STOPPED, ORDER_LOST = 0, 1, 2, 3, 4
 
-ORDER = 8
+
+ORDER_TRUSTED, ORDER_TO_REST, ORDER_TO_BORDER = 0, 1, 2
 
 
-@kernel
-def rest_state(kr: float, linear: bool) -> tuple[float, float]:
-    """Return sin and cos of the critical angle (linear: the angle and 1)."""
-    if linear:
-        return kr, 1.0
-    c = 1.0 / math.sqrt(1.0 + kr * kr)
-    return kr * c, c
+class Rules(NamedTuple):
+    """How an excursion is followed.
+
+    Args:
+        impacts: False carries the motion on below theta = 0, as if there were no base.
+        order: ORDER_TRUSTED takes D = k_h sin(phi) + (1 + k_v) cos(phi) >= 0 for granted;
+            ORDER_TO_REST checks it on the way between this motion and a block with `kr_other` at
+            rest; ORDER_TO_BORDER between this motion and the border of the irrecoverable states.
+        kr_other: see `order`.
+    """
+
+    impacts: bool
+    order: int
+    kr_other: float
 
 
-@kernel
-def first_touch(theta: float, u: FloatArray, theta_end: float, u_end: float, v_end: float) -> float:
-    """Fraction of a step at which theta returns to 0, or -1."""
-    v_start = u[1]
-    if theta_end > 0.0:
-        # theta is above its ends where it is concave, above its tangents where it is convex
-        if v_start < 0.0 and v_end < 0.0:
-            return -1.0
-        if v_start > 0.0 and v_end > 0.0 and max(theta + u[0], theta_end - u_end) > 0.0:
-            return -1.0
-    u_start = u[0] if u[0] != 0.0 else v_start
-    first = -1.0
-    second = -1.0
-    if (v_start > 0.0 and v_end < 0.0) or (v_start < 0.0 and v_end > 0.0):
-        extremum = bracketed_root(2, theta, u, ORDER, 0.0, 1.0)
-        u_mid = value(u, ORDER, extremum)
-        if (u_start > 0.0 and u_mid <= 0.0) or (u_start < 0.0 and u_mid >= 0.0):
-            first = bracketed_root(1, theta, u, ORDER, 0.0, extremum)
-        if (u_mid > 0.0 and u_end <= 0.0) or (u_mid < 0.0 and u_end >= 0.0):
-            second = bracketed_root(1, theta, u, ORDER, extremum, 1.0)
-    elif (u_start > 0.0 and u_end <= 0.0) or (u_start < 0.0 and u_end >= 0.0):
-        first = bracketed_root(1, theta, u, ORDER, 0.0, 1.0)
-    falling = u_start <= 0.0
-    left = 0.0
-    theta_left = theta
-    for stretch in range(3):
-        right = 1.0
-        if stretch == 0:
-            if first < 0.0:
-                continue
-            right = first
-        elif stretch == 1:
-            if second < 0.0:
-                continue
-            right = second
-        theta_right = theta_end if stretch == 2 else rotation(theta, u, ORDER, right)
-        if falling and theta_right <= 0.0:
-            if theta_left <= 0.0:
-                return left
-            return bracketed_root(0, theta, u, ORDER, left, right)
-        falling = not falling
-        left = right
-        theta_left = theta_right
-    return -1.0
+TRUSTED = Rules(True, ORDER_TRUSTED, 0.0)
+"""A block on its base, D >= 0 taken for granted."""
+
+NO_IMPACT = Rules(False, ORDER_TRUSTED, 0.0)
+"""The same carried on below its base: a motion that bounds others."""
 
 
-@kernel
+class Excursion(NamedTuple):
+    """What ended an excursion.
+
+    Args:
+        event: IMPACT, TOPPLED, IN_AIR (at the end of the record), STOPPED or ORDER_LOST.
+        place: where.
+        state: state of the block there.
+        steps: integration steps taken.
+    """
+
+    event: int
+    place: Place
+    state: State
+    steps: int
+
+
+@within
 def order_lost(
-    a0: float,
-    da: float,
-    w0: float,
-    dw: float,
+    shaking: StepExcitation,
     s0: float,
     c0: float,
     s1: float,
@@ -99,9 +84,21 @@ def order_lost(
     turned: float,
     tangent: float,
 ) -> bool:
-    """Return whether D may be negative between the states of one step and tan(phi) = tangent."""
+    """Whether D may be negative between the states of one step and tan(phi) = tangent.
+
+    Args:
+        shaking: the excitation over the step.
+        s0: sin(phi) at its start.
+        c0: cos(phi) there.
+        s1: sin(phi) at its end.
+        c1: cos(phi) there.
+        turned: bound of the angle that phi can turn in the step [rad].
+        tangent: tan(phi) of the other motion.
+    """
+    a0, da, w0, dw = shaking
     a1 = a0 + da
     w1 = w0 + dw
+    # D is linear in the drive: its least value over the step is at one of the ends
     least = min(
         min(a0 * s0 + w0 * c0, a1 * s0 + w1 * c0), min(a0 * s1 + w0 * c1, a1 * s1 + w1 * c1)
     )
@@ -110,189 +107,170 @@ def order_lost(
     return least < slack or min(a0 * tangent + w0, a1 * tangent + w1) < 0.0 or min(c0, c1) <= 0.0
 
 
-@kernel
-def integrate_excursion(
-    g: Ground,
-    kr: float,
+@within
+def take_span(
+    spans: FloatArray,
+    lengths: IntArray,
+    first_rows: IntArray,
+    p: float,
+    span_ph: float,
     i: int,
-    tau: float,
-    theta: float,
-    rate: float,
-    s: float,
-    c: float,
+    stop: int,
+    state: State,
+) -> tuple[int, State]:
+    """Go on by the longest span from node i that ends by `stop`; its length, 0 where none fits."""
+    theta, rate, s, c = state
+    for level in range(lengths.size):
+        length = lengths[level]
+        # rows stand at multiples of their length
+        if i % length != 0 or i + length > stop:
+            continue
+        row = first_rows[level] + i // length
+        ph = p * spans[row, 0]
+        if not 0.0 < ph <= span_ph:
+            continue
+        # |theta''| <= p² (|a| + w): the block cannot touch down in this span
+        if theta + min(ph * rate, 0.0) - 0.5 * ph * ph * spans[row, 1] <= 0.0:
+            continue
+        turned, u_end = span_step(spans, row, ph * rate, ph, s, c)
+        s, c = turn(s, c, turned)
+        return length, State(theta + turned, u_end / ph, s, c)
+    return 0, state
+
+
+@inner_kernel
+def end_of_record(excitation: BlockExcitation) -> Place:
+    """Return the last node: a stop there is none."""
+    return Place(excitation.q.size - 1, 0.0)
+
+
+@inner_kernel
+def excursion_from_rest(
+    excitation: BlockExcitation, kr: float, start: Place, rules: Rules
+) -> Excursion:
+    """Integrate the excursion of a block that lifts off at a place where q >= kr and rises."""
+    return integrate_excursion(
+        excitation, kr, start, at_rest(kr), True, end_of_record(excitation), rules
+    )
+
+
+@inner_kernel
+def integrate_excursion(
+    excitation: BlockExcitation,
+    kr: float,
+    start: Place,
+    state: State,
     lifting: bool,
-    stop_i: int,
-    stop_tau: float,
-    touch: bool,
-    check: int,
-    kr_other: float,
-) -> tuple[int, int, float, float, float, float, float, int]:
-    """Integrate an excursion from (i, tau) until the block impacts, topples or the stop comes.
+    stop: Place,
+    rules: Rules,
+) -> Excursion:
+    """Integrate an excursion until the block impacts, topples or the stop comes.
 
     Args:
-        interval_s: interval lengths [s], shape (n - 1,).
-        k_h: driving acceleration at the nodes [g], shape (n,).
-        w: 1 + k_v at the nodes, shape (n,).
-        tail_min_q: least k_h/(1 + k_v) from each node on, shape (n,).
-        p: frequency parameter [1/s].
-        ph_max: greatest p·h of one step.
-        linear: the linear model.
+        excitation: the excitation of a block.
         kr: rocking acceleration coefficient.
-        i: interval of the start.
-        tau: fraction of it.
-        theta: rotation at the start [rad].
-        rate: theta'/p at the start.
-        s: sin(theta_c - theta) at the start.
-        c: cos(theta_c - theta) at the start.
+        start: where it begins.
+        state: state of the block there.
         lifting: theta >= 0, theta' >= 0 and q >= kr at the start: until q next falls below
             kr the rotation rate cannot become negative, so that no impact is looked for.
-        stop_i: interval of the stop; n - 1 for none.
-        stop_tau: fraction of it.
-        touch: False continues below theta = 0 (a virtual motion).
-        check: 0 to trust that D = k_h sin(phi) + (1 + k_v) cos(phi) >= 0; 1 to check it on the
-            way between this motion and a block with `kr_other` at rest; 2 between this motion
-            and the border of the irrecoverable states.
-        kr_other: see `check`.
-
-    Returns:
-        Event, interval, fraction, theta, theta'/p, s, c there, and the steps taken.
+        stop: where it ends; the last node for none.
+        rules: how it is followed.
     """
-    interval_s = g.interval_s
-    k_h = g.k_h
-    w = g.w
-    tail_min_q = g.tail_min_q
-    p = g.p
-    ph_max = g.ph_max
-    linear = g.linear
-    u = g.u
-    us = g.us
-    uc = g.uc
+    interval_s = excitation.interval_s
+    k_h, w = excitation.k_h, excitation.w
+    tail_min_q, u = excitation.tail_min_q, excitation.u
+    spans, lengths = excitation.spans, excitation.span_length
+    first_rows = excitation.span_row
+    span_ph = excitation.span_ph
+    p, ph_max = excitation.p, excitation.ph_max
+    i, tau = start
+    theta, rate, s, c = state
     last = k_h.size - 1
     steps = 0
     ph_now = -1.0
-    per_ph = 0.0
-    u_now = 0.0
-    use_spans = touch and check == 0 and g.span_length.size > 0
-    while i < last and (i < stop_i or (i == stop_i and tau < stop_tau)):
-        if use_spans and tau == 0.0 and i % g.span_length[g.span_length.size - 1] == 0:
-            spanned = False
-            for level in range(g.span_length.size):
-                length = g.span_length[level]
-                if i % length != 0 or i + length > stop_i:
-                    continue
-                row = g.span_row[level] + i // length
-                ph = p * g.spans[row, 0]
-                if not 0.0 < ph <= g.span_ph:
-                    continue
-                # |theta''| <= p² (|a| + w): the block cannot touch down in this span
-                if theta + min(ph * rate, 0.0) - 0.5 * ph * ph * g.spans[row, 1] <= 0.0:
-                    continue
-                turned, u_end = span_step(g.spans, row, ph * rate, ph, s, c)
+    per_ph = u_now = 0.0
+    # a span says nothing of what happens inside it: neither impacts below 0 nor the sign of D
+    use_spans = rules.impacts and rules.order == ORDER_TRUSTED and lengths.size > 0
+    while i < last and (i < stop.interval or (i == stop.interval and tau < stop.fraction)):
+        if use_spans and tau == 0.0 and i % lengths[lengths.size - 1] == 0:
+            length, after = take_span(
+                spans, lengths, first_rows, p, span_ph, i, stop.interval, State(theta, rate, s, c)
+            )
+            if length > 0:
+                theta, rate, s, c = after
                 steps += 1
-                theta += turned
-                s, c = turn(s, c, turned)
-                rate = u_end / ph
                 lifting = False
                 ph_now = -1.0
                 i += length
-                spanned = True
-                break
-            if spanned:
-                if rate > 0.0 and s < 0.0 and s < c * tail_min_q[i]:
-                    return TOPPLED, i, 0.0, theta, rate, s, c, steps
+                if s < 0.0 and irrecoverable(rate, s, c, tail_min_q[i], 0.0):
+                    return Excursion(TOPPLED, Place(i, 0.0), State(theta, rate, s, c), steps)
                 continue
         end = 1.0
-        if i == stop_i and stop_tau < 1.0:
-            end = stop_tau
-        k0 = k_h[i]
-        k1 = k_h[i + 1]
-        w0 = w[i]
-        w1 = w[i + 1]
-        if lifting and k1 - kr * w1 < 0.0:
+        if i == stop.interval and stop.fraction < 1.0:
+            end = stop.fraction
+        # q is a ratio of straight lines: above kr at both nodes it is so between them
+        if lifting and k_h[i + 1] - kr * w[i + 1] < 0.0:
             lifting = False
         part = end - tau
         ph = p * interval_s[i] * part
-        if ph > 0.0:
-            pieces = 1
-            if ph > ph_max:
-                pieces = math.ceil(ph / ph_max)
-                part /= pieces
-                ph /= pieces
-            da = (k1 - k0) * part
-            dw = (w1 - w0) * part
-            for piece in range(pieces):
-                at = tau + piece * part
-                a0 = k0 + (k1 - k0) * at
-                v0 = w0 + (w1 - w0) * at
-                steps += 1
-                if ph != ph_now:
-                    ph_now = ph
-                    per_ph = 1.0 / ph
-                    u_now = ph * rate
-                if linear:
-                    us[0] = s
-                    uc[0] = c
-                    u[0] = u_now
-                    fill_coefficients(u, us, uc, ORDER, ph * ph, a0, da, v0, dw, True)
-                    turned, u_end, v_end = 0.0, 0.0, 0.0
-                    for k in range(ORDER, 0, -1):
-                        turned += u[k] / (k + 1)
-                        u_end += u[k]
-                        v_end += k * u[k]
-                    turned += u[0]
-                    u_end += u[0]
-                else:
-                    turned, u_end, v_end = lean_step(u, u_now, ph, s, c, a0, da, v0, dw)
-                theta_end = theta + turned
-                if lifting:
-                    theta_end = max(theta_end, 0.0)
-                    u_end = max(u_end, 0.0)
-                elif touch:
-                    look = theta_end <= 0.0
-                    u_start = u[0]
-                    v_start = u[1]
-                    if u_start > 0.0 and u_end > 0.0:
-                        look = look or (v_start < 0.0 and v_end > 0.0 and u_start + v_start <= 0.0)
-                    elif u_start < 0.0 and u_end < 0.0:
-                        look = look or (v_start > 0.0 and v_end < 0.0 and u_start + v_start >= 0.0)
-                    else:
-                        look = True
-                    if look:
-                        x = first_touch(theta, u, theta_end, u_end, v_end)
-                        if x >= 0.0:
-                            rate = min(value(u, ORDER, x) / ph, 0.0)
-                            s, c = rest_state(kr, linear)
-                            return IMPACT, i, min(at + part * x, 1.0), 0.0, rate, s, c, steps
-                theta = theta_end
-                if linear:
-                    s -= turned
-                    rate = u_end * per_ph
-                    u_now = u_end
-                else:
-                    s_end, c_end = turn(s, c, turned)
-                    if check > 0:
-                        tangent = kr_other if check == 1 else tail_min_q[i]
-                        if order_lost(
-                            a0, da, v0, dw, s, c, s_end, c_end,
-                            ph * (abs(rate) + abs(u_end * per_ph)), tangent,
-                        ):  # fmt: skip
-                            return ORDER_LOST, i, at, theta, rate, s, c, steps
-                    s = s_end
-                    c = c_end
-                    rate = u_end * per_ph
-                    u_now = u_end
-                if s < 0.0 and rate > 0.0 and piece < pieces - 1 and s < c * tail_min_q[i]:
-                    # in a long interval the block could swing right round before its end
-                    return TOPPLED, i, at + part, theta, rate, s, c, steps
-        if end < 1.0:
-            return STOPPED, i, end, theta, rate, s, c, steps
+        # intervals are cut as in the single run, so that both see the same steps
+        parts = 1 if ph > 0.0 else 0  # nothing moves in an interval of no time
+        if ph > ph_max:
+            parts = math.ceil(ph / ph_max)
+            part /= parts
+            ph /= parts
+        for number in range(parts):
+            at = tau + number * part
+            shaking = excitation_over(k_h, w, i, at, part)
+            steps += 1
+            if ph != ph_now:
+                # as long as steps have one length, U goes on without being rounded anew
+                ph_now = ph
+                per_ph = 1.0 / ph
+                u_now = ph * rate
+            # no error is estimated here: the margins of the search are above that of every order
+            turned, u_end, v_end = lean_step(u, u_now, ph, s, c, shaking)
+            theta_end = theta + turned
+            if lifting:
+                # lemma "lift": neither theta nor theta' falls below 0; rounding may say so
+                theta_end = max(theta_end, 0.0)
+                u_end = max(u_end, 0.0)
+            elif rules.impacts and (
+                theta_end <= 0.0
+                or (
+                    not keeps_direction(u_now, u[1], u_end, v_end)
+                    and not simple_turn(theta, theta_end, u_now, u[1], u_end, v_end, math.inf, 0.0)
+                )
+            ):
+                x = examine_step(theta, u, ORDER, theta_end, u_end, v_end).impact
+                if x >= 0.0:
+                    rest = at_rest(kr)
+                    # rounding may leave a rate above 0 at the root: a block does not close so
+                    rate = min(value(u, ORDER, x) / ph, 0.0)
+                    place = Place(i, min(at + part * x, 1.0))
+                    return Excursion(IMPACT, place, State(0.0, rate, rest.sin, rest.cos), steps)
+            theta = theta_end
+            s_end, c_end = turn(s, c, turned)
+            if rules.order != ORDER_TRUSTED:
+                tangent = rules.kr_other if rules.order == ORDER_TO_REST else tail_min_q[i]
+                most = ph * (abs(rate) + abs(u_end * per_ph))
+                if order_lost(shaking, s, c, s_end, c_end, most, tangent):
+                    return Excursion(ORDER_LOST, Place(i, at), State(theta, rate, s, c), steps)
+            s = s_end
+            c = c_end
+            rate = u_end * per_ph
+            u_now = u_end
+            # in a long interval the block could swing right round before its end
+            if number < parts - 1 and s < 0.0 and irrecoverable(rate, s, c, tail_min_q[i], 0.0):
+                return Excursion(TOPPLED, Place(i, at + part), State(theta, rate, s, c), steps)
+        if end < 1.0:  # the stop lies inside this interval
+            return Excursion(STOPPED, Place(i, end), State(theta, rate, s, c), steps)
         i += 1
         tau = 0.0
-        if rate > 0.0 and s < 0.0 and s < c * tail_min_q[i]:
-            return TOPPLED, i, tau, theta, rate, s, c, steps
-    if i < last or stop_i < last:
-        return STOPPED, i, tau, theta, rate, s, c, steps
-    half = s if linear else 2.0 * math.sin(0.5 * math.atan2(s, c))
-    if rate > half:
-        return TOPPLED, i, tau, theta, rate, s, c, steps
-    return IN_AIR, i, tau, theta, rate, s, c, steps
+        if s < 0.0 and irrecoverable(rate, s, c, tail_min_q[i], 0.0):
+            return Excursion(TOPPLED, Place(i, tau), State(theta, rate, s, c), steps)
+    event = STOPPED
+    if i >= last and stop.interval >= last:
+        # the ground is at rest from here on, and energy decides
+        event = TOPPLED if rate > upright_rate(s, c) else IN_AIR
+    return Excursion(event, Place(i, tau), State(theta, rate, s, c), steps)

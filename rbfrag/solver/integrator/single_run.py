@@ -1,14 +1,12 @@
 """Kernel of the toppling block: one run over one record.
 
-    moving: theta'' = p² [k_h cos(theta_c - theta) - (1 + k_v) sin(theta_c - theta)]
+    moving: theta'' = p² [k_h cos(theta_c - theta) - (1 + k_v) sin(theta_c - theta)]   (4.2, 4.13)
     rest:   theta = theta' = 0 while k_h <= (1 + k_v) k_r
 
-theta is the forward rotation about the toe; theta_c = atan(k_r). In the linear model, kept
-for verification against closed forms, sin is replaced by its argument, cos by 1, and
-theta_c = k_r. Events: lift-off (an upward crossing of the threshold), impact (theta back
-to 0, without rebound; motion restarts at once if the threshold is exceeded), and the
-verdict "irrecoverable". After the last sample the ground is at rest and the verdict is
-closed-form, by energy.
+theta is the forward rotation about the toe; theta_c = atan(k_r). Events: lift-off (an upward
+crossing of the threshold), impact (theta back to 0, without rebound; motion restarts at once if
+the threshold is exceeded), and the verdict "irrecoverable". After the last sample the ground is
+at rest and the verdict is closed-form, by energy.
 """
 
 from __future__ import annotations
@@ -19,16 +17,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.solver.excitation import BLOCK
-from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.events import examine_step
-from rbfrag.solver.integrator.taylor import (
-    MACHINE_EPSILON,
-    fill_coefficients,
-    step8,
-    turn,
-    value,
+from rbfrag.solver.excitation import BLOCK, Nodes
+from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel, within
+from rbfrag.solver.integrator.events import (
+    examine_step,
+    irrecoverable,
+    keeps_direction,
+    simple_turn,
+    upright_rate,
 )
+from rbfrag.solver.integrator.state import State, StepExcitation, at_rest, excitation_over
+from rbfrag.solver.integrator.taylor import MACHINE_EPSILON, taylor_step, turn, value
 
 FloatArray = NDArray[np.float64]
 
@@ -37,12 +36,16 @@ STABLE, TOPPLED, UNDETERMINED, JUMP = 0, 1, 2, 3
 PENDING = 4
 """Outcome of a run that is handed over before its end: its state is to be carried on."""
 
-AT_INTERVAL, THETA, RATE, SIN, COS, ERROR, DRIFT = 0, 1, 2, 3, 4, 5, 6
-PEAK, PEAK_ERROR, STARTED, LOST, STEPS, SAMPLES = 7, 8, 9, 10, 11, 12
-TO_THE_END = 13
-STATE_SIZE = 14
-"""Fields of the state of a run that moves at a node. An interval below 0 means the beginning;
-TO_THE_END above 0 that the run is not handed over again."""
+HANDED = np.dtype(
+    [
+        ("interval", "i8"), ("theta", "f8"), ("rate", "f8"), ("sin", "f8"), ("cos", "f8"),
+        ("error", "f8"), ("drift", "f8"), ("peak", "f8"), ("peak_error", "f8"),
+        ("started_s", "f8"), ("lost", "i8"), ("steps", "i8"), ("samples", "i8"),
+        ("to_the_end", "i8"),
+    ]
+)  # fmt: skip
+"""A run that moves at a node, as it is handed over. An interval below 0 means the beginning;
+`to_the_end` above 0 that the run is not handed over again."""
 
 
 class Run(NamedTuple):
@@ -61,13 +64,48 @@ class Run(NamedTuple):
     history_length: int
 
 
-@kernel
+class Block(NamedTuple):
+    """A block, and how it is integrated.
+
+    Args:
+        kr: rocking acceleration coefficient k_r.
+        cos_rest: cosine of its critical angle.
+        p: frequency parameter [1/s].
+        order: degree of the Taylor step.
+        ph_max: greatest p·h of one step.
+    """
+
+    kr: float
+    cos_rest: float
+    p: float
+    order: int
+    ph_max: float
+
+
+class Known(NamedTuple):
+    """What is known of a trajectory up to a place.
+
+    Args:
+        error: bound on |error of theta| + |error of theta'/p|.
+        drift: closer bound on the error of theta alone, which times an impact.
+        peak: greatest rotation so far [rad].
+        peak_error: bound of its error [rad].
+    """
+
+    error: float
+    drift: float
+    peak: float
+    peak_error: float
+
+
+@inner_kernel
 def next_lifting_node(
     q: FloatArray, block_max_q: FloatArray, start: int, stop: int, kr: float
 ) -> int:
     """First node in [start, stop) with q > kr, or `stop`; skips rest by block maxima."""
     i = start
     while i < stop:
+        # a record is at rest most of the time: most of it is passed sixteen nodes at a time
         if i % BLOCK == 0 and block_max_q[i // BLOCK] <= kr:
             i += BLOCK
         elif q[i] > kr:
@@ -77,385 +115,425 @@ def next_lifting_node(
     return stop
 
 
-@kernel
-def _exponential(x: float) -> float:
-    """Upper bound of exp(x) for 0 <= x, close for the small x of one step."""
-    if x > 1.0:
-        return math.exp(x)
+@inner_kernel
+def lift_off(nodes: Nodes, kr: float, i: int, tau: float, last: int) -> tuple[int, float, bool]:
+    """Find where a block at rest at (i, tau) begins to move: k_h > (1 + k_v) k_r.
+
+    Returns:
+        Interval (`last` or beyond for never) and fraction; whether the threshold is crossed there
+        from below, so that no impact is possible in the first step.
+    """
+    interval_s, k_h, w = nodes.interval_s, nodes.k_h, nodes.w
+    while i < last:
+        g0 = k_h[i] - w[i] * kr
+        g1 = k_h[i + 1] - w[i + 1] * kr
+        if interval_s[i] == 0.0 or (tau > 0.0 and g1 <= 0.0):
+            # nothing lifts in no time, nor where the drive is falling back
+            i += 1
+            tau = 0.0
+        elif tau > 0.0:  # at rest inside the interval, after an impact
+            return i, min(max(tau, -g0 / (g1 - g0)), 1.0), True
+        elif g0 > 0.0:
+            return i, 0.0, False
+        elif g1 > 0.0:
+            return i, -g0 / (g1 - g0), True
+        else:
+            i = next_lifting_node(nodes.q, nodes.block_max_q, i + 2, last + 1, kr) - 1
+    return i, 0.0, False
+
+
+@within
+def exponential_bound(x: float) -> float:
+    """Upper bound of exp(x) for 0 <= x <= 1, close for the small x of one step."""
     return 1.0 + x * (1.0 + x * (0.5 + x * (1.0 / 6.0 + x * 0.06)))
 
 
-@kernel
+@within
+def step_errors(
+    order: int,
+    ph: float,
+    state: State,
+    shaking: StepExcitation,
+    turned: float,
+    highest: tuple[float, float, float],
+) -> tuple[float, float, float]:
+    """Estimate what one step does to the error of its start, and adds to it.
+
+    Args:
+        order: degree N of U.
+        ph: p times the step length.
+        state: at the start.
+        shaking: over the step.
+        turned: theta(1) - theta(0).
+        highest: U[N - 2], U[N - 1] and U[N].
+
+    Returns:
+        Exponent by which an error grows at most; truncation; rounding.
+    """
+    a_size = abs(shaking.k_h) + abs(shaking.dk_h)
+    w_size = abs(shaking.w) + abs(shaking.dw)
+    # the linearised equation: d(theta'/p)/dt = p D d(theta), d(theta)/dt = p d(theta'/p)
+    stiffness = w_size * abs(state.cos)
+    stiffness += a_size * abs(state.sin)
+    growth = ph * max(1.0, stiffness)
+    # the first two omitted terms, from u[k+2] ~ (p·h)² D u[k]/((k+1)(k+2)): one
+    # alone is fooled, since from rest under constant a every other one vanishes
+    omitted = 16.0 * ph * (a_size + w_size) / (order * (order + 1))
+    truncation = omitted * (abs(highest[2]) + abs(highest[1]))
+    # and the terms in theta³, which from rest come three places apart
+    truncation += abs(highest[0] * turned) / ph
+    size = a_size * abs(state.cos) + w_size * (abs(state.sin) + abs(turned))
+    rounding = MACHINE_EPSILON * (
+        2.0 * (abs(state.theta + turned) + abs(state.rate) + abs(state.sin)) + 4.0 * ph * size
+    )
+    return growth, truncation, rounding
+
+
+@within
+def drift_of_step(ph: float, error: float, truncation: float, theta_end: float) -> float:
+    """Return what a step adds to the error of theta: theta' errs by `error`, theta by rounding."""
+    return ph * error + truncation + 2.0 * MACHINE_EPSILON * abs(theta_end)
+
+
+@inner_kernel
+def noted(
+    rows: FloatArray, filled: int, time_s: float, theta: float, rate: float, node: int
+) -> int:
+    """Fill one more row of a history that is not full; how many are filled."""
+    if filled >= rows.shape[1]:
+        return filled
+    rows[0, filled] = time_s
+    rows[1, filled] = theta
+    rows[2, filled] = rate
+    rows[3, filled] = node
+    return filled + 1
+
+
+class Crossing(NamedTuple):
+    """What the rest of an interval brought.
+
+    Args:
+        state: of the block at its end.
+        known: of the trajectory.
+        impact_at: fraction of the interval at which the block closes its contact, or -1; `state`
+            then holds the rate of the impact.
+        verdict_at: fraction at the end of the first step past which it has toppled, or -1.
+        verdict_error: `known.error` there.
+        steps: integration steps taken.
+        filled: rows of the history that are filled.
+    """
+
+    state: State
+    known: Known
+    impact_at: float
+    verdict_at: float
+    verdict_error: float
+    steps: int
+    filled: int
+
+
+@within
+def cross_interval(
+    nodes: Nodes,
+    block: Block,
+    i: int,
+    tau: float,
+    state: State,
+    known: Known,
+    lifting: bool,
+    rows: FloatArray,
+    filled: int,
+    u: FloatArray,
+) -> Crossing:
+    """Integrate from (i, tau) to the end of the interval, or to an impact before it.
+
+    Args:
+        nodes: the excitation.
+        block: the block.
+        i: the interval.
+        tau: fraction of it to begin at.
+        state: state of the block there.
+        known: what is known of the trajectory.
+        lifting: the threshold is being crossed from below: the first step holds no impact.
+        rows: history to be filled with peaks; with one, the run goes on after the verdict.
+        filled: how many rows are.
+        u: work, shape (9,).
+    """
+    theta, rate, s, c = state
+    error, drift, peak, peak_error = known
+    order = block.order
+    keeps = rows.shape[1] > 0
+    impact_at = -1.0
+    verdict_at = -1.0
+    verdict_error = 0.0
+    steps = 0
+    # a step holds the truncation at rounding only up to ph_max (see `taylor.PH_MAX`)
+    whole = block.p * (nodes.interval_s[i] * (1.0 - tau))
+    parts = max(1, math.ceil(whole / block.ph_max))
+    part = (1.0 - tau) / parts
+    ph = whole / parts
+    for number in range(parts):
+        at = tau + number * part
+        shaking = excitation_over(nodes.k_h, nodes.w, i, at, part)
+        steps += 1
+        u_start = ph * rate
+        # the step is exact for a straight drive up to its truncation: it ends at a kink, no further
+        turned, u_end, v_end = taylor_step(order, u, u_start, ph, s, c, shaking)
+        theta_end = theta + turned
+
+        highest = (u[order - 2], u[order - 1], u[order])
+        growth, truncation, rounding = step_errors(
+            order, ph, State(theta, rate, s, c), shaking, turned, highest
+        )
+        grown = math.exp(growth) if growth > 1.0 else exponential_bound(growth)
+        # Gronwall: what was wrong at the start grows at most so, what the step adds is added
+        error = error * grown + truncation + rounding
+        drift += drift_of_step(ph, error, truncation, theta_end)
+
+        if lifting:
+            # a threshold exceeded by less than rounding may seem to pull the block back
+            lifting = False
+            if theta_end <= 0.0 or u_end <= 0.0:
+                impact_at = at + part
+        elif theta_end <= 0.0 or (
+            not keeps_direction(u_start, u[1], u_end, v_end)
+            and (
+                keeps  # a history has all peaks
+                or not simple_turn(theta, theta_end, u_start, u[1], u_end, v_end, peak, drift)
+            )
+        ):
+            x, top, top_at, lowest = examine_step(theta, u, order, theta_end, u_end, v_end)
+            if top > peak:
+                peak = top
+                peak_error = error
+            if keeps and top > 0.0:
+                top_s = nodes.time_s[i] + (at + part * top_at) * nodes.interval_s[i]
+                filled = noted(rows, filled, top_s, top, 0.0, -1)
+            # no rebound: theta' of the impact is lost, and matters for the error estimate only
+            if x >= 0.0:
+                impact_at = at + part * x
+                rate = value(u, order, x) / ph
+            elif lowest <= drift:
+                # it may have touched after all, and lost the speed of the touch
+                g0 = nodes.k_h[i] - nodes.w[i] * block.kr
+                g1 = nodes.k_h[i + 1] - nodes.w[i + 1] * block.kr
+                error += math.sqrt(2.0 * max(g0, g1, 0.0) * block.cos_rest * drift)
+        if impact_at >= 0.0:
+            break  # the rest of the interval begins anew, from rest
+        theta = theta_end
+        rate = u_end / ph
+        s, c = turn(s, c, turned)
+        # in a long interval the block could swing right round before its end
+        between_nodes = number < parts - 1 and verdict_at < 0.0
+        if between_nodes and s < 0.0 and irrecoverable(rate, s, c, nodes.tail_min_q[i], error):
+            verdict_at = at + part
+            verdict_error = error
+            if not keeps:
+                break
+    return Crossing(
+        State(theta, rate, s, c), Known(error, drift, peak, peak_error),
+        impact_at, verdict_at, verdict_error, steps, filled,
+    )  # fmt: skip
+
+
+@inner_kernel
+def after_impact(
+    known: Known, rate: float, threshold: float, c_rest: float, theta_c: float
+) -> tuple[Known, bool]:
+    """Carry the errors through an impact, which takes away theta' and with it its error.
+
+    Args:
+        known: what is known of the trajectory before it.
+        rate: theta'/p of the impact.
+        threshold: k_h - (1 + k_v) k_r there.
+        c_rest: cosine of the critical angle.
+        theta_c: critical angle [rad].
+
+    Returns:
+        What is known after it, and whether the error hides what comes then.
+    """
+    error, drift, peak, peak_error = known
+    impact = abs(rate)
+    push = max(threshold * c_rest, 0.0)  # theta''/p² at theta = 0
+    if impact <= 2.0 * error or impact * impact <= 4.0 * push * drift:
+        # a graze: whether it touches at all is below the error, and if it does not it
+        # keeps its speed
+        error += impact + math.sqrt(2.0 * push * drift)
+        return Known(error, drift, peak, peak_error), error > 0.25 * theta_c
+    if threshold > 0.0:
+        # motion restarts at once; only the error of its starting time is left
+        late = 2.0 * drift / impact
+        error = push * late
+        return Known(error, error * late, peak, peak_error), False
+    return Known(0.0, 0.0, peak, peak_error), False
+
+
+@inner_kernel
+def after_record(state: State, known: Known, theta_c: float) -> tuple[int, float, float]:
+    """Return outcome, peak rotation and its error of free motion after the record, by energy."""
+    error, _, peak, peak_error = known
+    border = upright_rate(state.sin, state.cos)
+    margin = state.rate - border
+    # nearer to the border than the error: neither outcome is known
+    if abs(margin) <= error:
+        return UNDETERMINED, math.nan, error
+    if margin > 0.0:
+        return TOPPLED, math.nan, error
+    if state.rate > 0.0:
+        # 1 - cos is conserved up to the kinetic energy: sin²(x_top/2) = sin²(x/2) - rate²/4
+        rest = math.sqrt((border - state.rate) * (border + state.rate))
+        x_top = 2.0 * math.asin(0.5 * rest)
+        if theta_c - x_top > peak:
+            x = math.atan2(state.sin, state.cos)
+            peak = theta_c - x_top
+            peak_error = error * ((abs(math.sin(x)) + state.rate) / math.sin(x_top))
+    return STABLE, peak, peak_error
+
+
+@inner_kernel
+def verdict(
+    nodes: Nodes,
+    last: int,
+    lost: bool,
+    moving: bool,
+    state: State,
+    known: Known,
+    theta_c: float,
+) -> tuple[int, float, float, float]:
+    """Return outcome, peak, time of the verdict and error of a run that reached node `last`."""
+    n = nodes.k_h.size
+    if last < n - 1:
+        jump_s = nodes.time_s[0]
+        if last >= 0:  # 1 + k_v is a straight line to its zero
+            w0, w1 = nodes.w[last], nodes.w[last + 1]
+            jump_s = nodes.time_s[last] + nodes.interval_s[last] * w0 / (w0 - w1)
+        return JUMP, math.nan, jump_s, known.error
+    if lost:  # the block may be another one since an impact that the error hid
+        return UNDETERMINED, math.nan, math.nan, known.error
+    if not moving:
+        return STABLE, known.peak, math.nan, known.peak_error
+    outcome, peak, error = after_record(state, known, theta_c)
+    return outcome, peak, math.nan if outcome == STABLE else nodes.time_s[n - 1], error
+
+
+@bare_kernel
 def run_toppling(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    jump_node: int,
+    nodes: Nodes,
     kr: float,
     p: float,
-    linear: bool,
     order: int,
     ph_max: float,
-    history: FloatArray,
-    state: FloatArray,
-    work: FloatArray,
+    rows: FloatArray,
+    handed: np.ndarray,
+    u: FloatArray,
 ) -> tuple[int, float, float, float, float, int, int, int]:
     """Run one block over one record; the fields of :class:`Run` in order.
 
     Args:
-        time_s: node times [s], shape (n,).
-        interval_s: interval lengths [s], shape (n - 1,).
-        k_h: driving acceleration at the nodes [g].
-        w: 1 + k_v at the nodes.
-        q: k_h/(1 + k_v) at the nodes.
-        tail_min_q: least q from each node on, rest after the record included.
-        block_max_q: greatest q of each block of nodes.
-        jump_node: first node with 1 + k_v <= 0, or n.
-        kr: rocking acceleration coefficient k_r (linear model: critical angle [rad]).
+        nodes: the excitation.
+        kr: rocking acceleration coefficient k_r.
         p: frequency parameter [1/s].
-        linear: the linear verification model.
-        order: degree of the Taylor step.
+        order: degree of the Taylor step: 4, 5, 6 or 8.
         ph_max: greatest p·h of one step.
-        history: shape (4, m) to be filled with time, theta, theta' and node (-1 for an event
-            between nodes); (4, 0) for none. With a
-            history the run goes on after the verdict until the block lies beyond 90 degrees.
-        state: shape (STATE_SIZE,) to go on from there and to hand over with PENDING as soon as
-            the block moves at a node beyond; (0,) to run to the end.
-        work: work, shape (3, order + 1).
+        rows: history to be filled with time, theta, theta' and node (-1 for an event between
+            nodes), shape (4, m); (4, 0) for none. With one, the run goes on after the verdict until
+            the block lies beyond 90 degrees.
+        handed: of type HANDED, shape (1,) to go on from there and to hand over with PENDING as
+            soon as the block moves at a node beyond; (0,) to run to the end.
+        u: work, shape (9,).
     """
-    n = k_h.size
-    last = min(n, jump_node) - 1
-    if linear:
-        theta_c = kr
-        s_rest = kr
-        c_rest = 1.0
-    else:
-        theta_c = math.atan(kr)
-        c_rest = 1.0 / math.sqrt(1.0 + kr * kr)
-        s_rest = kr * c_rest
-    u = work[0]
-    s = work[1]
-    c = work[2]
-
-    room = history.shape[1]
-    filled = 0
-    started_s = math.nan
-    verdict_s = math.nan
-    peak = 0.0
-    peak_error = 0.0
-    steps = 0
-    moved = 0
-    counted = -1
-    decided = False
-    verdict_error = 0.0
-
-    i = 0
-    tau = 0.0  # position inside interval i
+    time_s, interval_s, k_h, w = nodes.time_s, nodes.interval_s, nodes.k_h, nodes.w
+    last = min(k_h.size, nodes.jump_node) - 1
+    theta_c = math.atan(kr)
+    rest = at_rest(kr)
+    block = Block(kr, rest.cos, p, order, ph_max)
+    keeps = rows.shape[1] > 0
+    filled = steps = samples = 0
+    counted = entered = -1  # interval counted last; the one at which a run was taken over
+    started_s, decided_s, decided_error = math.nan, math.nan, 0.0
+    i, tau = 0, 0.0  # interval, and position inside it
     moving = False
-    just_lifted = False  # starting at an upward crossing: no impact is possible in the first step
-    theta = 0.0
-    rate = 0.0  # theta'/p
-    error = 0.0  # bound on |error of theta| + |error of theta'/p|
-    drift = 0.0  # closer bound on the error of theta alone, which times an impact
+    lifting = False  # starting at an upward crossing: no impact is possible in the first step
     lost = False  # whether an impact may as well have been a fall: the error hid the difference
-    hands_over = state.size > 0 and state[TO_THE_END] <= 0.0
-    entered = -1  # interval at which a state was taken over
-    if state.size > 0 and state[AT_INTERVAL] >= 0.0:
-        i = int(state[AT_INTERVAL])
-        entered = i
+    state, known = rest, Known(0.0, 0.0, 0.0, 0.0)
+    hands_over = handed.size > 0 and handed[0].to_the_end == 0
+    if handed.size > 0 and handed[0].interval >= 0:
+        run = handed[0]
+        i = entered = run.interval
         moving = True
-        theta = state[THETA]
-        rate = state[RATE]
-        s[0] = state[SIN]
-        c[0] = state[COS]
-        error = state[ERROR]
-        drift = state[DRIFT]
-        peak = state[PEAK]
-        peak_error = state[PEAK_ERROR]
-        started_s = state[STARTED]
-        lost = state[LOST] > 0.0
-        steps = int(state[STEPS])
-        moved = int(state[SAMPLES])
+        state = State(run.theta, run.rate, run.sin, run.cos)
+        known = Known(run.error, run.drift, run.peak, run.peak_error)
+        started_s, lost, steps, samples = run.started_s, run.lost > 0, run.steps, run.samples
 
-    while i < last:
-        if hands_over and moving and tau == 0.0 and not just_lifted and i > entered:
-            state[AT_INTERVAL] = i
-            state[THETA] = theta
-            state[RATE] = rate
-            state[SIN] = s[0]
-            state[COS] = c[0]
-            state[ERROR] = error
-            state[DRIFT] = drift
-            state[PEAK] = peak
-            state[PEAK_ERROR] = peak_error
-            state[STARTED] = started_s
-            state[LOST] = 1.0 if lost else 0.0
-            state[STEPS] = steps
-            state[SAMPLES] = moved
-            return PENDING, math.nan, started_s, math.nan, error, steps, moved, 0
-        g0 = k_h[i] - w[i] * kr
-        g1 = k_h[i + 1] - w[i + 1] * kr
-        if not moving and interval_s[i] == 0.0:  # nothing lifts in no time
-            i += 1
-            tau = 0.0
-            continue
+    # only a history goes on after the verdict
+    while i < last and (keeps or math.isnan(decided_s)):
+        # only at a node and in motion: the batch knows plain steps of whole intervals alone
+        if hands_over and moving and tau == 0.0 and not lifting and i > entered:
+            run = handed[0]
+            run.interval = i
+            run.theta, run.rate, run.sin, run.cos = state
+            run.error, run.drift, run.peak, run.peak_error = known
+            run.started_s, run.lost, run.steps, run.samples = started_s, lost, steps, samples
+            return PENDING, math.nan, started_s, math.nan, known.error, steps, samples, 0
         if not moving:
-            if tau == 0.0:
-                if g0 > 0.0:
-                    moving = True
-                elif g1 <= 0.0:
-                    i = next_lifting_node(q, block_max_q, i + 2, last + 1, kr) - 1
-                    continue
-                else:
-                    tau = -g0 / (g1 - g0)
-                    moving = True
-                    just_lifted = True
-            elif g1 > 0.0:  # at rest inside the interval, after an impact
-                tau = min(max(tau, -g0 / (g1 - g0)), 1.0)
-                moving = True
-                just_lifted = True
-            else:
-                i += 1
-                tau = 0.0
-                continue
-            theta = 0.0
-            rate = 0.0
-            s[0] = s_rest
-            c[0] = c_rest
+            i, tau, lifting = lift_off(nodes, kr, i, tau, last)
+            if i >= last:
+                break
+            moving = True
+            state = rest
+            lifted_s = time_s[i] + tau * interval_s[i]
             if math.isnan(started_s):
-                started_s = time_s[i] + tau * interval_s[i]
-            if filled < room:
-                history[0, filled] = time_s[i] + tau * interval_s[i]
-                history[1, filled] = 0.0
-                history[2, filled] = 0.0
-                history[3, filled] = -1.0
-                filled += 1
-
-        left = interval_s[i] * (1.0 - tau)
-        impact_at = -1.0
-        if left <= 0.0:
+                started_s = lifted_s
+            if keeps:
+                filled = noted(rows, filled, lifted_s, 0.0, 0.0, -1)
+        if interval_s[i] * (1.0 - tau) <= 0.0:
             # a jump, or a start at the very end of the interval: what follows decides
-            moving = theta != 0.0 or rate != 0.0
-            just_lifted = False
+            moving = state.theta != 0.0 or state.rate != 0.0
+            lifting = False
         else:
+            # an impact and a new start in one interval count it once
             if i != counted:
                 counted = i
-                moved += 1
-            pieces = max(1, math.ceil(p * left / ph_max))
-            part = (1.0 - tau) / pieces
-            ph = p * left / pieces
-            da = (k_h[i + 1] - k_h[i]) * part
-            dw = (w[i + 1] - w[i]) * part
-            for piece in range(pieces):
-                at = tau + piece * part
-                a0 = k_h[i] + (k_h[i + 1] - k_h[i]) * at
-                w0 = w[i] + (w[i + 1] - w[i]) * at
-                steps += 1
-                if order == 8 and not linear:
-                    turned, u_end, v_end = step8(u, ph * rate, ph, s[0], c[0], a0, da, w0, dw)
-                else:
-                    u[0] = ph * rate
-                    fill_coefficients(u, s, c, order, ph * ph, a0, da, w0, dw, linear)
-                    turned, u_end, v_end = 0.0, 0.0, 0.0
-                    for k in range(order, 0, -1):
-                        turned += u[k] / (k + 1)
-                        u_end += u[k]
-                        v_end += k * u[k]
-                    turned += u[0]
-                    u_end += u[0]
-                theta_end = theta + turned
+                samples += 1
+            state, known, impact_at, verdict_at, verdict_error, taken, filled = cross_interval(
+                nodes, block, i, tau, state, known, lifting, rows, filled, u
+            )
+            steps += taken
+            lifting = False
+            if verdict_at >= 0.0 and math.isnan(decided_s):
+                decided_s = time_s[i] + verdict_at * interval_s[i]
+                decided_error = verdict_error
+            if impact_at >= 0.0:
+                stuck = impact_at <= tau
+                tau = min(impact_at, 1.0)
+                g0 = k_h[i] - w[i] * kr
+                g1 = k_h[i + 1] - w[i + 1] * kr
+                g = g0 + (g1 - g0) * tau
+                known, hidden = after_impact(known, state.rate, g, rest.cos, theta_c)
+                lost = lost or hidden
+                if keeps:
+                    filled = noted(rows, filled, time_s[i] + tau * interval_s[i], 0.0, 0.0, -1)
+                state = rest
+                # Stuck, the threshold is exceeded by less than rounding. A falling drive leaves
+                # the block at rest; a rising one starts it as an upward crossing does.
+                moving = g1 > g0 if stuck else g > 0.0 and tau < 1.0
+                lifting = stuck and moving
+                if not moving and (stuck or tau >= 1.0):
+                    i, tau = i + 1, 0.0
+                continue
+        i, tau = i + 1, 0.0
+        theta, rate, s, c = state
+        if keeps:
+            filled = noted(rows, filled, time_s[i], theta, rate * p, i)
+        # a history shows the fall as far as the block lies on its face
+        if not math.isnan(decided_s):
+            if theta > theta_c + 0.5 * math.pi:
+                break
+        elif s < 0.0 and irrecoverable(rate, s, c, nodes.tail_min_q[i], known.error):
+            decided_s = time_s[i]
+            decided_error = known.error
 
-                a_size = abs(a0) + abs(da)
-                w_size = abs(w0) + abs(dw)
-                stiffness = w_size * abs(c[0])
-                if not linear:
-                    stiffness += a_size * abs(s[0])
-                growth = ph * max(1.0, stiffness)
-                # the first two omitted terms, from u[k+2] ~ (p·h)² D u[k]/((k+1)(k+2)): one
-                # alone is fooled, since from rest under constant a every other one vanishes
-                omitted = 16.0 * ph * (a_size + w_size) / (order * (order + 1))
-                truncation = omitted * (abs(u[order]) + abs(u[order - 1]))
-                if not linear:
-                    # and the terms in theta³, which from rest come three places apart
-                    truncation += abs(u[order - 2] * turned) / ph
-                drive = a_size * abs(c[0]) + w_size * (abs(s[0]) + abs(turned))
-                rounding = MACHINE_EPSILON * (
-                    2.0 * (abs(theta_end) + abs(rate) + abs(s[0])) + 4.0 * ph * drive
-                )
-                error = error * _exponential(growth) + truncation + rounding
-                drift += ph * error + truncation + 2.0 * MACHINE_EPSILON * abs(theta_end)
-
-                if just_lifted:
-                    just_lifted = False
-                    if theta_end <= 0.0 or u_end <= 0.0:
-                        theta_end = 0.0
-                        impact_at = at + part
-                else:
-                    u_start = u[0]
-                    v_start = u[1]
-                    look = theta_end <= 0.0
-                    if u_start > 0.0 and u_end > 0.0:
-                        # theta may dip only if U falls and rises again; V is monotone in a step
-                        look = look or (v_start < 0.0 and v_end > 0.0 and u_start + v_start <= 0.0)
-                    elif u_start < 0.0 and u_end < 0.0:
-                        look = look or (v_start > 0.0 and v_end < 0.0 and u_start + v_start >= 0.0)
-                    elif room > 0:
-                        look = True
-                    elif u_start > 0.0:
-                        # a peak below its two tangents: of interest if it may be the highest
-                        top = min(theta + u_start, theta_end - u_end)
-                        look = look or v_start >= 0.0 or v_end >= 0.0 or top > peak
-                    else:
-                        # a dip above its two tangents: of interest if it may touch
-                        low = max(theta + u_start, theta_end - u_end)
-                        look = look or v_start <= 0.0 or v_end <= 0.0 or low <= drift
-                    if look:
-                        x, top, top_at, low = examine_step(theta, u, order, theta_end, u_end, v_end)
-                        if top > peak:
-                            peak = top
-                            peak_error = error
-                        if top > 0.0 and filled < room:
-                            history[0, filled] = time_s[i] + (at + part * top_at) * interval_s[i]
-                            history[1, filled] = top
-                            history[2, filled] = 0.0
-                            history[3, filled] = -1.0
-                            filled += 1
-                        if x >= 0.0:
-                            impact_at = at + part * x
-                            rate = value(u, order, x) / ph
-                        elif low <= drift:
-                            # it may have touched after all, and lost the speed of the touch
-                            error += math.sqrt(2.0 * max(g0, g1, 0.0) * c_rest * drift)
-                if impact_at >= 0.0:
-                    break
-                theta = theta_end
-                rate = u_end / ph
-                if linear:
-                    s[0] -= turned
-                else:
-                    s[0], c[0] = turn(s[0], c[0], turned)
-                if piece < pieces - 1 and not decided:
-                    # in a long interval the block could swing right round before its end
-                    least = tail_min_q[i]
-                    excess = c[0] * least - s[0]
-                    if rate > error and s[0] < 0.0 and excess > error * (1.0 - least):
-                        decided = True
-                        verdict_s = time_s[i] + (at + part) * interval_s[i]
-                        verdict_error = error
-                        if room == 0:
-                            return (
-                                TOPPLED, math.nan, started_s, verdict_s, error, steps, moved, 0,
-                            )  # fmt: skip
-
-        if impact_at >= 0.0:
-            moving = False
-            stuck = impact_at <= tau
-            tau = min(impact_at, 1.0)
-            g = g0 + (g1 - g0) * tau
-            impact = abs(rate)
-            push = max(g * c_rest, 0.0)  # theta''/p² at theta = 0
-            if impact <= 2.0 * error or impact * impact <= 4.0 * push * drift:
-                # a graze: whether it touches at all is below the error, and if it does not it
-                # keeps its speed
-                error += impact + math.sqrt(2.0 * push * drift)
-                lost = lost or error > 0.25 * theta_c
-            elif g > 0.0:
-                # motion restarts at once; only the error of its starting time is left
-                late = 2.0 * drift / impact
-                error = push * late
-                drift = error * late
-            else:
-                error = 0.0
-                drift = 0.0
-            if filled < room:
-                history[0, filled] = time_s[i] + tau * interval_s[i]
-                history[1, filled] = 0.0
-                history[2, filled] = 0.0
-                history[3, filled] = -1.0
-                filled += 1
-            if stuck:
-                # The threshold is exceeded by less than rounding. A falling drive leaves the
-                # block at rest; a rising one starts it as an upward crossing does.
-                if g1 > g0:
-                    moving = True
-                    just_lifted = True
-                    theta = 0.0
-                    rate = 0.0
-                    s[0] = s_rest
-                    c[0] = c_rest
-                else:
-                    i += 1
-                    tau = 0.0
-            elif g > 0.0 and tau < 1.0:
-                moving = True
-                theta = 0.0
-                rate = 0.0
-                s[0] = s_rest
-                c[0] = c_rest
-            elif tau >= 1.0:
-                i += 1
-                tau = 0.0
-            continue
-
-        i += 1
-        tau = 0.0
-        if filled < room:
-            history[0, filled] = time_s[i]
-            history[1, filled] = theta
-            history[2, filled] = rate * p
-            history[3, filled] = i
-            filled += 1
-        if not decided:
-            excess = c[0] * tail_min_q[i] - s[0]
-            if rate > error and s[0] < 0.0 and excess > error * (1.0 - tail_min_q[i]):
-                decided = True
-                verdict_s = time_s[i]
-                verdict_error = error
-                if room == 0:
-                    return TOPPLED, math.nan, started_s, verdict_s, error, steps, moved, 0
-        elif theta > theta_c + 0.5 * math.pi:
-            break
-
-    if decided:
-        return TOPPLED, math.nan, started_s, verdict_s, verdict_error, steps, moved, filled
-    if last < n - 1:
-        verdict_s = time_s[0]
-        if last >= 0:
-            verdict_s = time_s[last] + interval_s[last] * w[last] / (w[last] - w[last + 1])
-        return JUMP, math.nan, started_s, verdict_s, error, steps, moved, filled
-    if lost:
-        return UNDETERMINED, math.nan, started_s, math.nan, error, steps, moved, filled
-    if not moving:
-        return STABLE, peak, started_s, math.nan, peak_error, steps, moved, filled
-
-    # Free motion after the record: energy decides.
-    if linear:
-        x = s[0]
-        half = abs(x)
-    else:
-        x = math.atan2(s[0], c[0])
-        half = 2.0 * abs(math.sin(0.5 * x))
-    # the states that come to rest upright: the border between falling over and falling back
-    margin = rate - math.copysign(half, x)
-    topples = margin > 0.0
-    if abs(margin) <= error:
-        return UNDETERMINED, math.nan, started_s, time_s[n - 1], error, steps, moved, filled
-    if topples:
-        return TOPPLED, math.nan, started_s, time_s[n - 1], error, steps, moved, filled
-    if rate > 0.0:
-        # 1 - cos is conserved up to the kinetic energy: sin²(x_top/2) = sin²(x/2) - rate²/4
-        rest = math.sqrt((half - rate) * (half + rate))
-        if linear:
-            x_top = rest
-            amplification = (half + rate) / rest
-        else:
-            x_top = 2.0 * math.asin(0.5 * rest)
-            amplification = (abs(math.sin(x)) + rate) / math.sin(x_top)
-        if theta_c - x_top > peak:
-            peak = theta_c - x_top
-            peak_error = error * amplification
-    return STABLE, peak, started_s, math.nan, peak_error, steps, moved, filled
+    if not math.isnan(decided_s):
+        return TOPPLED, math.nan, started_s, decided_s, decided_error, steps, samples, filled
+    outcome, peak, verdict_s, error = verdict(nodes, last, lost, moving, state, known, theta_c)
+    return outcome, peak, started_s, verdict_s, error, steps, samples, filled

@@ -74,6 +74,7 @@ def fill_spans(
         rows: to be filled, shape (number of whole spans, COLUMNS).
     """
     for row in range(rows.shape[0]):
+        # a first pass for the length, which the moments are taken over, and the bound of theta''
         first = row * length
         whole = 0.0
         size = 0.0
@@ -86,6 +87,7 @@ def fill_spans(
         rows[row, 1] = size
         if whole <= 0.0:
             continue
+        # Legendre moments of a and w: the projection on cubics keeps them
         a_0, a_1, a_2, a_3 = 0.0, 0.0, 0.0, 0.0
         w_0, w_1, w_2, w_3 = 0.0, 0.0, 0.0, 0.0
         # integrals of X Y2 and of (1 - tau) X Y2; rate and value of the double integrals
@@ -99,11 +101,14 @@ def fill_spans(
                 continue
             da = k_h[i + 1] - k_h[i]
             dw = w[i + 1] - w[i]
+            # moments of degree 3 times a straight line, and X Y2 of degree 4: three points of
+            # Gauss are exact to degree 5
             for x, share in _GAUSS3:
                 y = 0.5 * (1.0 + x)
                 weight = 0.5 * share * part
                 a = k_h[i] + da * y
                 v = w[i] + dw * y
+                # Legendre polynomials on the whole span
                 z = 2.0 * (at + part * y) - 1.0
                 p2 = 1.5 * z * z - 0.5
                 p3 = (2.5 * z * z - 1.5) * z
@@ -116,6 +121,7 @@ def fill_spans(
                 w_2 += weight * v * p2
                 w_3 += weight * v * p3
                 h = part * y
+                # the double integrals so far, closed form inside an interval
                 a2 = va + h * (ra + h * (0.5 * k_h[i] + da * y * (1.0 / 6.0)))
                 w2 = vw + h * (rw + h * (0.5 * w[i] + dw * y * (1.0 / 6.0)))
                 left = weight * 0.5 * (1.0 - z)
@@ -134,6 +140,8 @@ def fill_spans(
             at += part
         a_0, a_1, a_2, a_3 = _cubic(a_0, a_1, a_2, a_3)
         w_0, w_1, w_2, w_3 = _cubic(w_0, w_1, w_2, w_3)
+        # the same integrals of the cubics themselves, of degree 8 and 9, are taken away: what
+        # is left is what the cubics miss (five points are exact to degree 9)
         for x, share in _GAUSS5:
             y = 0.5 * (1.0 + x)
             weight = 0.5 * share
@@ -173,6 +181,7 @@ def span_step(
     spans: FloatArray, row: int, u0: float, ph: float, s0: float, c0: float
 ) -> tuple[float, float]:
     """Return theta(1) - theta(0) and U(1) of one span; arguments as of a single step."""
+    # A and D of the drive as in `taylor.series`, here of degree 3 in time
     big_p = ph * ph
     a, w = spans[row, 2], spans[row, 6]
     pa, pd = big_p * (a * c0 - w * s0), big_p * (a * s0 + w * c0)
@@ -182,6 +191,7 @@ def span_step(
     pa2, pd2 = big_p * (a * c0 - w * s0), big_p * (a * s0 + w * c0)
     a, w = spans[row, 5], spans[row, 9]
     pa3, pd3 = big_p * (a * c0 - w * s0), big_p * (a * s0 + w * c0)
+    # the same recurrence, to order 10: a span is many samples long
     s2 = 0.5 * pa
     c2 = -0.5 * (u0 * u0)
     v2 = pa1 + pd * u0

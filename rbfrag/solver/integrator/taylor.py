@@ -1,16 +1,16 @@
 """One Taylor step of the rocking block, and the polynomials it leaves behind.
 
 On tau in [0, 1] with h the interval, P = p²h², U = h theta', phi = theta_c - theta,
-s = sin(phi), c = cos(phi) (linear model: s = phi, c = 1), a(tau) = a0 + da tau the driving
+s = sin(phi), c = cos(phi), a(tau) = a0 + da tau the driving
 acceleration and w(tau) = w0 + dw tau the effective gravity, both in g::
 
     U[k+1] = P/(k+1) (a0 c[k] + da c[k-1] - w0 s[k] - dw s[k-1])
     s[k+1] = -sum_j U[j] c[k-j]/(k+1),    c[k+1] = sum_j U[j] s[k-j]/(k+1)
     theta(tau) = theta + sum_k U[k] tau^(k+1)/(k+1)
 
-The steps that are written out (`step8` and the lower orders) take the same series in the angle
-delta turned since the start, whose sine and cosine begin with 0 and 1: with A = a c - w s and
-D = a s + w c, linear in tau like a and w, the drive is A cos(delta) + D sin(delta).
+The step takes the same series in the angle delta turned since the start, whose sine and cosine
+begin with 0 and 1: with A = a c - w s and D = a s + w c, linear in tau like a and w, the drive is
+A cos(delta) + D sin(delta).
 
 The record is linear between samples, so no step crosses a kink. s and c are carried from
 step to step by turning through the small increment of theta: the loop calls no sine or
@@ -25,7 +25,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.solver.integrator.compiled import fused_kernel, kernel, within
+from rbfrag.solver.integrator.compiled import fused_kernel, inner_kernel, within
+from rbfrag.solver.integrator.state import StepExcitation
 
 FloatArray = NDArray[np.float64]
 
@@ -39,58 +40,27 @@ of a step, and what is estimated for it, is then near the rounding of its result
 MACHINE_EPSILON = 2.220446049250313e-16
 
 
-@kernel
-def fill_coefficients(
-    u: FloatArray,
-    s: FloatArray,
-    c: FloatArray,
-    order: int,
-    big_p: float,
-    a0: float,
-    da: float,
-    w0: float,
-    dw: float,
-    linear: bool,
-) -> None:
-    """Fill u[1..order], s[1..order], c[1..order] from u[0], s[0], c[0]."""
-    for k in range(order):
-        drive = a0 * c[k] - w0 * s[k]
-        if k > 0:
-            drive += da * c[k - 1] - dw * s[k - 1]
-        u[k + 1] = big_p * drive / (k + 1)
-        if linear:
-            s[k + 1] = -u[k] / (k + 1)
-            c[k + 1] = 0.0
-        else:
-            sum_s = 0.0
-            sum_c = 0.0
-            for j in range(k + 1):
-                sum_s += u[j] * c[k - j]
-                sum_c += u[j] * s[k - j]
-            s[k + 1] = -sum_s / (k + 1)
-            c[k + 1] = sum_c / (k + 1)
-
-
 @within
-def series8(
-    u0: float,
-    ph: float,
-    s0: float,
-    c0: float,
-    a0: float,
-    da: float,
-    w0: float,
-    dw: float,
+def series(
+    order: int, u0: float, ph: float, s0: float, c0: float, shaking: StepExcitation
 ) -> tuple[float, float, float, float, float, float, float, float, float, float, float]:
-    """The series of a step of order 8; arguments as of :func:`step8`.
+    """The series of a step; arguments as of :func:`taylor_step`.
 
-    Sums begin with the terms that are known first: the time of a step is that of its longest
-    chain of dependent operations.
+    With v_k = k U[k], s_k and c_k the coefficients of the sine and cosine of the angle turned::
+
+        v[k+1] = A c[k] + A' c[k-1] + D s[k] + D' s[k-1]
+        s[k+1] = sum_j U[j] c[k-j]/(k+1),    c[k+1] = -sum_j U[j] s[k-j]/(k+1)
+
+    A lower order is the same series, ended early. Sums begin with the terms that are known first:
+    the time of a step is that of its longest chain of dependent operations.
 
     Returns:
         theta(1) - theta(0), U(1), U'(1), and the coefficients of U from the first to the eighth.
     """
+    a0, da, w0, dw = shaking
     big_p = ph * ph
+    # in delta the start is always 0: no value of phi enters the recurrence but here.
+    # A and D, P in them, and their changes over the step; U[1] is A itself
     pa, pa1 = big_p * (a0 * c0 - w0 * s0), big_p * (da * c0 - dw * s0)
     pd, pd1 = big_p * (a0 * s0 + w0 * c0), big_p * (da * s0 + dw * c0)
     s2 = 0.5 * pa
@@ -104,22 +74,39 @@ def series8(
     u3 = (1.0 / 3.0) * v3
     c4 = -0.25 * (u0 * s3 + pa * s2 + u2 * u0)
     v4 = pa1 * c2 + pd1 * s2 + pa * c3 + pd * s3
-    s5 = 0.2 * (u2 * c2 + pa * c3 + u0 * c4) + 0.05 * v4
     u4 = 0.25 * v4
-    c5 = -0.2 * (u0 * s4 + pa * s3 + u2 * s2 + u3 * u0)
+    # each sum of theta, U and U' begins with its three greatest terms, which are ready first
+    turned = u0 + (0.5 * pa + (1.0 / 6.0) * v2)
+    u_end = u0 + (pa + 0.5 * v2)
+    if order == 4:
+        turned += (1.0 / 12.0) * v3 + 0.05 * v4
+        u_end += (1.0 / 3.0) * v3 + 0.25 * v4
+        return turned, u_end, pa + v2 + v3 + v4, pa, u2, u3, u4, 0.0, 0.0, 0.0, 0.0
+    # below 0.004 p·h the fifth order is exact to 1e-12 of the drive (`lean_step`)
     v5 = pa1 * c3 + pd1 * s3 + pa * c4 + pd * s4
-    s6 = (1.0 / 6.0) * (u2 * c3 + u3 * c2 + pa * c4 + u0 * c5) + (1.0 / 30.0) * v5
     u5 = 0.2 * v5
-    c6 = -(1.0 / 6.0) * (u0 * s5 + pa * s4 + u2 * s3 + u3 * s2 + u4 * u0)
+    if order == 5:
+        turned += (1.0 / 12.0) * v3 + 0.05 * v4 + (1.0 / 30.0) * v5
+        u_end += (1.0 / 3.0) * v3 + 0.25 * v4 + 0.2 * v5
+        return turned, u_end, pa + v2 + v3 + v4 + v5, pa, u2, u3, u4, u5, 0.0, 0.0, 0.0
+    # s[k] and c[k] are only made as far as a higher order needs them
+    s5 = 0.2 * (u2 * c2 + pa * c3 + u0 * c4) + 0.05 * v4
+    c5 = -0.2 * (u0 * s4 + pa * s3 + u2 * s2 + u3 * u0)
     v6 = pa1 * c4 + pd1 * s4 + pa * c5 + pd * s5
-    s7 = (1.0 / 7.0) * (u3 * c3 + u2 * c4 + u4 * c2 + pa * c5 + u0 * c6) + (1.0 / 42.0) * v6
     u6 = (1.0 / 6.0) * v6
+    if order == 6:
+        turned += (1.0 / 12.0) * v3 + 0.05 * v4 + (1.0 / 30.0) * v5 + (1.0 / 42.0) * v6
+        u_end += (1.0 / 3.0) * v3 + 0.25 * v4 + 0.2 * v5 + (1.0 / 6.0) * v6
+        return turned, u_end, pa + v2 + v3 + v4 + v5 + v6, pa, u2, u3, u4, u5, u6, 0.0, 0.0
+    s6 = (1.0 / 6.0) * (u2 * c3 + u3 * c2 + pa * c4 + u0 * c5) + (1.0 / 30.0) * v5
+    c6 = -(1.0 / 6.0) * (u0 * s5 + pa * s4 + u2 * s3 + u3 * s2 + u4 * u0)
+    s7 = (1.0 / 7.0) * (u3 * c3 + u2 * c4 + u4 * c2 + pa * c5 + u0 * c6) + (1.0 / 42.0) * v6
     c7 = -(1.0 / 7.0) * (u0 * s6 + pa * s5 + u2 * s4 + u3 * s3 + u4 * s2 + u5 * u0)
     v7 = pa1 * c5 + pd1 * s5 + pa * c6 + pd * s6
     u7 = (1.0 / 7.0) * v7
     v8 = pa1 * c6 + pd1 * s6 + pa * c7 + pd * s7
     u8 = 0.125 * v8
-    turned = (u0 + (0.5 * pa + (1.0 / 6.0) * v2)) + (
+    turned += (
         (1.0 / 12.0) * v3
         + 0.05 * v4
         + (1.0 / 30.0) * v5
@@ -127,7 +114,7 @@ def series8(
         + (1.0 / 56.0) * v7
         + (1.0 / 72.0) * v8
     )
-    u_end = (u0 + (pa + 0.5 * v2)) + (
+    u_end += (
         (1.0 / 3.0) * v3 + 0.25 * v4 + 0.2 * v5 + (1.0 / 6.0) * v6 + (1.0 / 7.0) * v7 + 0.125 * v8
     )
     v_end = pa + v2 + v3 + v4 + v5 + v6 + v7 + v8
@@ -135,34 +122,25 @@ def series8(
 
 
 @fused_kernel
-def step8(
-    u: FloatArray,
-    u0: float,
-    ph: float,
-    s0: float,
-    c0: float,
-    a0: float,
-    da: float,
-    w0: float,
-    dw: float,
+def taylor_step(
+    order: int, u: FloatArray, u0: float, ph: float, s0: float, c0: float, shaking: StepExcitation
 ) -> tuple[float, float, float]:
-    """One non-linear step of order 8, the recurrence written out.
+    """One step of order 4, 5, 6 or 8.
 
     Args:
-        u: filled with the coefficients of U, for whoever has to look inside the step, shape (9,).
+        order: degree of U.
+        u: filled with the coefficients of U, zero beyond the order, for whoever has to look
+            inside the step, shape (9,).
         u0: U at the start, p times the step length times theta'/p.
         ph: p times the step length.
         s0: sin(phi) at the start.
         c0: cos(phi) at the start.
-        a0: driving acceleration at the start [g].
-        da: its change over the step.
-        w0: effective gravity at the start.
-        dw: its change over the step.
+        shaking: the excitation over the step.
 
     Returns:
         theta(1) - theta(0), U(1), U'(1).
     """
-    turned, u_end, v_end, u1, u2, u3, u4, u5, u6, u7, u8 = series8(u0, ph, s0, c0, a0, da, w0, dw)
+    turned, u_end, v_end, u1, u2, u3, u4, u5, u6, u7, u8 = series(order, u0, ph, s0, c0, shaking)
     u[0] = u0
     u[1] = u1
     u[2] = u2
@@ -175,123 +153,21 @@ def step8(
     return turned, u_end, v_end
 
 
-@fused_kernel
-def step6(
-    u: FloatArray,
-    u0: float,
-    ph: float,
-    s0: float,
-    c0: float,
-    a0: float,
-    da: float,
-    w0: float,
-    dw: float,
-) -> tuple[float, float, float]:
-    """One non-linear step of order 6, the higher coefficients zero; else as :func:`step8`."""
-    big_p = ph * ph
-    pa, pa1 = big_p * (a0 * c0 - w0 * s0), big_p * (da * c0 - dw * s0)
-    pd, pd1 = big_p * (a0 * s0 + w0 * c0), big_p * (da * s0 + dw * c0)
-    s2 = 0.5 * pa
-    c2 = -0.5 * (u0 * u0)
-    v2 = pa1 + pd * u0
-    s3 = (1.0 / 3.0) * (u0 * c2) + (1.0 / 6.0) * v2
-    u2 = 0.5 * v2
-    c3 = -(1.0 / 3.0) * (u0 * s2 + pa * u0)
-    v3 = pd1 * u0 + pa * c2 + pd * s2
-    s4 = 0.25 * (pa * c2 + u0 * c3) + (1.0 / 12.0) * v3
-    u3 = (1.0 / 3.0) * v3
-    c4 = -0.25 * (u0 * s3 + pa * s2 + u2 * u0)
-    v4 = pa1 * c2 + pd1 * s2 + pa * c3 + pd * s3
-    s5 = 0.2 * (u2 * c2 + pa * c3 + u0 * c4) + 0.05 * v4
-    u4 = 0.25 * v4
-    c5 = -0.2 * (u0 * s4 + pa * s3 + u2 * s2 + u3 * u0)
-    v5 = pa1 * c3 + pd1 * s3 + pa * c4 + pd * s4
-    u5 = 0.2 * v5
-    v6 = pa1 * c4 + pd1 * s4 + pa * c5 + pd * s5
-    u[0] = u0
-    u[1] = pa
-    u[2] = u2
-    u[3] = u3
-    u[4] = u4
-    u[5] = u5
-    u[6] = (1.0 / 6.0) * v6
-    u[7] = 0.0
-    u[8] = 0.0
-    turned = (u0 + (0.5 * pa + (1.0 / 6.0) * v2)) + (
-        (1.0 / 12.0) * v3 + 0.05 * v4 + (1.0 / 30.0) * v5 + (1.0 / 42.0) * v6
-    )
-    u_end = (u0 + (pa + 0.5 * v2)) + ((1.0 / 3.0) * v3 + 0.25 * v4 + 0.2 * v5 + (1.0 / 6.0) * v6)
-    v_end = pa + v2 + v3 + v4 + v5 + v6
-    return turned, u_end, v_end
-
-
-@fused_kernel
-def step5(
-    u: FloatArray,
-    u0: float,
-    ph: float,
-    s0: float,
-    c0: float,
-    a0: float,
-    da: float,
-    w0: float,
-    dw: float,
-) -> tuple[float, float, float]:
-    """One non-linear step of order 5, the higher coefficients zero; else as :func:`step8`."""
-    big_p = ph * ph
-    pa, pa1 = big_p * (a0 * c0 - w0 * s0), big_p * (da * c0 - dw * s0)
-    pd, pd1 = big_p * (a0 * s0 + w0 * c0), big_p * (da * s0 + dw * c0)
-    s2 = 0.5 * pa
-    c2 = -0.5 * (u0 * u0)
-    v2 = pa1 + pd * u0
-    s3 = (1.0 / 3.0) * (u0 * c2) + (1.0 / 6.0) * v2
-    u2 = 0.5 * v2
-    c3 = -(1.0 / 3.0) * (u0 * s2 + pa * u0)
-    v3 = pd1 * u0 + pa * c2 + pd * s2
-    s4 = 0.25 * (pa * c2 + u0 * c3) + (1.0 / 12.0) * v3
-    u3 = (1.0 / 3.0) * v3
-    c4 = -0.25 * (u0 * s3 + pa * s2 + u2 * u0)
-    v4 = pa1 * c2 + pd1 * s2 + pa * c3 + pd * s3
-    u4 = 0.25 * v4
-    v5 = pa1 * c3 + pd1 * s3 + pa * c4 + pd * s4
-    u[0] = u0
-    u[1] = pa
-    u[2] = u2
-    u[3] = u3
-    u[4] = u4
-    u[5] = 0.2 * v5
-    u[6] = 0.0
-    u[7] = 0.0
-    u[8] = 0.0
-    turned = (u0 + (0.5 * pa + (1.0 / 6.0) * v2)) + (
-        (1.0 / 12.0) * v3 + 0.05 * v4 + (1.0 / 30.0) * v5
-    )
-    u_end = (u0 + (pa + 0.5 * v2)) + ((1.0 / 3.0) * v3 + 0.25 * v4 + 0.2 * v5)
-    v_end = pa + v2 + v3 + v4 + v5
-    return turned, u_end, v_end
-
-
-@kernel
+@inner_kernel
 def lean_step(
-    u: FloatArray,
-    u0: float,
-    ph: float,
-    s0: float,
-    c0: float,
-    a0: float,
-    da: float,
-    w0: float,
-    dw: float,
+    u: FloatArray, u0: float, ph: float, s0: float, c0: float, shaking: StepExcitation
 ) -> tuple[float, float, float]:
-    """One non-linear step of the lowest order whose truncation is below 1e-12 of the drive.
+    """One step of the lowest order whose truncation is below 1e-12 of the drive.
 
     The first omitted coefficients are U[N+1] ~ (p·h)^N U[1]/(N+1)!, whatever the record.
     """
+    # margins of the search are far above 1e-12: what a lower order leaves out decides nothing
+    order = ORDER
     if ph <= 0.004:
-        return step5(u, u0, ph, s0, c0, a0, da, w0, dw)
-    if ph <= 0.02:
-        return step6(u, u0, ph, s0, c0, a0, da, w0, dw)
-    return step8(u, u0, ph, s0, c0, a0, da, w0, dw)
+        order = 5
+    elif ph <= 0.02:
+        order = 6
+    return taylor_step(order, u, u0, ph, s0, c0, shaking)
 
 
 SMALL_TURN = 0.125
@@ -301,6 +177,7 @@ SMALL_TURN = 0.125
 @within
 def small_turn(s: float, c: float, angle: float) -> tuple[float, float]:
     """As :func:`turn`, for angles up to SMALL_TURN."""
+    # 1 - cos instead of cos: near the start of a rotation nothing is lost in the difference
     x = angle * angle
     sine = angle + (angle * x) * (
         (x * (1.0 / 120.0) - 1.0 / 6.0) + (x * x) * (x * (1.0 / 362880.0) - 1.0 / 5040.0)
@@ -314,13 +191,14 @@ def turn(s: float, c: float, angle: float) -> tuple[float, float]:
     """Return s = sin(phi) and c = cos(phi) after phi has fallen by `angle`."""
     if abs(angle) <= SMALL_TURN:
         return small_turn(s, c, angle)
+    # 1 - cos as 2 sin²(half) keeps its digits where the angle is small
     sine = math.sin(angle)
     half = math.sin(0.5 * angle)
     versine = 2.0 * half * half
     return (s - s * versine) - c * sine, (c - c * versine) + s * sine
 
 
-@kernel
+@inner_kernel
 def value(x: FloatArray, order: int, tau: float) -> float:
     """Polynomial sum_k x[k] tau^k, k = 0..order."""
     total: float = x[order]
@@ -329,7 +207,7 @@ def value(x: FloatArray, order: int, tau: float) -> float:
     return total
 
 
-@kernel
+@inner_kernel
 def slope(x: FloatArray, order: int, tau: float) -> float:
     """Derivative of :func:`value` with respect to tau."""
     total: float = order * x[order]
@@ -338,7 +216,7 @@ def slope(x: FloatArray, order: int, tau: float) -> float:
     return total
 
 
-@kernel
+@inner_kernel
 def curvature(x: FloatArray, order: int, tau: float) -> float:
     """Second derivative of :func:`value` with respect to tau."""
     total: float = order * (order - 1) * x[order]
@@ -347,7 +225,7 @@ def curvature(x: FloatArray, order: int, tau: float) -> float:
     return total
 
 
-@kernel
+@inner_kernel
 def rotation(theta: float, u: FloatArray, order: int, tau: float) -> float:
     """Rotation theta(tau) on the step that starts at `theta`."""
     total: float = u[order] / (order + 1)
@@ -356,14 +234,18 @@ def rotation(theta: float, u: FloatArray, order: int, tau: float) -> float:
     return theta + tau * total
 
 
-@kernel
+OF_ROTATION, OF_RATE, OF_ACCELERATION = 0, 1, 2
+"""Whose root is asked for: theta(tau), U(tau) or U'(tau)."""
+
+
+@inner_kernel
 def bracketed_root(
     kind: int, theta: float, u: FloatArray, order: int, low: float, high: float
 ) -> float:
     """Root in [low, high] by Newton's method kept inside the bracket.
 
     Args:
-        kind: 0 for theta(tau) = 0, 1 for U(tau) = 0, 2 for U'(tau) = 0.
+        kind: OF_ROTATION, OF_RATE or OF_ACCELERATION.
         theta: rotation at the start of the step.
         u: coefficients of U.
         order: their degree.
@@ -379,27 +261,29 @@ def bracketed_root(
     at_high = _at(kind, theta, u, order, high)
     tau = 0.5 * (low + high)
     if (at_low > 0.0) != (at_high > 0.0):
+        # most functions here are nearly straight in a step
         chord = low + (high - low) * (at_low / (at_low - at_high))
         if low < chord < high:
             tau = chord
     before = 0.0  # size of the last step of Newton
     for _ in range(200):
         f = _at(kind, theta, u, order, tau)
+        # the bracket shrinks first: whatever the next iterate is, it stays inside
         if f == 0.0:
             return tau
         if (f > 0.0) == (at_low > 0.0):
             low = tau
         else:
             high = tau
-        if kind == 0:
+        if kind == OF_ROTATION:
             d = value(u, order, tau)
-        elif kind == 1:
+        elif kind == OF_RATE:
             d = slope(u, order, tau)
         else:
             d = curvature(u, order, tau)
         following = tau - f / d if d != 0.0 else low - 1.0
         newton = low < following < high
-        if not newton:
+        if not newton:  # a flat or curved stretch: halving always gains
             following = 0.5 * (low + high)
         step = abs(following - tau)
         if step <= MACHINE_EPSILON * tau or high - low <= MACHINE_EPSILON * high:
@@ -411,10 +295,10 @@ def bracketed_root(
     return 0.5 * (low + high)
 
 
-@kernel
+@inner_kernel
 def _at(kind: int, theta: float, u: FloatArray, order: int, tau: float) -> float:
-    if kind == 0:
+    if kind == OF_ROTATION:
         return rotation(theta, u, order, tau)
-    if kind == 1:
+    if kind == OF_RATE:
         return value(u, order, tau)
     return slope(u, order, tau)

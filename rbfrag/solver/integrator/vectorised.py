@@ -2,40 +2,34 @@
 
 A step of one run waits for the step before it, and leaves a processor idle most of the time. Here
 up to `BATCH` runs over one record take each step together. Only the plain step of a moving block
-is taken so; whatever else happens in an interval (a start, a peak, a touch, a jump, the end of the
-record) is left to :func:`rbfrag.solver.integrator.single_run.run_toppling`, which goes through
-that interval
-and hands the run back. Every operation is that of the single run, in the same order, so that the
-results are equal bit for bit.
+is taken so; whatever else happens in an interval (a start, a peak, an impact, a jump, the end of
+the record) is left to :func:`rbfrag.solver.integrator.single_run.run_toppling`, which goes through
+that interval and hands the run back. Every operation is that of the single run, in the same order,
+so that the results are equal bit for bit.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.solver.integrator.compiled import fused_kernel, kernel
+from rbfrag.solver.excitation import Nodes
+from rbfrag.solver.integrator.compiled import fused_kernel, inner_kernel, kernel, within
+from rbfrag.solver.integrator.events import irrecoverable, keeps_direction, simple_turn
 from rbfrag.solver.integrator.single_run import (
-    AT_INTERVAL,
-    COS,
-    DRIFT,
-    ERROR,
-    PEAK,
+    HANDED,
     PENDING,
-    RATE,
-    SAMPLES,
-    SIN,
-    STARTED,
-    STATE_SIZE,
-    STEPS,
-    THETA,
-    TO_THE_END,
     TOPPLED,
+    drift_of_step,
+    exponential_bound,
     run_toppling,
+    step_errors,
 )
-from rbfrag.solver.integrator.taylor import MACHINE_EPSILON, ORDER, SMALL_TURN, series8, small_turn
+from rbfrag.solver.integrator.state import State, StepExcitation, excitation_over
+from rbfrag.solver.integrator.taylor import ORDER, SMALL_TURN, series, small_turn
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -45,179 +39,126 @@ BATCH = 32
 FEW = 3
 """Number of runs that no longer pay for a vector step."""
 
-# rows of what a step takes ...
-_PH, _S, _C, _A0, _DA, _W0, _DW, _THETA, _RATE, _ERROR, _DRIFT, _PEAK, _LEAST, _APART = range(14)
-ROWS_IN = 14
+# Where the slots' values begin in one array: of what a step takes ...
+PH, SIN, COS, K_H, DK_H, W, DW, THETA, RATE, ERROR, DRIFT, PEAK, LEAST_Q, APART = (
+    row * BATCH for row in range(14)
+)
+TAKEN = 14
 
-# ... and of what it gives
-_TURNED, _U0, _U_END, _V_END, _U1, _U6, _U7, _U8, _S_END, _C_END, _ALONE, _FALLS = range(12)
-ROWS_OUT = 12
+# ... and of what it gives. (Arrays of their own would have to be told apart at each step.)
+TURNED, U_START, U_END, V_START, V_END, U6, U7, U8, SIN_END, COS_END, ALONE, FALLS = (
+    row * BATCH for row in range(12)
+)
+GIVEN = 12
+
+SLOT = np.dtype(
+    [("job", "i8"), ("number", "i8"), ("parts", "i8"), ("part", "f8"), ("length_s", "f8")]
+)
+"""Which run is in a slot, which part of its interval comes next, how many parts there are, their
+fraction of the interval, and the length of an interval that the last two hold for."""
 
 
 @fused_kernel
-def _steps(x: FloatArray, y: FloatArray, batch: int) -> None:
-    """Take one step of order 8 in every slot: `step8` and `turn` of `taylor`."""
+def take_steps(x: FloatArray, y: FloatArray, batch: int) -> None:
+    """Take one step of order 8 in every slot, as `taylor_step` and `turn` do."""
     for j in range(batch):
-        ph = x[_PH * BATCH + j]
-        u0 = ph * x[_RATE * BATCH + j]
-        s0 = x[_S * BATCH + j]
-        c0 = x[_C * BATCH + j]
-        a0 = x[_A0 * BATCH + j]
-        da = x[_DA * BATCH + j]
-        w0 = x[_W0 * BATCH + j]
-        dw = x[_DW * BATCH + j]
-        turned, u_end, v_end, u1, _, _, _, _, u6, u7, u8 = series8(u0, ph, s0, c0, a0, da, w0, dw)
-        s_end, c_end = small_turn(s0, c0, turned)
-        y[_TURNED * BATCH + j] = turned
-        y[_U0 * BATCH + j] = u0
-        y[_U_END * BATCH + j] = u_end
-        y[_V_END * BATCH + j] = v_end
-        y[_U1 * BATCH + j] = u1
-        y[_U6 * BATCH + j] = u6
-        y[_U7 * BATCH + j] = u7
-        y[_U8 * BATCH + j] = u8
-        y[_S_END * BATCH + j] = s_end
-        y[_C_END * BATCH + j] = c_end
+        u0 = x[PH + j] * x[RATE + j]
+        shaking = StepExcitation(x[K_H + j], x[DK_H + j], x[W + j], x[DW + j])
+        turned, u_end, v_end, u1, _, _, _, _, u6, u7, u8 = series(
+            ORDER, u0, x[PH + j], x[SIN + j], x[COS + j], shaking
+        )
+        s_end, c_end = small_turn(x[SIN + j], x[COS + j], turned)
+        y[TURNED + j] = turned
+        y[U_START + j] = u0
+        y[U_END + j] = u_end
+        y[V_START + j] = u1
+        y[V_END + j] = v_end
+        y[U6 + j] = u6
+        y[U7 + j] = u7
+        y[U8 + j] = u8
+        y[SIN_END + j] = s_end
+        y[COS_END + j] = c_end
 
 
-@kernel
-def _judge(x: FloatArray, y: FloatArray, batch: int) -> None:
+@inner_kernel
+def judge_steps(x: FloatArray, y: FloatArray, batch: int) -> None:
     """Carry the error estimates on; go on where the step was a plain one, mark the others."""
     for j in range(batch):
-        ph = x[_PH * BATCH + j]
-        s0 = x[_S * BATCH + j]
-        c0 = x[_C * BATCH + j]
-        a_size = abs(x[_A0 * BATCH + j]) + abs(x[_DA * BATCH + j])
-        w_size = abs(x[_W0 * BATCH + j]) + abs(x[_DW * BATCH + j])
-        turned = y[_TURNED * BATCH + j]
-        u_end = y[_U_END * BATCH + j]
-        theta = x[_THETA * BATCH + j]
+        ph = x[PH + j]
+        theta = x[THETA + j]
+        turned = y[TURNED + j]
+        # from here on the single run's own functions, without branches: one instruction a row
         theta_end = theta + turned
-        stiffness = w_size * abs(c0)
-        stiffness += a_size * abs(s0)
-        growth = ph * max(1.0, stiffness)
-        omitted = 16.0 * ph * (a_size + w_size) / (ORDER * (ORDER + 1))
-        truncation = omitted * (abs(y[_U8 * BATCH + j]) + abs(y[_U7 * BATCH + j]))
-        truncation += abs(y[_U6 * BATCH + j] * turned) / ph
-        drive = a_size * abs(c0) + w_size * (abs(s0) + abs(turned))
-        rounding = MACHINE_EPSILON * (
-            2.0 * (abs(theta_end) + abs(x[_RATE * BATCH + j]) + abs(s0)) + 4.0 * ph * drive
+        state = State(theta, x[RATE + j], x[SIN + j], x[COS + j])
+        shaking = StepExcitation(x[K_H + j], x[DK_H + j], x[W + j], x[DW + j])
+        highest = (y[U6 + j], y[U7 + j], y[U8 + j])
+        growth, truncation, rounding = step_errors(ORDER, ph, state, shaking, turned, highest)
+        error = x[ERROR + j] * exponential_bound(growth) + truncation + rounding
+        drift = x[DRIFT + j] + drift_of_step(ph, error, truncation, theta_end)
+        u_end = y[U_END + j]
+        u_start = y[U_START + j]
+        v_start = y[V_START + j]
+        v_end = y[V_END + j]
+        simple = keeps_direction(u_start, v_start, u_end, v_end) | simple_turn(
+            theta, theta_end, u_start, v_start, u_end, v_end, x[PEAK + j], drift
         )
-        grown = 1.0 + growth * (1.0 + growth * (0.5 + growth * (1.0 / 6.0 + growth * 0.06)))
-        error = x[_ERROR * BATCH + j] * grown + truncation + rounding
-        drift = x[_DRIFT * BATCH + j]
-        drift += ph * error + truncation + 2.0 * MACHINE_EPSILON * abs(theta_end)
-        u_start = y[_U0 * BATCH + j]
-        v_start = y[_U1 * BATCH + j]
-        v_end = y[_V_END * BATCH + j]
-        up = (u_start > 0.0) & (u_end > 0.0)
-        down = (u_start < 0.0) & (u_end < 0.0)
-        dips = (v_start < 0.0) & (v_end > 0.0) & (u_start + v_start <= 0.0)
-        rises = (v_start > 0.0) & (v_end < 0.0) & (u_start + v_start >= 0.0)
-        rounds = (u_start > 0.0) & (u_end <= 0.0) & (v_start < 0.0) & (v_end < 0.0)
-        rounds = rounds & (min(theta + u_start, theta_end - u_end) <= x[_PEAK * BATCH + j])
-        bounces = (u_start < 0.0) & (u_end >= 0.0) & (v_start > 0.0) & (v_end > 0.0)
-        bounces = bounces & (max(theta + u_start, theta_end - u_end) > drift)
-        plain = (up & ~dips) | (down & ~rises) | rounds | bounces
-        alone = (theta_end <= 0.0) | ~plain | (growth > 1.0) | (abs(turned) > SMALL_TURN)
-        alone = alone | (x[_APART * BATCH + j] > 0.0)
+        alone = (theta_end <= 0.0) | (not simple) | (x[APART + j] > 0.0)
+        # beyond these bounds the single run computes exp and sin themselves
+        alone = alone | (growth > 1.0) | (abs(turned) > SMALL_TURN)
         rate = u_end / ph
-        s_end = y[_S_END * BATCH + j]
-        c_end = y[_C_END * BATCH + j]
-        least = x[_LEAST * BATCH + j]
-        beyond = (rate > error) & (s_end < 0.0)
-        falls = beyond & (c_end * least - s_end > error * (1.0 - least))
-        y[_ALONE * BATCH + j] = 1.0 if alone else 0.0
-        y[_FALLS * BATCH + j] = 1.0 if falls else 0.0
-        x[_THETA * BATCH + j] = theta if alone else theta_end
-        x[_RATE * BATCH + j] = x[_RATE * BATCH + j] if alone else rate
-        x[_S * BATCH + j] = s0 if alone else s_end
-        x[_C * BATCH + j] = c0 if alone else c_end
-        x[_ERROR * BATCH + j] = x[_ERROR * BATCH + j] if alone else error
-        x[_DRIFT * BATCH + j] = x[_DRIFT * BATCH + j] if alone else drift
+        falls = irrecoverable(rate, y[SIN_END + j], y[COS_END + j], x[LEAST_Q + j], error)
+        y[ALONE + j] = 1.0 if alone else 0.0
+        y[FALLS + j] = 1.0 if falls else 0.0
+        # what goes to the single kernel keeps the state of its start
+        x[THETA + j] = theta if alone else theta_end
+        x[RATE + j] = x[RATE + j] if alone else rate
+        x[SIN + j] = x[SIN + j] if alone else y[SIN_END + j]
+        x[COS + j] = x[COS + j] if alone else y[COS_END + j]
+        x[ERROR + j] = x[ERROR + j] if alone else error
+        x[DRIFT + j] = x[DRIFT + j] if alone else drift
 
 
-@kernel
-def _enter(
-    states: FloatArray,
-    at: IntArray,
-    piece: IntArray,
-    length_s: FloatArray,
-    x: FloatArray,
-    slot: int,
-) -> None:
-    """Take a run into a slot."""
-    at[slot] = int(states[slot, AT_INTERVAL])
-    piece[slot] = 0
-    length_s[slot] = -1.0
-    x[_THETA * BATCH + slot] = states[slot, THETA]
-    x[_RATE * BATCH + slot] = states[slot, RATE]
-    x[_S * BATCH + slot] = states[slot, SIN]
-    x[_C * BATCH + slot] = states[slot, COS]
-    x[_ERROR * BATCH + slot] = states[slot, ERROR]
-    x[_DRIFT * BATCH + slot] = states[slot, DRIFT]
-    x[_PEAK * BATCH + slot] = states[slot, PEAK]
+@within
+def enter(run: Any, place: Any, x: FloatArray, slot: int) -> None:
+    """Take a run, at a node, into the steps of its slot."""
+    place.number = 0
+    place.length_s = -1.0
+    x[THETA + slot] = run.theta
+    x[RATE + slot] = run.rate
+    x[SIN + slot] = run.sin
+    x[COS + slot] = run.cos
+    x[ERROR + slot] = run.error
+    x[DRIFT + slot] = run.drift
+    x[PEAK + slot] = run.peak
 
 
-@kernel
-def _leave(states: FloatArray, at: IntArray, x: FloatArray, slot: int) -> None:
+@within
+def put_down(run: Any, x: FloatArray, slot: int) -> None:
     """Put down the state of a slot at the beginning of its interval."""
-    states[slot, AT_INTERVAL] = at[slot]
-    states[slot, THETA] = x[_THETA * BATCH + slot]
-    states[slot, RATE] = x[_RATE * BATCH + slot]
-    states[slot, SIN] = x[_S * BATCH + slot]
-    states[slot, COS] = x[_C * BATCH + slot]
-    states[slot, ERROR] = x[_ERROR * BATCH + slot]
-    states[slot, DRIFT] = x[_DRIFT * BATCH + slot]
+    run.theta = x[THETA + slot]
+    run.rate = x[RATE + slot]
+    run.sin = x[SIN + slot]
+    run.cos = x[COS + slot]
+    run.error = x[ERROR + slot]
+    run.drift = x[DRIFT + slot]
 
 
-@kernel
-def _by_itself(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    jump_node: int,
-    kr: FloatArray,
-    p: FloatArray,
-    ph_max: float,
-    history: FloatArray,
-    state: FloatArray,
-    work: FloatArray,
-    j: int,
-    whole: IntArray,
-    real: FloatArray,
-) -> bool:
-    """Carry a run on by the single kernel; whether it is to go on in a slot, else it is written."""
-    outcome, peak, started_s, verdict_s, error, steps, moved, _ = run_toppling(
-        time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, jump_node, kr[j], p[j], False,
-        ORDER, ph_max, history, state, work,
-    )  # fmt: skip
-    if outcome == PENDING:
-        return True
-    whole[0, j] = outcome
-    whole[1, j] = steps
-    whole[2, j] = moved
-    real[0, j] = peak
-    real[1, j] = started_s
-    real[2, j] = verdict_s
-    real[3, j] = error
-    return False
+@inner_kernel
+def move_slot(
+    x: FloatArray, y: FloatArray, runs: np.ndarray, slots: np.ndarray, source: int, slot: int
+) -> None:
+    """Let a run change its slot."""
+    for row in range(TAKEN):
+        x[row * BATCH + slot] = x[row * BATCH + source]
+    y[ALONE + slot] = y[ALONE + source]
+    y[FALLS + slot] = y[FALLS + source]
+    runs[slot] = runs[source]
+    slots[slot] = slots[source]
 
 
 @kernel
 def run_batch(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    q: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    jump_node: int,
+    nodes: Nodes,
     kr: FloatArray,
     p: FloatArray,
     ph_max: float,
@@ -226,137 +167,113 @@ def run_batch(
 ) -> None:
     """Run blocks over one record, order 8, side by side.
 
-
     Args:
-        time_s: as in :func:`rbfrag.solver.integrator.single_run.run_toppling`; likewise up to
-            `jump_node`.
+        nodes: the excitation.
         kr: rocking acceleration coefficients, shape (m,).
         p: frequency parameters [1/s], shape (m,).
         ph_max: greatest p·h of one step.
         whole: filled with outcome, steps and samples moved, shape (3, m).
         real: filled with peak, start, verdict and error, shape (4, m).
     """
-    last = min(k_h.size, jump_node) - 1
-    no_history = np.empty((4, 0))
-    work = np.empty((3, ORDER + 1))
-    x = np.ones(ROWS_IN * BATCH)
-    y = np.zeros(ROWS_OUT * BATCH)
-    states = np.zeros((BATCH, STATE_SIZE))
-    job = np.empty(BATCH, dtype=np.int64)
-    at = np.zeros(BATCH, dtype=np.int64)  # interval
-    length_s = np.full(BATCH, -1.0)  # of the interval that the next three are for
-    piece = np.zeros(BATCH, dtype=np.int64)
-    pieces = np.ones(BATCH, dtype=np.int64)
-    part = np.ones(BATCH)
-    next_job = 0
-    batch = 0
-    while True:
-        while batch < BATCH and next_job < kr.size:
-            # a new run, up to where it first moves at a node
-            states[batch, AT_INTERVAL] = -1.0
-            job[batch] = next_job
-            next_job += 1
-            if _by_itself(
-                time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, jump_node, kr, p,
-                ph_max, no_history, states[batch], work, job[batch], whole, real,
-            ):  # fmt: skip
-                _enter(states, at, piece, length_s, x, batch)
-                batch += 1
-        if batch <= FEW:
-            for slot in range(batch):
-                if piece[slot] == 0:
-                    _leave(states, at, x, slot)
-                states[slot, TO_THE_END] = 1.0
-                _by_itself(
-                    time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, jump_node, kr, p,
-                    ph_max, no_history, states[slot], work, job[slot], whole, real,
-                )  # fmt: skip
-            return
-        for slot in range(batch):
-            i = at[slot]
-            if i >= last or interval_s[i] == 0.0:
-                x[_APART * BATCH + slot] = 1.0
-                continue
-            x[_APART * BATCH + slot] = 0.0
-            if interval_s[i] != length_s[slot]:
-                length_s[slot] = interval_s[i]
-                left = p[job[slot]] * interval_s[i]
-                pieces[slot] = max(1, math.ceil(left / ph_max))
-                part[slot] = 1.0 / pieces[slot]
-                x[_PH * BATCH + slot] = left / pieces[slot]
-            dk = k_h[i + 1] - k_h[i]
-            dv = w[i + 1] - w[i]
-            if pieces[slot] == 1:
-                x[_A0 * BATCH + slot] = k_h[i]
-                x[_DA * BATCH + slot] = dk
-                x[_W0 * BATCH + slot] = w[i]
-                x[_DW * BATCH + slot] = dv
-                x[_LEAST * BATCH + slot] = tail_min_q[i + 1]
-                continue
-            if piece[slot] == 0:
-                _leave(states, at, x, slot)
-            start = piece[slot] * part[slot]
-            x[_A0 * BATCH + slot] = k_h[i] + dk * start
-            x[_DA * BATCH + slot] = dk * part[slot]
-            x[_W0 * BATCH + slot] = w[i] + dv * start
-            x[_DW * BATCH + slot] = dv * part[slot]
-            x[_LEAST * BATCH + slot] = tail_min_q[i + (piece[slot] + 1) // pieces[slot]]
-        padded = min(BATCH, (batch + 7) // 8 * 8)
-        _steps(x, y, padded)
-        _judge(x, y, padded)
+    # The loops over slots stand here: in functions of their own, numba would count the references
+    # to all these arrays at every step.
+    time_s, interval_s, k_h, w = nodes.time_s, nodes.interval_s, nodes.k_h, nodes.w
+    tail_min_q = nodes.tail_min_q
+    last = min(k_h.size, nodes.jump_node) - 1
+    x = np.ones(TAKEN * BATCH)
+    y = np.zeros(GIVEN * BATCH)
+    runs = np.zeros(BATCH, HANDED)
+    slots = np.zeros(BATCH, SLOT)
+    no_rows, u = np.empty((4, 0)), np.empty(9)
+    running = min(BATCH, kr.size)
+    job = running
+    for slot in range(running):
+        slots[slot].job = slot
+        runs[slot].interval = -1
+        y[ALONE + slot] = 1.0  # up to where it first moves at a node
+    begun = False
+    while running > 0:
+        # vectors of a few runs cost more than the runs: the last ones are finished one by one
+        if begun and running <= FEW:
+            for slot in range(running):
+                runs[slot].to_the_end = 1
+                x[APART + slot] = 1.0 if slots[slot].number == 0 else 0.0
+                y[ALONE + slot] = 1.0
+        elif begun:
+            # a loop of its own: mixed with the arithmetic, scattered reads keep that from becoming
+            # vector instructions
+            for slot in range(running):
+                place = slots[slot]
+                i = runs[slot].interval
+                if i >= last or interval_s[i] == 0.0:
+                    x[APART + slot] = 1.0
+                    continue
+                x[APART + slot] = 0.0
+                if interval_s[i] != place.length_s:
+                    # records are sampled evenly: the division is made once a run
+                    length = p[place.job] * interval_s[i]
+                    place.length_s = interval_s[i]
+                    place.parts = max(1, math.ceil(length / ph_max))
+                    place.part = 1.0 / place.parts
+                    x[PH + slot] = length / place.parts
+                if place.parts > 1 and place.number == 0:
+                    # the single kernel goes through a whole interval: it needs its beginning
+                    put_down(runs[slot], x, slot)
+                shaking = excitation_over(k_h, w, i, place.number * place.part, place.part)
+                x[K_H + slot] = shaking.k_h
+                x[DK_H + slot] = shaking.dk_h
+                x[W + slot] = shaking.w
+                x[DW + slot] = shaking.dw
+                x[LEAST_Q + slot] = tail_min_q[i + 1 if place.number == place.parts - 1 else i]
+            # whole vectors: what is done in slots without a run means nothing
+            filled = min(BATCH, (running + 7) // 8 * 8)
+            take_steps(x, y, filled)
+            judge_steps(x, y, filled)
+        begun = True
         slot = 0
-        while slot < batch:
-            falls = y[_FALLS * BATCH + slot] > 0.0
-            ended = False
-            if y[_ALONE * BATCH + slot] > 0.0 or (falls and piece[slot] < pieces[slot] - 1):
-                if pieces[slot] == 1 or x[_APART * BATCH + slot] > 0.0:
-                    _leave(states, at, x, slot)
-                ended = not _by_itself(
-                    time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, jump_node, kr, p,
-                    ph_max, no_history, states[slot], work, job[slot], whole, real,
-                )  # fmt: skip
-                if not ended:
-                    _enter(states, at, piece, length_s, x, slot)
-            elif piece[slot] < pieces[slot] - 1:
-                piece[slot] += 1
-            else:
-                piece[slot] = 0
-                at[slot] += 1
-                states[slot, STEPS] += pieces[slot]
-                states[slot, SAMPLES] += 1.0
+        while slot < running:
+            place = slots[slot]
+            run = runs[slot]
+            alone = y[ALONE + slot] > 0.0
+            falls = y[FALLS + slot] > 0.0
+            goes_on = not (alone or falls)
+            if place.number < place.parts - 1 and not alone:
+                alone = falls  # between nodes; the single kernel says where
+                place.number += 1 if goes_on else 0
+            elif not alone:
+                place.number = 0
+                run.interval += 1
+                run.steps += place.parts
+                run.samples += 1
                 if falls:
-                    j = job[slot]
-                    whole[0, j] = TOPPLED
-                    whole[1, j] = int(states[slot, STEPS])
-                    whole[2, j] = int(states[slot, SAMPLES])
-                    real[0, j] = math.nan
-                    real[1, j] = states[slot, STARTED]
-                    real[2, j] = time_s[at[slot]]
-                    real[3, j] = x[_ERROR * BATCH + slot]
-                    ended = True
-            while ended and next_job < kr.size:
-                states[slot, AT_INTERVAL] = -1.0
-                job[slot] = next_job
-                next_job += 1
-                if _by_itself(
-                    time_s, interval_s, k_h, w, q, tail_min_q, block_max_q, jump_node, kr, p,
-                    ph_max, no_history, states[slot], work, job[slot], whole, real,
-                ):  # fmt: skip
-                    _enter(states, at, piece, length_s, x, slot)
-                    ended = False
-            if ended:
-                # the last slot takes the place of the one that is done
-                batch -= 1
-                for row in range(ROWS_IN):
-                    x[row * BATCH + slot] = x[row * BATCH + batch]
-                y[_ALONE * BATCH + slot] = y[_ALONE * BATCH + batch]
-                y[_FALLS * BATCH + slot] = y[_FALLS * BATCH + batch]
-                states[slot] = states[batch]
-                job[slot] = job[batch]
-                at[slot] = at[batch]
-                length_s[slot] = length_s[batch]
-                piece[slot] = piece[batch]
-                pieces[slot] = pieces[batch]
-                part[slot] = part[batch]
-            else:
-                slot += 1
+                    whole[0, place.job], real[0, place.job] = TOPPLED, math.nan
+                    whole[1, place.job], whole[2, place.job] = run.steps, run.samples
+                    real[1, place.job], real[2, place.job] = run.started_s, time_s[run.interval]
+                    real[3, place.job] = x[ERROR + slot]
+            # a run that has just begun has no state in the slot yet
+            if alone and run.interval >= 0 and (place.parts == 1 or x[APART + slot] > 0.0):
+                put_down(run, x, slot)
+            while alone or (not goes_on and job < kr.size):
+                if not alone:  # its run is over, and the next one begins
+                    place.job = job
+                    job += 1
+                    run.interval = -1
+                # to its next moving node, or to its end
+                alone = False
+                j = place.job
+                (
+                    outcome, real[0, j], real[1, j], real[2, j], real[3, j],
+                    whole[1, j], whole[2, j], _,
+                ) = run_toppling(
+                    nodes, kr[j], p[j], ORDER, ph_max, no_rows, runs[slot : slot + 1], u
+                )  # fmt: skip
+                whole[0, j] = outcome
+                goes_on = outcome == PENDING
+                if goes_on:
+                    enter(run, place, x, slot)
+            if not goes_on:
+                # the last run takes the place of the one that is done
+                running -= 1
+                move_slot(x, y, runs, slots, running, slot)
+                continue
+            slot += 1

@@ -69,7 +69,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
             pose=pose_with(stays),
             after=after_free,
             sticks=False,
-            seats=False,
+            impact="leaves",
             lowest=square,
             highest=flat,
         )
@@ -101,7 +101,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
             pose=pose_with(constant(slip(exit.x))),
             after=after_rocking,
             sticks=False,
-            seats=False,
+            impact="leaves",
             lowest=0.0,
             highest=exit.x,
         )

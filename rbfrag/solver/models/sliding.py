@@ -110,7 +110,7 @@ def _equation(site: BlockOnPlanes, sense: float) -> Equation:
     horizontal = bool(site.settings.get("horizontal", False))
     if horizontal:
         factor = 1.0
-    drive = STANDARD_GRAVITY_M_S2 * factor
+    driving = STANDARD_GRAVITY_M_S2 * factor
     contact = Condition(
         per_k_h=constant(-math.sin(beta)),
         per_w=constant(math.cos(beta)),
@@ -120,8 +120,8 @@ def _equation(site: BlockOnPlanes, sense: float) -> Equation:
     )
     return Equation(
         inertia=constant(1.0),
-        drive=constant(drive),
-        resistance=constant(drive * math.tan(phi - beta)),
+        driving=constant(driving),
+        resistance=constant(driving * math.tan(phi - beta)),
         conditions=() if horizontal else (contact,),
     )
 
@@ -160,15 +160,15 @@ def sliding_displacements(
     Raises:
         InputError: a strength that is not above zero, a motion of no acceleration.
     """
-    drive = excitation(motion, vertical, polarity)
-    positive(drive.pga_g, "PGA", "g")
+    excited = excitation(motion, vertical, polarity)
+    positive(excited.pga_g, "PGA", "g")
     strengths = [positive(value, "ky_over_pga", "k_y/PGA") for value in ky_over_pga]
-    slid = SlidingBlocks(drive, slide_m).points(strengths).displacement_m
+    slid = SlidingBlocks(excited, slide_m).points(strengths).displacement_m
     assert slid is not None
     return slid
 
 
-def slide_m(drive: Excitation, ky: float) -> float:
+def slide_m(excited: Excitation, ky: float) -> float:
     """Return the permanent displacement down a level plane [m]; NaN where it is thrown."""
     friction_rad = math.atan(ky)
     level = BlockOnPlanes(
@@ -181,8 +181,8 @@ def slide_m(drive: Excitation, ky: float) -> float:
         yield_g=ky,
         settings={},
     )
-    course = follow(mechanism(level), drive)
-    return course.x if course.outcome is Outcome.STABLE else math.nan
+    run = follow(mechanism(level), excited)
+    return run.x if run.outcome is Outcome.STABLE else math.nan
 
 
 class Sliding(MechanismKind):
@@ -220,21 +220,21 @@ class Sliding(MechanismKind):
         self.refuse_foreign(options, self.search_options)
         if "displacement_m" not in options:
             raise InputError("displacement_m is missing: give the distance on a level plane [m]")
-        drive = excitation(motion, vertical, polarity)
+        excited = excitation(motion, vertical, polarity)
         return critical_of(
             self.kind,
-            SlidingBlocks(drive, slide_m),
+            SlidingBlocks(excited, slide_m),
             options["displacement_m"],
             polarity=polarity,
             search_limit=search_limit,
             tolerance=options.get("tolerance", TOLERANCE),
-            warnings=motion_remarks(motion, vertical, drive),
+            warnings=motion_remarks(motion, vertical, excited),
         )
 
-    def cases(self, **asked: Any) -> tuple[Case, ...]:
+    def cases(self, **request: Any) -> tuple[Case, ...]:
         """Return the first motion and every stated displacement."""
-        self.refuse_foreign(asked, self.campaign_options)
-        stated = asked.get("displacements_m", THRESHOLDS_M)
+        self.refuse_foreign(request, self.campaign_options)
+        stated = request.get("displacements_m", THRESHOLDS_M)
         stated = [positive(value, "--displacement", "m") for value in stated]
         each_once(stated, "--displacement")
         settings = {"search_limit": SEARCH_LIMIT, "tolerance": TOLERANCE}
@@ -260,26 +260,26 @@ class Sliding(MechanismKind):
         map_depth: float = MAP_DEPTH,
     ) -> list[CaseResult]:
         """Return critical strength and displacements of every case under one motion."""
-        drive = excitation(motion, vertical, polarity)
-        thrown = drive.jump_node < drive.w.size
+        excited = excitation(motion, vertical, polarity)
+        thrown = excited.jump_node < excited.w.size
         strengths = () if thrown else tuple(self.grid(cases[0], motion).tolist())
-        blocks = SlidingBlocks(drive, slide_m).points(strengths) if grid else None
+        blocks = SlidingBlocks(excited, slide_m).points(strengths) if grid else None
         if not search:
             return [CaseResult(None, blocks) for _ in cases]
         results = []
         for case in cases:
             settings: dict[str, Any] = dict(case.settings)
             # each for itself, so that an answer does not depend on what else was asked for
-            found = critical_of(
+            searched = critical_of(
                 self.kind,
-                SlidingBlocks(drive, slide_m),
+                SlidingBlocks(excited, slide_m),
                 settings["displacement_m"],
                 polarity=polarity,
                 search_limit=settings["search_limit"],
                 tolerance=settings["tolerance"],
-                warnings=drive.warnings,
+                warnings=excited.warnings,
             )
-            results.append(CaseResult(found, blocks))
+            results.append(CaseResult(searched, blocks))
         return results
 
 

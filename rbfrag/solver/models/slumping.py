@@ -7,7 +7,10 @@ derived in `rbfrag.solver.integrator.one_freedom.two_contacts`; it has the form 
 
     θ'' = p_s²(θ) [k_h - (1 + k_v) k_s(θ)] - q(θ) θ'²
 
-and reads, as all mechanisms here do, inertia θ'' = drive k_h - resistance (1 + k_v) - braking θ'².
+and reads, as all mechanisms here do,
+
+    inertia θ'' = driving k_h - resistance (1 + k_v) - braking θ'².
+
 The dissertation's own chapter on slumping is not available; this is derived from rigid-body
 mechanics.
 
@@ -68,8 +71,9 @@ from rbfrag.solver.search.scale import (
     critical_rad,
     critical_scales,
     grid_points,
-    judged,
     rotation_rad,
+    scaled_run,
+    scan_rules,
 )
 
 
@@ -116,7 +120,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         ),
         rotates=True,
         critical=forward.first_without_strength(flat),
-        if_seated="the block was driven back to where it had been: it is taken to stop there "
+        if_impact="the block was driven back to where it had been: it is taken to stop there "
         "without rebound, whatever its speed",
         least_q=_driven_up_the_back_plane(site),
         if_below="the record drives the block up its back plane at times, which is not followed",
@@ -216,6 +220,10 @@ RATIOS = np.geomspace(0.02, 0.95, 25)
 """k_s/PGA of the outcome grid: the record is scaled to them."""
 
 
+RULES = ("search_limit", "scan_ratio", "bracket")
+"""Settings of a case that are the rules of its search."""
+
+
 class Slumping(ScaledKind):
     """The slumping model; campaigns shake the blocks of the family."""
 
@@ -231,18 +239,18 @@ class Slumping(ScaledKind):
         """Return the slumping block."""
         return mechanism(site)
 
-    def cases(self, **asked: Any) -> tuple[Case, ...]:
+    def cases(self, **request: Any) -> tuple[Case, ...]:
         """Return every block of the family with every rotation that counts as failure.
 
         Raises:
             InputError: no rotation, one that repeats or that a block of the family cannot reach; a
                 block that does not slump.
         """
-        self.refuse_foreign(asked, ("rotations_deg", "family"))
-        family: Sequence[BlockClass] = asked.get("family", FAMILY)
+        self.refuse_foreign(request, ("rotations_deg", "family"))
+        family: Sequence[BlockClass] = request.get("family", FAMILY)
         rotations = [
             None if value is None else positive(value, "--rotation", "degrees")
-            for value in asked.get("rotations_deg", ROTATIONS_DEG)
+            for value in request.get("rotations_deg", ROTATIONS_DEG)
         ]
         each_once(rotations, "--rotation", for_none="recovery")
         least = min(each.gamma_deg for each in family)
@@ -284,7 +292,7 @@ class Slumping(ScaledKind):
 
         Cases of one block share their runs. The map is what the search saw; it costs nothing.
         """
-        drive = excitation(motion, vertical, polarity)
+        excited = excitation(motion, vertical, polarity)
         together: defaultdict[BlockClass, list[int]] = defaultdict(list)
         for number, case in enumerate(cases):
             together[_class_of(case)].append(number)
@@ -292,26 +300,19 @@ class Slumping(ScaledKind):
         for block, numbers in together.items():
             settings: dict[str, Any] = dict(cases[numbers[0]].settings)
             rotations: list[Any] = [cases[i].settings["rotation_deg"] for i in numbers]
-            found: Sequence[CriticalResult | None] = [None] * len(numbers)
-            if search:
-                found = critical_scales(
-                    motion,
-                    block.block,
-                    kind=self.kind,
-                    rotations_deg=rotations,
-                    beta_deg=block.beta_deg,
-                    phi_deg=block.phi_deg,
-                    vertical=vertical,
-                    polarity=polarity,
-                    **{name: settings[name] for name in ("search_limit", "scan_ratio", "bracket")},
-                )
             shaken = self._shaken(block)
+            searched: Sequence[CriticalResult | None] = [None] * len(numbers)
+            if search:
+                rules = scan_rules(*(settings[name] for name in RULES))
+                searched = critical_scales(
+                    motion, shaken, rotations, rules, vertical=vertical, polarity=polarity
+                )
             ratios = self.grid(cases[numbers[0]], motion)[: None if grid else 0]
-            scales = [shaken.yield_g / (k * drive.pga_g) for k in ratios.tolist()]
-            courses = [follow(shaken.mechanism, drive.scaled(scale)) for scale in scales]
-            for i, rotation, result in zip(numbers, rotations, found, strict=True):
+            scales = [shaken.yield_g / (k * excited.pga_g) for k in ratios.tolist()]
+            ends = [follow(shaken.mechanism, excited.scaled(scale)) for scale in scales]
+            for i, rotation, result in zip(numbers, rotations, searched, strict=True):
                 fails = rotation_rad(rotation, shaken)
-                runs = [judged(*each, fails) for each in zip(courses, scales, strict=True)]
+                runs = [scaled_run(*each, fails) for each in zip(ends, scales, strict=True)]
                 if result is not None and not full_map:
                     result = replace(result, intervals=no_intervals())
                 blocks = grid_points(ratios, runs, critical_rad(shaken)) if grid else None

@@ -54,11 +54,11 @@ class Toppling(Kind):
 
     kind = "toppling"
     mode = "topple"
-    settings = ("linear",)
+    settings = ()
     parameters = ("p2", "kr")
     searchable = True
     search_needs = "p2"
-    search_options = ("p2", "linear", "full_map", "map_depth", "block", *PLANES)
+    search_options = ("p2", "full_map", "map_depth", "block", *PLANES)
     campaign = True
     campaign_options = ("p2", "grid", "store_responses", "full_map")
 
@@ -70,7 +70,6 @@ class Toppling(Kind):
             kr=_strength(site),
             vertical=shaking.vertical,
             polarity=shaking.polarity,
-            linear=bool(site.settings.get("linear", False)),
             history=shaking.history,
         )
         return replace(answer, warnings=(*shaking.remarks, *answer.warnings))
@@ -78,17 +77,16 @@ class Toppling(Kind):
     def runner(self, site: BlockOnPlanes) -> Runner:
         """Return a function that says how the block ends under an excitation."""
         p2, kr = _size(site), _strength(site)
-        linear = bool(site.settings.get("linear", False))
 
-        def run(drive: Excitation) -> RunEnd:
-            refuse_endless(drive, p2)
-            found = simulate(drive, p2=p2, kr=kr, linear=linear)
+        def run(excited: Excitation) -> RunEnd:
+            refuse_endless(excited, p2)
+            end = simulate(excited, p2=p2, kr=kr)
             return RunEnd(
-                outcome=OUTCOMES[found.outcome],
-                moved=math.isfinite(found.started_s),
-                peak_rad=found.peak_rad if math.isfinite(found.peak_rad) else None,
+                outcome=OUTCOMES[end.outcome],
+                moved=math.isfinite(end.started_s),
+                peak_rad=end.peak_rad if math.isfinite(end.peak_rad) else None,
                 peak_displacement_m=None,
-                error=found.error_rad,
+                error=end.error_rad,
             )
 
         return run
@@ -107,10 +105,10 @@ class Toppling(Kind):
             raise InputError("p2 is missing: the critical block is searched for one p² [1/s²]")
         return critical(motion, kind=self.kind, **options)
 
-    def cases(self, **asked: Any) -> tuple[Case, ...]:
+    def cases(self, **request: Any) -> tuple[Case, ...]:
         """Return the block sizes."""
-        self.refuse_foreign(asked, ("p2",))
-        sizes = [positive(value, "p2", "1/s²") for value in asked.get("p2", DEFAULT_P2)]
+        self.refuse_foreign(request, ("p2",))
+        sizes = [positive(value, "p2", "1/s²") for value in request.get("p2", DEFAULT_P2)]
         each_once(sizes, "p2")
         settings = {"search_limit": SEARCH_LIMIT}
         return tuple(Case(self.kind, p2, settings=settings) for p2 in sizes)
@@ -137,14 +135,14 @@ class Toppling(Kind):
         map_depth: float = MAP_DEPTH,
     ) -> list[CaseResult]:
         """Return critical block and outcome grid of every case under one motion."""
-        drive = kept_excitation(motion, vertical, polarity)
+        excited = kept_excitation(motion, vertical, polarity)
         results = []
         for case in cases:
             assert case.p2 is not None
             settings: dict[str, Any] = dict(case.settings)
-            found = blocks = None
+            critical = blocks = None
             if search:
-                found = self.critical(
+                critical = self.critical(
                     motion,
                     p2=case.p2,
                     vertical=vertical,
@@ -154,8 +152,8 @@ class Toppling(Kind):
                     map_depth=map_depth,
                 )
             if grid:
-                blocks = run_blocks_at(drive, case.p2, self.grid(case, motion))
-            results.append(CaseResult(found, blocks))
+                blocks = run_blocks_at(excited, case.p2, self.grid(case, motion))
+            results.append(CaseResult(critical, blocks))
         return results
 
     def run_blocks(
@@ -168,8 +166,8 @@ class Toppling(Kind):
     ) -> SearchPoints:
         """Run blocks of stated k_r/PGA."""
         assert case.p2 is not None
-        drive = kept_excitation(motion, vertical, polarity)
-        return run_blocks_at(drive, case.p2, np.array(k_over_pga, dtype=np.float64))
+        excited = kept_excitation(motion, vertical, polarity)
+        return run_blocks_at(excited, case.p2, np.array(k_over_pga, dtype=np.float64))
 
     def history(
         self,
@@ -187,17 +185,17 @@ class Toppling(Kind):
         )
 
 
-def run_blocks_at(drive: Excitation, p2: float, kr_over_pga: FloatArray) -> SearchPoints:
+def run_blocks_at(excited: Excitation, p2: float, kr_over_pga: FloatArray) -> SearchPoints:
     """Run one block at each strength, in its order.
 
     Args:
-        drive: the excitation; its PGA must be positive.
+        excited: the excitation; its PGA must be positive.
         p2: frequency parameter p² [1/s²].
         kr_over_pga: block strengths over PGA.
     """
     from rbfrag.solver.integrator.batch import simulate_many
 
-    runs = simulate_many(drive, p2=p2, kr=kr_over_pga * drive.pga_g)
+    runs = simulate_many(excited, p2=p2, kr=kr_over_pga * excited.pga_g)
     return SearchPoints(
         kr_over_pga=kr_over_pga,
         theta_n=runs.theta_n,

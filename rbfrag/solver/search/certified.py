@@ -4,29 +4,34 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.integrator.block_excitation import Ground, block_excitation
+from rbfrag.solver.integrator.block_excitation import BlockExcitation, block_excitation
 from rbfrag.solver.results import MAP_DEPTH, RESOLUTION
 from rbfrag.solver.search.lower_bound import all_topple_below
 from rbfrag.solver.search.march import (
+    INTERVAL,
     ORDERLESS,
     SAFE,
     TO_BOTTOM,
     TO_BRACKET,
     TO_ISLAND,
     TOPPLES,
+    Settings,
     march,
+    new_march,
 )
-from rbfrag.solver.search.upper_bound import AT_THE_TOP, NOTHING_FAILS, upper_bound
+from rbfrag.solver.search.renewal import excursion_table, no_work
+from rbfrag.solver.search.upper_bound import NOTHING_FAILS, upper_bound
 
 FloatArray = NDArray[np.float64]
 
 MARGIN = 1e-10
-"""Relative margin on k_r of the enclosing motions: above the error of their steps."""
+"""Relative margin on k_r of the bounding trajectories: above the error of their steps."""
 
 MAP_MARGIN = 1e-6
 """The same in a map of a depth from 100 times as much on, where spans are longer: above the error
@@ -53,6 +58,9 @@ is given up: the rest of it is undecided."""
 
 MAX_INTERVALS = 20_000
 
+BRACKET_WIDTH = 1e-6
+"""Greatest relative width of a bracket."""
+
 
 @dataclass(frozen=True, eq=False)
 class CertifiedMap:
@@ -66,7 +74,7 @@ class CertifiedMap:
         point: a k_r of an undecided interval whose block topples, or NaN, shape (n,).
         reached: k_r down to which verdicts were given.
         complete: False when the step budget ended the search early.
-        runs: motions integrated.
+        runs: trajectories integrated.
         steps: integration steps taken.
     """
 
@@ -91,8 +99,13 @@ class CertifiedMap:
         without: NDArray[np.bool_] = (self.verdict != SAFE) & (self.verdict != TOPPLES)
         return without
 
+    def undecided_above(self, bottom: float) -> float:
+        """Return the length of k_r down to `bottom` that has no verdict."""
+        undecided = float((self.high - self.low)[self.undecided].sum())
+        return undecided + max(self.reached - bottom, 0.0)
 
-def keeps_order(drive: Excitation, linear: bool) -> bool:
+
+def keeps_order(excitation: Excitation) -> bool:
     """Return whether D >= 0 in every state short of the verdict, by the record alone.
 
     D = k_h sin(phi) + (1 + k_v) cos(phi) can only be negative where q = k_h/(1 + k_v) and
@@ -101,24 +114,25 @@ def keeps_order(drive: Excitation, linear: bool) -> bool:
     if q is yet to fall below tan(phi). Either way a value of q is followed by one of the
     opposite sign, positive first.
     """
-    if linear:
-        return True
-    highest = np.maximum.accumulate(np.maximum(drive.q, 0.0))
-    return bool((highest * -drive.q).max() <= 1.0)
+    # the greatest q so far against each q: only what follows a push can pull
+    highest = np.maximum.accumulate(np.maximum(excitation.q, 0.0))
+    return bool((highest * -excitation.q).max() <= 1.0)
 
 
-def surely_topples_below(g: Ground, drive: Excitation, bottom: float, top: float) -> float:
+def surely_topples_below(
+    block: BlockExcitation, excitation: Excitation, bottom: float, top: float
+) -> float:
     """Return a k_r below which every block topples, `bottom` where none is known."""
-    if g.linear or not keeps_order(drive, False):
+    # the bounds of its trajectories rest on the order, which is not checked on the way there
+    if not keeps_order(excitation):
         return bottom
-    return float(all_topple_below(g, bottom, top, MARGIN)[0])
+    return all_topple_below(block, bottom, top, MARGIN, np.empty(excitation.q.size))
 
 
 def certified_map(
-    drive: Excitation,
+    excitation: Excitation,
     *,
     p2: float,
-    linear: bool,
     bottom: float,
     full: bool,
     map_depth: float = MAP_DEPTH,
@@ -126,100 +140,122 @@ def certified_map(
     """Give verdicts from K_up down to the first toppling block, or to `bottom`.
 
     Args:
-        drive: the excitation; 1 + k_v > 0 throughout.
+        excitation: the excitation; 1 + k_v > 0 throughout.
         p2: frequency parameter p² [1/s²].
-        linear: the linear model.
         bottom: least k_r of interest.
         full: go on to `bottom`.
         map_depth: width of k_r/PGA that may be left undecided below the first toppling interval
             as wide as RESOLUTION.
     """
-    check = not keeps_order(drive, linear)
-    g = block_excitation(drive, p2=p2, linear=linear)
-    code, _, k_up, runs, steps = upper_bound(g, bottom, drive.max_q, MARGIN, 0.1 * DEPTH, check)
-    if code == AT_THE_TOP:
-        k_up = drive.max_q
+    n = excitation.q.size
+    check = not keeps_order(excitation)
+    block = block_excitation(excitation, p2=p2)
+    total = no_work()
+    intervals = np.empty(MAX_INTERVALS, dtype=INTERVAL)
+    count = 0
+
+    def give_verdicts(settings: Settings) -> float:
+        """March on; return the k_r that was reached."""
+        nonlocal count
+        # its own count: the budget is that of one march
+        work = no_work()
+        m = new_march(settings, n, intervals[count:])
+        march(block, m, work)
+        count += int(m.state["count"])
+        for name in ("trajectories", "steps"):
+            total[name] += work[name]
+        return float(m.state["high"])
+
+    code, k_up = upper_bound(
+        block, bottom, excitation.max_q, MARGIN, 0.1 * DEPTH, check, excursion_table(n), total
+    )
+    reached = bottom
     if code == NOTHING_FAILS:
-        nothing = np.empty(0)
-        none = np.empty(0, dtype=np.int64)
-        return CertifiedMap(bottom, nothing, nothing, none, nothing, bottom, True, runs, steps)
-    low, high, point = (np.empty(MAX_INTERVALS) for _ in range(3))
-    verdict = np.empty(MAX_INTERVALS, dtype=np.int64)
-    count, reached, made_runs, made_steps = march(
-        g, k_up, bottom, MARGIN, DEPTH, 0.0, ORDERLESS_DEPTH, FIRST_STEP, check,
-        TO_BRACKET, 0.0, False, STEP_BUDGET, low, high, verdict, point,
-    )  # fmt: skip
-    runs += made_runs
-    steps += made_steps
-    if full and reached > bottom and made_steps < STEP_BUDGET:
-        more, reached, made_runs, made_steps = march(
-            g, reached, bottom, MARGIN, DEPTH, 0.0, ORDERLESS_DEPTH, FIRST_STEP, check,
-            TO_ISLAND, RESOLUTION * drive.pga_g, True, MAP_STEPS,
-            low[count:], high[count:], verdict[count:], point[count:],
+        k_up = bottom
+    else:
+        first = Settings(
+            top=k_up, bottom=bottom, margin=MARGIN, depth=DEPTH, least=0.0,
+            order_depth=ORDERLESS_DEPTH, first_step=FIRST_STEP, check=check, goal=TO_BRACKET,
+            resolution=0.0, inside=False, budget=STEP_BUDGET,
         )  # fmt: skip
-        count += more
-        runs += made_runs
-        steps += made_steps
-        floor = surely_topples_below(g, drive, bottom, reached)
-        if floor < reached:
-            margin = MARGIN
-            if map_depth >= 100.0 * MAP_MARGIN:
-                margin = MAP_MARGIN
-                g = block_excitation(drive, p2=p2, linear=linear, span_ph=MAP_SPAN_PH)
-            more, reached, made_runs, made_steps = march(
-                g, reached, floor, margin, DEPTH, map_depth * drive.pga_g,
-                ORDERLESS_DEPTH, FIRST_STEP, check, TO_BOTTOM, 0.0, True, MAP_STEPS,
-                low[count:], high[count:], verdict[count:], point[count:],
-            )  # fmt: skip
-            count += more
-            runs += made_runs
-            steps += made_steps
-        if bottom < floor >= reached:
-            low[count], high[count] = bottom, reached
-            verdict[count], point[count] = TOPPLES, math.nan
-            count, reached = count + 1, bottom
-    done = full or not bool(((verdict[:count] == TOPPLES) | np.isfinite(point[:count])).any())
+        # down to the bracket without limits on islands: this part is what `certified` is about
+        before = int(total["steps"])
+        reached = give_verdicts(first)
+        if full and reached > bottom and total["steps"] - before < STEP_BUDGET:
+            # then as finely through the toppling interval that counts at the resolution ...
+            below = first._replace(top=reached, inside=True, budget=MAP_STEPS)
+            resolution = RESOLUTION * excitation.pga_g
+            reached = give_verdicts(below._replace(goal=TO_ISLAND, resolution=resolution))
+            # ... and below it to the depth of the map, with wider margins that let spans be longer
+            floor = surely_topples_below(block, excitation, bottom, reached)
+            if floor < reached:
+                margin = MARGIN
+                # wider margins must stay far below the depth, or they are what is left open
+                if map_depth >= 100.0 * MAP_MARGIN:
+                    margin = MAP_MARGIN
+                    block = block_excitation(excitation, p2=p2, span_ph=MAP_SPAN_PH)
+                least = map_depth * excitation.pga_g
+                reached = give_verdicts(
+                    below._replace(
+                        top=reached, bottom=floor, margin=margin, least=least, goal=TO_BOTTOM
+                    )
+                )
+            # what is left down to the bottom topples whatever came before
+            if bottom < floor >= reached:
+                intervals[count] = (bottom, reached, TOPPLES, math.nan)
+                count, reached = count + 1, bottom
+    rows = intervals[:count]
+    # without a map the search ends at the first block that topples, and is complete by that
+    done = full or not bool(((rows["verdict"] == TOPPLES) | np.isfinite(rows["point"])).any())
     return CertifiedMap(
         k_up=k_up,
-        low=low[:count].copy(),
-        high=high[:count].copy(),
-        verdict=verdict[:count].copy(),
-        point=point[:count].copy(),
+        low=rows["low"].copy(),
+        high=rows["high"].copy(),
+        verdict=rows["verdict"].copy(),
+        point=rows["point"].copy(),
         reached=reached,
         complete=not done or reached <= bottom,
-        runs=runs,
-        steps=steps,
+        runs=int(total["trajectories"]),
+        steps=int(total["steps"]),
     )
 
 
-def bracket_of(found: CertifiedMap) -> tuple[float, float, float] | None:
-    """Return the greatest k_r known to topple, the least known safe above it, and the undecided
-    length above that; None where nothing topples."""
-    safe_from = found.k_up
+class Bracket(NamedTuple):
+    """The answer of a search, in k_r.
+
+    Args:
+        lower: the greatest k_r known to topple.
+        upper: the least known safe above it.
+        undecided: length of k_r above that for which nothing is proven.
+    """
+
+    lower: float
+    upper: float
+    undecided: float
+
+
+def bracket_of(of_map: CertifiedMap) -> Bracket | None:
+    """Return the bracket of the critical value; None where nothing topples."""
+    safe_from = of_map.k_up
     undecided = 0.0
     for low, high, verdict, point in zip(
-        found.low.tolist(), found.high.tolist(), found.verdict.tolist(), found.point.tolist(),
+        of_map.low.tolist(), of_map.high.tolist(), of_map.verdict.tolist(), of_map.point.tolist(),
         strict=True,
     ):  # fmt: skip
         if verdict == SAFE:
             safe_from = low
             continue
+        # an undecided interval counts from a block in it that topples
         topples = high if verdict == TOPPLES else point
         if math.isnan(topples):
             undecided += high - low
             continue
         if safe_from - topples > BRACKET_WIDTH * safe_from:
+            # safe intervals end further up: what lies between them and this one is undecided
             safe_from = high
         else:
             # the slivers inside the bracket are its own width
-            undecided -= sum(
-                h - b
-                for b, h, v in zip(found.low, found.high, found.verdict, strict=True)
-                if v != SAFE and v != TOPPLES and high <= b and h <= safe_from
-            )
-        return topples, safe_from, max(undecided, 0.0)
+            inside = of_map.undecided & (high <= of_map.low) & (of_map.high <= safe_from)
+            undecided -= sum((of_map.high - of_map.low)[inside].tolist())
+        return Bracket(topples, safe_from, max(undecided, 0.0))
     return None
-
-
-BRACKET_WIDTH = 1e-6
-"""Greatest relative width of a bracket."""

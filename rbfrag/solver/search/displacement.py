@@ -40,11 +40,11 @@ class SlidingBlocks:
     """Blocks on a level plane under one excitation.
 
     Args:
-        drive: the excitation.
+        excited: the excitation.
         slide_m: displacement [m] of the block of a yield acceleration [g]; NaN where it is thrown.
     """
 
-    drive: Excitation
+    excited: Excitation
     slide_m: Callable[[Excitation, float], float]
 
     @cached_property
@@ -55,7 +55,7 @@ class SlidingBlocks:
     def displacement_m(self, ky_over_pga: float) -> float:
         """Return the permanent displacement down a level plane [m]; NaN where it is thrown."""
         if ky_over_pga not in self.known:
-            self.known[ky_over_pga] = self.slide_m(self.drive, ky_over_pga * self.drive.pga_g)
+            self.known[ky_over_pga] = self.slide_m(self.excited, ky_over_pga * self.excited.pga_g)
         return self.known[ky_over_pga]
 
     def points(self, ky_over_pga: Sequence[float]) -> SearchPoints:
@@ -93,16 +93,17 @@ def critical_of(
     distance = not_negative(displacement_m, "displacement_m", "m")
     limit = positive(search_limit, "search_limit", "k_y/PGA")
     width = positive(tolerance, "tolerance", "k_y/PGA")
-    drive = blocks.drive
+    excited = blocks.excited
     before = len(blocks.known)
     low = high = None
     ends: list[float] = []
     status: Status = "no_motion"
-    top = drive.max_q / drive.pga_g if drive.pga_g > 0.0 else 0.0
-    if drive.jump_node < drive.w.size:
+    top = excited.max_q / excited.pga_g if excited.pga_g > 0.0 else 0.0
+    if excited.jump_node < excited.w.size:
         status = "outside_model"
     elif top > limit:
         if distance == 0.0:
+            # a block moves as soon as k_h/(1 + k_v) exceeds its strength: a closed form
             status, low, high = "found", top, top
         elif blocks.displacement_m(limit) <= distance:
             status = "below_limit"
@@ -115,14 +116,13 @@ def critical_of(
         kind=kind,
         p2=math.nan,
         polarity=polarity,
-        linear=False,
-        pga_g=drive.pga_g,
+        pga_g=excited.pga_g,
         status=status,
         search_limit=limit,
         kr_over_pga=low,
         lower=low,
         upper=high,
-        kr=None if low is None else low * drive.pga_g,
+        kr=None if low is None else low * excited.pga_g,
         y_m_s=None,
         # the displacement falls with the strength: there is one border, and it is bracketed
         certified=status != "outside_model",
@@ -141,6 +141,7 @@ def critical_of(
 def _bracket(
     blocks: SlidingBlocks, distance: float, low: float, high: float, width: float
 ) -> tuple[float, float]:
+    # the displacement falls with the strength: what is known already narrows the bracket
     for k, slid in sorted(blocks.known.items()):
         if slid > distance:
             low = max(low, k)

@@ -1,288 +1,399 @@
-"""One verdict for all blocks of a range: two motions that enclose theirs.
+"""One verdict for all blocks of an interval of k_r: two trajectories that enclose theirs.
 
 With q = k_h/(1 + k_v) and D = k_h sin(phi) + (1 + k_v) cos(phi) >= 0, the acceleration of the
-block grows with theta and falls with k_r. Hence a motion that is ahead of another in theta and
-theta' stays so until the other impacts, and a smaller k_r only adds to its lead. A motion
-*ahead*, with the smallest k_r and the earliest start, and one *behind*, with the largest k_r
-and the latest start, enclose every block between. Rules A to E say how the enclosure is carried
-through impacts and new starts.
+block grows with theta and falls with k_r. Hence a trajectory with the greater theta and theta' of
+two keeps them until the other impacts, and a smaller k_r only adds to its lead (order). An *upper*
+trajectory, with the smallest k_r and the earliest start, and a *lower* one, with the greatest k_r
+and the latest start, enclose every block between. Rules A to F say how the enclosure is carried
+through impacts and new starts; docs/theory/critical.md proves them.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rbfrag.solver.integrator.block_excitation import Ground
-from rbfrag.solver.integrator.compiled import kernel
+from rbfrag.solver.integrator.block_excitation import BlockExcitation
+from rbfrag.solver.integrator.compiled import inner_kernel, within
 from rbfrag.solver.integrator.excursion import (
-    IMPACT,
     IN_AIR,
-    ORDER,
+    NO_IMPACT,
     ORDER_LOST,
+    ORDER_TO_BORDER,
+    ORDER_TO_REST,
     STOPPED,
     TOPPLED,
+    TRUSTED,
+    Rules,
+    end_of_record,
+    excursion_from_rest,
     integrate_excursion,
-    rest_state,
 )
-from rbfrag.solver.integrator.taylor import bracketed_root
-from rbfrag.solver.search.renewal import Starts, fails_after, last_rest
-from rbfrag.solver.search.rises import APART, TURNED_BACK, common_start, next_start, restart_floor
+from rbfrag.solver.integrator.state import Place, State, at_rest
+from rbfrag.solver.integrator.taylor import OF_RATE, ORDER, bracketed_root
+from rbfrag.solver.search.renewal import ExcursionTable, fails_after, last_rest
+from rbfrag.solver.search.rises import (
+    APART,
+    LIFTED,
+    TURNED_BACK,
+    common_start,
+    next_start,
+    restart_floor,
+)
 
-FloatArray = NDArray[np.float64]
+ALL_SAFE, ALL_TOPPLE, SPLIT, NO_ORDER, OPEN = 0, 1, 2, 3, 4
 
-ALL_SAFE, ALL_TOPPLE, SPLIT, NO_ORDER = 0, 1, 2, 3
+OVERTAKEN = 3
+"""Beside LIFTED, TURNED_BACK and APART, of a pair of trajectories."""
+
+ANYWHERE = math.nan
 
 
-@kernel
+class Blocks(NamedTuple):
+    """The blocks of an interval of k_r, and how their bounding trajectories are integrated.
+
+    Args:
+        k1: smallest k_r.
+        k2: greatest k_r.
+        k_upper: k_r of the upper trajectory, k1 less the margin.
+        k_lower: k_r of the lower trajectory, k2 and the margin.
+        upper_rules: what is checked of D >= 0 along the upper trajectory.
+        lower_rules: the same along the lower one.
+    """
+
+    k1: float
+    k2: float
+    k_upper: float
+    k_lower: float
+    upper_rules: Rules
+    lower_rules: Rules
+
+
+class Trajectory(NamedTuple):
+    """A bounding trajectory at one instant."""
+
+    place: Place
+    state: State
+
+
+class Impacts(NamedTuple):
+    """Between which instants every block of the interval closes its contact.
+
+    Args:
+        first: impact of the lower trajectory.
+        last: impact of the upper one.
+        in_air: the upper one has none before the record ends.
+        mixable: some blocks start anew at `first`, while others move: rule E may be tried.
+        lower: the lower trajectory at its impact, for rule E.
+        upper: the upper one at the same instant.
+    """
+
+    first: Place
+    last: Place
+    in_air: bool
+    mixable: bool
+    lower: Trajectory
+    upper: Trajectory
+
+
+class Pair(NamedTuple):
+    """A pair of trajectories that encloses all blocks in motion.
+
+    Args:
+        kind: LIFTED; TURNED_BACK where the lower one falls back at once; APART where there is no
+            such pair; OVERTAKEN where the upper one ends before the lower one starts.
+        latest: start of the lower trajectory, from rest.
+        upper: the upper trajectory.
+    """
+
+    kind: int
+    latest: Place
+    upper: Trajectory
+
+
+class Decision(NamedTuple):
+    """A verdict on an interval of k_r.
+
+    Args:
+        verdict: ALL_SAFE, ALL_TOPPLE, SPLIT (none), NO_ORDER (D < 0 was met) or OPEN (go on).
+        split_at: a k_r to split at, or ANYWHERE.
+    """
+
+    verdict: int
+    split_at: float
+
+
+@inner_kernel
 def decide(
-    g: Ground,
+    excitation: BlockExcitation,
     k1: float,
     k2: float,
     margin: float,
     check: bool,
-    starts: Starts,
-    at_rest: int,
-) -> tuple[int, float, int, int]:
+    table: ExcursionTable,
+    rest: int,
+    work: np.void,
+) -> Decision:
     """Decide whether all blocks with k_r in [k1, k2] topple, or none, if that can be told.
 
     Args:
-        g: the excitation of a block.
+        excitation: the excitation of a block.
         k1: smallest k_r.
         k2: greatest k_r.
-        margin: the enclosing motions are integrated with k1 (1 - margin) and k2 (1 + margin).
+        margin: the bounding trajectories are integrated with k1 (1 - margin) and k2 (1 + margin).
         check: check D >= 0 on the way.
-        starts: excursions from rest of a k_r <= k1.
-        at_rest: node at which all blocks are at rest, and from which on the excursions count.
-
-    Returns:
-        Verdict, a k_r to split at (NaN for anywhere), trajectories, steps.
+        table: excursions from rest of a k_r <= k1.
+        rest: node at which all blocks are at rest, and from which on the table counts.
+        work: counts what it costs.
     """
-    interval_s = g.interval_s
-    k_h = g.k_h
-    w = g.w
-    q = g.q
-    block_max_q = g.block_max_q
-    p = g.p
-    ph_max = g.ph_max
-    linear = g.linear
-    u = g.u
-    n = q.size
-    steps = 0
-    trajectories = 0
-    ka = k1 * (1.0 - margin)
-    kb = k2 * (1.0 + margin)
-    sa0, ca0 = rest_state(ka, linear)
-    sb0, cb0 = rest_state(kb, linear)
-
-    rest, _ = last_rest(g, starts, at_rest, at_rest, at_rest)
-    ib = rest  # first and last impact
-    tb = 0.0
-    ia = rest
-    ta = 0.0
-    in_air = False  # the upper bounding trajectory is still off its base when the record ends
-    mixable = False  # the trajectory before this rest lets rule E be tried
-    # the motions at the first impact, for rule E
-    ixb = 0
-    txb = 0.0
-    rate_b = 0.0
-    theta_a = 0.0
-    rate_a = 0.0
-    s_a = 0.0
-    c_a = 0.0
-
+    n = excitation.q.size
+    blocks = blocks_between(k1, k2, margin, check)
+    # D at the outset: what precedes the last rest before an excursion that topples cannot matter
+    impacts = all_at_rest(blocks, last_rest(excitation, table, rest, rest, rest).node)
+    # each turn gets past an impact, of which an interval holds a few at most
     for _ in range(4 * n + 16):
-        ie, te = next_start(k_h, w, q, block_max_q, k1, ib, tb)
-        if ie >= n or not fails_after(g, starts, ie):
-            return ALL_SAFE, math.nan, trajectories, steps
-        code = APART
-        il = 0
-        tl = 0.0
-        peak = math.nan
-        if not in_air:
-            code, il, tl, peak = common_start(k_h, w, q, k2, kb, ie, te, ia, ta)
-        if code != APART:
-            ixa = ie
-            txa = te
-            theta_a = 0.0
-            rate_a = 0.0
-            s_a = sa0
-            c_a = ca0
-        else:
-            mixed = False
-            if mixable:
-                # rule E: carry the lower bounding trajectory on below zero until it turns
-                i = ixb
-                tau = txb
-                theta = 0.0
-                rate = rate_b
-                s = sb0
-                c = cb0
-                while i < n - 1 and q[i + 1] > kb:
-                    il = i
-                    tl = tau
-                    event, i, tau, theta, rate, s, c, made = integrate_excursion(
-                        g, kb, i, tau, theta, rate, s, c, False, i + 1, 0.0, False, 0, 0.0,
-                    )  # fmt: skip
-                    steps += made
-                    if rate >= 0.0:
-                        mixed = True
-                        left = 1.0 - tl
-                        if p * interval_s[il] * left <= ph_max and u[0] < 0.0:
-                            # all have theta' >= 0 from where the lower trajectory turns
-                            turn_at = bracketed_root(1, theta, u, ORDER, 0.0, 1.0)
-                            tl = min(tl + turn_at * left + 1e-13, 1.0)
-                        else:
-                            il = i
-                            tl = 0.0
-                        break
-                trajectories += 1
-                mixable = False
-            if mixed:
-                # ahead of those that have had no impact since, and of those that have
-                event, _, _, theta, rate, s, c, made = integrate_excursion(
-                    g, ka, ixb, txb, 0.0, 0.0, sa0, ca0, True, il, tl, True, 0, 0.0,
-                )  # fmt: skip
-                steps += made
-                event, ixa, txa, theta_a, rate_a, s_a, c_a, made = integrate_excursion(
-                    g, ka, ixb, txb, theta_a, rate_a, s_a, c_a, False, il, tl, False, 0, 0.0,
-                )  # fmt: skip
-                steps += made
-                if event != STOPPED:
-                    return SPLIT, math.nan, trajectories, steps
-                if theta > theta_a:
-                    theta_a = theta
-                    s_a = s
-                    c_a = c
-                rate_a = max(rate_a, rate, 0.0)
-            else:
-                rest_from = 2 * n if in_air else (ia + 1 if ta > 0.0 else ia)
-                rest, failing = last_rest(g, starts, ib, rest_from, -1)
-                if failing < 0:
-                    return ALL_SAFE, math.nan, trajectories, steps
-                if rest > ib:
-                    ib = rest
-                    ia = rest
-                    tb = 0.0
-                    ta = 0.0
-                    in_air = False
-                    continue
-                # rule F: what starts in this stretch is below the upper trajectory from e
-                event, i, tau, _, _, _, _, made = integrate_excursion(
-                    g,
-                    ka,
-                    ie,
-                    te,
-                    0.0,
-                    0.0,
-                    sa0,
-                    ca0,
-                    True,
-                    n - 1,
-                    0.0,
-                    True,
-                    1 if check else 0,
-                    kb,
-                )
-                steps += made
-                trajectories += 1
-                if event == ORDER_LOST:
-                    return NO_ORDER, math.nan, trajectories, steps
-                if event == TOPPLED:
-                    if k1 < peak < k2:
-                        return SPLIT, peak, trajectories, steps
-                    return SPLIT, math.nan, trajectories, steps
-                in_air = in_air or event == IN_AIR
-                node = ie + 1
-                while node < n and q[node] > k1:
-                    node += 1
-                ib = node
-                tb = 0.0
-                if i > ia or (i == ia and tau > ta):
-                    ia = i
-                    ta = tau
-                if ia < node:
-                    ia = node
-                    ta = 0.0
-                continue
-
-        # lower bounding trajectory
-        floor = restart_floor(q, k1, k2, il)
-        mixable = False
-        in_air = False
-        if code == TURNED_BACK:
-            event = IMPACT
-            ixb = il
-            txb = tl
-            rate_b = 0.0
-        else:
-            event, ixb, txb, _, rate_b, _, _, made = integrate_excursion(
-                g,
-                kb,
-                il,
-                tl,
-                0.0,
-                0.0,
-                sb0,
-                cb0,
-                True,
-                n - 1,
-                0.0,
-                True,
-                2 if check else 0,
-                0.0,
+        earliest = next_start(excitation, k1, impacts.first)
+        # no block starts any more, or (D) no excursion that starts from here on topples
+        if earliest.interval >= n or not fails_after(excitation, table, earliest.interval):
+            return Decision(ALL_SAFE, ANYWHERE)
+        # the weakest block, less the margin, starts first and bounds all from above where they lift
+        pair = Pair(APART, earliest, Trajectory(earliest, at_rest(blocks.k_upper)))
+        peak = ANYWHERE
+        if not impacts.in_air:
+            # A: one pair for all, where all are lifted together. Not while the upper trajectory is
+            # still off its base at the end of the record: it is not known when all are at rest
+            start = common_start(excitation, k2, blocks.k_lower, earliest, impacts.last)
+            pair = Pair(start.kind, start.latest, pair.upper)
+            peak = start.peak
+        if pair.kind == APART and impacts.mixable:
+            # E: some blocks start anew while others have not closed their contact
+            pair = mixed_pair(excitation, blocks, impacts, work)
+            if pair.kind == OVERTAKEN:
+                return Decision(SPLIT, ANYWHERE)
+        if pair.kind == APART:
+            # D: a later instant at which all are at rest, with what covers them until then: the
+            # excursions from rest, and the upper trajectory that is not over yet
+            renewal = last_rest(
+                excitation, table, impacts.first.interval, node_of_rest(impacts, n), -1
             )
-            steps += made
-            trajectories += 1
-            if event == ORDER_LOST:
-                return NO_ORDER, math.nan, trajectories, steps
-            if event == TOPPLED:
-                return ALL_TOPPLE, math.nan, trajectories, steps
-        check_ahead = 1 if check else 0
-        if event == IN_AIR:
-            event, _, _, _, _, _, _, made = integrate_excursion(
-                g, ka, ixa, txa, theta_a, rate_a, s_a, c_a, True, n - 1, 0.0, True, check_ahead, kb,
-            )  # fmt: skip
-            steps += made
-            trajectories += 1
-            if event == ORDER_LOST:
-                return NO_ORDER, math.nan, trajectories, steps
-            return (ALL_SAFE if event == IN_AIR else SPLIT), math.nan, trajectories, steps
-        # the lower bounding trajectory has ended in an impact; bring the upper one there
-        event, ixa, txa, theta_a, rate_a, s_a, c_a, made = integrate_excursion(
-            g, ka, ixa, txa, theta_a, rate_a, s_a, c_a, True, ixb, txb, True, check_ahead, kb,
-        )  # fmt: skip
-        steps += made
-        trajectories += 1
-        if event == ORDER_LOST:
-            return NO_ORDER, math.nan, trajectories, steps
-        if event == IN_AIR:  # the first impact is at the end of the record
-            return ALL_SAFE, math.nan, trajectories, steps
-        if event != STOPPED:
-            return SPLIT, math.nan, trajectories, steps
-        at = k_h[ixb] + (k_h[ixb + 1] - k_h[ixb]) * txb
-        at /= w[ixb] + (w[ixb + 1] - w[ixb]) * txb
-        lifting = rate_a >= 0.0 and at >= k1
-        event, ia, ta, _, _, _, _, made = integrate_excursion(
-            g, ka, ixa, txa, theta_a, rate_a, s_a, c_a, lifting, n - 1, 0.0, True, check_ahead, kb,
-        )  # fmt: skip
-        steps += made
-        if event == ORDER_LOST:
-            return NO_ORDER, math.nan, trajectories, steps
-        if event == TOPPLED:
-            return SPLIT, math.nan, trajectories, steps
-        in_air = event == IN_AIR
-        ib = ixb
-        tb = txb
-        mixable = at > kb and code != TURNED_BACK
-        if floor >= 0:
-            if ib < floor:
-                ib = floor
-                tb = 0.0
-                mixable = False
-            if ia < floor:
-                ia = floor
-                ta = 0.0
-    return SPLIT, math.nan, trajectories, steps
+            if renewal.failing < 0:
+                return Decision(ALL_SAFE, ANYWHERE)
+            if renewal.node > impacts.first.interval:
+                impacts = all_at_rest(blocks, renewal.node)
+                continue
+            # F: this stretch alone; B: where to split if that does not help
+            decision, impacts = one_stretch(excitation, blocks, impacts, earliest, peak, work)
+        else:
+            decision, impacts = carried_on(excitation, blocks, impacts, pair, work)
+        if decision.verdict != OPEN:
+            return decision
+    return Decision(SPLIT, ANYWHERE)
+
+
+@within
+def blocks_between(k1: float, k2: float, margin: float, check: bool) -> Blocks:
+    """Pull the ends of an interval of k_r apart by the margin."""
+    # D is looked at between the upper trajectory and the least rotated block, at rest with the
+    # greatest k_r; between the lower one and the border of the irrecoverable states, beyond which
+    # the order no longer matters
+    k_lower = k2 * (1.0 + margin)
+    return Blocks(
+        k1,
+        k2,
+        k1 * (1.0 - margin),
+        k_lower,
+        Rules(True, ORDER_TO_REST, k_lower) if check else TRUSTED,
+        Rules(True, ORDER_TO_BORDER, 0.0) if check else TRUSTED,
+    )
+
+
+@within
+def all_at_rest(blocks: Blocks, node: int) -> Impacts:
+    """All blocks are at rest at a node: both trajectories may start anew from there."""
+    place = Place(node, 0.0)
+    lower = Trajectory(place, at_rest(blocks.k_lower))
+    return Impacts(place, place, False, False, lower, Trajectory(place, at_rest(blocks.k_upper)))
+
+
+@within
+def node_of_rest(impacts: Impacts, n: int) -> int:
+    """Node by which the upper trajectory has closed its contact; beyond all where it never has."""
+    if impacts.in_air:
+        return 2 * n
+    return impacts.last.interval + (1 if impacts.last.fraction > 0.0 else 0)
+
+
+@within
+def mixed_pair(
+    excitation: BlockExcitation, blocks: Blocks, impacts: Impacts, work: np.void
+) -> Pair:
+    """Rule E: one pair for blocks that start anew at their impact and for those still in motion.
+
+    The lower trajectory is carried on below zero, virtually, until it turns, with q > k2 all the
+    while. Lifted from then on, rest bounds every block from below. From above it is the further
+    rotated of two, with the faster rate of the two: the upper trajectory carried on without its
+    base, for those still in motion, and a start from rest at the first impact, for the others.
+    """
+    # The lower one is virtual: below zero it is a motion of the same equation, for which order
+    # and lift hold as they do above. Blocks whose contact closes from `landed` on start at once,
+    # since q > k2: it bounds them and those still in motion from below all the while
+    work["trajectories"] += 1
+    q, u = excitation.q, excitation.u
+    landed = impacts.lower.place
+    place = landed
+    state = impacts.lower.state
+    while place.interval < q.size - 1 and q[place.interval + 1] > blocks.k_lower:
+        i, tau = place
+        carried = integrate_excursion(
+            excitation, blocks.k_lower, place, state, False, Place(i + 1, 0.0), NO_IMPACT
+        )
+        work["steps"] += carried.steps
+        place = carried.place
+        state = carried.state
+        if state.rate < 0.0:
+            continue
+        turn = Place(place.interval, 0.0)
+        left = 1.0 - tau
+        if excitation.p * excitation.interval_s[i] * left <= excitation.ph_max and u[0] < 0.0:
+            # the interval was one step, whose series is still there: the root of its rate, and
+            # a little later, where theta' >= 0 is certain
+            turned = bracketed_root(OF_RATE, state.theta, u, ORDER, 0.0, 1.0)
+            turn = Place(i, min(tau + turned * left + 1e-13, 1.0))
+        # from above: a block that starts anew is bounded by a start at `landed`, which is no later;
+        # one still in motion by the upper trajectory, which must not end before
+        anew = integrate_excursion(
+            excitation, blocks.k_upper, landed, at_rest(blocks.k_upper), True, turn, TRUSTED
+        )
+        upper = integrate_excursion(
+            excitation, blocks.k_upper, landed, impacts.upper.state, False, turn, NO_IMPACT
+        )
+        work["steps"] += anew.steps + upper.steps
+        # what has rotated further and faster than both bounds both
+        furthest = anew.state if anew.state.theta > upper.state.theta else upper.state
+        rate = max(upper.state.rate, anew.state.rate, 0.0)
+        state = State(furthest.theta, rate, furthest.sin, furthest.cos)
+        kind = LIFTED if upper.event == STOPPED else OVERTAKEN
+        return Pair(kind, turn, Trajectory(upper.place, state))
+    return Pair(APART, place, impacts.upper)
+
+
+@within
+def one_stretch(
+    excitation: BlockExcitation,
+    blocks: Blocks,
+    impacts: Impacts,
+    earliest: Place,
+    peak: float,
+    work: np.void,
+) -> tuple[Decision, Impacts]:
+    """Rule F: the blocks that start in one stretch of q > k1 are over when its first one is.
+
+    The excursion from rest at its first crossing bounds them all from above: once that is over,
+    all have closed their contact, and the next start is looked for after the stretch.
+    """
+    q = excitation.q
+    excursion = excursion_from_rest(excitation, blocks.k_upper, earliest, blocks.upper_rules)
+    work["steps"] += excursion.steps
+    work["trajectories"] += 1
+    if excursion.event == ORDER_LOST:
+        return Decision(NO_ORDER, ANYWHERE), impacts
+    if excursion.event == TOPPLED:
+        return Decision(SPLIT, border_of_lift(blocks, peak)), impacts
+    # the next start of any block is after this stretch, since q <= k1 where it ends; the impacts
+    # of both this excursion and those before it are by the later of the two
+    node = earliest.interval + 1
+    while node < q.size and q[node] > blocks.k1:
+        node += 1
+    last = not_before(later(impacts.last, excursion.place), node)
+    in_air = impacts.in_air or excursion.event == IN_AIR
+    after = Impacts(Place(node, 0.0), last, in_air, False, impacts.lower, impacts.upper)
+    return Decision(OPEN, ANYWHERE), after
+
+
+@within
+def border_of_lift(blocks: Blocks, peak: float) -> float:
+    """Rule B: the k_r to split at is that of the peak of q at which A failed.
+
+    It lifts the weaker blocks and not the stronger, if it lies between them.
+    """
+    return peak if blocks.k1 < peak < blocks.k2 else ANYWHERE
+
+
+@within
+def carried_on(
+    excitation: BlockExcitation, blocks: Blocks, impacts: Impacts, pair: Pair, work: np.void
+) -> tuple[Decision, Impacts]:
+    """Carry a pair of trajectories to the verdict, or to the impacts of both.
+
+    All topple if the lower one does, and none does in this excursion if the upper one does not.
+    """
+    k_h, w = excitation.k_h, excitation.w
+    # a lower trajectory that is never lifted impacts where it starts: rest bounds all
+    lower = Trajectory(pair.latest, at_rest(blocks.k_lower))
+    if pair.kind != TURNED_BACK:
+        excursion = excursion_from_rest(excitation, blocks.k_lower, pair.latest, blocks.lower_rules)
+        work["steps"] += excursion.steps
+        work["trajectories"] += 1
+        if excursion.event == ORDER_LOST:
+            return Decision(NO_ORDER, ANYWHERE), impacts
+        if excursion.event == TOPPLED:
+            # by order every block of the interval topples with the one that bounds it from below
+            return Decision(ALL_TOPPLE, ANYWHERE), impacts
+        lower = Trajectory(excursion.place, excursion.state)
+    # the upper one as far as the lower one went
+    meeting = integrate_excursion(
+        excitation, blocks.k_upper, pair.upper.place, pair.upper.state, True, lower.place,
+        blocks.upper_rules,
+    )  # fmt: skip
+    work["steps"] += meeting.steps
+    work["trajectories"] += 1
+    if meeting.event == ORDER_LOST:
+        return Decision(NO_ORDER, ANYWHERE), impacts
+    if meeting.event == IN_AIR:
+        # the record ends before any block comes down, and none has the energy to topple
+        return Decision(ALL_SAFE, ANYWHERE), impacts
+    if meeting.event != STOPPED:
+        # it topples, or rounding lets it impact before the lower one
+        return Decision(SPLIT, ANYWHERE), impacts
+    # and on to its own impact: by lift none is looked for while q >= k1
+    i, tau = lower.place
+    q_there = k_h[i] + (k_h[i + 1] - k_h[i]) * tau
+    q_there /= w[i] + (w[i + 1] - w[i]) * tau
+    lifting = meeting.state.rate >= 0.0 and q_there >= blocks.k1
+    excursion = integrate_excursion(
+        excitation, blocks.k_upper, meeting.place, meeting.state, lifting,
+        end_of_record(excitation), blocks.upper_rules,
+    )  # fmt: skip
+    work["steps"] += excursion.steps
+    if excursion.event == ORDER_LOST:
+        return Decision(NO_ORDER, ANYWHERE), impacts
+    if excursion.event == TOPPLED:
+        return Decision(SPLIT, ANYWHERE), impacts
+    # C: none starts anew before q has fallen below k1
+    floor = restart_floor(excitation.q, blocks.k1, blocks.k2, pair.latest.interval)
+    # E can help next where some blocks start anew at once, as all do in a stretch of q > k2
+    after = Impacts(
+        not_before(lower.place, floor),
+        not_before(excursion.place, floor),
+        excursion.event == IN_AIR,
+        q_there > blocks.k_lower and pair.kind != TURNED_BACK and i >= floor,
+        lower,
+        Trajectory(lower.place, meeting.state),
+    )
+    return Decision(OPEN, ANYWHERE), after
+
+
+@within
+def not_before(place: Place, node: int) -> Place:
+    """Return a place, or the node if it comes later."""
+    return Place(node, 0.0) if place.interval < node else place
+
+
+@within
+def later(one: Place, other: Place) -> Place:
+    """Return the later of two places."""
+    if other.interval > one.interval:
+        return other
+    return other if other.interval == one.interval and other.fraction > one.fraction else one

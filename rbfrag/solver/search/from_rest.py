@@ -7,115 +7,112 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.solver.integrator.block_excitation import Ground
-from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.excursion import IMPACT, TOPPLED, integrate_excursion, rest_state
-from rbfrag.solver.search.renewal import Starts, fails_after, no_starts
+from rbfrag.solver.integrator.block_excitation import BlockExcitation
+from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel
+from rbfrag.solver.integrator.excursion import (
+    IMPACT,
+    TOPPLED,
+    TRUSTED,
+    Excursion,
+    excursion_from_rest,
+)
+from rbfrag.solver.integrator.state import Place
+from rbfrag.solver.search.renewal import ExcursionTable, fails_after
 from rbfrag.solver.search.rises import next_start
 
 FloatArray = NDArray[np.float64]
 
 
-@kernel
-def linear_distance(
-    g: Ground,
-    start_i: int,
-    start_tau: float,
-    i: int,
-    tau: float,
-    rate: float,
-    s: float,
-    c: float,
-    toppled: bool,
-) -> float:
+@inner_kernel
+def linear_distance(excitation: BlockExcitation, start: Place, excursion: Excursion) -> float:
     """How far in k_r an excursion was from the border, by the linear model: > 0 if it toppled.
 
     The linear model says what becomes of the state at the end of the excursion under the rest
     of the drive; referred back to its start, that is a distance in k_r. Good for a secant;
     nothing is concluded from its size.
     """
-    time_s = g.time_s
-    interval_s = g.interval_s
-    remaining = g.remaining
-    p = g.p
-    linear = g.linear
-    x = s if linear else math.atan2(s, c)
+    time_s, interval_s, remaining = excitation.time_s, excitation.interval_s, excitation.remaining
+    i, tau = excursion.place
+    phi = math.atan2(excursion.state.sin, excursion.state.cos)
     end_s = time_s[i]
     to_come = remaining[i]
     if tau > 0.0:
         end_s += tau * interval_s[i]
         to_come += (remaining[i + 1] - to_come) * tau
-    start_s = time_s[start_i]
-    if start_tau > 0.0:
-        start_s += start_tau * interval_s[start_i]
-    distance: float = (rate + to_come - x) * math.exp(-p * (end_s - start_s))
-    if toppled:
+    start_s = time_s[start.interval]
+    if start.fraction > 0.0:
+        start_s += start.fraction * interval_s[start.interval]
+    # a difference of states grows as exp(p t) in the linear model: seen from the start it is that
+    # much smaller
+    faded = math.exp(-excitation.p * (end_s - start_s))
+    distance: float = (excursion.state.rate + to_come - phi) * faded
+    # the sign is that of the outcome, even where the estimate rounds to the other side
+    if excursion.event == TOPPLED:
         return max(distance, 1e-300)
     return min(distance, -1e-300)
 
 
-@kernel
+@inner_kernel
 def follow(
-    g: Ground,
-    kr: float,
-    node: int,
-    starts: Starts,
-    use: bool,
-) -> tuple[float, int]:
-    """Follow a block at rest at a node; return its distance from toppling and the steps taken.
+    excitation: BlockExcitation, kr: float, node: int, table: ExcursionTable, work: np.void
+) -> float:
+    """Follow a block at rest at a node; return its distance from toppling, > 0 if it topples.
 
     Args:
-        g: the excitation of a block.
+        excitation: the excitation of a block.
         kr: rocking acceleration coefficient.
         node: node of rest.
-        starts: excursions from rest of a k_r <= kr: where none is left that fails, the run ends.
-        use: False to do without them.
+        table: excursions from rest of a k_r <= kr: where none is left that fails, the run ends.
+        work: counts what it costs.
     """
-    k_h = g.k_h
-    w = g.w
-    q = g.q
-    block_max_q = g.block_max_q
-    linear = g.linear
-    n = q.size
-    s0, c0 = rest_state(kr, linear)
+    n = excitation.q.size
+    # a block that is never lifted is as far from toppling as it is strong
     best = -kr
-    steps = 0
-    i = node
-    tau = 0.0
+    place = Place(node, 0.0)
+    # an interval holds a few impacts at most: an end for a chatter that rounding keeps up
     for _ in range(4 * n + 16):
-        i, tau = next_start(k_h, w, q, block_max_q, kr, i, tau)
-        if i >= n or (use and not fails_after(g, starts, i)):
+        start = next_start(excitation, kr, place)
+        if start.interval >= n or not fails_after(excitation, table, start.interval):
             break
-        event, at, fraction, _, rate, s, c, made = integrate_excursion(
-            g, kr, i, tau, 0.0, 0.0, s0, c0, True, n - 1, 0.0, True, 0, 0.0,
-        )  # fmt: skip
-        steps += made
-        distance = linear_distance(g, i, tau, at, fraction, rate, s, c, event == TOPPLED)
-        if event == TOPPLED:
-            return distance, steps
+        # one block alone is no bound of others: the order of motions is not asked about
+        excursion = excursion_from_rest(excitation, kr, start, TRUSTED)
+        work["steps"] += excursion.steps
+        distance = linear_distance(excitation, start, excursion)
+        if excursion.event == TOPPLED:
+            best = distance
+            break
         best = max(best, distance)
-        if event != IMPACT:
+        if excursion.event != IMPACT:
             break
-        i = at
-        tau = fraction
-    return best, steps
+        # renewal: after an impact it depends on the past through its next start alone
+        place = excursion.place
+    work["trajectories"] += 1
+    return best
 
 
-@kernel
-def first_turn(g: Ground, kr: FloatArray, first: int, topples: bool) -> int:
-    """Return the number of the first block from `first` on that does not do as said.
+@bare_kernel
+def first_change(
+    excitation: BlockExcitation,
+    kr: FloatArray,
+    first: int,
+    topples: bool,
+    table: ExcursionTable,
+    work: np.void,
+) -> int:
+    """Return the number of the first block from `first` on that does not do as the others.
 
     Args:
-        g: the excitation of a block.
+        excitation: the excitation of a block.
         kr: rocking acceleration coefficients of blocks at rest when the record begins, shape (m,).
         first: number of the first block to look at.
-        topples: what is said.
+        topples: what the others do.
+        table: as for `follow`.
+        work: counts what it costs.
 
     Returns:
         The number, m where there is none.
     """
-    unknown = no_starts(0)
     for j in range(first, kr.size):
-        if (follow(g, kr[j], 0, unknown, False)[0] > 0.0) != topples:
+        if (follow(excitation, kr[j], 0, table, work) > 0.0) != topples:
             return j
     return kr.size

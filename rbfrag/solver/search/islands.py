@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.solver.integrator.block_excitation import Ground
+from rbfrag.solver.integrator.block_excitation import BlockExcitation
 from rbfrag.solver.results import OutcomeIntervals
+from rbfrag.solver.search.borders import border
 from rbfrag.solver.search.certified import CertifiedMap
-from rbfrag.solver.search.from_rest import first_turn
-from rbfrag.solver.search.march import SAFE, TOPPLES, border
-from rbfrag.solver.search.renewal import no_starts
+from rbfrag.solver.search.from_rest import first_change
+from rbfrag.solver.search.march import SAFE, TOPPLES
+from rbfrag.solver.search.renewal import excursion_table, no_work
 
 FloatArray = NDArray[np.float64]
 
@@ -22,7 +23,7 @@ PROBES = 12
 BORDER = 1e-9
 """Relative width to which the floor of an island is closed in on."""
 
-WORDS = {SAFE: "safe", TOPPLES: "topples"}
+OUTCOMES = {SAFE: "safe", TOPPLES: "topples"}
 
 
 class Islands(NamedTuple):
@@ -37,35 +38,35 @@ class Islands(NamedTuple):
 
 
 def outcome_intervals(
-    found: CertifiedMap, pga_g: float, max_q: float, bottom: float | None = None
+    certified: CertifiedMap, pga_g: float, max_q: float, bottom: float | None = None
 ) -> OutcomeIntervals:
-    """Return the map over k_r/PGA, rising, up to the k_r that no drive exceeds.
+    """Return the map over k_r/PGA, rising, up to the k_r that no q exceeds.
 
     Args:
-        found: verdicts in k_r, falling.
+        certified: verdicts in k_r, falling.
         pga_g: PGA [g].
         max_q: greatest k_h/(1 + k_v).
         bottom: k_r down to which the map reaches, undecided where the search was given up
             above it; None for where the search ended.
     """
-    low = found.low[::-1]
-    high = found.high[::-1]
-    words = [WORDS.get(int(v), "undecided") for v in found.verdict[::-1]]
-    edges = [*low.tolist(), *high.tolist()[-1:]] or [found.k_up]
+    low = certified.low[::-1]
+    high = certified.high[::-1]
+    outcomes = [OUTCOMES.get(int(v), "undecided") for v in certified.verdict[::-1]]
+    edges = [*low.tolist(), *high.tolist()[-1:]] or [certified.k_up]
     if bottom is not None and edges[0] > bottom:
         edges.insert(0, bottom)
-        words.insert(0, "undecided")
-    top = max(max_q, found.k_up)
-    if top > found.k_up:
+        outcomes.insert(0, "undecided")
+    top = max(max_q, certified.k_up)
+    if top > certified.k_up:
         edges.append(top)
-        words.append("safe")
+        outcomes.append("safe")
     kept_edges = edges[:1]
-    kept_words: list[str] = []
-    for word, edge in zip(words, edges[1:], strict=True):
-        if kept_words and kept_words[-1] == word:
+    kept_outcomes: list[str] = []
+    for outcome, edge in zip(outcomes, edges[1:], strict=True):
+        if kept_outcomes and kept_outcomes[-1] == outcome:
             kept_edges[-1] = edge
         else:
-            kept_words.append(word)
+            kept_outcomes.append(outcome)
             kept_edges.append(edge)
     ratio = np.array(kept_edges) / pga_g
     # ends one rounding apart may fall together in the quotient, and such an interval is none
@@ -73,12 +74,12 @@ def outcome_intervals(
     return OutcomeIntervals(
         k_lo=ratio[:-1][wide],
         k_hi=ratio[1:][wide],
-        outcome=tuple(word for word, kept in zip(kept_words, wide, strict=True) if kept),  # type: ignore[misc]
+        outcome=tuple(each for each, kept in zip(kept_outcomes, wide, strict=True) if kept),  # type: ignore[misc]
     )
 
 
 def islands_of_map(
-    found: CertifiedMap, g: Ground, lower: float, resolution: float
+    certified: CertifiedMap, block: BlockExcitation, lower: float, resolution: float
 ) -> tuple[Islands, int]:
     """Read the islands off a full map.
 
@@ -87,16 +88,15 @@ def islands_of_map(
     does not end a toppling island for `resolved`, nor make the set reentrant.
 
     Args:
-        found: the map, in k_r.
-        g: the excitation of the blocks.
+        certified: the map, in k_r.
+        block: the excitation of the blocks.
         lower: greatest k_r that topples.
         resolution: width of k_r below which islands are ignored.
 
     Returns:
         What was read, and the number of blocks.
     """
-    unknown = no_starts(0)
-    runs = 0
+    work = no_work()
     width: float | None = None
     resolved: float | None = None
     reentrant = False
@@ -104,15 +104,17 @@ def islands_of_map(
     gap_top: float | None = None
     bottom = lower
     for low, high, verdict in zip(
-        found.low.tolist(), found.high.tolist(), found.verdict.tolist(), strict=True
+        certified.low.tolist(), certified.high.tolist(), certified.verdict.tolist(), strict=True
     ):
+        # what lies above the answer is no island below it
         if high > lower and low >= lower:
             continue
         if verdict == SAFE:
             if gap_top is None:
                 gap_top = high
             if width is None:
-                _, floor, runs, _ = border(g, high, -1.0, bottom, BORDER, 0, unknown, False)
+                # the island of the answer ends in the sliver between the two verdicts
+                _, floor = border(block, high, -1.0, bottom, BORDER, 0, excursion_table(0), work)
                 width = lower - floor
             if gap_top - low > resolution:
                 reentrant = True
@@ -123,20 +125,21 @@ def islands_of_map(
             bottom = low
             if resolved is None and island_top - bottom >= resolution:
                 resolved = island_top
+    # no safe interval below: it reaches down to the end of the map
     if width is None:
-        width = lower - found.reached
+        width = lower - certified.reached
         if resolved is None and width >= resolution:
             resolved = lower
-    return Islands(width, resolved, reentrant), runs
+    return Islands(width, resolved, reentrant), int(work["trajectories"])
 
 
 def islands_by_blocks(
-    g: Ground, lower: float, floor: float, bottom: float, resolution: float
+    block: BlockExcitation, lower: float, floor: float, bottom: float, resolution: float
 ) -> tuple[Islands, int]:
     """Look for islands below the critical value by single blocks: a finding, not a proof.
 
     Args:
-        g: the excitation of the blocks.
+        block: the excitation of the blocks.
         lower: greatest k_r that topples.
         floor: least k_r to look at; every one below it topples, or is below `bottom`.
         bottom: least k_r of interest.
@@ -145,32 +148,32 @@ def islands_by_blocks(
     Returns:
         What was found, and the number of blocks.
     """
+    # every block below the answer topples: one island, as wide as it can be
     if lower <= floor:
         return Islands(lower - bottom, lower, False), 0
     kr = np.geomspace(lower, floor, PROBES)
     # the island of the critical value itself may be narrower than the spacing
     near = lower - resolution * np.array([0.25, 1.0])
     kr = np.concatenate([[lower], near[near > kr[1]], kr[1:]])
-    unknown = no_starts(0)
-    runs = 0
+    nothing_known = excursion_table(0)
+    work = no_work()
     at = 1
     inside = True  # of an island
     edges = [lower]  # tops and floors of islands in turn
     resolved: float | None = None
     reentrant = False
     while resolved is None or not reentrant:
-        turn = int(first_turn(g, kr, at, inside))
-        runs += min(turn, kr.size - 1) - at + 1
+        turn = first_change(block, kr, at, inside, nothing_known, work)
+        # all the rest do the same, down to the limit
         if turn == kr.size:
             edge = bottom
             if not inside:
                 break
         else:
-            low_side, high_side, made, _ = border(
-                g, float(kr[turn]), -1.0 if inside else 1.0, float(kr[turn - 1]), BORDER,
-                0, unknown, False,
+            low_side, high_side = border(
+                block, float(kr[turn]), -1.0 if inside else 1.0, float(kr[turn - 1]), BORDER,
+                0, nothing_known, work,
             )  # fmt: skip
-            runs += made
             edge = high_side if inside else low_side
         if inside and resolved is None and edges[-1] - edge >= resolution:
             resolved = edges[-1]
@@ -183,4 +186,4 @@ def islands_by_blocks(
             reentrant = True  # the lowest block is known to topple
         inside = not inside
         at = turn + 1
-    return Islands(lower - edges[1], resolved, reentrant), runs
+    return Islands(lower - edges[1], resolved, reentrant), int(work["trajectories"])

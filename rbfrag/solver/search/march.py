@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.solver.integrator.block_excitation import Ground
-from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.search.envelopes import ALL_SAFE, ALL_TOPPLE, NO_ORDER, SPLIT, decide
+from rbfrag.solver.integrator.block_excitation import BlockExcitation
+from rbfrag.solver.integrator.compiled import bare_kernel, within
+from rbfrag.solver.search.borders import border
+from rbfrag.solver.search.envelopes import ALL_SAFE, ALL_TOPPLE, NO_ORDER, SPLIT, Decision, decide
 from rbfrag.solver.search.from_rest import follow
-from rbfrag.solver.search.renewal import Starts, begin, last_rest, no_starts, work_of
-from rbfrag.solver.search.upper_bound import between
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from rbfrag.solver.search.renewal import (
+    ExcursionTable,
+    add_work,
+    begin,
+    excursion_table,
+    last_rest,
+)
 
 SAFE, TOPPLES, UNKNOWN, ORDERLESS = 0, 1, 2, 3
 
@@ -24,85 +28,51 @@ BORDER = 1e-11
 
 TO_BRACKET, TO_ISLAND, TO_BOTTOM = 0, 1, 2
 
+INTERVAL = np.dtype(
+    [("low", np.float64), ("high", np.float64), ("verdict", np.int64), ("point", np.float64)]
+)
+"""Ends of an interval of k_r; SAFE, TOPPLES, UNKNOWN or ORDERLESS; a k_r of an UNKNOWN interval
+whose block topples, or NaN."""
 
-@kernel
-def border(
-    g: Ground,
-    lo: float,
-    at_lo: float,
-    hi: float,
-    width: float,
-    rest: int,
-    starts: Starts,
-    use: bool,
-) -> tuple[float, float, int, int]:
-    """Close in on a border between two k_r of which one topples and the other does not.
-
-    Returns:
-        A k_r on the side of `lo` and one on the side of `hi`, a relative `width` apart; runs,
-        steps.
-    """
-    low_topples = at_lo > 0.0
-    at_hi = math.inf if at_lo < 0.0 else -math.inf
-    runs = 0
-    steps = 0
-    tries = 0
-    gauge = hi - lo
-    slow = True
-    side = 0
-    while hi - lo > width * hi:
-        k = between(lo, hi, at_lo, at_hi, side, 0.25 * width * hi, slow)
-        far, made = follow(g, k, rest, starts, use)
-        runs += 1
-        steps += made
-        if (far > 0.0) == low_topples:
-            lo = k
-            at_lo = far
-            if side > 0:
-                at_hi *= 0.5
-            side = 1
-        else:
-            hi = k
-            at_hi = far
-            if side < 0:
-                at_lo *= 0.5
-            side = -1
-        slow = math.isinf(at_hi)
-        tries += 1
-        if tries == 3:
-            tries = 0
-            slow = slow or hi - lo > 0.125 * gauge
-            gauge = hi - lo
-    return lo, hi, runs, steps
+STATE = np.dtype(
+    [
+        # what has no verdict yet lies below `high`; the verdict above; intervals so far
+        ("high", np.float64),
+        ("above", np.int64),
+        ("count", np.int64),
+        # width to try next; width after the last verdict that met no border; whether the last
+        # width was halved; part of the way to a border that is tried at once
+        ("width", np.float64),
+        ("steady", np.float64),
+        ("halved", np.bool_),
+        ("part", np.float64),
+        # a border known by two blocks: above `border_high` all do as `above`, the block at
+        # `border_point` does not
+        ("border_high", np.float64),
+        ("border_low", np.float64),
+        ("border_point", np.float64),
+        # whether a block that topples is known; width of the toppling interval being passed
+        ("found", np.bool_),
+        ("island", np.float64),
+        # node of rest from which on the fine table counts; what that table gave; how much wider
+        # than the interval its distance from the k_r of its table must be before a new one is made
+        ("window", np.int64),
+        ("fine_rest", np.int64),
+        ("fine_failing", np.int64),
+        ("patience", np.float64),
+    ],
+    align=True,
+)
+"""What a march carries from one interval to the next."""
 
 
-@kernel
-def march(
-    g: Ground,
-    top: float,
-    bottom: float,
-    margin: float,
-    depth: float,
-    least: float,
-    order_depth: float,
-    first_step: float,
-    check: bool,
-    goal: int,
-    resolution: float,
-    inside: bool,
-    max_steps: int,
-    low: FloatArray,
-    high: FloatArray,
-    verdict: IntArray,
-    point: FloatArray,
-) -> tuple[int, float, int, int]:
-    """Give verdicts from `top` downwards until the goal or `bottom` is reached.
+class Settings(NamedTuple):
+    """What a march is to do.
 
     Args:
-        g: the excitation of a block.
         top: k_r to start from.
         bottom: k_r to stop at.
-        margin: relative margin on k_r of the enclosing motions.
+        margin: relative margin on k_r of the bounding trajectories.
         depth: relative width below which an interval is left undecided.
         least: the same, as a width of k_r itself.
         order_depth: the relative one where the order of motions is lost.
@@ -112,156 +82,300 @@ def march(
             and as wide as the resolution) or TO_BOTTOM.
         resolution: width of k_r of the islands that count for TO_ISLAND.
         inside: blocks below `top` topple, it is not K_up.
-        max_steps: integration steps after which the march is given up.
-        low: filled with the lower ends of the intervals, falling.
-        high: filled with their upper ends.
-        verdict: filled with SAFE, TOPPLES, UNKNOWN or ORDERLESS.
-        point: filled with a k_r of an UNKNOWN interval whose block topples, or NaN.
-
-    Returns:
-        Number of intervals, k_r reached, runs, steps.
+        budget: integration steps after which the march is given up.
     """
-    n = g.q.size
-    # starts from rest over the whole record at one k_r, and over the part of it that they leave
-    # open at a greater one
-    coarse = no_starts(n)
-    coarse_k = math.inf
-    coarse_other = 0.0
-    fine = no_starts(n)
-    fine_k = math.inf
-    fine_rest = -1
-    fine_fails = -1
-    window = 0
-    runs = 0
-    steps = 0
-    count = 0
-    found = inside
-    island = 0.0  # width of the toppling interval being passed
-    hi = top
-    width = first_step * top
-    steady = width  # width of the last interval that got a verdict
-    side = TOPPLES if inside else SAFE
-    share = 0.6
-    patience = 2.0
-    halved = False
-    edge_high = top  # a border known by two blocks: one of `side` above, one of the other below
-    edge_low = top
-    edge_point = top
-    if not inside:
-        far, made = follow(g, top * (1.0 - depth), 0, coarse, False)
-        runs += 1
-        steps += made
-        if far > 0.0:  # K_up itself is the border
-            edge_point = top * (1.0 - depth)
-            edge_low = edge_point - max(0.25 * depth, 2.0 * margin) * top
-    while hi > bottom and steps < max_steps and count < low.size - 1:
-        if hi == edge_high and edge_low < hi:
-            high[count] = hi
-            low[count] = edge_low
-            verdict[count] = UNKNOWN
-            point[count] = edge_point if side == SAFE else math.nan
-            count += 1
-            side = TOPPLES if side == SAFE else SAFE
-            hi = edge_low
-            width = min(steady, 0.2 * hi)
-            if side == TOPPLES:
-                found = True
-                if goal == TO_BRACKET:
-                    break
+
+    top: float
+    bottom: float
+    margin: float
+    depth: float
+    least: float
+    order_depth: float
+    first_step: float
+    check: bool
+    goal: int
+    resolution: float
+    inside: bool
+    budget: int
+
+
+class March(NamedTuple):
+    """A march under way.
+
+    Args:
+        settings: what it is to do.
+        coarse: excursions from rest over the whole record, at one k_r.
+        fine: those over the part of it that the coarse ones leave open, at a greater k_r.
+        state: of dtype STATE.
+        intervals: of dtype INTERVAL, by falling k_r; filled.
+    """
+
+    settings: Settings
+    coarse: ExcursionTable
+    fine: ExcursionTable
+    state: np.void
+    intervals: NDArray[np.void]
+
+
+def new_march(settings: Settings, n: int, intervals: NDArray[np.void]) -> March:
+    """Return a march over a record of n nodes that has not begun."""
+    state = np.zeros(1, dtype=STATE)[0]
+    return March(settings, excursion_table(n), excursion_table(n), state, intervals)
+
+
+@bare_kernel
+def march(excitation: BlockExcitation, m: March, work: np.void) -> None:
+    """Give verdicts from the top downwards until the goal or the bottom is reached.
+
+    Args:
+        excitation: the excitation of a block.
+        m: the march; its state and its intervals are filled.
+        work: counts what it costs.
+    """
+    state, settings = m.state, m.settings
+    begin_march(excitation, m, work)
+    while (
+        state["high"] > settings.bottom
+        and work["steps"] < settings.budget
+        and state["count"] < m.intervals.size - 1
+        and not at_goal(m)
+    ):
+        high = state["high"]
+        if high == state["border_high"] and state["border_low"] < high:
+            pass_border(m)
             continue
-        finest = max(depth * hi, least)
-        clear = max(0.25 * finest, 2.0 * margin * hi)  # of the margins of the enclosing motions
-        lo = max(hi - width, bottom)
-        if lo < bottom + 0.1 * finest:
-            lo = bottom
-        if lo < edge_high < hi:
-            # towards a border the distance left is shared out: all of it at once seldom works
-            lo = edge_high
-            if hi - lo > 3.0 * finest:
-                lo = hi - share * (hi - lo)
-        if lo < coarse_k or (check and hi > coarse_other):
-            coarse_k = max(bottom, lo - 0.5 * (hi - lo) - 0.1 * hi)
-            coarse_other = hi * (1.0 + margin)
-            runs, steps = runs + work_of(coarse)[0], steps + work_of(coarse)[1]
-            begin(coarse, coarse_k, coarse_k * (1.0 - margin), coarse_other, check, 0, n)
-            fine_k = math.inf
-            window, _ = last_rest(g, coarse, 0, 0, 0)
-        if lo >= fine_k:
-            what, peak, made_runs, made = decide(g, lo, hi, margin, check, fine, window)
+        low = next_low(m)
+        # D needs excursions of a k_r no greater than any of the interval, and near it to say much
+        renew_coarse(excitation, m, low, work)
+        decision = decision_on(excitation, m, low, work)
+        # a split at a given k_r gets its verdict without another table
+        inside = low < decision.split_at < high
+        if decision.verdict == SPLIT and not inside and refined(excitation, m, low, work):
+            continue
+        least = max(settings.depth * high, settings.least)
+        if decision.verdict == NO_ORDER:
+            # narrower intervals do not bring the order back
+            least = max(least, settings.order_depth * high)
+        if decision.verdict == ALL_SAFE or decision.verdict == ALL_TOPPLE:
+            widen(m, low)
+            record(m, low, SAFE if decision.verdict == ALL_SAFE else TOPPLES, math.nan)
+        elif inside:
+            state["width"] = high - decision.split_at  # B
+        elif high - low > least:
+            # without a border to be blamed the interval was too wide
+            if decision.verdict != SPLIT or not border_between(excitation, m, low, work):
+                state["width"] = 0.5 * (high - low)
+                state["halved"] = True
+                state["part"] *= 0.5
         else:
-            what, peak, made_runs, made = decide(g, lo, hi, margin, check, coarse, 0)
-        runs += made_runs
-        steps += made
-        scanned = fine_k if lo >= fine_k else coarse_k
-        if what == SPLIT and not (lo < peak < hi) and lo - scanned > patience * (hi - lo):
-            fine_k = max(lo - 0.5 * (hi - lo), coarse_k)
-            runs, steps = runs + work_of(fine)[0], steps + work_of(fine)[1]
-            begin(fine, fine_k, fine_k * (1.0 - margin), coarse_other, check, window, n)
-            rest, failing = last_rest(g, fine, window, window, window)
-            gained = rest != fine_rest or failing != fine_fails
-            patience = 2.0 if gained else patience * 8.0
-            fine_rest, fine_fails = rest, failing
-            continue
-        topples_at = math.nan
-        if what in (ALL_SAFE, ALL_TOPPLE):
-            answer = SAFE if what == ALL_SAFE else TOPPLES
-            # soon after a width that was too much the next one is tried with care
-            width = min((1.3 if halved else 2.0) * (hi - lo), 0.2 * lo)
-            halved = False
-            share = min(1.3 * share, 0.9)
-            if not (edge_high < hi):
-                steady = width
-            side = answer
-        elif lo < peak < hi:
-            width = hi - peak
-            continue
-        elif hi - lo > (max(order_depth * hi, finest) if what == NO_ORDER else finest):
-            if what == SPLIT and not (lo <= edge_high < hi):
-                # is a border the reason? then verdicts can go as far as that
-                far, made = follow(g, lo, window, coarse, True)
-                runs += 1
-                steps += made
-                if (far > 0.0) == (side == SAFE):
-                    edge_point, edge_high, made_runs, made = border(
-                        g, lo, far, hi, max(BORDER, 0.1 * least / hi), window, coarse, True
-                    )
-                    runs += made_runs
-                    steps += made
-                    edge_low = max(edge_point - clear, lo)
-                    edge_high = min(edge_high + clear, hi)
-                    width = hi - edge_high
-                    share = 0.6
-                    continue
-            width = 0.5 * (hi - lo)
-            halved = True
-            share *= 0.5
-            continue
-        else:
-            answer = ORDERLESS if what == NO_ORDER else UNKNOWN
-            width = hi - lo
-            if not found:
-                far, made = follow(g, lo, window, coarse, True)
-                runs += 1
-                steps += made
-                if far > 0.0:
-                    topples_at = lo
-        if count > 0 and verdict[count - 1] == answer and answer != UNKNOWN:
-            low[count - 1] = lo
-        else:
-            high[count] = hi
-            low[count] = lo
-            verdict[count] = answer
-            point[count] = topples_at
-            count += 1
-        if answer == TOPPLES:
-            found = True
-            island = island + hi - lo
-        elif answer == SAFE:
-            island = 0.0
-        found = found or topples_at == lo
-        hi = lo
-        if found and (goal == TO_BRACKET or (goal == TO_ISLAND and island > resolution)):
-            break
-    runs += work_of(coarse)[0] + work_of(fine)[0]
-    steps += work_of(coarse)[1] + work_of(fine)[1]
-    return count, hi, runs, steps
+            leave_open(excitation, m, low, decision.verdict, work)
+    add_work(m.coarse, work)
+    add_work(m.fine, work)
+
+
+@within
+def at_goal(m: March) -> bool:
+    """Whether the march has come as far as it is to go."""
+    settings = m.settings
+    return m.state["found"] and (
+        settings.goal == TO_BRACKET
+        or (settings.goal == TO_ISLAND and m.state["island"] > settings.resolution)
+    )
+
+
+@within
+def begin_march(excitation: BlockExcitation, m: March, work: np.void) -> None:
+    """Take up a march at its top; where that is K_up, look whether it is a border itself."""
+    state, settings = m.state, m.settings
+    top = settings.top
+    state["high"] = top
+    state["above"] = TOPPLES if settings.inside else SAFE
+    state["width"] = settings.first_step * top
+    state["steady"] = state["width"]
+    state["part"] = 0.6
+    state["border_high"] = top
+    state["border_low"] = top
+    state["border_point"] = top
+    state["found"] = settings.inside
+    state["fine_rest"] = -1
+    state["fine_failing"] = -1
+    state["patience"] = 2.0
+    # no k_r has a table yet
+    m.coarse.about["kr"] = math.inf
+    m.fine.about["kr"] = math.inf
+    if not settings.inside:
+        # K_up is often the critical value itself, where the excursion that decides is not preceded
+        # by another
+        point = top * (1.0 - settings.depth)
+        if follow(excitation, point, 0, m.coarse, work) > 0.0:
+            state["border_point"] = point
+            clear = max(0.25 * settings.depth, 2.0 * settings.margin) * top
+            state["border_low"] = point - clear
+
+
+@within
+def pass_border(m: March) -> None:
+    """Leave the little interval of a border undecided, and go on below it."""
+    state = m.state
+    # blocks within the margins of a border have no verdict; they are fewer than the depth allows
+    row = m.intervals[state["count"]]
+    row["high"] = state["high"]
+    row["low"] = state["border_low"]
+    row["verdict"] = UNKNOWN
+    row["point"] = state["border_point"] if state["above"] == SAFE else math.nan
+    state["count"] += 1
+    state["above"] = TOPPLES if state["above"] == SAFE else SAFE
+    state["high"] = state["border_low"]
+    state["width"] = min(state["steady"], 0.2 * state["high"])
+    state["found"] = state["found"] or state["above"] == TOPPLES
+
+
+@within
+def next_low(m: March) -> float:
+    """Choose the lower end of the next interval."""
+    state, settings = m.state, m.settings
+    high, border_high = state["high"], state["border_high"]
+    least = max(settings.depth * high, settings.least)
+    low: float = max(high - state["width"], settings.bottom)
+    # no sliver is left above the bottom
+    if low < settings.bottom + 0.1 * least:
+        low = settings.bottom
+    if low < border_high < high:
+        # towards a border a part of the way is tried: all of it at once seldom works
+        low = border_high
+        if high - low > 3.0 * least:
+            low = high - state["part"] * (high - low)
+    return low
+
+
+@within
+def renew_coarse(excitation: BlockExcitation, m: March, low: float, work: np.void) -> None:
+    """Begin the coarse table anew where its k_r, or what D was checked for, is passed."""
+    settings = m.settings
+    high = m.state["high"]
+    about = m.coarse.about
+    if low < about["kr"] or (settings.check and high > about["kr_other"]):
+        add_work(m.coarse, work)
+        # some way below the interval, so that the table holds for the next ones, too
+        kr = max(settings.bottom, low - 0.5 * (high - low) - 0.1 * high)
+        other = high * (1.0 + settings.margin)
+        n = excitation.q.size
+        begin(m.coarse, kr, settings.margin, other, settings.check, 0, n)
+        # rest in the coarse table is rest in the fine one, of a greater k_r: that one begins there
+        m.fine.about["kr"] = math.inf
+        m.state["window"] = last_rest(excitation, m.coarse, 0, 0, 0).node
+
+
+@within
+def decision_on(excitation: BlockExcitation, m: March, low: float, work: np.void) -> Decision:
+    """Ask the rules about the next interval, by the table whose k_r is nearest below."""
+    settings = m.settings
+    fine = low >= m.fine.about["kr"]
+    return decide(
+        excitation, low, m.state["high"], settings.margin, settings.check,
+        m.fine if fine else m.coarse, m.state["window"] if fine else 0, work,
+    )  # fmt: skip
+
+
+@within
+def refined(excitation: BlockExcitation, m: March, low: float, work: np.void) -> bool:
+    """Make the fine table anew, nearer to an interval that got no verdict, if that may help."""
+    state, settings = m.state, m.settings
+    width = state["high"] - low
+    coarse_kr = m.coarse.about["kr"]
+    kr = m.fine.about["kr"] if low >= m.fine.about["kr"] else coarse_kr
+    # as near as the interval is wide, the table is not what stands in the way
+    if low - kr <= state["patience"] * width:
+        return False
+    add_work(m.fine, work)
+    window = state["window"]
+    begin(
+        m.fine, max(low - 0.5 * width, coarse_kr), settings.margin, m.coarse.about["kr_other"],
+        settings.check, window, excitation.q.size,
+    )  # fmt: skip
+    renewal = last_rest(excitation, m.fine, window, window, window)
+    gained = renewal.node != state["fine_rest"] or renewal.failing != state["fine_failing"]
+    # a table that taught nothing is not made again soon
+    state["patience"] = 2.0 if gained else state["patience"] * 8.0
+    state["fine_rest"] = renewal.node
+    state["fine_failing"] = renewal.failing
+    return True
+
+
+@within
+def border_between(excitation: BlockExcitation, m: March, low: float, work: np.void) -> bool:
+    """Look whether a border is why there is no verdict; verdicts can go as far as that."""
+    state, settings = m.state, m.settings
+    high = state["high"]
+    if low <= state["border_high"] < high:
+        return False  # it is known
+    # it is there if the block at the lower end does otherwise than those above
+    distance = follow(excitation, low, state["window"], m.coarse, work)
+    if (distance > 0.0) != (state["above"] == SAFE):
+        return False
+    width = max(BORDER, 0.1 * settings.least / high)
+    point, border_high = border(
+        excitation, low, distance, high, width, state["window"], m.coarse, work
+    )
+    # the bounding trajectories of both sides are clear of it by their margins
+    least = max(settings.depth * high, settings.least)
+    clear = max(0.25 * least, 2.0 * settings.margin * high)
+    state["border_point"] = point
+    state["border_low"] = max(point - clear, low)
+    state["border_high"] = min(border_high + clear, high)
+    state["width"] = high - state["border_high"]
+    state["part"] = 0.6
+    return True
+
+
+@within
+def widen(m: March, low: float) -> None:
+    """Choose the width after a verdict."""
+    state = m.state
+    # soon after a width that was too much the next one is tried with care
+    factor = 1.3 if state["halved"] else 2.0
+    state["width"] = min(factor * (state["high"] - low), 0.2 * low)
+    state["halved"] = False
+    state["part"] = min(1.3 * state["part"], 0.9)
+    if not (state["border_high"] < state["high"]):
+        state["steady"] = state["width"]
+
+
+@within
+def leave_open(
+    excitation: BlockExcitation, m: March, low: float, verdict: int, work: np.void
+) -> None:
+    """Leave an interval undecided that is as narrow as one may be."""
+    state = m.state
+    state["width"] = state["high"] - low
+    point = math.nan
+    # a single block may topple even so, and is then the answer
+    if not state["found"] and follow(excitation, low, state["window"], m.coarse, work) > 0.0:
+        point = low
+    record(m, low, ORDERLESS if verdict == NO_ORDER else UNKNOWN, point)
+
+
+@within
+def record(m: March, low: float, verdict: int, point: float) -> None:
+    """Write down what is known of the next interval, and pass it."""
+    state = m.state
+    count = state["count"]
+    high = state["high"]
+    # neighbours with one verdict are one interval; what is undecided keeps its own point
+    if count > 0 and m.intervals[count - 1]["verdict"] == verdict and verdict != UNKNOWN:
+        m.intervals[count - 1]["low"] = low
+    else:
+        row = m.intervals[count]
+        row["high"] = high
+        row["low"] = low
+        row["verdict"] = verdict
+        row["point"] = point
+        state["count"] = count + 1
+    if verdict == TOPPLES:
+        state["island"] += high - low
+        state["above"] = TOPPLES
+    elif verdict == SAFE:
+        state["island"] = 0.0
+        state["above"] = SAFE
+    state["found"] = state["found"] or verdict == TOPPLES or not math.isnan(point)
+    state["high"] = low

@@ -13,16 +13,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from functools import cache
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
-from rbfrag.solver.integrator.one_freedom.follow import Course, follow
+from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, follow
 from rbfrag.solver.kind import PLANES
 from rbfrag.solver.mechanism import MechanismKind, ShakenMechanism, shaken_mechanism
 from rbfrag.solver.quantity import number, positive
@@ -74,7 +74,7 @@ class ScaledRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class ScaleSearch:
     """What the search found of one record and block, before it is put in terms of k/PGA.
 
     Args:
@@ -142,6 +142,7 @@ class Found:
                 else:
                     rows.append((k, k, word))
             before = run
+        # a run alone says nothing of its neighbourhood
         rows = [row for row in rows if row[1] > row[0]]
         return OutcomeIntervals(
             k_lo=np.array([row[0] for row in rows], dtype=np.float64),
@@ -184,106 +185,105 @@ class ScaledKind(MechanismKind):
                     f"{name} is missing: shape, friction and dip of a block decide about "
                     f"{self.kind}"
                 )
-        (found,) = critical_scales(
-            motion,
-            options.pop("block"),
-            kind=self.kind,
-            rotations_deg=[rotation_deg],
-            vertical=vertical,
-            polarity=polarity,
-            search_limit=search_limit,
-            **options,
+        rules = scan_rules(
+            search_limit,
+            options.pop("scan_ratio", SCAN_RATIO),
+            options.pop("bracket", BRACKET),
         )
-        return found
+        shaken = shaken_mechanism(options.pop("block"), kind=self.kind, **options)
+        (result,) = critical_scales(
+            motion, shaken, [rotation_deg], rules, vertical=vertical, polarity=polarity
+        )
+        return result
 
 
-def critical_scales(
-    motion: GroundMotion,
-    block: Block,
-    *,
-    kind: str,
-    rotations_deg: Sequence[float | None],
-    beta_deg: float,
-    phi_deg: float,
-    phi_back_deg: float | None = None,
-    vertical: GroundMotion | None = None,
-    polarity: Polarity = "forward",
-    search_limit: float = SEARCH_LIMIT,
-    scan_ratio: float = SCAN_RATIO,
-    bracket: float = BRACKET,
-) -> tuple[CriticalResult, ...]:
-    """Return the smallest factors on a record that turn a block so far; they share their runs.
+class ScanRules(NamedTuple):
+    """How far and how finely the scales are looked at.
 
     Args:
-        motion: horizontal ground motion.
-        block: shape and size.
-        kind: name of the model; the block's mode must be its.
-        rotations_deg: peak rotations that count as failure [deg]; None among them for failure
-            past recovery.
-        beta_deg: dip of the base, out of the slope positive [deg].
-        phi_deg: friction angle of the base [deg].
-        phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
-        vertical: vertical motion of the same recording, upward positive; scaled with the
-            horizontal one.
-        polarity: ``forward`` or ``reverse``.
-        search_limit: least k/PGA that is looked at.
-        scan_ratio: ratio of two scales that are looked at one after the other, above 1; beyond
-            the answer its square.
-        bracket: width of the bracket over the scale.
+        search_limit: least k/PGA that is looked at: the greatest scale.
+        ratio: ratio of two scales that are looked at one after the other, above 1; beyond the
+            answer its square.
+        bracket: width of the bracket of the critical scale, over the scale.
+    """
+
+    search_limit: float
+    ratio: float
+    bracket: float
+
+
+def scan_rules(search_limit: float, scan_ratio: float, bracket: float) -> ScanRules:
+    """Return the rules of a search.
 
     Raises:
-        InputError: a value outside its range, a block of another mode, or one that no earthquake
-            decides about.
+        InputError: a value outside its range.
     """
     limit = positive(search_limit, "search_limit", "k/PGA")
     ratio = number(scan_ratio, "scan_ratio", "a ratio above 1")
     if not ratio > 1.0:
         raise InputError(f"scan_ratio = {ratio:g} is not above 1: give a ratio such as 1.05")
-    width = positive(bracket, "bracket", "a width over the scale")
-    shaken = shaken_mechanism(
-        block, kind=kind, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_back_deg
-    )
+    return ScanRules(limit, ratio, positive(bracket, "bracket", "a width over the scale"))
+
+
+def critical_scales(
+    motion: GroundMotion,
+    shaken: ShakenMechanism,
+    rotations_deg: Sequence[float | None],
+    rules: ScanRules,
+    *,
+    vertical: GroundMotion | None = None,
+    polarity: Polarity = "forward",
+) -> tuple[CriticalResult, ...]:
+    """Return the smallest factors on a record that turn a block so far; they share their runs.
+
+    Args:
+        motion: horizontal ground motion.
+        shaken: the block.
+        rotations_deg: peak rotations that count as failure [deg]; None among them for failure
+            past recovery.
+        rules: how far and how finely the scales are looked at.
+        vertical: vertical motion of the same recording, upward positive; scaled with the
+            horizontal one.
+        polarity: ``forward`` or ``reverse``.
+
+    Raises:
+        InputError: a rotation outside its range.
+    """
     failures_rad = [rotation_rad(rotation_deg, shaken) for rotation_deg in rotations_deg]
-    drive = excitation(motion, vertical, polarity)
-    remarks = (*shaken.remarks, *motion_remarks(motion, vertical, drive))
-    courses: dict[float, Course] = {}
-
-    def runner(fails_rad: float) -> Callable[[float], ScaledRun]:
-        def run(scale: float) -> ScaledRun:
-            if scale not in courses:
-                courses[scale] = follow(shaken.mechanism, drive.scaled(scale))
-            return judged(courses[scale], scale, fails_rad)
-
-        return run
-
+    excited = excitation(motion, vertical, polarity)
+    remarks = (*shaken.remarks, *motion_remarks(motion, vertical, excited))
+    pga_g = excited.pga_g
+    scale_limit = shaken.yield_g / (rules.search_limit * pga_g) if pga_g > 0.0 else math.inf
+    starts = first_motion(excited, shaken.yield_g)
+    # the answers differ in the rotation that counts as failure, not in the motion of the block
+    run_at = cache(lambda scale: follow(shaken.mechanism, excited.scaled(scale)))
     answers = []
     for rotation_deg, fails_rad in zip(rotations_deg, failures_rad, strict=True):
-        found = Found(
-            rotation_deg=rotation_deg,
-            pga_g=drive.pga_g,
-            yield_g=shaken.yield_g,
-            starts=first_motion(drive, shaken.yield_g),
-            scale_limit=shaken.yield_g / (limit * drive.pga_g) if drive.pga_g > 0.0 else math.inf,
-        )
-        if found.starts is None or found.starts >= found.scale_limit:
-            found = replace(found, certified=True)
+
+        def run(scale: float, fails_rad: float = fails_rad) -> ScaledRun:
+            return scaled_run(run_at(scale), scale, fails_rad)
+
+        start = ScaleSearch(rotation_deg, pga_g, shaken.yield_g, starts, scale_limit)
+        if starts is None or starts >= scale_limit:
+            # nothing moves below the limit: the closed form of the first motion is the proof
+            result = replace(start, certified=True)
         else:
-            found = _search(found, runner(fails_rad), ratio, width)
-        answers.append(_answer(found, shaken, polarity, remarks))
+            result = _search(start, run, rules)
+        answers.append(_answer(result, shaken, polarity, remarks))
     return tuple(answers)
 
 
-def first_motion(drive: Excitation, yield_g: float) -> float | None:
+def first_motion(excited: Excitation, yield_g: float) -> float | None:
     """Return the least factor on an excitation at which a block of that yield moves.
 
     The block moves where s k_h > (1 + s k_v) k, that is s > k/(k_h - k k_v); between two nodes the
     denominator is linear, so that its greatest value is at a node.
 
     Args:
-        drive: the excitation, both components scaled together.
+        excited: the excitation, both components scaled together.
         yield_g: yield acceleration where 1 + k_v = 1 [g].
     """
-    most = float(np.max(drive.k_h - yield_g * (drive.w - 1.0)))
+    most = float(np.max(excited.k_h - yield_g * (excited.w - 1.0)))
     return yield_g / most if most > 0.0 else None
 
 
@@ -314,25 +314,24 @@ def critical_rad(shaken: ShakenMechanism) -> float:
     return highest if math.isfinite(highest) else 0.5 * math.pi
 
 
-def judged(course: Course, scale: float, fails_rad: float) -> ScaledRun:
+def scaled_run(run: MechanismRun, scale: float, fails_rad: float) -> ScaledRun:
     """Return a run with its verdict: whether it reaches the rotation that counts as failure."""
-    return ScaledRun(
-        scale, course.peak, course.outcome, _verdict(course, fails_rad), _ending(course)
-    )
+    return ScaledRun(scale, run.peak, run.outcome, _verdict(run, fails_rad), _ending(run))
 
 
-def _verdict(course: Course, fails_rad: float) -> Verdict:
-    if course.outcome is Outcome.TOPPLED or course.peak - course.error >= fails_rad:
+def _verdict(run: MechanismRun, fails_rad: float) -> Verdict:
+    # a rotation that was reached counts, whatever ended the model afterwards
+    if run.outcome is Outcome.TOPPLED or run.peak - run.error >= fails_rad:
         return "fails"
-    if course.outcome is Outcome.UNDETERMINED or course.peak + course.error >= fails_rad:
+    if run.outcome is Outcome.UNDETERMINED or run.peak + run.error >= fails_rad:
         return "undecided"
-    return "safe" if course.outcome is Outcome.STABLE else "outside"
+    return "safe" if run.outcome is Outcome.STABLE else "outside"
 
 
-def _ending(course: Course) -> str:
-    if course.outcome in (Outcome.STABLE, Outcome.TOPPLED):
+def _ending(run: MechanismRun) -> str:
+    if run.outcome in (Outcome.STABLE, Outcome.TOPPLED):
         return ""
-    return course.sentences[-1] if course.sentences else course.outcome.advice
+    return run.sentences[-1] if run.sentences else run.outcome.advice
 
 
 def grid_points(ratios: FloatArray, runs: Sequence[ScaledRun], critical_rad: float) -> SearchPoints:
@@ -349,23 +348,46 @@ def grid_points(ratios: FloatArray, runs: Sequence[ScaledRun], critical_rad: flo
     )
 
 
-def _search(nothing: Found, run: Callable[[float], ScaledRun], ratio: float, width: float) -> Found:
+def _search(start: ScaleSearch, run: Callable[[float], ScaledRun], rules: ScanRules) -> ScaleSearch:
     """Scan upward, close in on the first scale that is not safe, and look further."""
-    assert nothing.starts is not None
+    assert start.starts is not None
+    limit = start.scale_limit
+    runs, safe = _scan(run, start.starts, limit, rules.ratio)
+    if runs[-1].verdict == "safe":
+        return _result(start, runs, None, limit)
+    more, safe = _close_in(run, safe, runs[-1], rules.bracket)
+    runs += more
+    # closing in may have met a lower scale of another verdict than the one it began with
+    first = min((each for each in runs if each.verdict != "safe"), key=lambda each: each.scale)
+    if first.verdict != "fails":  # the model ends before the block fails, or it is too close
+        return _result(start, runs, None, safe, first.sentence or first.outcome.advice)
+    runs += _look_beyond(run, first.scale, limit, rules.ratio)
+    return _result(start, runs, (safe, first.scale), limit)
+
+
+def _scan(
+    run: Callable[[float], ScaledRun], starts: float, limit: float, ratio: float
+) -> tuple[list[ScaledRun], float]:
+    """Go up from the scale of the first motion; return the runs and the last safe scale."""
     runs: list[ScaledRun] = []
-    safe, limit = nothing.starts, nothing.scale_limit
-    first: ScaledRun | None = None
-    while first is None and safe < limit:
-        scale = min(safe * ratio, limit)
-        runs.append(run(scale))
-        if runs[-1].verdict == "safe":
-            safe = scale
-        else:
-            first = runs[-1]
-    if first is None:
-        return _result(nothing, runs, None, limit, "")
+    safe = starts
+    while safe < limit:
+        runs.append(run(min(safe * ratio, limit)))
+        if runs[-1].verdict != "safe":
+            break
+        safe = runs[-1].scale
+    return runs, safe
+
+
+def _close_in(
+    run: Callable[[float], ScaledRun], safe: float, first: ScaledRun, width: float
+) -> tuple[list[ScaledRun], float]:
+    """Halve the bracket between a safe scale and one that is not; return the runs and the safe
+    end. Whatever is not safe is its upper end, whether it fails or not."""
+    runs: list[ScaledRun] = []
     while first.scale - safe > width * first.scale:
         middle = 0.5 * (safe + first.scale)
+        # neighbouring floating-point numbers have no middle
         if not safe < middle < first.scale:
             break
         runs.append(run(middle))
@@ -373,26 +395,32 @@ def _search(nothing: Found, run: Callable[[float], ScaledRun], ratio: float, wid
             safe = middle
         else:
             first = runs[-1]
-    if first.verdict == "fails":
-        scale = first.scale
-        while scale < limit:
-            scale = min(scale * ratio * ratio, limit)
-            runs.append(run(scale))
-            if runs[-1].verdict == "outside":
-                break
-        return _result(nothing, runs, (safe, first.scale), limit, "")
-    return _result(nothing, runs, None, safe, first.sentence or first.outcome.advice)
+    return runs, safe
+
+
+def _look_beyond(
+    run: Callable[[float], ScaledRun], scale: float, limit: float, ratio: float
+) -> list[ScaledRun]:
+    """Look at stronger records, in steps twice as wide: does one spare the block?"""
+    runs: list[ScaledRun] = []
+    while scale < limit:
+        scale = min(scale * ratio * ratio, limit)
+        runs.append(run(scale))
+        # where the model has ended, a yet stronger record ends it too
+        if runs[-1].verdict == "outside":
+            break
+    return runs
 
 
 def _result(
-    nothing: Found,
+    start: ScaleSearch,
     runs: list[ScaledRun],
-    found: tuple[float, float] | None,
+    bracket: tuple[float, float] | None,
     limit: float,
-    ended: str,
-) -> Found:
+    ended: str = "",
+) -> ScaleSearch:
     runs = sorted(runs, key=lambda each: each.scale)
-    warnings = list(nothing.warnings)
+    warnings = list(start.warnings)
     if ended:
         warnings.append(
             f"beyond {limit:.6g} times the record the model has no answer ({ended}): whether the "
@@ -400,62 +428,60 @@ def _result(
         )
     if any(each.verdict == "undecided" for each in runs):
         warnings.append("some runs end closer to failure than their error: they count as not safe")
-    reentrant = found is not None and any(
-        each.verdict == "safe" and each.scale > found[1] for each in runs
-    )
+    lower, scale = bracket or (None, None)
     return replace(
-        nothing,
-        status="below_limit" if found is None else "found",
-        scale=None if found is None else found[1],
-        lower=None if found is None else found[0],
+        start,
+        status="below_limit" if bracket is None else "found",
+        scale=scale,
+        lower=lower,
         scale_limit=limit,
         ended=ended,
-        reentrant=reentrant,
+        reentrant=scale is not None
+        and any(each.verdict == "safe" and each.scale > scale for each in runs),
         runs=tuple(runs),
         warnings=tuple(warnings),
     )
 
 
 def _answer(
-    found: Found, shaken: ShakenMechanism, polarity: Polarity, remarks: tuple[str, ...]
+    search: ScaleSearch, shaken: ShakenMechanism, polarity: Polarity, remarks: tuple[str, ...]
 ) -> CriticalResult:
-    k = None if found.scale is None else found.k_over_pga(found.scale)
-    kr = None if k is None else k * found.pga_g
+    k = None if search.scale is None else search.k_over_pga(search.scale)
+    kr = None if k is None else k * search.pga_g
     critical = critical_rad(shaken)
     return CriticalResult(
         kind=shaken.kind,
         p2=shaken.p2,
         polarity=polarity,
-        linear=False,
-        pga_g=found.pga_g,
-        status=found.status,
-        search_limit=found.k_over_pga(found.scale_limit) if found.pga_g > 0.0 else SEARCH_LIMIT,
+        pga_g=search.pga_g,
+        status=search.status,
+        search_limit=search.k_over_pga(search.scale_limit) if search.pga_g > 0.0 else SEARCH_LIMIT,
         kr_over_pga=k,
         lower=k,
-        upper=None if found.lower is None else found.k_over_pga(found.lower),
+        upper=None if search.lower is None else search.k_over_pga(search.lower),
         kr=kr,
         y_m_s=None if kr is None else kr * STANDARD_GRAVITY_M_S2 / math.sqrt(shaken.p2),
-        certified=found.certified,
-        k_up_over_pga=None if found.starts is None else found.k_over_pga(found.starts),
+        certified=search.certified,
+        k_up_over_pga=None if search.starts is None else search.k_over_pga(search.starts),
         undecided=None,
         island_width=None,
         kr_over_pga_resolved=None,
-        reentrant=found.reentrant,
-        n_runs=len(found.runs),
-        warnings=(*remarks, *found.warnings),
-        points=found.points(critical),
-        intervals=found.intervals(),
+        reentrant=search.reentrant,
+        n_runs=len(search.runs),
+        warnings=(*remarks, *search.warnings),
+        points=search.points(critical),
+        intervals=search.intervals(),
         of_kind={
-            "rotation_deg": found.rotation_deg,
-            "scale": found.scale,
-            "lower_scale": found.lower,
-            "starts_scale": found.starts,
-            "scale_limit": found.scale_limit,
+            "rotation_deg": search.rotation_deg,
+            "scale": search.scale,
+            "lower_scale": search.lower,
+            "starts_scale": search.starts,
+            "scale_limit": search.scale_limit,
             "yield_name": shaken.yield_name,
             "yield_g": shaken.yield_g,
             "leaves_g": shaken.leaves_g,
             "critical_rotation_rad": critical,
-            "ended": found.ended,
-            "runs": found.runs,
+            "ended": search.ended,
+            "runs": search.runs,
         },
     )

@@ -185,14 +185,14 @@ def stability_arrays(
     inputs += [arrays[name] for name in given]
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         in_chunks(formula, inputs, (codes[0], codes[1], k, ky, p2, codes[2]))
-    found = StabilityArray(codes[0], codes[1], k, ky, p2, codes[2])
-    if nan == "raise" and found.reason_code.any():
-        first = np.flatnonzero(found.reason_code.ravel())[0]
+    result = StabilityArray(codes[0], codes[1], k, ky, p2, codes[2])
+    if nan == "raise" and result.reason_code.any():
+        first = np.flatnonzero(result.reason_code.ravel())[0]
         place = tuple(int(i) for i in np.unravel_index(first, shape))
         raise InputError(
             f"element {place[0] if len(place) == 1 else place}: {REASONS[codes[2][place]]}"
         )
-    return found
+    return result
 
 
 def _tangent(angle_deg: Any) -> Any:
@@ -212,11 +212,11 @@ def _direction(
         if not here.any():
             continue
         if code == SLUMP:
-            found = slump(t1, -1.0, -t3, 1.0, cot, mu1, mu2)
+            mechanism = slump(t1, -1.0, -t3, 1.0, cot, mu1, mu2)
         else:
-            found = confined_topple(t3, -1.0, t1, -1.0, cot, mu1, mu2)
-        sine = np.where(here, found[0], sine)
-        cosine = np.where(here, found[1], cosine)
+            mechanism = confined_topple(t3, -1.0, t1, -1.0, cot, mu1, mu2)
+        sine = np.where(here, mechanism[0], sine)
+        cosine = np.where(here, mechanism[1], cosine)
     return sine, cosine
 
 

@@ -79,7 +79,7 @@ def margins(block: Block, around: Surroundings) -> tuple[Margin, ...]:
     normal3 = [-a1] if block.is_parallelogram and around.back_fracture else []
     beta = [] if around.back_fracture else [around.beta_deg]
 
-    found = [
+    result = [
         *_both_ways("alpha1", a1, [limit, *normal1, *beta], -90.0, a3, now,
                     lambda value: mode(value, a3, limit)),
         *_both_ways("alpha3", a3, [limit, *normal3], a1, 90.0, now,
@@ -93,8 +93,8 @@ def margins(block: Block, around: Surroundings) -> tuple[Margin, ...]:
             return mode(a1, a3, -91.0)
         return mode(a1, a3, 0.5 * (a1 + a3) if phi_deg < phi3 else 91.0)
 
-    found += _both_ways("phi", around.phi_deg, [phi1, phi3], 0.0, 90.0, now, mode_at_phi)
-    return tuple(sorted(found, key=lambda margin: abs(margin.change_deg)))
+    result += _both_ways("phi", around.phi_deg, [phi1, phi3], 0.0, 90.0, now, mode_at_phi)
+    return tuple(sorted(result, key=lambda margin: abs(margin.change_deg)))
 
 
 def _both_ways(
@@ -106,7 +106,7 @@ def _both_ways(
     now: int,
     mode: Callable[[float], int],
 ) -> list[Margin]:
-    found = []
+    result = []
     inside = [edge for edge in edges if low <= edge < high]
     up = [*sorted(edge for edge in inside if edge >= value), high]
     down = [*sorted((edge for edge in inside if edge <= value), reverse=True), low]
@@ -116,9 +116,9 @@ def _both_ways(
                 continue
             there = mode(0.5 * (edge + after))
             if there != now:
-                found.append(Margin(variable, edge - value, MODES[there]))
+                result.append(Margin(variable, edge - value, MODES[there]))
                 break
-    return found
+    return result
 
 
 def degrees_of(tangent: float) -> float:
@@ -157,61 +157,64 @@ class Finding:
     lifts: bool
 
 
-def warnings_about(block: Block, found: Finding) -> tuple[str, ...]:
+def warnings_about(block: Block, finding: Finding) -> tuple[str, ...]:
     """Return one sentence for everything that the answer takes for granted."""
-    return tuple(_sentences(block, found))
+    return tuple(_sentences(block, finding))
 
 
-def _sentences(block: Block, found: Finding) -> Iterator[str]:
-    if abs(found.k) <= AT_LIMIT:
+def _sentences(block: Block, finding: Finding) -> Iterator[str]:
+    if abs(finding.k) <= AT_LIMIT:
         yield "the block is stable at its limit: its yield acceleration is zero to rounding"
-    if found.backward:
+    if finding.backward:
         yield (
             f"nothing supports the block from behind and its weight passes upslope of the heel "
-            f"(beta = {found.beta_deg:.6g} is below alpha1 = {block.alpha1_deg:.6g} degrees): it "
+            f"(beta = {finding.beta_deg:.6g} is below alpha1 = {block.alpha1_deg:.6g} degrees): it "
             "turns back about the heel at rest"
         )
-    elif found.untenable:
+    elif finding.untenable:
         yield "the reaction at the back contact cannot hold the block, which turns back at rest"
-    elif found.state == "unstable":
+    elif finding.state == "unstable":
         yield "the block fails at rest: its yield acceleration is negative"
-    if found.state == "locked":
+    if finding.state == "locked":
         yield "the block is wedged: no horizontal acceleration moves it in this mode"
-    if found.lifts:
+    if finding.lifts:
         yield (
             "the bond of the base is so strong that the toe lifts off before it slides: the "
             "acceleration given is an upper bound"
         )
-    if found.back_fracture:
-        yield from _about_back_plane(block, found)
+    if finding.back_fracture:
+        yield from _about_back_plane(block, finding)
 
 
-def _about_back_plane(block: Block, found: Finding) -> Iterator[str]:
-    corner = block.gamma_deg + found.phi_deg + found.phi_back_deg
-    if found.mode in ("slide", "confined_topple") and corner > 180.0:
+def _about_back_plane(block: Block, finding: Finding) -> Iterator[str]:
+    corner = block.gamma_deg + finding.phi_deg + finding.phi_back_deg
+    if finding.mode in ("slide", "confined_topple") and corner > 180.0:
         yield (
             f"gamma + phi + phi_back = {corner:.6g} degrees exceeds 180: a heel wedged between the "
             "planes could hold the block at any acceleration; the answer takes the back plane to "
             "be free of pre-stress"
         )
-    if found.mode == "topple" and block.gamma_deg + found.phi_back_deg > 90.0:
+    if finding.mode == "topple" and block.gamma_deg + finding.phi_back_deg > 90.0:
         yield (
             "friction on the back plane could hold the heel back above k_r; the answer takes the "
             "back plane to be free of pre-stress"
         )
-    if found.mode == "slide" and found.beta_deg < block.alpha1_deg:
+    if finding.mode == "slide" and finding.beta_deg < block.alpha1_deg:
         yield (
             "at rest the block leans on the back plane (beta is below alpha1): after sliding it "
             "falls back, its angles grow, and it may become a slump"
         )
-    if found.mode in ("slide", "slump") and found.phi_back_deg > found.phi_deg + block.gamma_deg:
+    if (
+        finding.mode in ("slide", "slump")
+        and finding.phi_back_deg > finding.phi_deg + block.gamma_deg
+    ):
         yield (
-            f"phi_back = {found.phi_back_deg:.6g} degrees exceeds phi + gamma: friction on a back "
-            "plane so much rougher than the base could hold the block beyond this acceleration"
+            f"phi_back = {finding.phi_back_deg:.6g} degrees exceeds phi + gamma: friction on a "
+            "back plane so much rougher than the base could hold the block beyond this acceleration"
         )
-    dip = math.fmod(block.gamma_deg + found.beta_deg, 180.0)
+    dip = math.fmod(block.gamma_deg + finding.beta_deg, 180.0)
     steepness = min(abs(dip), 180.0 - abs(dip))
-    if steepness < abs(found.beta_deg):
+    if steepness < abs(finding.beta_deg):
         yield (
             f"the back plane dips {steepness:.6g} degrees, less than the base: the base must be "
             "the set nearer to horizontal"

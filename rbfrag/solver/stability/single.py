@@ -307,20 +307,20 @@ def level_rectangle(p2: float, kr: float) -> tuple[Block, Stability]:
     return block, stability(block, beta_deg=0.0, phi_deg=rough_deg, back_fracture=False)
 
 
-def stability_as_dict(block: Block, found: Stability) -> dict[str, Any]:
+def stability_as_dict(block: Block, stability: Stability) -> dict[str, Any]:
     """Return the answer with the keys of the JSON contract.
 
     A yield acceleration that no number expresses is None; the state says why.
     """
     answer: dict[str, Any] = {
-        "mode": found.mode,
-        "state": found.state,
+        "mode": stability.mode,
+        "state": stability.state,
         "p2": block.p2,
-        "kr": _finite(found.kr),
-        "ky": _finite(found.ky),
-        "ks": _finite(found.ks),
-        "kct": _finite(found.kct),
-        "yield_acceleration": _finite(found.yield_acceleration),
+        "kr": _finite(stability.kr),
+        "ky": _finite(stability.ky),
+        "ks": _finite(stability.ks),
+        "kct": _finite(stability.kct),
+        "yield_acceleration": _finite(stability.yield_acceleration),
         "alpha1_deg": block.alpha1_deg,
         "alpha3_deg": block.alpha3_deg,
         "gamma_deg": block.gamma_deg,
@@ -331,20 +331,20 @@ def stability_as_dict(block: Block, found: Stability) -> dict[str, Any]:
         "s2_m": block.s2_m,
         "area_m2": block.area_m2,
         "shape_factor": block.shape_factor,
-        "delta_deg": found.delta_deg,
+        "delta_deg": stability.delta_deg,
         "margins": [
             {"variable": m.variable, "change_deg": m.change_deg, "mode": m.mode}
-            for m in found.margins
+            for m in stability.margins
         ],
         "cohesion": None,
-        "warnings": list(found.warnings),
+        "warnings": list(stability.warnings),
     }
-    if found.cohesion is not None:
+    if stability.cohesion is not None:
         answer["cohesion"] = {
-            "ratio": found.cohesion.ratio,
-            "ky": _finite(found.cohesion.ky),
-            "phi_equivalent_deg": found.cohesion.phi_equivalent_deg,
-            "ky_equivalent": _finite(found.cohesion.ky_equivalent),
+            "ratio": stability.cohesion.ratio,
+            "ky": _finite(stability.cohesion.ky),
+            "phi_equivalent_deg": stability.cohesion.phi_equivalent_deg,
+            "ky_equivalent": _finite(stability.cohesion.ky_equivalent),
         }
     return answer
 

@@ -3,7 +3,7 @@ import pytest
 import statsmodels.api as sm
 
 from rbfrag.fragility.fit.line import (
-    FLOOR_SHARE,
+    FLOOR_FRACTION,
     TOLERANCE,
     Bins,
     clustered_line,
@@ -32,7 +32,7 @@ def test_own_line_equals_statsmodels(points):
 
 def test_clustered_covariance_equals_the_sandwich(points):
     x, y, weights, events = points
-    line, covariance, r_squared = clustered_line(x, y, weights, events)
+    line, covariance, naive_errors, r_squared = clustered_line(x, y, weights, events)
     design = np.column_stack([np.ones_like(x), x])
     bread = np.linalg.inv(design.T @ (weights[:, None] * design))
     beta = bread @ design.T @ (weights * y)
@@ -46,6 +46,8 @@ def test_clustered_covariance_equals_the_sandwich(points):
     sandwich = bread @ meat @ bread * groups / (groups - 1) * (n - 1) / (n - 2)
     assert line == pytest.approx(beta, rel=1e-10)
     assert covariance == pytest.approx(sandwich, rel=1e-8)
+    naive = np.sqrt(np.diag(bread) * (weights @ residuals**2) / (n - 2))
+    assert naive_errors == pytest.approx(naive, rel=1e-10)
     mean = weights @ y / weights.sum()
     share = 1 - weights @ residuals**2 / (weights @ (y - mean) ** 2)
     assert r_squared == pytest.approx(share, rel=1e-10)
@@ -107,7 +109,7 @@ def test_bootstrap_repeats_with_its_seed_and_sees_clusters():
             y[order],
             1.0 / (powers(x[order], 1) @ fit.parameters[2:]),
             events[order],
-        )[1]
+        ).covariance
         spread = draws[0].std(axis=0, ddof=1)
         assert spread[:2] == pytest.approx(np.sqrt(np.diag(clustered)), rel=0.35)
         spreads.append(spread[1])
@@ -142,7 +144,7 @@ def test_variance_stays_positive_where_a_free_fit_would_not():
     bins = Bins(x, np.arange(20) * 20)
     squared = 0.02 * (x - 0.04)  # a straight fit would be negative at zero
     result = fit_variance(bins, squared, np.ones(400), 1, None)
-    assert result[0] == pytest.approx(FLOOR_SHARE * squared.min() * 400 / 398, rel=1e-12)
+    assert result[0] == pytest.approx(FLOOR_FRACTION * squared.min() * 400 / 398, rel=1e-12)
     assert result[1] > 0.0
 
 

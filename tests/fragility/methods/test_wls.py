@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from rbfrag.fragility.methods import SINGLE
-from rbfrag.fragility.methods.wls import METHOD, mean_m_s, negative_share, rise, variance_m2_s2
+from rbfrag.fragility.methods.wls import (
+    METHOD,
+    mean_m_s,
+    negative_probability,
+    rise,
+    variance_m2_s2,
+)
 
 
 def score(parameters, x, y):
@@ -57,6 +63,6 @@ def test_rise_has_the_sign_of_the_slope_in_x(parameters):
         assert False in seen  # a line that starts well above zero falls for the weakest blocks
 
 
-def test_negative_share_is_the_mass_below_zero():
+def test_negative_probability_is_the_mass_below_zero():
     z, _ = score(CASES[0], 0.01, 0.0)
-    assert negative_share(CASES[0], 0.01, SINGLE) == pytest.approx(1.0 - SINGLE.ndtr(z))
+    assert negative_probability(CASES[0], 0.01, SINGLE) == pytest.approx(1.0 - SINGLE.ndtr(z))

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.block.polygon import polygon_properties
+from rbfrag.solver.stability.single import stability
 
 angles = st.tuples(
     st.floats(-85.0, 85.0), st.floats(-85.0, 85.0)
@@ -250,3 +251,29 @@ def test_a_polygon_has_no_mirror_image_of_its_own() -> None:
 
 def test_numpy_numbers_are_numbers() -> None:
     assert Block.from_angles(np.float64(-10.0), np.int64(20), np.float32(2.0)).alpha3_deg == 20.0
+
+
+@given(st.floats(0.05, 20.0), st.floats(0.05, 20.0))
+def test_a_rectangle_is_its_outline_and_the_closed_forms(height_m: float, width_m: float) -> None:
+    block = Block.rectangle(height_m, width_m)
+    corners = [(0.0, 0.0), (width_m, 0.0), (width_m, height_m), (0.0, height_m)]
+    outline = Block.from_polygon(corners, heel=0, back=3, toe=1, gamma_deg=90.0)
+    half_diagonal = math.hypot(height_m, width_m) / 2.0
+    assert block.r3_m == pytest.approx(half_diagonal, rel=1e-14)
+    assert block.p2 == pytest.approx(3.0 * 9.80665 / (4.0 * half_diagonal), rel=1e-13)
+    assert block.p2 == pytest.approx(outline.p2, rel=1e-11)
+    assert block.alpha3_deg == pytest.approx(math.degrees(math.atan2(width_m, height_m)), rel=1e-14)
+    assert (block.alpha1_deg, block.gamma_deg) == (-block.alpha3_deg, 90.0)
+    assert block.alpha3_deg == pytest.approx(outline.alpha3_deg, rel=1e-11)
+    assert (block.s1_m, block.base_m) == pytest.approx((height_m, width_m), rel=1e-14)
+    assert block.area_m2 == pytest.approx(height_m * width_m, rel=1e-13)
+    assert not block.confines
+    topples = stability(block, beta_deg=0.0, phi_deg=89.9)
+    if topples.mode == "topple":
+        assert topples.kr == pytest.approx(width_m / height_m, rel=1e-13)
+
+
+@pytest.mark.parametrize("sides", [(0.0, 1.0), (1.0, -1.0), (math.nan, 1.0), (1.0, math.inf)])
+def test_a_rectangle_has_sides_above_zero(sides: tuple[float, float]) -> None:
+    with pytest.raises(InputError, match=r"height_m|width_m"):
+        Block.rectangle(*sides)

@@ -16,19 +16,16 @@ from tests.solver.search.test_critical import shaking
 
 
 @pytest.mark.parametrize("with_vertical", [False, True])
-@pytest.mark.parametrize("linear", [False, True])
-def test_every_block_of_a_batch_has_the_numbers_of_its_single_run(
-    with_vertical: bool, linear: bool
-) -> None:
+def test_every_block_of_a_batch_has_the_numbers_of_its_single_run(with_vertical: bool) -> None:
     vertical = shaking(60, pga_g=0.4) if with_vertical else None
     drive = excitation(shaking(11), vertical, "reverse")
     kr = np.geomspace(0.02, 1.1 * drive.max_q, 23)
     p2 = np.array([30.0, 3.0, 0.1])[:, None]
-    runs = simulate_many(drive, p2=p2, kr=kr, linear=linear)
+    runs = simulate_many(drive, p2=p2, kr=kr)
     outcomes = set()
     for i in range(3):
         for j in range(23):
-            alone = simulate(drive, p2=float(p2[i, 0]), kr=float(kr[j]), linear=linear)
+            alone = simulate(drive, p2=float(p2[i, 0]), kr=float(kr[j]))
             here = (
                 runs.outcome[i, j], runs.peak_rad[i, j], runs.started_s[i, j],
                 runs.verdict_s[i, j], runs.error_rad[i, j], runs.steps[i, j],
@@ -37,8 +34,7 @@ def test_every_block_of_a_batch_has_the_numbers_of_its_single_run(
             np.testing.assert_array_equal(np.array(here), np.array(alone[:7]))
             outcomes.add(alone.outcome)
     assert len(outcomes) > 1
-    theta_c = kr if linear else np.arctan(kr)
-    np.testing.assert_array_equal(runs.theta_n, runs.peak_rad / theta_c)
+    np.testing.assert_array_equal(runs.theta_n, runs.peak_rad / np.arctan(kr))
 
 
 def test_a_batch_does_not_depend_on_its_company_or_order() -> None:

@@ -26,7 +26,7 @@ from rbfrag.solver.integrator.one_freedom.equation import (
     Phase,
     Pose,
 )
-from rbfrag.solver.integrator.one_freedom.follow import Course, follow
+from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, follow
 from rbfrag.solver.integrator.one_freedom.harmonics import constant, cosine, sine, turning
 from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
 from rbfrag.solver.integrator.one_freedom.step import TURN_MAX
@@ -139,14 +139,14 @@ def test_the_error_estimate_covers_the_error(name: str, seed: int) -> None:
 def test_the_history_changes_nothing() -> None:
     drive = excitation(record(1, 0.8))
     for mechanism in (*MECHANISMS.values(), TWO_WAY):
-        with_history = follow(mechanism, drive, travel=True)
+        with_history = follow(mechanism, drive, history=True)
         without = follow(mechanism, drive)
-        assert with_history.travel is not None
-        assert replace_travel(with_history) == replace_travel(without)
+        assert with_history.history is not None
+        assert without_history(with_history) == without_history(without)
 
 
-def replace_travel(course: Course) -> list[object]:
-    plain = replace(course, travel=None)
+def without_history(run: MechanismRun) -> list[object]:
+    plain = replace(run, history=None)
     return [getattr(plain, name) for name in plain.__dataclass_fields__]
 
 
@@ -180,10 +180,10 @@ def test_limits_and_contacts_are_met_in_the_same_place_by_long_and_short_steps()
     # an equation that is the same everywhere, and one that is all but the same
     drive = excitation(record(3, 0.8))
 
-    def run(wobble: float, highest: float, lift: float) -> Course:
+    def run(wobble: float, highest: float, lift: float) -> MechanismRun:
         equation = Equation(
             inertia=constant(1.0),
-            drive=constant(9.0) + cosine() * wobble,
+            driving=constant(9.0) + cosine() * wobble,
             resistance=constant(1.5),
             conditions=(
                 Condition(constant(-lift), constant(0.3), constant(-0.004),
@@ -260,7 +260,7 @@ def test_painleve() -> None:
 
 def test_an_end_nearer_to_the_limit_than_the_error_is_open() -> None:
     # a pulse and a limit that the block reaches but for rounding, a little more, a little less
-    equation = Equation(inertia=constant(1.0), drive=constant(3.0), resistance=constant(0.7))
+    equation = Equation(inertia=constant(1.0), driving=constant(3.0), resistance=constant(0.7))
     drive = excitation(
         GroundMotion.from_nodes([0.0, 0.0, 0.3, 0.3, 9.0], [0.0, 0.6, 0.6, 0.0, 0.0])
     )
@@ -290,7 +290,7 @@ from rbfrag.solver.results import Outcome
 
 
 def mechanism(site):
-    equation = Equation(inertia=constant(2.0), drive=constant(9.80665), resistance=constant(0.5))
+    equation = Equation(inertia=constant(2.0), driving=constant(9.80665), resistance=constant(0.5))
     return Mechanism(
         first=Phase("moves", equation, lambda x: Pose(0.0, (x, 0.0), x),
                     lambda exit: Ending(Outcome.TOPPLED, "it has left the belt"), highest=0.01),
@@ -331,7 +331,7 @@ def test_a_fifth_model_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_equations_that_are_the_same_everywhere_are_solved_exactly() -> None:
-    equation = Equation(inertia=constant(1.0), drive=constant(2.0), resistance=constant(1.0))
+    equation = Equation(inertia=constant(1.0), driving=constant(2.0), resistance=constant(1.0))
     assert equation.uniform
     assert not rocking_equation(Block.from_angles(-15, 18, 1.0), 0.0).uniform
 

@@ -10,7 +10,8 @@ import pytest
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.integrator.spans import COLUMNS, fill_spans, span_step
-from rbfrag.solver.integrator.taylor import step8, turn
+from rbfrag.solver.integrator.state import StepExcitation
+from rbfrag.solver.integrator.taylor import ORDER, taylor_step, turn
 from tests.solver.search.test_critical import shaking
 
 START = (0.3, 0.12, -0.2)
@@ -34,9 +35,8 @@ def integrated(
         else:
             ph = p * float(drive.interval_s[i])
             a, w = drive.k_h, drive.w
-            turned, u_end, _ = step8(
-                u, ph * rate, ph, s, c, a[i], a[i + 1] - a[i], w[i], w[i + 1] - w[i]
-            )
+            over = StepExcitation(a[i], a[i + 1] - a[i], w[i], w[i + 1] - w[i])
+            turned, u_end, _ = taylor_step(ORDER, u, ph * rate, ph, s, c, over)
         theta += turned
         rate = u_end / ph
         s, c = turn(s, c, turned)

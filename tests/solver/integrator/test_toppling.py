@@ -78,14 +78,6 @@ def test_only_p_times_time_matters(factor: float) -> None:
     assert other.peak_theta_rad == pytest.approx(one.peak_theta_rad, rel=1e-11)
 
 
-def test_linear_model_scales_with_amplitude() -> None:
-    motion = noise(2)
-    one = respond(motion, p2=5.0, kr=0.3, linear=True)
-    other = respond(motion.scaled(0.01), p2=5.0, kr=0.003, linear=True)
-    assert one.peak_theta_n
-    assert other.peak_theta_n == pytest.approx(one.peak_theta_n, rel=1e-10)
-
-
 def test_constant_vertical_acceleration_is_a_scaled_gravity() -> None:
     # k_h/(1+k_v) and p² (1+k_v) take their places; free motion comes back before the end
     motion = nodes([0.0, 0.0, 0.1, 0.1, 3.0], [0.0, 0.6, 0.6, 0.0, 0.0])
@@ -182,7 +174,7 @@ def test_extreme_slenderness(kr: float) -> None:
 
 def test_past_the_critical_angle_and_back() -> None:
     motion = nodes([0.0, 0.0, 0.25, 0.25, 0.5, 0.5], [0, 1.0, 1.0, -1.0, -1.0, 0])
-    run = respond(motion, p2=2.0, kr=0.1, linear=False)
+    run = respond(motion, p2=2.0, kr=0.1)
     assert run.outcome is Outcome.STABLE
     assert run.peak_theta_n is not None
     assert run.peak_theta_n > 1.0

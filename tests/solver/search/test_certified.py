@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.excitation import Excitation, excitation
-from rbfrag.solver.integrator.block_excitation import linear_drive
+from rbfrag.solver.integrator.block_excitation import remaining_excitation
 from rbfrag.solver.integrator.single_run import STABLE, TOPPLED
 from rbfrag.solver.results import CriticalResult
 from rbfrag.solver.search.certified import MAP_DEPTH, certified_map, keeps_order
 from rbfrag.solver.search.critical import critical
 from rbfrag.solver.toppling_run import simulate
+from tests.physics.linear_block import largest_failing
 
 
 def noise(seed: int, npts: int = 900, dt_s: float = 0.01, pga_g: float = 0.6) -> GroundMotion:
@@ -193,7 +194,7 @@ def test_fresh_excursions_fail_monotonely_in_kr() -> None:
     for node in rng.choice(rises, 6, replace=False):
         drive = excitation(GroundMotion(a[node:], motion.dt_s))
         # a weakest block that lifts with the others, so that its first excursion is the same one
-        result = certified_map(drive, p2=4.0, linear=False, bottom=0.02, full=False)
+        result = certified_map(drive, p2=4.0, bottom=0.02, full=False)
         compared += 1
         for kr in rng.uniform(result.k_up, drive.max_q, 50):
             assert simulate(drive, p2=4.0, kr=kr * (1.0 + 1e-9)).outcome == STABLE
@@ -204,7 +205,7 @@ def test_linear_upper_bound_is_the_backward_integral() -> None:
     motion = noise(5)
     p = 1.7
     still = np.empty(motion.npts)
-    greatest, node = linear_drive(motion.interval_s, motion.acceleration_g, p, still)
+    greatest, node = remaining_excitation(motion.interval_s, motion.acceleration_g, p, still)
     fine_t = np.linspace(0.0, motion.time_s[-1], 40 * (motion.npts - 1) + 1)
     fine_a = np.interp(fine_t, motion.time_s, motion.acceleration_g)
     faded = fine_a * np.exp(-p * fine_t)
@@ -214,9 +215,9 @@ def test_linear_upper_bound_is_the_backward_integral() -> None:
     assert greatest == pytest.approx(integral.max(), rel=1e-4)
     assert still[0] == pytest.approx(integral[0], rel=1e-3, abs=1e-5)
     assert 0 < node < motion.npts
-    # in the linear model it is K_up itself
-    found = certified_map(excitation(motion), p2=p * p, linear=True, bottom=0.001, full=False)
-    assert found.k_up == pytest.approx(greatest, rel=1e-8)
+    # of the linearised block it is the largest failing excursion from rest itself
+    found = largest_failing(excitation(motion), p * p)
+    assert found == pytest.approx(greatest, rel=1e-8)
 
 
 def test_plateau_exactly_at_the_block_is_no_start() -> None:
@@ -230,9 +231,8 @@ def test_plateau_exactly_at_the_block_is_no_start() -> None:
 
 def test_order_is_kept_where_no_pull_follows_a_push_of_inverse_size() -> None:
     push = GroundMotion.from_nodes([0.0, 0.5, 1.0, 1.5, 2.0], [0.0, -2.0, 0.0, 2.0, 0.0])
-    assert keeps_order(excitation(push), False)
-    assert not keeps_order(excitation(push, None, "reverse"), False)
-    assert keeps_order(excitation(push, None, "reverse"), True)
+    assert keeps_order(excitation(push))
+    assert not keeps_order(excitation(push, None, "reverse"))
     assert critical(push, p2=3.0).certified
 
 

@@ -21,7 +21,7 @@ from rbfrag.solver.models.sliding import sliding_displacements
 from rbfrag.solver.reports import critical_as_dict
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import CriticalResult, Outcome
-from rbfrag.solver.search.scale import Found, first_motion
+from rbfrag.solver.search.scale import ScaleSearch, first_motion
 from tests.synthetic import shaking as samples
 
 PLANES = {"beta_deg": 22.0, "phi_deg": 30.0}
@@ -203,7 +203,7 @@ def test_beyond_the_end_of_the_model_nothing_is_told() -> None:
     found = search(shaking(), slump(), rotation_deg=2.0)
     its = found.of_kind
     last = its["runs"][0].scale
-    ended = Found(
+    ended = ScaleSearch(
         rotation_deg=2.0,
         pga_g=found.pga_g,
         yield_g=its["yield_g"],

@@ -17,6 +17,7 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.single_run import TOPPLED
 from rbfrag.solver.toppling_run import runner
+from tests.physics import linear_block
 from tests.solver.excursions_from_rest import largest_failing
 from tests.synthetic import shaking
 
@@ -38,7 +39,7 @@ def test_is_the_linear_bound_by_bisection(name: str, polarity: str) -> None:
     drive = excitation(motion, None, polarity)  # type: ignore[arg-type]
     for p2 in P2:
         x = toppling_spectrum(motion, p2, polarity)  # type: ignore[call-overload]
-        k = largest_failing(drive, p2, linear=True)
+        k = linear_block.largest_failing(drive, p2)
         assert k * STANDARD_GRAVITY_M_S2 / math.sqrt(p2) == pytest.approx(x, rel=1e-9, abs=1e-13)
 
 
@@ -49,7 +50,7 @@ def test_non_linear_bound_is_close(seed: int) -> None:
     for polarity in POLARITIES:
         for p2 in (30.0, 3.0, 0.1, 0.01):
             x = toppling_spectrum(motion, p2, polarity)
-            k = largest_failing(excitation(motion, None, polarity), p2, linear=False)
+            k = largest_failing(excitation(motion, None, polarity), p2)
             apart = abs(math.log(k * STANDARD_GRAVITY_M_S2 / (math.sqrt(p2) * x)))
             assert apart <= (0.001 if k < 0.05 else 0.01)
             compared += 1
@@ -63,7 +64,7 @@ def test_no_block_above_it_topples() -> None:
         for polarity in POLARITIES:
             drive = excitation(motion, None, polarity)
             for p2 in np.exp(rng.uniform(math.log(0.1), math.log(30.0), 6)):
-                run = runner(drive, p2=float(p2), linear=False)
+                run = runner(drive, p2=float(p2))
                 top = math.sqrt(p2) * toppling_spectrum(motion, float(p2), polarity)
                 top /= STANDARD_GRAVITY_M_S2
                 for factor in np.exp(rng.uniform(math.log(1.02), math.log(1.6), 4)):
@@ -79,6 +80,6 @@ def test_real_records(records_dir: Path) -> None:
             drive = excitation(motion, None, polarity)
             for p2 in (10.0, 0.1):
                 x = toppling_spectrum(motion, p2, polarity)
-                k = largest_failing(drive, p2, linear=True)
+                k = linear_block.largest_failing(drive, p2)
                 y = k * STANDARD_GRAVITY_M_S2 / math.sqrt(p2)
                 assert y == pytest.approx(x, rel=1e-9)

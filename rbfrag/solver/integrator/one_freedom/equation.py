@@ -2,11 +2,12 @@
 
 With x the coordinate (a rotation [rad], or a displacement [m] on which nothing depends):
 
-    inertia(x) x'' = drive(x) k_h - resistance(x) (1 + k_v) - braking(x) x'^2
+    inertia(x) x'' = driving(x) k_h - resistance(x) (1 + k_v) - braking(x) x'^2
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -51,14 +52,14 @@ class Equation:
 
     Args:
         inertia: factor of x''.
-        drive: factor of k_h, above zero: k_h drives forward.
+        driving: factor of k_h, above zero: k_h drives forward.
         resistance: factor of 1 + k_v, counted against the motion.
         braking: factor of x'^2, counted against the motion.
         conditions: what must hold besides.
     """
 
     inertia: Harmonics
-    drive: Harmonics
+    driving: Harmonics
     resistance: Harmonics
     braking: Harmonics = field(default_factory=lambda: constant(0.0))
     conditions: tuple[Condition, ...] = ()
@@ -66,26 +67,40 @@ class Equation:
     @cached_property
     def table(self) -> FloatArray:
         """The coefficients as the kernel reads them, shape (4 + 3 conditions, 7)."""
-        rows = [self.inertia, self.drive, self.resistance, self.braking]
+        # the order that step.py names: INERTIA, DRIVING, RESISTANCE, BRAKING, CONDITIONS
+        rows = [self.inertia, self.driving, self.resistance, self.braking]
         for condition in self.conditions:
+            # three rows each, after the four of the equation: CONDITIONS + 3 n
             rows += [condition.per_k_h, condition.per_w, condition.per_rate2]
         return np.array([row.coefficients for row in rows])
 
     @cached_property
     def uniform(self) -> bool:
         """Whether the equation is the same everywhere: x is then a cubic in each interval."""
-        everywhere = (self.inertia, self.drive, self.resistance, self.braking)
+        everywhere = (self.inertia, self.driving, self.resistance, self.braking)
+        # braking by x'^2 would make U a series without end, even with constant factors
         return all(row.constant for row in everywhere) and not self.braking.coefficients[0]
+
+    @cached_property
+    def own_rate_at_rest(self) -> float:
+        """Rate of the block's own time at x = 0 [1/s], as steps are measured by."""
+        # (N + M)/D as in step.own_rate; D = 0 must not divide by zero
+        own2 = abs(self.driving(0.0)) + abs(self.resistance(0.0))
+        return math.sqrt(own2 / max(abs(self.inertia(0.0)), 1e-300))
 
     def first_without_strength(self, limit: float) -> float:
         """Return the least x at which a block at rest moves of itself, or `limit`."""
+        # a strength of three harmonics has few zeros: a scan of the range does not miss the first
         places = limit * np.arange(_LOOKS + 1) / _LOOKS
         weak = np.flatnonzero(self.resistance.at(places[1:]) <= 0.0)
+        # with strength everywhere the model ends at its limit first
         if not weak.size:
             return limit
         before, here = float(places[weak[0]]), float(places[weak[0] + 1])
+        # bisection to rounding: the result is a critical rotation that answers are divided by
         while here - before > 1e-15 * limit:
             middle = 0.5 * (before + here)
+            # neighbouring numbers: nothing is left to halve
             if not before < middle < here:
                 break
             before, here = (before, middle) if self.resistance(middle) <= 0.0 else (middle, here)
@@ -93,7 +108,7 @@ class Equation:
 
     def threshold(self, x: float) -> float:
         """Return the k_h that starts the motion at a position where 1 + k_v = 1."""
-        return self.resistance(x) / self.drive(x)
+        return self.resistance(x) / self.driving(x)
 
 
 @dataclass(frozen=True)
@@ -153,6 +168,9 @@ class Exit:
     rest_min_q: float
 
 
+Impact = Literal["comes to rest", "leaves"]
+
+
 @dataclass(frozen=True, eq=False)
 class Phase:
     """A stretch of motion that one equation (for each sense) governs.
@@ -166,9 +184,10 @@ class Phase:
         sticks: whether friction holds the block at a standstill. Where it does not, x turns
             freely, and `forward` governs both senses.
         leaves_in_reverse: whether the onset of motion in reverse ends the phase.
-        lowest: least x; the block is seated there, without rebound, if the phase `seats`.
+        lowest: least x.
         highest: greatest x.
-        seats: whether the block comes to rest at `lowest`, rather than leaving the phase.
+        impact: what the impact at `lowest` does: the block comes to rest, without rebound, or
+            leaves the phase.
     """
 
     name: str
@@ -180,7 +199,7 @@ class Phase:
     leaves_in_reverse: bool = False
     lowest: float = 0.0
     highest: float = np.inf
-    seats: bool = True
+    impact: Impact = "comes to rest"
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +211,7 @@ class Mechanism:
         rotates: whether x is a rotation [rad] rather than a displacement [m].
         critical: x at which the block stands without any strength; None where there is none.
         warnings: what the reader of the answer should know.
-        if_seated: the same where the block has come back to its lowest position in motion.
+        if_impact: the same where the block has come back to its lowest position in motion.
         least_q: least k_h/(1 + k_v) that the model covers.
         if_below: what the reader should know where the record goes below it.
     """
@@ -201,6 +220,6 @@ class Mechanism:
     rotates: bool
     critical: float | None
     warnings: tuple[str, ...] = ()
-    if_seated: str = ""
+    if_impact: str = ""
     least_q: float = -np.inf
     if_below: str = ""

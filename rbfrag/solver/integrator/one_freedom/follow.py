@@ -18,10 +18,13 @@ from rbfrag.solver.integrator.one_freedom.equation import (
     Phase,
     Pose,
 )
-from rbfrag.solver.integrator.one_freedom.run import (
+from rbfrag.solver.integrator.one_freedom.run import run_phase
+from rbfrag.solver.integrator.one_freedom.state import (
     AT_REST,
+    COMES_TO_REST,
     ENDLESS,
     JUMPED,
+    LEAVES,
     LOWER,
     NO_REVERSE,
     REVERSE,
@@ -29,10 +32,15 @@ from rbfrag.solver.integrator.one_freedom.run import (
     REVERSE_MOVES,
     UPPER,
     VIOLATED,
+    Entry,
+    Peak,
+    PhaseRules,
     PhaseRun,
-    run_phase,
+    Work,
+    record_of,
 )
-from rbfrag.solver.integrator.one_freedom.step import ORDER, TURN_MAX, UNIFORM_ORDER
+from rbfrag.solver.integrator.one_freedom.step import CONDITIONS, ORDER, TURN_MAX, UNIFORM_ORDER
+from rbfrag.solver.integrator.state import Place
 from rbfrag.solver.results import FloatArray, Outcome
 
 PHASES_MAX = 1000
@@ -41,7 +49,11 @@ PHASES_MAX = 1000
 MOST_STEPS = 1e8
 """Steps of one run beyond which the size of the block cannot be meant."""
 
-_NO_ROOM = np.empty((4, 0))
+_NO_ROWS = np.empty((4, 0))
+_NO_CONDITIONS = np.empty((0, 3))
+
+FROM_REST = Entry(Place(0, 0.0), 0.0, 0.0, 0.0, 0.0, 0.0)
+"""A block at rest at x = 0 when the record begins."""
 
 
 class Change(NamedTuple):
@@ -57,7 +69,7 @@ class Change(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Travel:
+class MotionHistory:
     """The motion in time at nodes and events.
 
     Args:
@@ -76,7 +88,7 @@ class Travel:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class MechanismRun:
     """What became of a mechanism under one excitation.
 
     Args:
@@ -96,7 +108,7 @@ class Course:
         samples_moved: sample intervals that had to be integrated.
         changes: changes of phase.
         sentences: what the answer takes for granted, and where it ends.
-        travel: the motion in time, if asked for.
+        history: the motion in time, if it is kept.
     """
 
     outcome: Outcome
@@ -113,237 +125,229 @@ class Course:
     samples_moved: int
     changes: tuple[Change, ...]
     sentences: tuple[str, ...]
-    travel: Travel | None = None
+    history: MotionHistory | None = None
 
 
 def follow(
     mechanism: Mechanism,
-    drive: Excitation,
+    excitation: Excitation,
     *,
-    travel: bool = False,
+    history: bool = False,
     turn_max: float = TURN_MAX,
     order: int = ORDER,
-) -> Course:
+) -> MechanismRun:
     """Run a mechanism from rest under one excitation until nothing moves any more.
 
     Args:
         mechanism: the block.
-        drive: accelerations at nodes.
-        travel: keep the motion in time.
+        excitation: accelerations at nodes.
+        history: keep the motion in time.
         turn_max: greatest step, in units of the block's own time; for convergence studies.
         order: order of the method; for convergence studies.
 
     Raises:
         InputError: a block so small that the run would not end in reasonable time.
     """
-    _refuse_endless(mechanism, drive, turn_max)
-    state = PhaseRun(
-        code=-1, condition=0, node=0, tau=0.0, free_s=0.0, time_s=float(drive.time_s[0]),
-        x=0.0, rate=0.0,
-        peak=0.0, started_s=math.nan, stopped_s=math.nan, certain_s=math.nan, error_x=0.0,
-        error_rate=0.0, peak_error=0.0, steps=0, samples_moved=0, seatings=0, history_length=0,
-    )  # fmt: skip
-    phase = mechanism.first
+    _refuse_endless(mechanism, excitation, turn_max)
+    record = record_of(excitation)
+    phase, entry = mechanism.first, FROM_REST
     changes: list[Change] = []
-    pieces: list[Travel] = []
-    steps = samples_moved = seatings = 0
+    histories: list[MotionHistory] = []
+    steps = samples_moved = impacts = 0
     started = ended = math.nan
-    peak, peak_error, slipped = 0.0, 0.0, 0.0
+    peak, slipped = Peak(0.0, 0.0), 0.0
     while True:
-        store = _room(drive) if travel else _NO_ROOM
-        found = _run(phase, drive, state, store, turn_max, order)
-        steps += found.steps
-        samples_moved += found.samples_moved
-        seatings += found.seatings
-        started = found.started_s if math.isnan(started) else started
-        ended = found.stopped_s if not math.isnan(found.stopped_s) else ended
-        if found.peak > peak:
-            peak, peak_error = found.peak, found.peak_error
-        slipped = max(slipped, *(phase.pose(x).displacement_m for x in (found.peak, found.x)))
-        if travel:
-            pieces.append(_travel(phase, store[:, : found.history_length], found))
-        if found.code in (UPPER, LOWER, REVERSE):
-            following = phase.after(_exit(found, drive))
-            ended = found.time_s
+        rows = _empty_rows(excitation) if history else _NO_ROWS
+        # each phase has equations and limits of its own; the record and the entry go on
+        rules = _rules(phase, turn_max, order)
+        run = run_phase(record, rules, entry, _work(rules), rows)
+        entry = run.end
+        steps += run.steps
+        samples_moved += run.samples_moved
+        impacts += run.impacts
+        started = run.started_s if math.isnan(started) else started
+        ended = ended if math.isnan(run.stopped_s) else run.stopped_s
+        # each phase has a peak of its own, which is not below where it began
+        peak = run.peak if run.peak.x > peak.x else peak
+        # the slip grows with x in every phase: its greatest is at the peak or at the end
+        slipped = max(slipped, phase.pose(entry.x).displacement_m)
+        if run.peak.x != entry.x:
+            slipped = max(slipped, phase.pose(run.peak.x).displacement_m)
+        if history:
+            histories.append(_history(phase, rows[:, : run.history_length], run))
+        # the model says what follows a limit; every other stop ends the run
+        if run.stop in (UPPER, LOWER, REVERSE):
+            following = phase.after(_exit(run, excitation))
+            ended = run.time_s
         else:
-            following, ended = _end(phase, found, ended)
+            following = _ending(phase, run)
+            ended = ended if run.stop == AT_REST else run.time_s
         if isinstance(following, Ending):
-            following = _doubted(following, phase, found)
+            following = _doubted(following, phase, run)
             break
+        # a model that hands the block to and fro at one instant would never end
         if len(changes) >= PHASES_MAX:
             following = Ending(Outcome.UNDETERMINED, "the motion changes without end")
             break
-        changes.append(Change(found.time_s, following.name))
+        changes.append(Change(run.time_s, following.name))
         phase = following
-        state = found
-    said = list(mechanism.warnings)
-    if seatings:
-        said.append(mechanism.if_seated)
-    if mechanism.least_q > -math.inf and drive.min_q < mechanism.least_q:
-        said.append(mechanism.if_below)
+    sentences = list(mechanism.warnings)
+    # what was taken for granted is told only where the run made use of it
+    if impacts:
+        sentences.append(mechanism.if_impact)
+    if mechanism.least_q > -math.inf and excitation.min_q < mechanism.least_q:
+        sentences.append(mechanism.if_below)
     if following.sentence:
-        said.append(following.sentence)
-    return Course(
+        sentences.append(following.sentence)
+    return MechanismRun(
         outcome=following.outcome,
-        peak=peak,
-        x=found.x,
-        rate=found.rate,
+        peak=peak.x,
+        x=entry.x,
+        rate=entry.rate,
         peak_displacement_m=slipped,
-        pose=phase.pose(found.x) if following.in_place else None,
+        pose=phase.pose(entry.x) if following.in_place else None,
         started_s=_or_none(started),
-        ended_s=_or_none(ended) if not math.isnan(started) or found.code == JUMPED else None,
-        certain_s=_or_none(found.certain_s),
-        error=peak_error,
+        ended_s=_or_none(ended) if not math.isnan(started) or run.stop == JUMPED else None,
+        certain_s=_or_none(run.certain_s),
+        error=peak.error,
         steps=steps,
         samples_moved=samples_moved,
         changes=tuple(changes),
-        sentences=tuple(said),
-        travel=_joined(pieces) if travel else None,
+        sentences=tuple(sentences),
+        history=_joined(histories) if history else None,
     )
 
 
-def _run(
-    phase: Phase,
-    drive: Excitation,
-    state: PhaseRun,
-    store: FloatArray,
-    turn_max: float,
-    order: int,
-) -> PhaseRun:
+def _rules(phase: Phase, turn_max: float, order: int) -> PhaseRules:
     in_reverse = NO_REVERSE
     if phase.reverse is not None:
         in_reverse = REVERSE_LEAVES if phase.leaves_in_reverse else REVERSE_MOVES
+    # the kernel takes two tables; the second is not looked at where nothing moves in reverse
     backward = phase.forward if phase.reverse is None else phase.reverse
     uniform = phase.forward.uniform and backward.uniform
-    return PhaseRun(
-        *run_phase(
-            drive.time_s,
-            drive.interval_s,
-            drive.k_h,
-            drive.w,
-            drive.tail_min_q,
-            drive.block_max_q,
-            drive.block_min_q,
-            drive.jump_node,
-            phase.forward.table,
-            backward.table,
-            phase.sticks,
-            in_reverse,
-            phase.lowest,
-            phase.highest,
-            phase.seats,
-            state.node,
-            state.tau,
-            state.free_s,
-            state.x,
-            state.rate,
-            state.error_x,
-            state.error_rate,
-            UNIFORM_ORDER if uniform else order,
-            turn_max,
-            store,
-        )
+    return PhaseRules(
+        phase.forward.table,
+        backward.table,
+        phase.sticks,
+        in_reverse,
+        float(phase.lowest),
+        float(phase.highest),
+        COMES_TO_REST if phase.impact == "comes to rest" else LEAVES,
+        uniform,
+        UNIFORM_ORDER if uniform else order,
+        turn_max,
     )
 
 
-def _doubted(ending: Ending, phase: Phase, found: PhaseRun) -> Ending:
+def _work(rules: PhaseRules) -> Work:
+    series = np.empty((8, rules.order + 1))
+    # conditions that depend on x are taken at each step: they need no work array
+    if not rules.uniform:
+        return Work(series, _NO_CONDITIONS, _NO_CONDITIONS)
+    forward, reverse = (
+        np.empty(((len(table) - CONDITIONS) // 3, 3)) for table in (rules.forward, rules.reverse)
+    )
+    return Work(series, forward, reverse)
+
+
+def _doubted(ending: Ending, phase: Phase, run: PhaseRun) -> Ending:
     """Return the ending, or that it is open, where the limit is nearer than the error."""
-    falls_short = found.code == AT_REST and phase.highest - found.peak <= found.peak_error
+    # a peak that would have reached the limit, had its error been added
+    falls_short = run.stop == AT_REST and phase.highest - run.peak.x <= run.peak.error
     just_arrives = False
-    if found.code == UPPER:
+    if run.stop == UPPER:
         # how far it would have gone on, against what the position may be wrong by
-        strength = phase.forward.resistance(found.x) / phase.forward.inertia(found.x)
-        just_arrives = found.rate <= found.error_rate + math.sqrt(
-            2.0 * abs(strength) * found.error_x
-        )
+        x, rate, error_x, error_rate = run.end[2:]
+        strength = phase.forward.resistance(x) / phase.forward.inertia(x)
+        just_arrives = rate <= error_rate + math.sqrt(2.0 * abs(strength) * error_x)
     if not (falls_short or just_arrives):
         return ending
     return Ending(Outcome.UNDETERMINED, Outcome.UNDETERMINED.advice)
 
 
-def _end(phase: Phase, found: PhaseRun, ended: float) -> tuple[Ending, float]:
-    """Return how a run ends that leaves no phase behind it, and when."""
-    if found.code == AT_REST:
-        return Ending(Outcome.STABLE), ended
-    if found.code == JUMPED:
-        at = f"at {found.time_s:.3f} s: {Outcome.JUMP.advice}"
-        return Ending(Outcome.JUMP, at), found.time_s
-    if found.code == VIOLATED:
-        equation = phase.forward if found.rate >= 0.0 or not phase.sticks else phase.reverse
-        assert equation is not None
-        if found.condition == 0:
-            return (
-                Ending(
-                    Outcome.INDETERMINATE,
-                    f"at {found.time_s:.3f} s: rigid bodies with this friction have no unique "
-                    "motion here (Painlevé's paradox); nothing is said about the time after",
-                ),
-                found.time_s,
-            )
-        broken = equation.conditions[found.condition - 1]
-        return Ending(broken.outcome, f"at {found.time_s:.3f} s: {broken.sentence}"), found.time_s
-    assert found.code == ENDLESS
-    return (
-        Ending(Outcome.UNDETERMINED, "after the record the block neither stops nor falls"),
-        found.time_s,
-    )
-
-
-def _exit(found: PhaseRun, drive: Excitation) -> Exit:
-    reason: ExitReason = "upper"
-    if found.code == LOWER:
-        reason = "lower"
-    elif found.code == REVERSE:
-        reason = "reverse"
-    rest = np.append(drive.q[min(found.node + 1, drive.q.size) :], 0.0)
-    if found.node < drive.q.size - 1:
-        k_h = drive.k_h[found.node] + found.tau * (
-            drive.k_h[found.node + 1] - drive.k_h[found.node]
+def _ending(phase: Phase, run: PhaseRun) -> Ending:
+    """Return how a run ends that leaves no phase behind it."""
+    if run.stop == AT_REST:
+        return Ending(Outcome.STABLE)
+    if run.stop == ENDLESS:
+        return Ending(Outcome.UNDETERMINED, "after the record the block neither stops nor falls")
+    at = f"at {run.time_s:.3f} s: "
+    if run.stop == JUMPED:
+        return Ending(Outcome.JUMP, at + Outcome.JUMP.advice)
+    assert run.stop == VIOLATED
+    if run.condition == 0:
+        return Ending(
+            Outcome.INDETERMINATE,
+            at + "rigid bodies with this friction have no unique motion here (Painlevé's "
+            "paradox); nothing is said about the time after",
         )
-        w = drive.w[found.node] + found.tau * (drive.w[found.node + 1] - drive.w[found.node])
-        rest = np.append(rest, k_h / w)
-    thrown = drive.jump_node < drive.q.size
+    # the conditions are those of the equation that held, which the sense of motion tells
+    equation = phase.forward if run.end.rate >= 0.0 or not phase.sticks else phase.reverse
+    assert equation is not None
+    broken = equation.conditions[run.condition - 1]
+    return Ending(broken.outcome, at + broken.sentence)
+
+
+def _exit(run: PhaseRun, excitation: Excitation) -> Exit:
+    reason: ExitReason = "upper"
+    if run.stop == LOWER:
+        reason = "lower"
+    elif run.stop == REVERSE:
+        reason = "reverse"
+    node, fraction = run.end.place
+    # q is monotone between nodes: its extremes are at nodes, here, or 0 after the record
+    rest = np.append(excitation.q[min(node + 1, excitation.q.size) :], 0.0)
+    if node < excitation.q.size - 1:
+        (k_h, k_h_after), (w, w_after) = (
+            values[node : node + 2] for values in (excitation.k_h, excitation.w)
+        )
+        rest = np.append(
+            rest, (k_h + fraction * (k_h_after - k_h)) / (w + fraction * (w_after - w))
+        )
+    # nothing is known of the time after a jump: any motion may come
+    thrown = excitation.jump_node < excitation.q.size
     return Exit(
         reason=reason,
-        time_s=found.time_s,
-        x=found.x,
-        rate=found.rate,
+        time_s=run.time_s,
+        x=run.end.x,
+        rate=run.end.rate,
         rest_max_q=math.inf if thrown else float(rest.max()),
         rest_min_q=-math.inf if thrown else float(rest.min()),
     )
 
 
-def _room(drive: Excitation) -> FloatArray:
+def _empty_rows(excitation: Excitation) -> FloatArray:
     # nodes, a start, a turn and a standstill in each interval, and the free motion after it
-    return np.empty((4, 6 * drive.time_s.size + 20_000))
+    return np.empty((4, 6 * excitation.time_s.size + 20_000))
 
 
-def _travel(phase: Phase, store: FloatArray, found: PhaseRun) -> Travel:
+def _history(phase: Phase, rows: FloatArray, run: PhaseRun) -> MotionHistory:
     """Return what the kernel kept of one phase, and the state in which it was left."""
-    time_s = np.append(store[0], found.time_s)
-    x = np.append(store[1], found.x)
-    rate = np.append(store[2], found.rate)
+    time_s = np.append(rows[0], run.time_s)
+    x = np.append(rows[1], run.end.x)
+    rate = np.append(rows[2], run.end.rate)
+    # the strength left, drawn beside k_h: where it is below, the block speeds up
     strength = np.array([phase.forward.threshold(float(value)) for value in x])
-    return Travel(time_s, x, rate, strength, tuple(phase.pose(float(value)) for value in x))
+    return MotionHistory(time_s, x, rate, strength, tuple(phase.pose(float(value)) for value in x))
 
 
-def _joined(pieces: list[Travel]) -> Travel:
-    return Travel(
-        np.concatenate([piece.time_s for piece in pieces]),
-        np.concatenate([piece.x for piece in pieces]),
-        np.concatenate([piece.rate for piece in pieces]),
-        np.concatenate([piece.strength_g for piece in pieces]),
-        tuple(pose for piece in pieces for pose in piece.poses),
+def _joined(parts: list[MotionHistory]) -> MotionHistory:
+    return MotionHistory(
+        np.concatenate([part.time_s for part in parts]),
+        np.concatenate([part.x for part in parts]),
+        np.concatenate([part.rate for part in parts]),
+        np.concatenate([part.strength_g for part in parts]),
+        tuple(pose for part in parts for pose in part.poses),
     )
 
 
-def _refuse_endless(mechanism: Mechanism, drive: Excitation, turn_max: float) -> None:
+def _refuse_endless(mechanism: Mechanism, excitation: Excitation, turn_max: float) -> None:
     equation = mechanism.first.forward
+    # an exact step needs no division, whatever the size of the block
     if equation.uniform:
         return
-    own2 = abs(equation.drive(0.0)) + abs(equation.resistance(0.0))
-    own2 /= max(abs(equation.inertia(0.0)), 1e-300)
-    steps = math.sqrt(own2) * float(drive.time_s[-1] - drive.time_s[0]) / turn_max
+    duration_s = float(excitation.time_s[-1] - excitation.time_s[0])
+    steps = equation.own_rate_at_rest * duration_s / turn_max
     if steps > MOST_STEPS:
         raise InputError(
             f"the block is so small that one run would take {steps:.1g} steps over this record: "

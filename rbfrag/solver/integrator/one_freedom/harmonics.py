@@ -61,6 +61,7 @@ class Harmonics:
             return Harmonics((a0 * other, a1 * other, a2 * other, a3 * other))
         a0, a1, a2, a3 = self.half
         b0, b1, b2, b3 = other.half
+        # such a product means that a model is wrong: no equation of motion here has one
         if (a3 and (b1 or b2 or b3)) or (a2 and (b2 or b3)) or (a1 and b3):
             raise ValueError(f"the product holds harmonics above {DEGREE}")
         # the convolution of both series, without the terms that are zero by the above
@@ -82,6 +83,7 @@ class Harmonics:
     def __call__(self, theta: float) -> float:
         """Return the value at a rotation [rad]."""
         numbers = self._numbers
+        # harmonics that are zero are left out, which most are
         value = numbers[0]
         for n in range(1, self.degree + 1):
             value += numbers[2 * n - 1] * math.cos(n * theta)
@@ -99,6 +101,7 @@ class Harmonics:
 
     def derivative(self) -> Harmonics:
         """Return the derivative by θ."""
+        # of e^{inθ} it is in e^{inθ}; that of the constant is zero
         _, a1, a2, a3 = self.half
         return Harmonics((0j, 1j * a1, 2j * a2, 3j * a3))
 
@@ -109,6 +112,7 @@ class Harmonics:
 
     @cached_property
     def _numbers(self) -> tuple[float, ...]:
+        # a e^{inθ} + its conjugate = 2 Re a cos nθ - 2 Im a sin nθ
         a0, *others = self.half
         return (a0.real, *(part for a in others for part in (2.0 * a.real, -2.0 * a.imag)))
 
@@ -160,6 +164,7 @@ class Vector:
 
     def cross(self, other: Vector) -> Harmonics:
         """Return the component of the vector product that stands on the plane."""
+        # of arm and force: the moment of the force, counter-clockwise positive
         return self.x * other.y - self.y * other.x
 
 
@@ -170,10 +175,12 @@ def constant_vector(components: tuple[float, float]) -> Vector:
 
 def turning(arm: tuple[float, float], sense: int = 1) -> Vector:
     """Return an arm of the block that has turned by θ, counter-clockwise where sense is 1."""
+    # (x cos θ - y sin θ, y cos θ + x sin θ), with θ reversed where sense is -1
     x, y = arm
     return Vector(_wave(x, -sense * y), _wave(y, sense * x))
 
 
 def _wave(cosine_part: float, sine_part: float) -> Harmonics:
     """Return the function with these factors of cos θ and sin θ."""
+    # the inverse of the above: half of each, the sine with the other sign
     return Harmonics((0j, complex(0.5 * cosine_part, -0.5 * sine_part), 0j, 0j))

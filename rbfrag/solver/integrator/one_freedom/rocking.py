@@ -26,25 +26,29 @@ def rocking_equation(block: Block, beta_rad: float, phi_rad: float | None = None
     alpha3 = math.radians(block.alpha3_deg)
     balance = alpha3 - beta_rad
     p2, r3 = block.p2, block.r3_m
-    drive = cosine(balance, -1) * p2
+    # (4.13): θ'' = p² [k_h cos(θc - θ) - (1 + k_v) sin(θc - θ)], θc - θ what is left to balance
+    driving = cosine(balance, -1) * p2
     resistance = sine(balance, -1) * p2
     # the centroid, as seen from the toe, is at r3 (-sin, cos) of α3 - θ
     along, across = cosine(alpha3, -1), sine(alpha3, -1)
     if phi_rad is None:
-        return Equation(inertia=constant(1.0), drive=drive, resistance=resistance)
+        return Equation(inertia=constant(1.0), driving=driving, resistance=resistance)
+    # the force on the toe, docs/theory/confined-toppling.md: R/m = r3 (θ'' t - θ'² e) - g G, with
+    # θ'' by the equation of motion
     friction = math.tan(phi_rad)
     # force on the toe per mass along the base and normal to it: its factors of k_h, w and θ'²
     shear = (
-        drive * along * r3 - g * math.cos(beta_rad),
+        driving * along * r3 - g * math.cos(beta_rad),
         resistance * along * -r3 - g * math.sin(beta_rad),
         across * r3,
     )
     normal = (
-        drive * across * r3 - g * math.sin(beta_rad),
+        driving * across * r3 - g * math.sin(beta_rad),
         resistance * across * -r3 + g * math.cos(beta_rad),
         along * -r3,
     )
 
+    # N tan φ ± T > 0: the toe presses and slips in neither sense
     def holds(sign: float) -> Condition:
         per_k_h, per_w, per_rate2 = (
             across_base * friction - along_base * sign
@@ -61,7 +65,7 @@ def rocking_equation(block: Block, beta_rad: float, phi_rad: float | None = None
 
     return Equation(
         inertia=constant(1.0),
-        drive=drive,
+        driving=driving,
         resistance=resistance,
         conditions=(holds(1.0), holds(-1.0)),
     )

@@ -9,570 +9,246 @@ is located to rounding on the polynomial of the step.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
-import numpy as np
-
-from rbfrag.solver.excitation import BLOCK
-from rbfrag.solver.integrator.compiled import kernel
-from rbfrag.solver.integrator.one_freedom.coast import EPSILON, coast, fill_uniform_conditions
-from rbfrag.solver.integrator.one_freedom.step import (
-    BRAKING,
-    CONDITIONS,
-    DRIVE,
-    INERTIA,
-    RESISTANCE,
-    UNIFORM_ORDER,
-    fill_step,
-    first_standstill,
-    first_violation,
-    harmonic_slope,
-    harmonic_sum,
-    least_condition,
-    rate_at,
-    root_between,
-    travel_at,
+from rbfrag.solver.integrator.compiled import bare_kernel, within
+from rbfrag.solver.integrator.one_freedom.coast import coast, fill_uniform_conditions
+from rbfrag.solver.integrator.one_freedom.cross import cross_interval
+from rbfrag.solver.integrator.one_freedom.events import (
+    AT_HIGHEST,
+    AT_LOWEST,
+    BROKEN,
+    IMPACT,
+    PASSED,
+    broken_condition,
 )
+from rbfrag.solver.integrator.one_freedom.rest import leave_rest
+from rbfrag.solver.integrator.one_freedom.state import (
+    AT_REST,
+    ENDLESS,
+    JUMPED,
+    LOWER,
+    REVERSE,
+    REVERSE_LEAVES,
+    UPPER,
+    VIOLATED,
+    Entry,
+    Line,
+    Peak,
+    PhaseRules,
+    PhaseRun,
+    Record,
+    State,
+    Work,
+    certain_since,
+    line_at,
+    noted,
+    resting,
+)
+from rbfrag.solver.integrator.one_freedom.step import DRIVING, RESISTANCE, harmonic_sum, own_rate
+from rbfrag.solver.integrator.state import Place
 from rbfrag.solver.results import FloatArray
 
-AT_REST, UPPER, LOWER, REVERSE, VIOLATED, JUMPED, ENDLESS = range(7)
-"""Why the kernel stopped."""
-
-NO_REVERSE, REVERSE_MOVES, REVERSE_LEAVES = range(3)
-"""What the onset of motion in reverse means."""
-
-CALM = 1e-12
-"""Margin of a threshold by which a whole block of nodes must fall short of it to be passed over."""
+GOES_ON = -1
+"""A phase that has not ended."""
 
 FREE_STEPS_MAX = 100_000
 """Steps after the record before a motion that does not end is given up."""
 
-TURN_OF_ORDER_5, TURN_OF_ORDER_6 = 0.012, 0.03
-"""Steps, in units of the block's own time, whose truncation at these orders is below rounding."""
-
-SLOW = 1e-4
-"""Size of the last two terms of a series, over its first three, at which a step is halved."""
-
-SPLITS_MAX = 40
-"""Halvings of a step whose series does not converge."""
+FREE_STEP_S = 0.1
+"""Length of a step after the record where the equation is the same everywhere [s]."""
 
 
-class PhaseRun(NamedTuple):
-    """What the kernel returns; times are NaN where nothing happened."""
-
-    code: int
-    condition: int
-    node: int
-    tau: float
-    free_s: float
-    time_s: float
-    x: float
-    rate: float
-    peak: float
-    started_s: float
-    stopped_s: float
-    certain_s: float
-    error_x: float
-    error_rate: float
-    peak_error: float
-    steps: int
-    samples_moved: int
-    seatings: int
-    history_length: int
-
-
-@kernel
-def calm_between(
-    f_drive: float, f_resist: float, r_drive: float, r_resist: float, may_reverse: bool
-) -> tuple[float, float]:
-    """Return bounds of k_h/(1 + k_v) between which a block certainly stays at rest."""
-    above = -math.inf
-    below = -math.inf
-    if f_drive > 0.0 and f_resist > 0.0:
-        above = f_resist / f_drive * (1.0 - CALM)
-    if may_reverse:
-        below = math.inf
-        if r_drive > 0.0 and r_resist < 0.0:
-            below = r_resist / r_drive * (1.0 - CALM)
-    return above, below
-
-
-@kernel
+@bare_kernel
 def run_phase(
-    time_s: FloatArray,
-    interval_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    tail_min_q: FloatArray,
-    block_max_q: FloatArray,
-    block_min_q: FloatArray,
-    jump_node: int,
-    forward: FloatArray,
-    reverse: FloatArray,
-    sticks: bool,
-    in_reverse: int,
-    lowest: float,
-    highest: float,
-    seats: bool,
-    node: int,
-    tau: float,
-    free_s: float,
-    x: float,
-    rate: float,
-    error_x: float,
-    error_rate: float,
-    highest_order: int,
-    turn_max: float,
-    history: FloatArray,
-) -> tuple[
-    int, int, int, float, float, float, float, float, float, float, float, float, float, float,
-    float, int, int, int, int,
-]:  # fmt: skip
-    """Run one phase; the fields of :class:`PhaseRun` in order.
+    record: Record, rules: PhaseRules, entry: Entry, work: Work, history: FloatArray
+) -> PhaseRun:
+    """Run one phase from where it is entered to where it ends.
 
     Args:
-        time_s: node times [s], shape (n,).
-        interval_s: interval lengths [s], shape (n - 1,).
-        k_h: driving acceleration at the nodes [g].
-        w: 1 + k_v at the nodes.
-        tail_min_q: least k_h/(1 + k_v) from each node on, rest after the record included.
-        block_max_q: greatest k_h/(1 + k_v) of each block of `BLOCK` nodes.
-        block_min_q: least of it.
-        jump_node: first node with 1 + k_v <= 0, or n.
-        forward: table of the equation of forward motion, or of all motion if not `sticks`.
-        reverse: table of the equation of motion in reverse.
-        sticks: whether friction holds the block at a standstill.
-        in_reverse: `NO_REVERSE`, `REVERSE_MOVES` or `REVERSE_LEAVES`.
-        lowest: least x.
-        highest: greatest x.
-        seats: whether the block comes to rest at `lowest` instead of leaving the phase.
-        node: interval that the phase is entered in.
-        tau: position inside that interval, 0 to 1.
-        free_s: time after the record at the entry [s].
-        x: position at the entry.
-        rate: rate at the entry [1/s].
-        error_x: error of the position at the entry.
-        error_rate: error of the rate at the entry.
-        highest_order: degree of a step; `UNIFORM_ORDER` where the equation is the same everywhere.
-            Short steps, that need no more, take a lower one.
-        turn_max: greatest step in units of the block's own time.
-        history: shape (4, m) to be filled with time, x, x' and node (-1 for an event between
-            nodes); (4, 0) for none.
+        record: the excitation.
+        rules: what governs the motion.
+        entry: where and how the phase is entered.
+        work: work arrays of the kernels.
+        history: shape (4, m), for time, x, x' and node (-1 between nodes); (4, 0) for none.
     """
-    n = k_h.size
-    last = min(n, jump_node) - 1
-    room = history.shape[1]
-    filled = 0
-    u = np.empty(highest_order + 1)
-    work = np.empty((7, highest_order + 1))
-    uniform = highest_order == UNIFORM_ORDER
-    order = highest_order
-    conditions = np.empty(((forward.shape[0] - CONDITIONS) // 3 if uniform else 0, 3))
-    conditions_of = 0
+    fill_uniform_conditions(rules, work)
+    node, tau, free_s = entry.place.interval, entry.place.fraction, entry.free_s
+    state = placed(rules, entry)
+    peak = Peak(entry.x, entry.error_x)
+    started_s = stopped_s = certain_s = math.nan
+    steps = moved = impacts = free_steps = filled = 0
+    counted = -1  # the interval that was last counted as moved in
+    stop, condition = GOES_ON, 0
+    # without friction nothing holds the block, even where its rate is zero
+    moving = entry.rate != 0.0 or not rules.sticks
+    barred = 0  # sense in which the block has just come to a standstill
+    jumped = False  # the accelerations have: conditions must be looked at anew
+    line = line_at(record, node, free_s, 1.0)
 
-    peak = x
-    peak_error = error_x
-    started_s = math.nan
-    stopped_s = math.nan
-    certain_s = math.nan
-    steps = 0
-    moved = 0
-    seatings = 0
-    counted = -1
-    free_steps = 0
-    code = -1
-    condition = 0
-
-    moving = rate != 0.0 or not sticks
-    sense = -1 if rate < 0.0 else 1
-    just_lifted = False  # started where the acceleration is zero
-    barred = 0  # sense in which the block has just come to a standstill: not resumed at once
-    inspect = False  # accelerations have jumped: conditions must be looked at anew
-    f_drive = f_resist = r_drive = r_resist = 0.0
-    c = 1.0
-    s = 0.0
-    if not uniform:
-        c = math.cos(x)
-        s = math.sin(x)
-    settled = False  # thresholds at the present position are known
-    base_s = time_s[0]
-    h = 0.0
-
-    while code < 0:
-        free = node >= last
-        if free and last < n - 1:
-            code = JUMPED
-            break
-        if free:
-            a0, a1, w0, w1 = 0.0, 0.0, 1.0, 1.0
-            h = 1.0
-            base_s = time_s[n - 1] + free_s
-        else:
-            base_s = time_s[node]
-            a0, a1, w0, w1 = k_h[node], k_h[node + 1], w[node], w[node + 1]
-            h = interval_s[node]
-
+    while stop == GOES_ON:
         if not moving:
-            if not settled:
-                settled = True
-                f_drive = harmonic_sum(forward, DRIVE, c, s)
-                f_resist = harmonic_sum(forward, RESISTANCE, c, s)
-                if in_reverse != NO_REVERSE:
-                    r_drive = harmonic_sum(reverse, DRIVE, c, s)
-                    r_resist = harmonic_sum(reverse, RESISTANCE, c, s)
-            may_reverse = in_reverse != NO_REVERSE and x > lowest
-            f0 = f_drive * a0 - f_resist * w0
-            f1 = f_drive * a1 - f_resist * w1
-            r0 = r_drive * a0 - r_resist * w0
-            r1 = r_drive * a1 - r_resist * w1
-            if tau > 0.0:
-                f0 += (f1 - f0) * tau
-                r0 += (r1 - r0) * tau
-            if h == 0.0:  # nothing starts in no time
-                node += 1
-                tau = 0.0
-                barred = 0
-                continue
-            start = 2.0
-            just_lifted = False
-            if f0 > 0.0 and barred != 1:
-                start = tau
-                sense = 1
-            elif may_reverse and r0 < 0.0 and barred != -1:
-                start = tau
-                sense = -1
-            else:
-                if f1 > 0.0 and f1 > f0:
-                    start = tau + (1.0 - tau) * max(-f0, 0.0) / (f1 - f0)
-                    sense = 1
-                    just_lifted = True
-                if may_reverse and r1 < 0.0 and r1 < r0:
-                    other = tau + (1.0 - tau) * max(r0, 0.0) / (r0 - r1)
-                    if other < start:
-                        start = other
-                        sense = -1
-                        just_lifted = True
-            barred = 0
-            if start > 1.0:
-                if free:
-                    code = AT_REST
-                    break
-                node += 1
-                tau = 0.0
-                # rest costs one comparison a sample, or one a block of samples
-                above, below = calm_between(f_drive, f_resist, r_drive, r_resist, may_reverse)
-                while node < last:
-                    if (node + 1) % BLOCK == 0 and node + BLOCK <= last:
-                        block = (node + 1) // BLOCK
-                        if block_max_q[block] < above and block_min_q[block] > below:
-                            node += BLOCK
-                            continue
-                    if f_drive * k_h[node + 1] > f_resist * w[node + 1]:
-                        break
-                    if may_reverse and r_drive * k_h[node + 1] < r_resist * w[node + 1]:
-                        break
-                    node += 1
-                continue
-            tau = min(start, 1.0)
-            table = forward if sense > 0 else reverse
-            moment_s = base_s + tau * h
-            if sense < 0 and in_reverse == REVERSE_LEAVES:
-                code = REVERSE
+            rest = leave_rest(record, rules, state, Place(node, tau), barred)
+            node, tau = rest.place.interval, rest.place.fraction
+            state = resting(state, state.error_x, rest.sense, rest.smooth)
+            line = line_at(record, node, free_s, 1.0)
+            stop, condition = stop_at_rest(record, rules, state, line, Place(node, tau))
+            now_s = line.start_s + tau * line.h
+            # a start that a contact does not survive is one: the block moves, the model ends
+            if math.isnan(started_s) and stop in (GOES_ON, VIOLATED):
+                started_s = now_s
+            if stop != GOES_ON:
                 break
-            least, condition = least_condition(
-                table, c, s, 0.0, a0 + (a1 - a0) * tau, w0 + (w1 - w0) * tau
-            )
-            if least <= 0.0:
-                code = VIOLATED
-                if math.isnan(started_s):
-                    started_s = moment_s
-                break
-            moving = True
-            rate = 0.0
-            error_rate = 0.0
-            if math.isnan(started_s):
-                started_s = moment_s
-            if filled < room:
-                history[0, filled] = moment_s
-                history[1, filled] = x
-                history[2, filled] = 0.0
-                history[3, filled] = -1.0
-                filled += 1
+            moving, barred = True, 0
+            filled = noted(history, filled, now_s, state.x, 0.0, -1)
+        elif thrown(record, node):
+            stop = JUMPED
+            break
+        free = node >= record.last
+        forward = state.sense > 0 or not rules.sticks
+        table = rules.forward if forward else rules.reverse
 
-        table = forward if sense > 0 or not sticks else reverse
-        if uniform and not free and tau == 0.0 and not inspect and rate * sense > 0.0:
-            if conditions_of != sense:
-                conditions_of = sense
-                fill_uniform_conditions(table, conditions)
-            before = node
-            node, x, rate, error_x, error_rate, peak, peak_error, certain_s, filled = coast(
-                time_s, interval_s, k_h, w, tail_min_q, table, conditions,
-                forward[DRIVE, 0], forward[RESISTANCE, 0], lowest, highest, node, last,
-                x, rate, error_x, error_rate, peak, peak_error, certain_s, history, filled,
-            )  # fmt: skip
-            if node > before:
-                steps += node - before
-                moved += node - before - (1 if counted == before else 0)
-                counted = node - 1
+        # whole intervals in which nothing happens, where an interval is one exact step
+        if rules.uniform and not (free or jumped) and tau == 0.0 and state.rate * state.sense > 0.0:
+            conditions = work.conditions_forward if forward else work.conditions_reverse
+            far = coast(
+                record, rules, table, conditions, node, state, peak, certain_s, history, filled
+            )
+            if far.node > node:
+                # the first of them may have been counted already, by an event in it
+                steps += far.node - node
+                moved += far.node - node - (1 if counted == node else 0)
+                node, counted = far.node, far.node - 1
+                state, peak, certain_s, filled = far.state, far.peak, far.certain_s, far.filled
                 continue
-        inertia = table[INERTIA, 0]
-        own = 0.0
-        if not uniform:
-            inertia = harmonic_sum(table, INERTIA, c, s)
-            pull = abs(harmonic_sum(table, DRIVE, c, s))
-            hold = abs(harmonic_sum(table, RESISTANCE, c, s))
-            own = math.sqrt((pull + hold) / max(abs(inertia), 1e-300))
-        if free:
-            # any length will do: nothing drives the block any more
-            h = turn_max / own if not uniform else 0.1
-            free_steps += 1
-            if free_steps > FREE_STEPS_MAX:
-                code = ENDLESS
-                break
-        left = h * (1.0 - tau)
-        if left <= 0.0:
-            if sticks and rate == 0.0:
-                moving = False
-            elif filled < room:
-                history[0, filled] = base_s
-                history[1, filled] = x
-                history[2, filled] = rate
-                history[3, filled] = node
-                filled += 1
-            node += 1
-            tau = 0.0
-            inspect = True
+        own = 0.0 if rules.uniform else own_rate(table, state.cos, state.sin)
+        # after the record any length of step will do: nothing drives the block any more
+        line = line_at(record, node, free_s, FREE_STEP_S if rules.uniform else rules.turn_max / own)
+        free_steps += 1 if free else 0
+        if free_steps > FREE_STEPS_MAX:
+            stop = ENDLESS
+            break
+        if line.h * (1.0 - tau) <= 0.0:  # a jump of the record, or a start at an interval's end
+            moving = not rules.sticks or state.rate != 0.0
+            if moving:
+                filled = noted(history, filled, line.start_s, state.x, state.rate, node)
+            node, tau, jumped = node + 1, 0.0, True
             continue
         if not free and node != counted:
-            counted = node
-            moved += 1
-        if inspect:
-            inspect = False
-            least, condition = least_condition(table, c, s, rate, a0, w0)
-            if least <= 0.0:
-                code = VIOLATED
+            moved, counted = moved + 1, node
+        if jumped:
+            jumped = False
+            broken, condition = broken_condition(table, state, line.a0, line.w0)
+            if broken:
+                stop = VIOLATED
                 break
-
-        pieces = 1
-        if not uniform:
-            turn = max(own, 2.0 * abs(rate)) * left
-            pieces = max(1, math.ceil(turn / turn_max))
-            order = highest_order
-            if turn < TURN_OF_ORDER_5:
-                order = min(order, 5)
-            elif turn < TURN_OF_ORDER_6:
-                order = min(order, 6)
-        start_tau = tau
-        part = (1.0 - tau) / pieces
-        piece = 0
-        splits = 0
-        standing = False
-        while piece < pieces:
-            at = start_tau + piece * part
-            step_s = part * h
-            ab = a0 + (a1 - a0) * at
-            wb = w0 + (w1 - w0) * at
-            da = (a1 - a0) * part
-            dw = (w1 - w0) * part
-            u[0] = step_s * rate
-            fill_step(table, u, work, order, c, s, step_s, ab, da, wb, dw)
-            steps += 1
-            travel = travel_at(u, order, 1.0)
-            truncation = 0.0
-            if not uniform:
-                last_terms = abs(u[order]) + abs(u[order - 1])
-                if last_terms > SLOW * (abs(u[0]) + abs(u[1]) + abs(u[2])) and splits < SPLITS_MAX:
-                    # the state changes faster than its own time says, near inertia = 0
-                    splits += 1
-                    start_tau = at
-                    order = highest_order
-                    pieces = 2 * (pieces - piece)
-                    piece = 0
-                    part = (1.0 - start_tau) / pieces
-                    continue
-                # the first two terms left out follow from these two as those did from earlier ones
-                ratio = 64.0 * (own * own + 4.0 * rate * rate) * step_s * step_s
-                truncation = min(1.0, ratio / (order * (order + 1))) * last_terms / order
-
-            # leading zeros: the block starts from rest, or where the acceleration is zero too
-            first = 0
-            if rate == 0.0:
-                first = 1
-                if just_lifted:
-                    u[1] = 0.0
-                    first = 2
-                just_lifted = False
-            # a start that rounding turns into the other sense is none
-            standstill = 0.0
-            if u[first] * sense > 0.0 or not sticks:
-                standstill = first_standstill(u, first, order)
-            end = min(standstill, 1.0)
-            reached = x + travel_at(u, order, end) if end < 1.0 else x + travel
-            event = 0
-            if standstill <= 1.0:
-                event = 1
-            if not sticks and event == 1 and lowest <= reached <= highest:
-                # without friction the block turns and goes on
-                if reached > peak:
-                    peak = reached
-                    peak_error = error_x
-                if filled < room:
-                    history[0, filled] = base_s + (at + part * end) * h
-                    history[1, filled] = reached
-                    history[2, filled] = 0.0
-                    history[3, filled] = -1.0
-                    filled += 1
-                event = 0
-                turned_at = end
-                end = 1.0
-                reached = x + travel
-                if reached > highest:
-                    end = root_between(u, 0, order, 0, highest - x, turned_at, 1.0)
-                    event = 2
-                elif reached < lowest:
-                    end = root_between(u, 0, order, 0, lowest - x, turned_at, 1.0)
-                    event = 3
-            if event < 2 and reached > highest:
-                end = root_between(u, 0, order, 0, highest - x, 0.0, end)
-                event = 2
-            elif event < 2 and reached < lowest:
-                end = root_between(u, 0, order, 0, lowest - x, 0.0, end)
-                event = 3
-
-            # errors: those of the start carried on by the linearised equation, and the new ones
-            slope = 0.0
-            drag = 0.0
-            if not uniform:
-                inertia = harmonic_sum(table, INERTIA, c, s)
-                acceleration = u[1] / (step_s * step_s)
-                slope = abs(
-                    harmonic_slope(table, DRIVE, c, s) * ab
-                    - harmonic_slope(table, RESISTANCE, c, s) * wb
-                    - harmonic_slope(table, BRAKING, c, s) * rate * rate
-                    - harmonic_slope(table, INERTIA, c, s) * acceleration
-                ) / abs(inertia)
-                drag = abs(2.0 * harmonic_sum(table, BRAKING, c, s) * rate / inertia)
-            span = end * step_s
-            pull = slope * error_x + drag * error_rate
-            error_x += span * (error_rate + 0.5 * span * pull)
-            error_rate += span * (pull + 0.5 * span * (slope * error_rate + drag * pull))
-            error_x += truncation + EPSILON * (2.0 * abs(reached) + abs(u[0]))
-            if step_s > 0.0:
-                error_rate += order * truncation / step_s
-                error_rate += EPSILON * (2.0 * abs(rate) + 4.0 * own * own * span)
-                if uniform:
-                    error_rate += 4.0 * EPSILON * (abs(u[1]) + abs(u[2])) / step_s
-
-            # conditions at the end of the stretch
-            if end > 0.0:
-                rate_end = rate_at(u, 0, order, end) / step_s
-                if event == 1:
-                    rate_end = 0.0
-                c_end = c
-                s_end = s
-                if not uniform:
-                    c_end = math.cos(reached if event < 2 else x + travel_at(u, order, end))
-                    s_end = math.sin(reached if event < 2 else x + travel_at(u, order, end))
-                least, condition = least_condition(
-                    table, c_end, s_end, rate_end, ab + da * end, wb + dw * end
-                )
-                if least <= 0.0:
-                    end, condition = first_violation(
-                        table, u, order, x, step_s, ab, da, wb, dw, end
-                    )
-                    code = VIOLATED
-                    tau = at + part * end
-                    rate = rate_at(u, 0, order, end) / step_s
-                    x += travel_at(u, order, end)
-                    if x > peak:
-                        peak = x
-                        peak_error = error_x
-                    break
-                c = c_end
-                s = s_end
-                if event == 2:
-                    x = highest
-                elif event == 3:
-                    x = lowest
-                else:
-                    x = reached
-                rate = rate_end
-            tau = at + part * end
-            if x > peak:
-                peak = x
-                peak_error = error_x
-            if event == 2:
-                code = UPPER
-                break
-            if event == 3:
-                if not seats:
-                    code = LOWER
-                    break
-                rate = 0.0
-                error_x = 0.0
-                standing = True
-                seatings += 1
-                barred = -1
-                break
-            if event == 1:
-                rate = 0.0
-                standing = True
-                barred = sense
-                break
-            piece += 1
-
-        if code >= 0:
+        crossing = cross_interval(
+            rules, table, work.series, line, tau, own, state, peak, history, filled
+        )
+        state, peak, filled = crossing.state, crossing.peak, crossing.filled
+        steps += crossing.steps
+        tau, condition = crossing.tau, crossing.condition
+        stop = stop_of(crossing.kind)
+        if stop != GOES_ON:
             break
-        if standing:
-            stopped_s = base_s + tau * h
-            settled = False
-            moving = not sticks
-            error_rate = 0.0
-            certain_s = math.nan
-            if filled < room:
-                history[0, filled] = stopped_s
-                history[1, filled] = x
-                history[2, filled] = 0.0
-                history[3, filled] = -1.0
-                filled += 1
+        if crossing.kind != PASSED:  # a standstill, or an impact that stops the block
+            impacts += 1 if crossing.kind == IMPACT else 0
+            moving, barred = not rules.sticks, state.sense
+            stopped_s, certain_s = line.start_s + tau * line.h, math.nan
+            filled = noted(history, filled, stopped_s, state.x, 0.0, -1)
+            # what is left of an interval of the record goes on from the same place
             if free:
-                free_s += tau * h
-                tau = 0.0
+                free_s, tau = free_s + tau * line.h, 0.0
             elif tau >= 1.0:
-                node += 1
-                tau = 0.0
+                node, tau = node + 1, 0.0
             continue
         tau = 0.0
         if free:
-            free_s += h
-            base_s = time_s[n - 1] + free_s
+            free_s += line.h
         else:
             node += 1
-            base_s = time_s[node]
-        if filled < room:
-            history[0, filled] = base_s
-            history[1, filled] = x
-            history[2, filled] = rate
-            history[3, filled] = -1.0 if free else node
-            filled += 1
-        least_q = 0.0 if free else tail_min_q[node]
-        pull = harmonic_sum(forward, DRIVE, c, s)
-        if rate > 0.0 and pull > 0.0 and pull * least_q > harmonic_sum(forward, RESISTANCE, c, s):
-            if math.isnan(certain_s):
-                certain_s = base_s
-        else:
-            certain_s = math.nan
+        now_s = record.time_s[node] + free_s
+        filled = noted(history, filled, now_s, state.x, state.rate, -1 if free else node)
+        certain_s = certain_at(record, rules, state, node, free, now_s, certain_s)
 
-    moment_s = base_s + tau * h
-    if node >= last and code != JUMPED:
-        # a free interval has no length of its own that another phase could go on in
-        free_s += tau * h
-        tau = 0.0
-    if code == JUMPED:
-        moment_s = time_s[0]
-        if last >= 0:
-            moment_s = time_s[last] + interval_s[last] * w[last] / (w[last] - w[last + 1])
-    return (
-        code, condition, node, tau, free_s, moment_s, x, rate, peak, started_s, stopped_s,
-        certain_s, error_x, error_rate, peak_error, steps, moved, seatings, filled,
+    stop_s = time_of_jump(record) if stop == JUMPED else line.start_s + tau * line.h
+    if node >= record.last and stop != JUMPED:
+        # an interval of rest has no length of its own that another phase could go on in
+        free_s, tau = free_s + tau * line.h, 0.0
+    end = Entry(Place(node, tau), free_s, state.x, state.rate, state.error_x, state.error_rate)
+    return PhaseRun(
+        stop, condition, stop_s, end, peak, started_s, stopped_s, certain_s, steps, moved, impacts,
+        filled,
     )  # fmt: skip
+
+
+@within
+def certain_at(
+    record: Record,
+    rules: PhaseRules,
+    state: State,
+    node: int,
+    free: bool,
+    now_s: float,
+    since_s: float,
+) -> float:
+    """Return :func:`certain_since` at a node, or after the record."""
+    driving = harmonic_sum(rules.forward, DRIVING, state.cos, state.sin)
+    resistance = harmonic_sum(rules.forward, RESISTANCE, state.cos, state.sin)
+    # after the record k_h is zero for ever: the block goes on only if it has no strength left
+    least_q = 0.0 if free else record.tail_min_q[node]
+    return certain_since(since_s, now_s, state.rate, driving, resistance, least_q)
+
+
+@within
+def placed(rules: PhaseRules, entry: Entry) -> State:
+    """Return the state in which a phase is entered."""
+    cos, sin = 1.0, 0.0  # the harmonics of a constant: no cosine is taken that nothing depends on
+    if not rules.uniform:
+        cos, sin = math.cos(entry.x), math.sin(entry.x)
+    sense = -1 if entry.rate < 0.0 else 1
+    return State(entry.x, entry.rate, cos, sin, entry.error_x, entry.error_rate, sense, False)
+
+
+@within
+def thrown(record: Record, node: int) -> bool:
+    """Whether the ground falls away under the block before the next node (1 + k_v <= 0)."""
+    return node >= record.last and record.last < record.k_h.size - 1
+
+
+@within
+def time_of_jump(record: Record) -> float:
+    """Return when 1 + k_v reaches zero [s]."""
+    at, w = record.last, record.w
+    # w is a straight line between the last node in contact and the next
+    jump_s: float = record.time_s[max(at, 0)]
+    if at >= 0:
+        jump_s += record.interval_s[at] * w[at] / (w[at] - w[at + 1])
+    return jump_s
+
+
+@within
+def stop_at_rest(
+    record: Record, rules: PhaseRules, state: State, line: Line, place: Place
+) -> tuple[int, int]:
+    """Return why a phase ends where its rest does, or that it goes on, and what fails."""
+    if state.sense == 0:
+        return (JUMPED if thrown(record, place.interval) else AT_REST), 0
+    # confined toppling: the heel leaves its plane, and another phase begins
+    # (docs/theory/confined-toppling.md)
+    if state.sense < 0 and rules.in_reverse == REVERSE_LEAVES:
+        return REVERSE, 0
+    table = rules.forward if state.sense > 0 else rules.reverse
+    a = line.a0 + (line.a1 - line.a0) * place.fraction
+    w = line.w0 + (line.w1 - line.w0) * place.fraction
+    broken, condition = broken_condition(table, state, a, w)
+    return (VIOLATED if broken else GOES_ON), condition
+
+
+@within
+def stop_of(kind: int) -> int:
+    """Return why a phase ends with an event, or that it goes on."""
+    if kind == BROKEN:
+        return VIOLATED
+    if kind == AT_HIGHEST:
+        return UPPER
+    return LOWER if kind == AT_LOWEST else GOES_ON

@@ -13,8 +13,10 @@ of U from a division of series. The record is linear between samples, so no step
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from rbfrag.solver.integrator.compiled import fused_kernel, kernel
+from rbfrag.solver.integrator.compiled import fused_kernel, inner_kernel, within
+from rbfrag.solver.integrator.one_freedom.state import PhaseRules, State
 from rbfrag.solver.results import FloatArray
 
 ORDER = 8
@@ -26,21 +28,56 @@ UNIFORM_ORDER = 2
 TURN_MAX = 0.12
 """Greatest step, in units of the block's own time; longer intervals are split evenly."""
 
-INERTIA, DRIVE, RESISTANCE, BRAKING, CONDITIONS = 0, 1, 2, 3, 4
+EPSILON = 2.220446049250313e-16
+"""Machine epsilon; the errors count a few roundings of it a step."""
+
+SLOW = 1e-4
+"""Size of the last two terms of a series, over its first three, at which a step is halved."""
+
+INERTIA, DRIVING, RESISTANCE, BRAKING, CONDITIONS = 0, 1, 2, 3, 4
 """Rows of a table of coefficients."""
 
 
-@kernel
+class Step(NamedTuple):
+    """One Taylor step, with tau in [0, 1].
+
+    Args:
+        h: its length [s].
+        a0: driving acceleration at its start [g].
+        da: change of it over the step.
+        w0: effective gravity 1 + k_v at its start.
+        dw: change of it over the step.
+    """
+
+    h: float
+    a0: float
+    da: float
+    w0: float
+    dw: float
+
+
+class Errors(NamedTuple):
+    """Bounds on the errors of the position and of its rate."""
+
+    x: float
+    rate: float
+
+
+@inner_kernel
 def harmonic_sum(table: FloatArray, row: int, c: float, s: float) -> float:
     """Value of one row of coefficients (up to the second harmonic) where cos x = c, sin x = s."""
-    c2 = c * c - s * s
-    s2 = 2.0 * c * s
+    return with_double(table, row, c, s, c * c - s * s, 2.0 * c * s)
+
+
+@inner_kernel
+def with_double(table: FloatArray, row: int, c: float, s: float, c2: float, s2: float) -> float:
+    """The same where c2 = cos 2x and s2 = sin 2x are known."""
     value: float = table[row, 0] + table[row, 1] * c + table[row, 2] * s
     value += table[row, 3] * c2 + table[row, 4] * s2
     return value
 
 
-@kernel
+@inner_kernel
 def harmonic_slope(table: FloatArray, row: int, c: float, s: float) -> float:
     """Derivative of one row of coefficients (up to the second harmonic)."""
     c2 = c * c - s * s
@@ -53,7 +90,7 @@ def harmonic_slope(table: FloatArray, row: int, c: float, s: float) -> float:
 @fused_kernel
 def uniform_terms(
     inertia: float,
-    drive: float,
+    driving: float,
     resistance: float,
     h: float,
     a0: float,
@@ -62,48 +99,37 @@ def uniform_terms(
     dw: float,
 ) -> tuple[float, float]:
     """First and second Taylor coefficient of U where the equation is the same everywhere."""
+    # U' = h² [N a - M w]/D is linear in tau: two terms are exact
     scale = h * h / inertia
-    first = scale * (drive * a0 - resistance * w0)
-    return first, 0.5 * scale * (drive * da - resistance * dw)
+    first = scale * (driving * a0 - resistance * w0)
+    return first, 0.5 * scale * (driving * da - resistance * dw)
 
 
 @fused_kernel
-def fill_step(
-    table: FloatArray,
-    u: FloatArray,
-    work: FloatArray,
-    order: int,
-    c: float,
-    s: float,
-    h: float,
-    a0: float,
-    da: float,
-    w0: float,
-    dw: float,
-) -> None:
-    """Fill u[1..order] from u[0].
+def fill_step(table: FloatArray, series: FloatArray, order: int, state: State, step: Step) -> None:
+    """Fill the Taylor coefficients of U for one step.
 
     Args:
         table: coefficients of an equation.
-        u: Taylor coefficients of U; u[0] = h x' on entry.
-        work: room for series, shape (7, order + 1).
+        series: shape (8, order + 1); its first row is filled with those of U, the others with
+            those of cos x, sin x, cos 2x, sin 2x, D, Q and U².
         order: degree of U.
-        c: cosine of x at the start.
-        s: its sine.
-        h: length of the step [s].
-        a0: driving acceleration at the start [g].
-        da: its change over the step.
-        w0: effective gravity at the start.
-        dw: its change over the step.
+        state: state of the block at the start.
+        step: length and accelerations.
     """
+    h, a0, da, w0, dw = step
+    u = series[0]
+    u[0] = h * state.rate
     if order == UNIFORM_ORDER:
         u[1], u[2] = uniform_terms(
-            table[INERTIA, 0], table[DRIVE, 0], table[RESISTANCE, 0], h, a0, da, w0, dw
+            table[INERTIA, 0], table[DRIVING, 0], table[RESISTANCE, 0], h, a0, da, w0, dw
         )
         return
+    # dx/dtau = U: the series of x is that of U integrated, and needs no row of its own
     hh = h * h
-    c1, s1, c2, s2 = work[0], work[1], work[2], work[3]
-    d, q, squared = work[4], work[5], work[6]
+    c, s = state.cos, state.sin
+    c1, s1, c2, s2 = series[1], series[2], series[3], series[4]
+    d, q, squared = series[5], series[6], series[7]
     c1[0], s1[0], c2[0], s2[0] = c, s, c * c - s * s, 2.0 * c * s
     n_before = 0.0
     m_before = 0.0
@@ -114,7 +140,7 @@ def fill_step(
         n = table[1, 1] * ck + table[1, 2] * sk + table[1, 3] * c2k + table[1, 4] * s2k
         m = table[2, 1] * ck + table[2, 2] * sk + table[2, 3] * c2k + table[2, 4] * s2k
         qk = table[3, 1] * ck + table[3, 2] * sk + table[3, 3] * c2k + table[3, 4] * s2k
-        if k == 0:
+        if k == 0:  # the constants of the harmonics enter the first coefficients only
             dk += table[0, 0]
             n += table[1, 0]
             m += table[2, 0]
@@ -122,6 +148,7 @@ def fill_step(
             inverse = 1.0 / dk
         d[k] = dk
         q[k] = qk
+        # products of series (Cauchy), and the derivatives (cos x)' = -x' sin x, (sin x)' = x' cos x
         square = 0.0
         turn_c = 0.0
         turn_s = 0.0
@@ -135,11 +162,13 @@ def fill_step(
             turn_c2 += uj * s2[k - j]
             turn_s2 += uj * c2[k - j]
         squared[k] = square
+        # what is known of (D U')_k: the driving terms less Q U² less the D_j U'_(k-j) with j > 0
         known = hh * (a0 * n + da * n_before - w0 * m - dw * m_before)
         n_before = n
         m_before = m
         for j in range(k + 1):
             known -= q[j] * squared[k - j]
+        # D_0 is divided by at the end: it is not zero, least_condition() sees to it
         for j in range(1, k + 1):
             known -= d[j] * (k - j + 1) * u[k - j + 1]
         part = 1.0 / (k + 1)
@@ -150,169 +179,101 @@ def fill_step(
         s2[k + 1] = 2.0 * turn_s2 * part
 
 
-@kernel
-def rate_at(u: FloatArray, first: int, order: int, tau: float) -> float:
-    """Value of U/tau^first at tau, where the coefficients before `first` are zero."""
-    value = 0.0
-    for k in range(order, first - 1, -1):
-        value = value * tau + u[k]
-    return value
+@within
+def own_rate(table: FloatArray, c: float, s: float) -> float:
+    """Return the rate of the block's own time [1/s]: sqrt((N + M)/D), p of a toppling block."""
+    driving = abs(harmonic_sum(table, DRIVING, c, s))
+    resistance = abs(harmonic_sum(table, RESISTANCE, c, s))
+    inertia = harmonic_sum(table, INERTIA, c, s)
+    # D = 0 (Painlevé) gives a rate without bound and steps that do not end: keep it finite
+    return math.sqrt((driving + resistance) / max(abs(inertia), 1e-300))
 
 
-@kernel
-def acceleration_at(u: FloatArray, first: int, order: int, tau: float) -> float:
-    """Derivative of U/tau^first at tau."""
-    value = 0.0
-    for k in range(order, first, -1):
-        value = value * tau + (k - first) * u[k]
-    return value
+@within
+def converges_slowly(u: FloatArray, order: int) -> bool:
+    """Whether the last two terms of a series are not small beside its first three."""
+    last_terms: float = abs(u[order]) + abs(u[order - 1])
+    first_terms: float = abs(u[0]) + abs(u[1]) + abs(u[2])
+    return last_terms > SLOW * first_terms
 
 
-@kernel
-def travel_at(u: FloatArray, order: int, tau: float) -> float:
-    """Change of x from the start of the step to tau."""
-    value = 0.0
-    for k in range(order, -1, -1):
-        value = value * tau + u[k] / (k + 1)
-    return value * tau
+@within
+def truncation(u: FloatArray, order: int, own: float, rate: float, h: float) -> float:
+    """Return a bound on what the terms left out add to x at the end of a step.
 
-
-@kernel
-def root_between(
-    u: FloatArray, first: int, order: int, what: int, target: float, low: float, high: float
-) -> float:
-    """Root in [low, high], to rounding, by Newton's method kept inside a bracket.
+    The first two of them follow from the last two of the series as those did from earlier ones.
+    One would not do: from rest under a constant acceleration every other term vanishes.
 
     Args:
         u: Taylor coefficients of U.
-        first: number of leading coefficients that are zero.
         order: degree of U.
-        what: 0 for the travel less `target`, 1 for U/tau^first, 2 for its derivative.
-        target: travel to reach.
-        low: end where the sign is that of the function just after the start.
-        high: end where the sign is the other, or the value zero.
+        own: rate of the block's own time [1/s].
+        rate: rate at the start [1/s].
+        h: length of the step [s].
     """
-    sign_low = 1.0
-    at_high = _value(u, first, order, what, target, high)
-    if at_high == 0.0:
-        return high
-    if at_high > 0.0:
-        sign_low = -1.0
-    tau = 0.5 * (low + high)
-    for _ in range(100):
-        value = _value(u, first, order, what, target, tau)
-        if value == 0.0:
-            return tau
-        if value * sign_low > 0.0:
-            low = tau
-        else:
-            high = tau
-        slope = 0.0
-        if what == 0:
-            slope = rate_at(u, 0, order, tau)
-        elif what == 1:
-            slope = acceleration_at(u, first, order, tau)
-        following = tau - value / slope if slope != 0.0 else low - 1.0
-        if not low < following < high:
-            following = 0.5 * (low + high)
-        if following == tau or high - low <= 1e-16 * max(abs(high), abs(low)):
-            return high
-        tau = following
-    return high
+    last_terms: float = abs(u[order]) + abs(u[order - 1])
+    # every second term falls by about (own h)²/(n (n + 1)); 64 leaves a margin of eight in own h
+    ratio = 64.0 * (own * own + 4.0 * rate * rate) * h * h
+    return min(1.0, ratio / (order * (order + 1))) * last_terms / order
 
 
-@kernel
-def _value(u: FloatArray, first: int, order: int, what: int, target: float, tau: float) -> float:
-    if what == 0:
-        return travel_at(u, order, tau) - target
-    if what == 1:
-        return rate_at(u, first, order, tau)
-    return acceleration_at(u, first, order, tau)
+@within
+def sensitivity(
+    table: FloatArray, state: State, step: Step, acceleration: float
+) -> tuple[float, float]:
+    """Return bounds of the derivatives of x'' by x [1/s²] and by x' [1/s] at a step's start."""
+    c, s, rate = state.cos, state.sin, state.rate
+    inertia = harmonic_sum(table, INERTIA, c, s)
+    # the derivative of D x'' = N a - M w - Q x'² by x, with x'' as the series has it
+    by_x = abs(
+        harmonic_slope(table, DRIVING, c, s) * step.a0
+        - harmonic_slope(table, RESISTANCE, c, s) * step.w0
+        - harmonic_slope(table, BRAKING, c, s) * rate * rate
+        - harmonic_slope(table, INERTIA, c, s) * acceleration
+    ) / abs(inertia)
+    return by_x, abs(2.0 * harmonic_sum(table, BRAKING, c, s) * rate / inertia)
 
 
-@kernel
-def first_standstill(u: FloatArray, first: int, order: int) -> float:
-    """First tau in (0, 1] at which the rate vanishes, or 2.
-
-    A rate that dips below zero between two ends of one sign is seen where its derivative
-    changes sign once, which short steps ensure.
-    """
-    start = u[first]
-    if start == 0.0:
-        return 2.0
-    end = rate_at(u, first, order, 1.0)
-    if start * end <= 0.0:
-        return root_between(u, first, order, 1, 0.0, 0.0, 1.0)
-    slope_start = acceleration_at(u, first, order, 0.0)
-    slope_end = acceleration_at(u, first, order, 1.0)
-    if slope_start * start < 0.0 and slope_end * start > 0.0:
-        least = root_between(u, first, order, 2, 0.0, 0.0, 1.0)
-        if rate_at(u, first, order, least) * start <= 0.0:
-            return root_between(u, first, order, 1, 0.0, 0.0, least)
-    return 2.0
-
-
-@kernel
-def _with_double(table: FloatArray, row: int, c: float, s: float, c2: float, s2: float) -> float:
-    """Value of one row that has no third harmonic."""
-    value: float = table[row, 0] + table[row, 1] * c + table[row, 2] * s
-    value += table[row, 3] * c2 + table[row, 4] * s2
-    return value
-
-
-@kernel
-def least_condition(
-    table: FloatArray, c: float, s: float, rate: float, a: float, w: float
-) -> tuple[float, int]:
-    """Least of the inertia and the conditions at a state, and which it is (0: the inertia)."""
-    c2 = c * c - s * s
-    s2 = 2.0 * c * s
-    c3 = c * c2 - s * s2
-    s3 = s * c2 + c * s2
-    least = _with_double(table, INERTIA, c, s, c2, s2)
-    which = 0
-    if least <= 0.0:
-        return least, which  # the conditions are those of forces times the inertia
-    for n in range((table.shape[0] - CONDITIONS) // 3):
-        row = CONDITIONS + 3 * n
-        value = _with_double(table, row, c, s, c2, s2) * a
-        value += _with_double(table, row + 1, c, s, c2, s2) * w
-        third = _with_double(table, row + 2, c, s, c2, s2)
-        third += table[row + 2, 5] * c3 + table[row + 2, 6] * s3
-        value += third * rate * rate
-        if value < least:
-            least = value
-            which = n + 1
-    return least, which
-
-
-@kernel
-def first_violation(
+@within
+def error_growth(
+    rules: PhaseRules,
     table: FloatArray,
     u: FloatArray,
     order: int,
+    own: float,
+    state: State,
+    step: Step,
+    tau: float,
     x: float,
-    h: float,
-    a0: float,
-    da: float,
-    w0: float,
-    dw: float,
-    end: float,
-) -> tuple[float, int]:
-    """First tau in (0, end] of a step at which a condition fails at its end, and which."""
-    low = 0.0
-    high = end
-    which = 0
-    for _ in range(60):
-        tau = 0.5 * (low + high)
-        here = x + travel_at(u, order, tau)
-        rate = rate_at(u, 0, order, tau) / h
-        least, number = least_condition(
-            table, math.cos(here), math.sin(here), rate, a0 + da * tau, w0 + dw * tau
-        )
-        if least > 0.0:
-            low = tau
-        else:
-            high = tau
-            which = number
-    return high, which
+) -> Errors:
+    """Return the errors after a step: the earlier ones carried on, and what the step adds.
+
+    Args:
+        rules: those of the phase.
+        table: coefficients of the equation of the present sense.
+        u: Taylor coefficients of U.
+        order: degree of U.
+        own: rate of the block's own time [1/s]; 0 where the equation is the same everywhere.
+        state: state at the start.
+        step: length and accelerations.
+        tau: fraction of the step that is taken.
+        x: position that it leads to.
+    """
+    by_x, by_rate, left_out = 0.0, 0.0, 0.0
+    if not rules.uniform:
+        left_out = truncation(u, order, own, state.rate, step.h)
+        by_x, by_rate = sensitivity(table, state, step, u[1] / (step.h * step.h))
+    # the linearised equation to second order in the span
+    span_s = tau * step.h
+    pull = by_x * state.error_x + by_rate * state.error_rate
+    error_x = state.error_x + span_s * (state.error_rate + 0.5 * span_s * pull)
+    error_rate = state.error_rate + span_s * (
+        pull + 0.5 * span_s * (by_x * state.error_rate + by_rate * pull)
+    )
+    # truncation of x and, as its derivative by tau, of the rate; a few roundings of each
+    error_x += left_out + EPSILON * (2.0 * abs(x) + abs(u[0]))
+    error_rate += order * left_out / step.h
+    error_rate += EPSILON * (2.0 * abs(state.rate) + 4.0 * own * own * span_s)
+    if rules.uniform:
+        error_rate += 4.0 * EPSILON * (abs(u[1]) + abs(u[2])) / step.h
+    return Errors(error_x, error_rate)

@@ -60,10 +60,12 @@ def two_contact_equation(
     """
     g = STANDARD_GRAVITY_M_S2
     sense = -1.0 if clockwise else 1.0
+    # friction is mobilised in full: the directions of the contact forces do not change
     u_a, u_b = constant_vector(base.direction), constant_vector(back.direction)
     a = back.arm.cross(u_b) * -sense
     b = base.arm.cross(u_a) * sense
     force = u_a * a + u_b * b
+    # C' and C'': dashes are derivatives by θ, not by time
     velocity = path.derivative()
     bend = velocity.derivative()
     # of the resultant G = per_k_h k_h + per_w (1 + k_v)
@@ -74,7 +76,7 @@ def two_contact_equation(
     on_back = velocity * b - u_a * inertia_m2
     return Equation(
         inertia=velocity.cross(force) - u_a.cross(u_b) * inertia_m2,
-        drive=per_k_h.cross(force) * g,
+        driving=per_k_h.cross(force) * g,
         resistance=per_w.cross(force) * -g,
         braking=bend.cross(force),
         conditions=tuple(

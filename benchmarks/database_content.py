@@ -24,13 +24,14 @@ from rbfrag.db.schema import (
     suite,
     suite_motion,
     toppling_spectrum,
+    vertical,
+    with_motions,
 )
 
 # When, by which run and under which row number something was written; a digest is of these too.
 _INCIDENTAL = {"id", "campaign_id", "added", "created", "digest"}
 
 _motion_key = (motion.c.samples_sha256, motion.c.dt_s)
-_vertical = motion.alias("vertical")
 
 
 def content_digest(connection: Connection) -> str:
@@ -77,19 +78,15 @@ def _own(table: Any, *without: str) -> list[Any]:
 def _queries() -> dict[str, Select[Any]]:
     event_key = (earthquake.c.event_id, earthquake.c.guessed)
     combination_key = combination.c.natural_key
-    with_vertical = (
-        combination.join(motion, motion.c.id == combination.c.motion_id),
-        response.join(motion, motion.c.id == response.c.motion_id),
-    )
     labelled = {
         table: select(
             table.c.natural_key,
             *_motion_key,
-            _vertical.c.samples_sha256,
-            _vertical.c.dt_s,
+            vertical.c.samples_sha256,
+            vertical.c.dt_s,
             *_own(table, "natural_key", "motion_id", "vertical_motion_id"),
-        ).select_from(joined.outerjoin(_vertical, _vertical.c.id == table.c.vertical_motion_id))
-        for table, joined in zip((combination, response), with_vertical, strict=True)
+        ).select_from(with_motions(table))
+        for table in (combination, response)
     }
     return {
         "earthquake": select(*_own(earthquake)),

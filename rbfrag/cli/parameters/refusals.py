@@ -1,0 +1,137 @@
+"""Which options do not go together, and which need another: one table for all commands."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import NamedTuple
+
+from rbfrag.errors import InputError
+
+NUMBERS = ("--p2", "--kr")
+SHAPE = ("--height", "--width", "--dip", "--alpha1", "--alpha3", "--r3", "--s1", "--s2", "--gamma")
+PLANES = ("--beta", "--phi", "--phi-back", "--no-back")
+MEASURES = ("--pgv", "--pga", "--tm", "--pgd")
+
+ONCE = "a block is described once"
+
+
+class Conflict(NamedTuple):
+    """Options of which none goes with any of some others.
+
+    Args:
+        options: those that are refused.
+        others: those that they do not go with.
+        why: what to do instead, or why not.
+        commands: where this holds; () for all that have both.
+    """
+
+    options: tuple[str, ...]
+    others: tuple[str, ...]
+    why: str
+    commands: tuple[str, ...] = ()
+
+
+class Need(NamedTuple):
+    """Options that do nothing unless one of some others is given.
+
+    Args:
+        options: those that are refused.
+        others: what they need one of.
+        goes_with: these others in words.
+        why: what to do.
+        commands: where this holds; () for all that have one of the others.
+    """
+
+    options: tuple[str, ...]
+    others: tuple[str, ...]
+    goes_with: str
+    why: str
+    commands: tuple[str, ...] = ()
+
+
+FILES = ("--block", "--polygon")
+TABLES = ("--blocks", "--rockmass")
+
+CONFLICTS = (
+    Conflict(("--ky",), (*SHAPE, *FILES), ONCE),
+    Conflict((*SHAPE, *FILES, *TABLES), NUMBERS, ONCE),
+    Conflict(SHAPE[:-1], FILES, "the file has the shape"),
+    Conflict(("--polygon",), ("--block",), ONCE),
+    Conflict(TABLES, (*SHAPE, *FILES), ONCE),
+    Conflict(("--rockmass",), ("--blocks",), "one of them is enough"),
+    Conflict(PLANES, NUMBERS, "numbers say all about the block"),
+    Conflict(PLANES, TABLES, "the file has the planes", ("hazard", "shakemap", "nrml", "pelicun")),
+    Conflict(PLANES[1:], ("--ky",), "the strength follows from --ky and --beta"),
+    Conflict((*SHAPE, *FILES, *PLANES[1:], "--motion"), ("--batch",), "the table has the blocks"),
+    Conflict(
+        ("--motion",),
+        MEASURES,
+        "give the accelerogram, or the measures that a fragility model answers for",
+    ),
+)
+
+_NAME_IT = "name the accelerogram, too"
+_MEASURE = "give --pgv, --pga and --tm, or --pgd and --tm, too"
+
+NEEDS = (
+    Need(("--batch",), ("--out",), "--out", "--out FILE names the table of answers"),
+    Need(("--out",), ("--batch",), "--batch", "--batch FILE names the table of blocks"),
+    Need(
+        ("--vertical", "--reverse", "--scales", "--jobs", "--units", "--dt", "--polarity"),
+        ("--motion",),
+        "--motion",
+        _NAME_IT,
+    ),
+    Need(
+        ("--displacement",),
+        ("--motion", *MEASURES),
+        "--motion, or with --pgv",
+        _NAME_IT,
+        ("rockmass",),
+    ),
+    Need(
+        ("--rotation",),
+        ("--motion", "--displacement"),
+        "--motion, or with --pgv and --displacement",
+        _NAME_IT,
+        ("rockmass",),
+    ),
+    Need(("--model",), MEASURES, "a measure of the motion", _MEASURE, ("rockmass",)),
+    Need(
+        ("--db",),
+        ("--motion", *MEASURES),
+        "a motion or a measure of it",
+        f"give --motion, or {_MEASURE.removeprefix('give ')}",
+        ("rockmass",),
+    ),
+    Need(("--exaggerate",), ("--animate",), "--animate", "it is a factor on what the film shows"),
+    Need(("--n",), ("--rockmass",), "--rockmass", "only a rock mass is drawn anew"),
+)
+
+
+def refuse(command: str, given: Collection[str], known: Collection[str]) -> None:
+    """Refuse options that do not go together.
+
+    Args:
+        command: name of the command's function.
+        given: the options that were given.
+        known: all that the command has; what it cannot be given, nothing needs.
+
+    Raises:
+        InputError: the first option that does not go with the others; the message names both.
+    """
+    for rule in CONFLICTS:
+        if not rule.commands or command in rule.commands:
+            one = _first(rule.options, given)
+            other = _first(rule.others, given)
+            if one and other:
+                raise InputError(f"{one} does not go with {other}: {rule.why}")
+    for need in NEEDS:
+        if (not need.commands or command in need.commands) and _first(need.others, known):
+            one = _first(need.options, given)
+            if one and not _first(need.others, given):
+                raise InputError(f"{one} goes with {need.goes_with}: {need.why}")
+
+
+def _first(options: Collection[str], among: Collection[str]) -> str | None:
+    return next((option for option in options if option in among), None)

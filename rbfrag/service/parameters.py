@@ -1,0 +1,313 @@
+"""What operations are asked: the parameters of a query, and a body, as pydantic models.
+
+A parameter has the name of the command line's option without its dashes, and the same unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, StrictFloat
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.methods import TOPPLING_BLOCK
+
+if TYPE_CHECKING:
+    from rbfrag.solver.described import DescribedBlock
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Text = Annotated[str, Field(min_length=1, max_length=200)]
+
+Column = StrictFloat | Annotated[list[StrictFloat | None], Field(min_length=1, fail_fast=True)]
+"""A number that stands for every element, or a list of one an element, null where there is none."""
+
+
+def _words(text: str) -> Any:
+    return Field(description=text)
+
+
+def _example(value: object) -> Any:
+    return Field(examples=[value])
+
+
+P2 = _words("Frequency parameter p² of the block [1/s²].")
+KR = _words("Rocking acceleration coefficient k_r = tan(critical angle) [g].")
+HEIGHT = _words("Height of a rectangle, perpendicular to its base [m], with width.")
+WIDTH = _words("Width of a rectangle along its base [m], with height.")
+DIP = _words("Dip of the base of a rectangle, out of the slope positive [deg]. Default: 0.")
+S1 = _words("Spacing of the base fractures [m], with s2 and gamma.")
+S2 = _words("Spacing of the back fractures [m].")
+GAMMA = _words("Dip of the back plane less dip of the base [deg].")
+BETA = _words("Dip of the base, out of the slope positive [deg].")
+PHI = _words("Friction angle of the base [deg]; only a rectangle is taken to topple without.")
+KIND = _words("How the block fails. Default: what it is given by.")
+KY = _words("Sliding: yield acceleration coefficient tan(phi - beta).")
+DISPLACEMENT = _words("Sliding: the displacement that is too far [m].")
+KS = _words("Slumping: yield acceleration coefficient k_s.")
+PS2 = _words("Slumping: frequency parameter p_s² at rest [1/s²].")
+ROTATION = _words("Slumping: rotation that is too far [deg]. Default: failure past recovery.")
+PGV = _words("Peak ground velocity [m/s].")
+PGA = _words("Peak ground acceleration [g].")
+TM = _words("Mean period [s].")
+PGD = _words("Peak ground displacement [m].")
+LEVEL = Field(gt=0.0, lt=1.0, description="Confidence level of the interval.")
+MODEL = _words(
+    "Name of a stored model. Default: the database's default if the given measures suffice for "
+    "it, else the best that they suffice for."
+)
+
+# keywords of rbfrag.predict and rbfrag.stability by the names of the parameters
+MEASURES = {"pgv": "pgv_m_s", "pga": "pga_g", "tm": "tm_s", "pgd": "pgd_m"}
+NUMBERS = {"p2": "p2", "kr": "kr", "ky": "ky", "ks": "ks", "ps2": "ps2"}
+SLIDING = {"displacement": "displacement_m", "beta": "beta_deg"}
+RECTANGLE = {"height": "height_m", "width": "width_m", "dip": "dip_deg"}
+PLANES = {
+    "beta": "beta_deg", "phi": "phi_deg", "phi_back": "phi_back_deg", "cohesion": "cohesion_pa",
+    "density": "density_kg_m3", "kv": "kv",
+}  # fmt: skip
+
+_SHAPES = ("height", "width", "dip", "alpha1", "alpha3", "r3", "s1", "s2", "gamma")
+SHAPES = dict(zip(_SHAPES, _SHAPES, strict=True))
+OF_A_SHAPE = ("beta", "phi", "phi_back", "no_back")
+WAYS = "height and width, or by alpha1, alpha3 and r3, or by s1, s2 and gamma"
+
+
+class Parameters(BaseModel):
+    """Named values; a name that is not known is refused."""
+
+    model_config = ConfigDict(
+        extra="forbid", allow_inf_nan=False, protected_namespaces=(), use_attribute_docstrings=True
+    )
+
+    def given(self, names: Mapping[str, str]) -> dict[str, Any]:
+        """Return those of some parameters that were given, by their keywords."""
+        values = self.__dict__
+        return {
+            keyword: value
+            for name, keyword in names.items()
+            if (value := values.get(name)) is not None
+        }
+
+
+class Shape(Parameters):
+    """A block by its shape, and the planes that it stands on."""
+
+    height: Annotated[Positive | None, HEIGHT] = None
+    width: Annotated[Positive | None, WIDTH] = None
+    dip: Annotated[float | None, DIP] = None
+    alpha1: float | None = None
+    """Angle of the heel [deg], with alpha3 and r3."""
+    alpha3: float | None = None
+    """Angle of the toe [deg]."""
+    r3: Positive | None = None
+    """Distance from centroid to toe [m]."""
+    s1: Annotated[Positive | None, S1] = None
+    s2: Annotated[Positive | None, S2] = None
+    gamma: Annotated[float | None, GAMMA] = None
+    beta: Annotated[float | None, BETA] = None
+    phi: Annotated[float | None, PHI] = None
+    phi_back: float | None = None
+    """Friction angle of the back plane [deg]. Default: phi."""
+    no_back: bool = False
+    """There is no fracture behind the block."""
+
+    def described(self) -> DescribedBlock | None:
+        """Return the block; None where nothing is said of its shape."""
+        shape = self.given(SHAPES)
+        if not shape:
+            return None
+        from rbfrag.solver.described import describe
+
+        conditions = self.given(PLANES)
+        if self.no_back:
+            conditions["back_fracture"] = False
+        return describe(shape, conditions)
+
+    def numbers(self, kind: str | None = None) -> tuple[dict[str, float], tuple[str, ...]]:
+        """Return what predictions read of the block, by keyword, and warnings.
+
+        Args:
+            kind: how a block that is given by its shape is asked to fail; None for toppling.
+
+        Raises:
+            InputError: numbers and a shape, or a shape that does not fail so.
+        """
+        described, values = self.described(), self.given(NUMBERS)
+        if described is None:
+            # the dip of the base is also that of a block that slides
+            base = self.given({"beta": "beta_deg"})
+            for name in ("phi", "phi_back", "no_back") if "ky" in values else OF_A_SHAPE:
+                if (value := getattr(self, name)) is not None and value is not False:
+                    raise InputError(f"{name} goes with the shape of a block, by {WAYS}")
+            return values | base, ()
+        if values:
+            raise InputError(f"{next(iter(values))} does not go with a shape: give one of them")
+        from rbfrag.solver.described import numbers_of_kind
+
+        return numbers_of_kind(described, kind or TOPPLING_BLOCK.kind)
+
+    def toppling(self, *names: str) -> tuple[list[float], tuple[str, ...]]:
+        """Return some of p2 [1/s²] and k_r, and warnings."""
+        values, remarks = self.numbers()
+        for name in names:
+            if name not in values:
+                raise InputError(
+                    f"{name} is missing: a block is given by {' and '.join(names)}, or by {WAYS}"
+                )
+        return [values[name] for name in names], remarks
+
+
+class _Weight(Parameters):
+    cohesion: float | None = None
+    """Cohesion of the base [Pa], with density."""
+    density: float | None = None
+    """Density of the rock [kg/m3]."""
+    kv: float | None = None
+    """Vertical acceleration of the ground, up positive [g]."""
+
+
+class BlockQuery(_Weight, Shape):
+    """Parameters of `/v1/block`."""
+
+    s1: Annotated[Positive | None, S1, _example(1.0)] = None
+    s2: Annotated[Positive | None, S2, _example(0.6)] = None
+    gamma: Annotated[float | None, GAMMA, _example(25.0)] = None
+    beta: Annotated[float | None, BETA, _example(20.0)] = None
+    phi: Annotated[float | None, PHI, _example(40.0)] = None
+
+
+class _Numbers(Parameters):
+    p2: Annotated[Positive | None, P2, _example(3.0)] = None
+    kr: Annotated[Positive | None, KR, _example(0.1)] = None
+
+
+class TopplingBlock(Shape, _Numbers):
+    """A block that topples: two numbers, or a shape."""
+
+
+class DrawingQuery(_Weight, TopplingBlock):
+    """Parameters of `/v1/drawing`."""
+
+
+class Motion(Parameters):
+    """What is known of a motion, and what answers."""
+
+    pgv: Annotated[NotNegative | None, PGV, _example(0.6)] = None
+    pga: Annotated[NotNegative | None, PGA] = None
+    tm: Annotated[Positive | None, TM] = None
+    pgd: Annotated[NotNegative | None, PGD] = None
+    model: Annotated[Text | None, MODEL] = None
+
+
+class PredictQuery(Motion, TopplingBlock):
+    """Parameters of `GET /v1/predict`."""
+
+    kind: Annotated[Text | None, KIND] = None
+    ky: Annotated[Positive | None, KY] = None
+    displacement: Annotated[Positive | None, DISPLACEMENT] = None
+    ks: Annotated[Positive | None, KS] = None
+    ps2: Annotated[Positive | None, PS2] = None
+    rotation: Annotated[float | None, ROTATION] = None
+    level: Annotated[float, LEVEL] = 0.95
+
+
+class PredictRows(Parameters):
+    """Numbers, which stand for every element, and lists of one length."""
+
+    p2: Annotated[Column | None, P2] = None
+    kr: Annotated[Column | None, KR] = None
+    height: Annotated[Column | None, HEIGHT] = None
+    width: Annotated[Column | None, WIDTH] = None
+    dip: Annotated[Column | None, DIP] = None
+    ky: Annotated[Column | None, KY] = None
+    displacement: Annotated[Column | None, DISPLACEMENT] = None
+    beta: Annotated[Column | None, BETA] = None
+    ks: Annotated[Column | None, KS] = None
+    ps2: Annotated[Column | None, PS2] = None
+    pgv: Annotated[Column | None, PGV] = None
+    pga: Annotated[Column | None, PGA] = None
+    tm: Annotated[Column | None, TM] = None
+    pgd: Annotated[Column | None, PGD] = None
+    kind: Annotated[Text | None, KIND] = None
+    rotation: Annotated[StrictFloat | None, ROTATION] = None
+    model: Annotated[Text | None, MODEL] = None
+    level: Annotated[StrictFloat, LEVEL] = 0.95
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"p2": 3.0, "kr": [0.1, 0.2, 0.3], "pgv": [0.6, 0.6, 1.2]}]}
+    )
+
+
+class Reading(Parameters):
+    """How an accelerogram is read that does not say it itself."""
+
+    trace: Annotated[int, Field(ge=0)] | None = None
+    """Number of the trace in the file, from 0; where there are several."""
+    units: Literal["g", "m/s2", "cm/s2", "mm/s2"] | None = None
+    """Unit of acceleration of a text file that does not state it."""
+    dt: Positive | None = None
+    """Sampling interval [s] of a text file that holds accelerations only."""
+
+
+MOST_SIZES = 100
+"""Most values of p² in one request for a spectrum."""
+
+_NUMBER = r"([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?"
+
+
+class SpectrumQuery(Reading):
+    """Parameters of `/v1/spectrum`."""
+
+    p2: Annotated[str, Field(pattern=f"^{_NUMBER}(,{_NUMBER})*$")] = "30,10,3,1,0.3,0.1"
+    """Frequency parameters p² [1/s²], separated by commas."""
+    polarity: Literal["forward", "reverse", "both"] = "forward"
+    """forward: positive samples drive forward; reverse: negative ones; both."""
+
+    def sizes(self) -> list[float]:
+        """Return the values of p² [1/s²]."""
+        sizes = [float(each) for each in self.p2.split(",")]
+        if len(sizes) > MOST_SIZES:
+            raise InputError(f"p2 has {len(sizes)} values; one request may ask for {MOST_SIZES}")
+        return sizes
+
+
+class CriticalQuery(Reading, Shape):
+    """Parameters of `/v1/critical`."""
+
+    p2: Annotated[Positive | None, P2, _example(3.0)] = None
+    reverse: bool = False
+    """Positive samples drive backward: k_h(t) = -a(t)."""
+    map: bool = False
+    """Map the toppling and safe intervals of k_r/PGA down to 0.01, borders to 1e-4."""
+
+
+class RockmassQuery(Motion):
+    """Parameters of `/v1/rockmass`."""
+
+    pgv: Annotated[NotNegative | None, PGV] = None
+    n: Annotated[int, Field(ge=1)] | None = None
+    """Number of realisations. Default: that of the body, else 20000."""
+    seed: Annotated[int, Field(ge=0)] | None = None
+    """Seed of the random numbers. Default: that of the body, else 1."""
+    level: Annotated[float | None, LEVEL] = None
+
+
+class HazardQuery(TopplingBlock):
+    """Parameters of `/v1/hazard`."""
+
+    years: Positive = 50.0
+    """Period of the probability [years]."""
+    imt: Text | None = None
+    """Intensity measure of the curve: PGV, PGA, SA(1.0)."""
+    site: Text | None = None
+    """Site of the file: its number from 1 on, or its name."""
+    tm: Annotated[Positive | None, TM] = None
+    convert: Text | None = None
+    """Published conversion of a spectral acceleration to PGV: newmark_hall_1982 (SA(1)) or
+    bommer_alarcon_2006 (SA(0.5))."""
+    component: Text | None = None
+    """What the curve's horizontal component means: single, geometric_mean, rotd50 or larger."""
+    model: Annotated[Text | None, MODEL] = None
+    level: Annotated[float, LEVEL] = 0.95

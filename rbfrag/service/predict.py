@@ -1,0 +1,155 @@
+"""`/v1/predict`: the probability that blocks fail."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.concurrency import run_in_threadpool
+
+from rbfrag.db.location import locate
+from rbfrag.errors import InputError
+from rbfrag.fragility.predict import predict, prediction_document
+from rbfrag.service.documents import PredictAnswer, PredictArrays
+from rbfrag.service.parameters import (
+    MEASURES,
+    NUMBERS,
+    RECTANGLE,
+    SLIDING,
+    PredictQuery,
+    PredictRows,
+)
+from rbfrag.service.problem import READ, SENT
+from rbfrag.service.reading import QueryRoute
+from rbfrag.service.settings import Settings
+from rbfrag.service.work import WorkerPool, json_answer, json_text
+
+ROWS_BESIDE = 5000
+"""So many rows are answered beside other requests; more than these, by another process."""
+
+
+def answer_one(query: PredictQuery, db: str | None) -> PredictAnswer:
+    """Return what `rbfrag predict --json` prints."""
+    block, remarks = query.numbers(query.kind)
+    document = prediction_document(
+        block | query.given(MEASURES) | query.given({"displacement": "displacement_m"}),
+        kind=query.kind,
+        rotation_deg=query.rotation,
+        model=query.model,
+        level=query.level,
+        db=db,
+        remarks=remarks,
+    )
+    return PredictAnswer.model_validate(document)
+
+
+def columns_of(body: PredictRows, row_limit: int) -> dict[str, Any]:
+    """Return numbers and lists of one length, by the keywords of :func:`rbfrag.predict`.
+
+    Raises:
+        InputError: lists of several lengths, or longer than the limit.
+    """
+    lengths = {}
+    for name, value in body:
+        if isinstance(value, list):
+            lengths[name] = len(value)
+            if len(value) > row_limit:
+                raise InputError(
+                    f"{name} has {len(value)} elements; one request may hold {row_limit}: split it"
+                )
+    if len({length for length in lengths.values() if length > 1}) > 1:
+        sizes = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise InputError(f"the lists differ in length: {sizes}; give one length, or one number")
+    return body.given({**RECTANGLE, **NUMBERS, **SLIDING, **MEASURES})
+
+
+def answer_many(given: dict[str, Any], chosen: dict[str, Any], db: str | None) -> bytes:
+    """Return probabilities of many blocks.
+
+    Args:
+        given: numbers and lists of numbers, as :func:`columns_of` gives them.
+        chosen: kind, rotation_deg, model and level.
+        db: database of the models.
+    """
+    values = dict(given)
+    rectangle = {name: values.pop(name) for name in RECTANGLE.values() if name in values}
+    if rectangle:
+        values |= _numbers_of_rectangles(rectangle, values)
+    if values and not any(isinstance(value, list) for value in values.values()):
+        # an array of one element, so that single numbers are answered by lists too
+        first = next(iter(values))
+        values[first] = [values[first]]
+    answers: Any = predict(**values, **chosen, db=db)
+    return json_text(
+        {
+            "probability": _with_null(answers.probability),
+            "ci_low": _with_null(answers.ci_low),
+            "ci_high": _with_null(answers.ci_high),
+            "in_domain": answers.in_domain.tolist(),
+            "reason": answers.reason.tolist(),
+            "kind": answers.kind,
+            "level": answers.level,
+            "model": answers.model,
+            "term": answers.term,
+            "method": answers.method,
+            "warnings": list(answers.notes),
+        }
+    )
+
+
+def _numbers_of_rectangles(columns: dict[str, Any], others: dict[str, Any]) -> dict[str, Any]:
+    from rbfrag.exchange.block_table import rectangle_columns
+
+    for name, keyword in RECTANGLE.items():
+        if keyword not in columns and name != "dip":
+            raise InputError(f"{name} is missing: a rectangle has height, width and dip")
+    for name in NUMBERS:
+        if name in others:
+            raise InputError(f"{name} does not go with height and width: give one of them")
+    numbers = rectangle_columns(columns)
+    return {"p2": numbers["p2_1_s2"].tolist(), "kr": numbers["kr"].tolist()}
+
+
+def _with_null(values: Any) -> list[float | None]:
+    return [None if math.isnan(value) else value for value in values.tolist()]
+
+
+def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
+    """Add the operations on `/v1/predict`, whose long work is done by a pool."""
+    # a server's answer is waited for; a file's models are in memory
+    on_server = isinstance(locate(settings.db), str)
+
+    async def predict_one(query: Annotated[PredictQuery, Query()]) -> PredictAnswer:
+        """Return what `rbfrag predict --json` prints for the same values."""
+        if on_server:
+            return await run_in_threadpool(answer_one, query, settings.db)
+        return answer_one(query, settings.db)
+
+    routes.add_api_route(
+        "/v1/predict",
+        predict_one,
+        summary="Probability that one block fails",
+        responses=READ,
+        route_class_override=QueryRoute,
+    )
+
+    @routes.post(
+        "/v1/predict",
+        summary="Probability that each of many blocks fails",
+        response_model=PredictArrays,
+        responses=SENT,
+    )
+    async def predict_many(request: Request, body: PredictRows) -> Response:
+        """Return probabilities of many blocks.
+
+        Each name is a number or a list; numbers stand for every element. Where an element cannot
+        be used, its answer is null and `reason` says why.
+        """
+        columns = columns_of(body, settings.row_limit)
+        chosen = body.given({"kind": "kind", "rotation": "rotation_deg", "model": "model"})
+        given = columns, {**chosen, "level": body.level}, settings.db
+        longest = max((len(each) for each in columns.values() if isinstance(each, list)), default=1)
+        if longest > ROWS_BESIDE:
+            return json_answer(await pool.run(request, answer_many, *given))
+        return json_answer(await run_in_threadpool(answer_many, *given))

@@ -1,0 +1,83 @@
+"""Kernels say when they are compiled; those that only kernels call have no entry from Python."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+
+import rbfrag
+from rbfrag.solver.integrator.compiled import inner_kernel, kernel
+
+SCRIPT = """
+from rbfrag.solver.integrator.compiled import on_compilation
+on_compilation(lambda: print("compiles"))
+from rbfrag.solver.integrator.state import at_rest
+from rbfrag.solver.integrator.taylor import turn
+turn(0.1, 0.9, 0.01), at_rest(0.1)
+"""
+
+
+def test_the_first_compilation_is_announced_once_and_never_from_the_cache(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True,
+            check=True,
+        ).stdout
+        for _ in range(2)
+    ]  # fmt: skip
+    assert said == ["compiles\n", ""]
+
+
+def test_machine_code_of_another_version_is_compiled_anew(tmp_path: Path) -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    run = [sys.executable, "-c", SCRIPT]
+    subprocess.run(run, env=environment, check=True)
+    (index,) = tmp_path.rglob("*.turn-*.nbi")
+    # an index of this numba that names a class which is no longer there
+    missing = b"cno_such_module\nNoSuchClass\n."
+    index.write_bytes(pickle.dumps(numba.__version__) + missing)
+    said = subprocess.run(run, env=environment, capture_output=True, text=True, check=True)
+    assert said.stdout == "compiles\n"
+
+
+def test_a_change_in_any_file_of_the_solver_outdates_machine_code(tmp_path: Path) -> None:
+    package = tmp_path / "rbfrag"
+    shutil.copytree(Path(rbfrag.__file__).parent, package)
+    environment = {
+        **os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(tmp_path)
+    }  # fmt: skip
+
+    def said() -> str:
+        return subprocess.run(
+            [sys.executable, "-c", SCRIPT], env=environment, cwd=tmp_path, capture_output=True,
+            text=True, check=True,
+        ).stdout  # fmt: skip
+
+    assert [said(), said()] == ["compiles\n", ""]
+    other = package / "solver" / "integrator" / "excursion.py"  # not where `turn` stands
+    other.write_text(other.read_text() + "\n")
+    assert said() == "compiles\n"
+
+
+@inner_kernel
+def doubled(x: float) -> float:
+    return 2.0 * x
+
+
+@kernel
+def doubled_and_one(x: float) -> float:
+    return doubled(x) + 1.0
+
+
+def test_a_kernel_without_an_entry_refuses_a_call_from_python() -> None:
+    assert doubled_and_one(2.0) == 5.0
+    with pytest.raises(TypeError, match="doubled is called by other kernels only"):
+        doubled(2.0)

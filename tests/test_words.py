@@ -1,0 +1,122 @@
+"""Names are the field's own terms: none has a word of the left column of the glossary."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+SOURCES = sorted(ROOT.glob("rbfrag/**/*.py"))
+
+INSTEAD = {
+    "fly flies flight flown": "integrate, trajectory",
+    "lane lanes": "batch",
+    "fresh": "from rest",
+    "seat seats reseat": "impact, closes its contact",
+    "fate fates course courses": "outcome, trajectory",
+    "ahead behind": "upper or lower bounding trajectory, back",
+    "still": "at rest, remaining excitation",
+    "drive drives": "excitation",
+    "odd": "flagged",
+    "plain": "in domain",
+    "padded": "zero-filled",
+    "house houses room workshop garden shoulder shoulders": "package, module, worker pool",
+    "piece pieces leftover leftovers": "chunk, part, remainder",
+    "made found asked told said": "what it is: realisations, result, request, warnings",
+}
+"""Words that no identifier may contain, each with what to say instead."""
+
+WORDS = {word: instead for words, instead in INSTEAD.items() for word in words.split()}
+WHOLE = {"Ground": "excitation", "Starts": "excursion table"}
+"""The same of whole identifiers: ground motion is the field's own word."""
+
+EXCEPTIONS = {
+    "connection_made": "asyncio calls a protocol's method by this name",
+    "DatabaseNotFoundError": "a public error: scripts catch it by this name",
+    "found": {
+        "campaign/simulate.py": "a key of the JSON answer of `simulate`",
+    },
+    "FOUND_HAS_VALUE": "about the stored status `found`",
+}
+"""Identifiers that stay, and why; by file below rbfrag/ where the reason holds there alone."""
+
+
+def identifiers(tree: ast.AST) -> Iterator[tuple[str, int]]:
+    """Yield the names that a source gives: functions, classes, arguments, variables, attributes."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            yield node.name, node.lineno
+        elif isinstance(node, ast.arg):
+            yield node.arg, node.lineno
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id, node.lineno
+        elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+            yield node.attr, node.lineno
+        elif isinstance(node, ast.alias) and node.asname:
+            yield node.asname, node.lineno
+
+
+def words_of(name: str) -> set[str]:
+    """Return the words of an identifier, by underscores and capitals."""
+    return {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)}
+
+
+def wrong_names(source: str, where: str) -> list[str]:
+    """Return the identifiers of a source that are not in the field's terms."""
+    found = []
+    for name, line in identifiers(ast.parse(source)):
+        reason = EXCEPTIONS.get(name, {})
+        if isinstance(reason, str) or where in reason:
+            continue
+        instead = [WORDS[word] for word in sorted(words_of(name) & set(WORDS))]
+        instead += [WHOLE[name]] if name in WHOLE else []
+        found += [f"{where}:{line}: {name} (instead: {'; '.join(instead)})"] if instead else []
+    return found
+
+
+def test_names_are_the_terms_of_the_field() -> None:
+    found = [
+        text
+        for path in SOURCES
+        if "versions" not in path.parts  # migrations tell what the tables were once called
+        for text in wrong_names(path.read_text(), path.relative_to(ROOT / "rbfrag").as_posix())
+    ]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("def fly(ground): pass", "integrate"),
+        ("class Ground: pass", "excitation"),
+        ("made = 1", "realisations"),
+        ("def f(asked): pass", "request"),
+        ("class A:\n    lanesInUse: int", "batch"),
+        ("import a as leftovers", "chunk"),
+        ("self.told = 1", "warnings"),
+    ],
+)
+def test_such_a_name_is_seen(source: str, words: str) -> None:
+    (text,) = wrong_names(source, "a.py")
+    assert words in text
+
+
+def test_what_the_field_says_is_free() -> None:
+    assert not wrong_names(
+        "ground_motion = 1\nclass GroundMotion: pass\nstarts = restarted = 1", "a.py"
+    )
+
+
+def test_no_exception_is_left_over() -> None:
+    names: dict[str, set[str]] = {}
+    for path in SOURCES:
+        where = path.relative_to(ROOT / "rbfrag").as_posix()
+        for name, _ in identifiers(ast.parse(path.read_text())):
+            names.setdefault(name, set()).add(where)
+    for name, reason in EXCEPTIONS.items():
+        assert name in names
+        assert isinstance(reason, str) or set(reason) <= names[name]
