@@ -39,6 +39,7 @@ AXIS = {
 """What a curve may run over."""
 
 FIXED = {
+    "pgv_m_s": "PGV = {:g} m/s",
     "pga_g": "PGA = {:g} g",
     "tm_s": "$T_m$ = {:g} s",
     **{name: f"SA({period:.1f} s) = {{:g}} g" for period, name in SPECTRAL.items()},

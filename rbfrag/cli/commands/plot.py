@@ -38,26 +38,6 @@ class Held:
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class HeldMotion:
-    """What is held along a curve over another measure."""
-
-    pga: options.Pga = None
-    tm: options.Tm = None
-    sa03: options.Sa03 = None
-    sa10: options.Sa10 = None
-    sa20: options.Sa20 = None
-    sa30: options.Sa30 = None
-
-    def given(self) -> dict[str, float]:
-        """Return those that were given, by name."""
-        values = {
-            "pga_g": self.pga, "tm_s": self.tm, "sa03_g": self.sa03, "sa10_g": self.sa10,
-            "sa20_g": self.sa20, "sa30_g": self.sa30,
-        }  # fmt: skip
-        return {name: value for name, value in values.items() if value is not None}
-
-
 VARIED = {
     "pgv": "pgv_m_s", "pga": "pga_g", "pgd": "pgd_m", "sa03": "sa03_g", "sa10": "sa10_g",
     "sa20": "sa20_g", "sa30": "sa30_g",
@@ -135,7 +115,7 @@ def plot_curve(
     *,
     out: Out,
     block: BlockOptions,
-    held: HeldMotion,
+    held: options.Measures,
     over: str | None = option(
         "What the curve runs over: pgv, pga, pgd, sa03, sa10, sa20 or sa30. Default: pgv, or what "
         "--model reads first."
@@ -163,14 +143,16 @@ def plot_curve(
     varied = None if over is None else VARIED.get(over)
     if over is not None and varied is None:
         raise InputError(f"--over {over}: a curve runs over {', '.join(VARIED)}")
-    if varied in fixed:
-        raise InputError(f"--{over} does not go with --over {over}, which runs over all values")
     if model is None:
         varied = varied or "pgv_m_s"
         chosen = find_model(None, [varied, *fixed], db)
     else:
         chosen = find_model(model, MEASURES, db)
         varied = varied or chosen.term.inputs[0]
+    if varied in fixed:
+        raise InputError(
+            f"{varied} is what the curve runs over: leave its value out, or add --over"
+        )
     others = {}
     if beside is not None:
         from rbfrag.exchange.other_fragilities import of_measure
