@@ -208,24 +208,69 @@ TOPPLING_BLOCK = BlockParameters(("p2", "kr"), "toppling", "kr", "p2", NOT_LIFTE
 """Blocks known by p² [1/s²] and the yield acceleration coefficient k_r."""
 
 
+class SizeFactor(NamedTuple):
+    """What eta is multiplied by: h(p) = exp(A l - B l²), l = ln p with p in 1/s.
+
+    Without it a model is too vague for small blocks and too sure for large ones. A factor on all of
+    eta keeps P monotone in the block's strength and in the shaking, which factors on single terms
+    do not. Outside p² from 0.1 to 30 1/s² it stays at its value at the edge.
+
+    A and B are chosen, not estimated: such that the calibration slope of each block size is level
+    on earthquakes left out (docs/theory/fragility.md).
+
+    Args:
+        a: A.
+        b: B.
+    """
+
+    a: float
+    b: float = 0.0
+
+    def of(self, p: Any, ns: Numbers) -> Any:
+        """Return h of the frequency parameter p [1/s]."""
+        l = ns.log(ns.minimum(ns.maximum(p, _LEAST_P), _GREATEST_P))  # noqa: E741  as in the formula
+        return ns.exp((self.a - self.b * l) * l)
+
+
+_LEAST_P, _GREATEST_P = math.sqrt(0.1), math.sqrt(30.0)
+"""Ends of the sizes that A and B were chosen for [1/s]."""
+
+
 @dataclass(frozen=True)
 class Form:
     """A method on one measure.
 
     Args:
         parameters: their names; the method's `exponent` stands last and may be missing.
-        eta: eta and its slopes, from the parameters, values by name and functions.
+        formula: eta before the size factor and its slopes, from the parameters, values by name and
+            functions.
         rank: place among the methods on this measure by falling skill on held-out earthquakes
             (docs/theory/model-choice.md).
         bounds: what mechanics forbids.
         start: where the search for the likeliest parameters begins; empty where none is needed.
+        size_factor: what eta is multiplied by; None for nothing.
     """
 
     parameters: tuple[str, ...]
-    eta: Callable[[Sequence[float], Mapping[str, Any], Numbers], Eta]
+    formula: Callable[[Sequence[float], Mapping[str, Any], Numbers], Eta]
     rank: int
     bounds: tuple[Bound, ...] = ()
     start: tuple[float, ...] = ()
+    size_factor: SizeFactor | None = None
+
+    def eta(self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers) -> Eta:
+        """Return eta and its slopes.
+
+        Args:
+            parameters: of the formula, in its order.
+            values: completed values by name.
+            ns: functions for the kind of number given.
+        """
+        found = self.formula(parameters, values, ns)
+        if self.size_factor is None:
+            return found
+        h = self.size_factor.of(values["p"], ns)
+        return found._replace(eta=h * found.eta, slopes=tuple(h * each for each in found.slopes))
 
 
 @dataclass(frozen=True)
