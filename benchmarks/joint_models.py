@@ -17,7 +17,7 @@ from sqlalchemy import select
 from rbfrag.db import schema
 from rbfrag.db.engine import opened_database
 from rbfrag.fragility.fit.clusters import cr3, jackknife_steps
-from rbfrag.fragility.fit.data import LEAST_Y0_OVER_PGV, read_source
+from rbfrag.fragility.fit.data import Y0_OVER_PGV, read_source
 from rbfrag.fragility.fit.likelihood import Binomial, maximise, most_likely
 from rbfrag.fragility.methods import LOGIT, LOGLOG, Link
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -62,7 +62,7 @@ def read_outcomes(path: str | Path) -> Outcomes:
     table, ground = source.table, source.table.pga_g * STANDARD_GRAVITY_M_S2
     p = np.sqrt(table.p2)
     y = source.k_over_pga * (ground / p)[:, None]
-    read = np.isfinite(source.failed) & (y / table.pgv_m_s[:, None] >= LEAST_Y0_OVER_PGV * 0.999999)
+    read = np.isfinite(source.failed) & (y / table.pgv_m_s[:, None] >= Y0_OVER_PGV[0] * 0.999999)
 
     def each(values: NDArray[np.generic]) -> NDArray[np.generic]:
         return np.broadcast_to(values[:, None], read.shape)[read]

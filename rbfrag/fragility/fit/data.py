@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.scores import Judged, critical_outcomes
-from rbfrag.fragility.measures import Term
+from rbfrag.fragility.measures import SPECTRAL, Term
 from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, Method
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -35,11 +35,12 @@ FEWEST_EVENTS = 3
 FEWEST_OBSERVED = 10
 FEW_EVENTS = 10
 
-LEAST_Y0_OVER_PGV = 0.1
-"""Weaker blocks of the stored grid are left to models that do not read PGV."""
+Y0_OVER_PGV = np.geomspace(0.1, 4.0, 25)
+"""Blocks that models are judged on, as y0/PGV; of weaker blocks of the stored grid, and of stronger
+ones, which are safe, only the fits of wide forms know."""
 
-Y0_OVER_PGV = np.geomspace(LEAST_Y0_OVER_PGV, 4.0, 25)
-"""Blocks that are judged by critical values where no outcomes are stored, as y0/PGV."""
+WIDER_STEPS = 10
+"""Blocks that the fits of wide forms read above those."""
 
 K_OVER_PGA = np.geomspace(0.02, 0.95, 25)
 """The same of blocks that the record is scaled to."""
@@ -211,6 +212,7 @@ class FitData:
         blocks: what formulas read of the blocks of the grid, shape (n, m) or (n, 1).
         failed: what they do: 1 fails, 0 does not, NaN not known, shape (n, m).
         read: which of them this fit may read, same shape.
+        scored: which of these it is judged on, same shape.
         outcomes: where the outcomes come from, in words.
         domain: range of each variable that the fit covers.
         n_total: number of combinations read.
@@ -229,6 +231,7 @@ class FitData:
     blocks: dict[str, FloatArray]
     failed: FloatArray
     read: NDArray[np.bool_]
+    scored: NDArray[np.bool_]
     outcomes: str
     domain: dict[str, tuple[float, float]]
     n_total: int = 0
@@ -260,7 +263,7 @@ class FitData:
     @property
     def judged(self) -> Judged:
         """What the fit is judged on."""
-        known = np.isfinite(self.failed) & self.read
+        known = np.isfinite(self.failed) & self.scored
         return Judged(np.where(known, self.failed, 0.0), known, self.event, self.outcomes)
 
     def grid(self, name: str) -> FloatArray:
@@ -282,6 +285,7 @@ class _Points:
     read: NDArray[np.bool_]
     outcomes: str
     ranges: dict[str, FloatArray]
+    scored: NDArray[np.bool_] | None = None
 
 
 def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None = None) -> FitData:
@@ -330,6 +334,7 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         blocks={name: v[chosen] for name, v in points.blocks.items()},
         failed=failed,
         read=points.read[chosen],
+        scored=points.scored[chosen] if points.scored is not None else points.read[chosen],
         outcomes=points.outcomes,
         domain=_domain({name: v[chosen] for name, v in points.ranges.items()}),
         n_total=int(table.p2.size),
@@ -396,7 +401,7 @@ def _refuse_thin(data: FitData, method: Method, term: Term) -> None:
 
 def _measures(source: FitSource) -> dict[str, FloatArray]:
     table = source.table
-    names = ("pgv_m_s", "pga_g", "pgd_m", "tm_s")
+    names = ("pgv_m_s", "pga_g", "pgd_m", "tm_s", *SPECTRAL.values())
     return {"xp_m_s": source.xp_m_s, **{name: getattr(table, name) for name in names}}
 
 
@@ -415,7 +420,11 @@ def _pulse_s(source: FitSource) -> FloatArray:
 def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     """Return the points of blocks of any strength k_r and some size p²."""
     table = source.table
-    given = _measures(source)
+    wide = method.forms[term.name].wide
+    if wide:
+        source = _with_safe_blocks(source)
+    p, pga_m_s2 = np.sqrt(table.p2), table.pga_g * STANDARD_GRAVITY_M_S2
+    given = {**_measures(source), "p": p}
     x = np.asarray(term.intensity_m_s(given), dtype=np.float64)
     for name in term.inputs:
         x = np.where(np.isfinite(given[name]), x, np.nan)
@@ -430,7 +439,6 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
             "the term xp needs the toppling spectrum X(p), which is stored for none of the "
             f"{x.size} combinations: run  rbfrag simulate  again, which adds it"
         )
-    p, pga_m_s2 = np.sqrt(table.p2), table.pga_g * STANDARD_GRAVITY_M_S2
     observed = table.status == "found"
     status = table.status.astype(str)
     limit = np.where(np.isin(status, _CENSORED), table.search_limit * pga_m_s2 / p, np.nan)
@@ -441,8 +449,11 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     kr = source.k_over_pga * table.pga_g[:, None]
     y0 = source.k_over_pga * (pga_m_s2 / p)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        read = y0 >= LEAST_Y0_OVER_PGV * (1.0 - 1e-9) * table.pgv_m_s[:, None]
-    read &= (y0 > 0.0) & np.isfinite(y0)
+        ratio = y0 / table.pgv_m_s[:, None]
+    some_block = (y0 > 0.0) & np.isfinite(y0)
+    scored = read = some_block & (ratio >= Y0_OVER_PGV[0] * (1.0 - 1e-9))
+    if wide:
+        scored, read = scored & (ratio <= Y0_OVER_PGV[-1] * (1.0 + 1e-9)), some_block
     failed, source_of_outcomes = source.judged_outcomes(y0, y)
     some = read.any(axis=0)
     of_outcomes = method.reads == "outcomes"
@@ -467,6 +478,28 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
         read=read[:, some],
         outcomes=source_of_outcomes,
         ranges=ranges,
+        scored=scored[:, some],
+    )
+
+
+def _with_safe_blocks(source: FitSource) -> FitSource:
+    """Return a source whose outcome grid goes on above its strongest block, with safe blocks.
+
+    No excursion from rest exceeds twice PGV, and the grid ends at four times PGV. The steps are
+    those of the grid.
+    """
+    n, m = source.failed.shape
+    if m < 2:
+        return source
+    step = Y0_OVER_PGV[1] / Y0_OVER_PGV[0]
+    last = source.k_over_pga[:, -1:]
+    k = last * step ** np.arange(1, WIDER_STEPS + 1)
+    # where nothing was run nothing is added
+    safe = np.where(np.isfinite(source.failed).any(axis=1), 0.0, np.nan)
+    return replace(
+        source,
+        k_over_pga=np.hstack([source.k_over_pga, k]),
+        failed=np.hstack([source.failed, np.repeat(safe[:, None], WIDER_STEPS, axis=1)]),
     )
 
 
