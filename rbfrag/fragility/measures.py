@@ -28,8 +28,6 @@ class Term:
         formula: the term from its inputs, in the order of `inputs`.
         variance_degree: degree of the dissertation's variance polynomial in this term.
         level: how much it knows of the motion: 3 the record itself, 0 less than PGV with PGA.
-        richer: the terms of the models that know more, directly or by their own table of least
-            widths of the interval.
         of_block: what the formula reads of the block, after the inputs.
         advice: what every answer says of a term that knows little; empty for nothing.
     """
@@ -41,7 +39,6 @@ class Term:
     formula: Callable[..., Any]
     variance_degree: int
     level: int = 0
-    richer: tuple[str, ...] = ()
     of_block: tuple[str, ...] = ()
     advice: str = ""
 
@@ -83,7 +80,7 @@ def spectral_velocity_m_s(sa_g: Any, period_s: float) -> Any:
     return sa_g * (STANDARD_GRAVITY_M_S2 * period_s / (2.0 * math.pi))
 
 
-def _first_at_1s(sa10_g: Any, *others: Any) -> Any:
+def _first_at_1s(sa10_g: Any, *_others: Any) -> Any:
     """Return V_1.0 [m/s]; the other measures enter the model by themselves."""
     return spectral_velocity_m_s(sa10_g, 1.0)
 
@@ -137,7 +134,6 @@ TERMS: Mapping[str, Term] = {
             pgv_m_s,
             1,
             0,
-            ("pgv_pga", "pgv_pga_tm"),
         ),
         Term(
             "pga_sa03_sa10_sa30",
@@ -155,7 +151,6 @@ TERMS: Mapping[str, Term] = {
             pga_tm_m_s,
             1,
             0,
-            ("pgv_pga_tm",),
         ),
         Term(
             "pga_sa10",
@@ -187,7 +182,6 @@ TERMS: Mapping[str, Term] = {
             pgd_tm_m_s,
             2,
             0,
-            ("xp",),
         ),
         Term(
             "pgv_pga",
@@ -197,7 +191,6 @@ TERMS: Mapping[str, Term] = {
             first_m_s,
             1,
             1,
-            ("pgv_pga_tm",),
         ),
         Term(
             "pgv_pga_tm",
@@ -207,7 +200,6 @@ TERMS: Mapping[str, Term] = {
             first_m_s,
             1,
             2,
-            ("xp",),
         ),
         Term("xp", "toppling spectrum", "X(p)", ("xp_m_s", "pga_g"), first_m_s, 1, 3),
     )

@@ -488,8 +488,7 @@ def _with_safe_blocks(source: FitSource) -> FitSource:
     No excursion from rest exceeds twice PGV, and the grid ends at four times PGV. The steps are
     those of the grid.
     """
-    n, m = source.failed.shape
-    if m < 2:
+    if source.failed.shape[1] < 2:
         return source
     step = Y0_OVER_PGV[1] / Y0_OVER_PGV[0]
     last = source.k_over_pga[:, -1:]

@@ -15,10 +15,10 @@ from importlib import import_module
 from typing import Any, Literal, NamedTuple
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.dependence import normal_quantile, normal_share
 from rbfrag.fragility.measures import Term
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
-_ROOT_HALF = math.sqrt(0.5)
 _LARGEST_EXPONENT = 709.0
 
 
@@ -35,8 +35,9 @@ class Numbers(NamedTuple):
         minimum: the smaller of two.
         sin: sine of an angle [rad].
         cos: its cosine.
-        between: ``between(x, first, step, table)`` is the value of a table with nodes in equal
-            steps, on the line from node to node and constant beyond the ends.
+        ndtri: its inverse.
+        fourth_powers: Σ (x·d)⁴ over the steps d of parameters that leave earthquakes out, from
+            :class:`rbfrag.fragility.intervals.ParameterErrors` and the slopes x.
     """
 
     log: Callable[[Any], Any]
@@ -48,29 +49,18 @@ class Numbers(NamedTuple):
     minimum: Callable[[Any, Any], Any]
     sin: Callable[[Any], Any]
     cos: Callable[[Any], Any]
-    between: Callable[[Any, float, float, Sequence[float]], Any]
+    ndtri: Callable[[Any], Any]
+    fourth_powers: Callable[[Any, Sequence[Any]], Any]
 
 
 def _exp(x: float) -> float:
     return math.exp(x) if x < _LARGEST_EXPONENT else math.inf
 
 
-def _ndtr(z: float) -> float:
-    return 0.5 * math.erfc(-z * _ROOT_HALF)
-
-
-def _between(x: float, first: float, step: float, table: Sequence[float]) -> float:
-    at = (x - first) / step
-    last = len(table) - 1
-    if not 0.0 < at < last:
-        return table[last if at > 0.0 else 0]
-    node = int(at)
-    return table[node] + (at - node) * (table[node + 1] - table[node])
-
-
 SINGLE = Numbers(
-    math.log, _exp, math.sqrt, _ndtr, math.expm1, max, min, math.sin, math.cos, _between
-)
+    math.log, _exp, math.sqrt, normal_share, math.expm1, max, min, math.sin, math.cos,
+    normal_quantile, lambda errors, x: errors.fourth_powers(*x),
+)  # fmt: skip
 """For single numbers."""
 
 
@@ -78,17 +68,18 @@ SINGLE = Numbers(
 def arrays() -> Numbers:
     """Return the same functions for numpy arrays."""
     import numpy as np
-    from scipy.special import ndtr
+    from scipy.special import ndtr, ndtri
 
-    def between(x: Any, first: float, step: float, table: Sequence[float]) -> Any:
-        nodes = np.array([*table, table[-1]])
-        at = np.clip((x - first) / step, 0.0, len(table) - 1.0)
-        node = np.nan_to_num(at).astype(np.intp)  # what is not a number stays so in `at`
-        return nodes[node] + (at - node) * np.diff(nodes, append=0.0)[node]
+    def fourth_powers(errors: Any, x: Sequence[Any]) -> Any:
+        # more terms than earthquakes: here the products are faster than the polynomial
+        squares = np.array(errors.steps) @ np.stack(np.broadcast_arrays(*x))
+        squares *= squares
+        return np.einsum("en,en->n", squares, squares)
 
     return Numbers(
-        np.log, np.exp, np.sqrt, ndtr, np.expm1, np.maximum, np.minimum, np.sin, np.cos, between
-    )
+        np.log, np.exp, np.sqrt, ndtr, np.expm1, np.maximum, np.minimum, np.sin, np.cos,
+        ndtri, fourth_powers,
+    )  # fmt: skip
 
 
 class Eta(NamedTuple):
@@ -271,8 +262,10 @@ class Form:
     size_factor: SizeFactor | None = None
     wide: bool = False
 
-    def eta(self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers) -> Eta:
-        """Return eta and its slopes.
+    def unscaled(
+        self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers
+    ) -> tuple[Eta, Any]:
+        """Return eta and its slopes before the size factor, and the factor.
 
         Args:
             parameters: of the formula, in its order.
@@ -280,9 +273,11 @@ class Form:
             ns: functions for the kind of number given.
         """
         found = self.formula(parameters, values, ns)
-        if self.size_factor is None:
-            return found
-        h = self.size_factor.of(values["p"], ns)
+        return found, 1.0 if self.size_factor is None else self.size_factor.of(values["p"], ns)
+
+    def eta(self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers) -> Eta:
+        """Return eta and its slopes; arguments as for :meth:`unscaled`."""
+        found, h = self.unscaled(parameters, values, ns)
         return found._replace(eta=h * found.eta, slopes=tuple(h * each for each in found.slopes))
 
 

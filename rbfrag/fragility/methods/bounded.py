@@ -15,7 +15,8 @@ Of measures that the hazard is given in, with V_T = SA g T/2π, Q_T = ln(V_T/(PG
     pga_sa10             A = .29   the same + b4 Q_1 + b5 Q_1 l
     pga_sa03_sa10_sa30   A = .27   the same + b4 Q_.3 + b5 Q_.3 l + ... of Q_1 and Q_3
 
-ln(1 - r) is left out where PGV is unknown: its coefficient would be negative, and P rise near r = 1.
+ln(1 - r) is left out where PGV is unknown: its coefficient would be negative, and P would rise
+near r = 1.
 """
 
 from __future__ import annotations
