@@ -234,6 +234,13 @@ def terms_from(given: Collection[str]) -> tuple[str, ...]:
     return tuple(name for name in BEST_FIRST if set(TERMS[name].inputs) <= set(given))
 
 
+def least_inputs() -> list[tuple[str, ...]]:
+    """Return the sets of measures of which each suffices for a term and none holds another."""
+    stated = [term.inputs for term in TERMS.values() if set(term.inputs) <= set(STATED)]
+    least = [own for own in stated if not any(set(other) < set(own) for other in stated)]
+    return list(dict.fromkeys(least))
+
+
 LOWEST, HIGHEST = 1e-9, 1e9
 """Beyond these no rock block and no earthquake exists, and arithmetic might overflow."""
 
