@@ -123,7 +123,8 @@ def predict_many(
     values, shape = _flat(given)
     size = int(np.prod(shape))
     ns = arrays()
-    out = _Columns(*np.empty((7, size)), np.ones(size, dtype=np.bool_))
+    p, low, high, event_low, event_high, y, x = np.empty((7, size))
+    out = _Columns(p, low, high, event_low, event_high, y, x, np.ones(size, dtype=np.bool_))
     reach = quantiles if interval else None
     if not interval:
         out.low[:] = out.high[:] = np.nan
