@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
+from rbfrag.fragility.fit.censoring import censoring_weights
 from rbfrag.fragility.fit.scores import Judged, critical_outcomes
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, Method
@@ -218,6 +219,8 @@ class FitData:
         n_outside_model: combinations for which the block model does not apply.
         guessed_events: number of earthquakes read off file headers.
         fingerprint: hash of natural keys and fitted values.
+        weights: what each outcome counts where it is judged, shape (n, m), so that those known
+            stand for those not known; None: each the same.
     """
 
     kind: str
@@ -236,6 +239,7 @@ class FitData:
     n_outside_model: int = 0
     guessed_events: int = 0
     fingerprint: str = ""
+    weights: FloatArray | None = None
 
     @property
     def x(self) -> FloatArray:
@@ -261,7 +265,10 @@ class FitData:
     def judged(self) -> Judged:
         """What the fit is judged on."""
         known = np.isfinite(self.failed) & self.read
-        return Judged(np.where(known, self.failed, 0.0), known, self.event, self.outcomes)
+        if self.weights is not None:
+            known &= self.weights > 0.0
+        failed = np.where(known, self.failed, 0.0)
+        return Judged(failed, known, self.event, self.outcomes, self.weights)
 
     def grid(self, name: str) -> FloatArray:
         """Return a value of the blocks of the grid, shape (n, m)."""
@@ -282,6 +289,7 @@ class _Points:
     read: NDArray[np.bool_]
     outcomes: str
     ranges: dict[str, FloatArray]
+    weights: FloatArray | None = None
 
 
 def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None = None) -> FitData:
@@ -337,6 +345,7 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         n_outside_model=int((table.status == "outside_model").sum()),
         guessed_events=len(set(table.event_id[own][table.event_guessed[own]].tolist())),
         fingerprint=_fingerprint(keys[chosen], names[event], values, observed, failed, of_outcomes),
+        weights=None if points.weights is None else points.weights[chosen],
     )
     _refuse_thin(data, method, term)
     return data
@@ -471,7 +480,11 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
 
 
 def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
-    """Return the points of blocks of known strength and size under scaled records."""
+    """Return the points of blocks of known strength and size under scaled records.
+
+    A block that fails under a scale of the record counts as failing under all greater ones, also
+    where the model would end before: P is that of failing at this shaking or at weaker.
+    """
     table = source.table
     assert source.strength_g is not None
     strength = source.strength_g
@@ -482,26 +495,29 @@ def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
     size = np.sqrt(table.p2)
     block = {method.block.strength: strength, str(method.block.size): table.p2, "p": size}
     block["y_m_s"] = strength * STANDARD_GRAVITY_M_S2 / size
-    k = source.k_over_pga if source.k_over_pga.shape[1] else np.tile(K_OVER_PGA, (ratio.size, 1))
+    stored = source.k_over_pga
+    k = stored if stored.shape[1] else np.tile(K_OVER_PGA, (ratio.size, 1))
+    usable = known & (ratio < 1.0)
+    failed, decided = critical_outcomes(ratio, observed, k)
+    weights = np.zeros(k.shape)
+    weights[usable] = censoring_weights(*(part[usable] for part in (ratio, observed, k, strength)))
 
     def shaking(k: FloatArray, strength: FloatArray, per_pga: FloatArray) -> dict[str, FloatArray]:
         # the scaled record: its PGA is k over the ratio, and PGV goes with it
         of_record = {"pga_g": strength / k, "pgv_m_s": strength / k * per_pga}
         return {**of_record, "intensity_m_s": term.intensity_m_s(of_record)}
 
-    if not source.k_over_pga.shape[1]:
-        source = FitSource(table, source.xp_m_s, k, np.full(k.shape, np.nan))
-    failed, source_of_outcomes = source.judged_outcomes(k, ratio)
     return _Points(
         values={**shaking(ratio, strength, per_pga), **block},
         observed=observed,
-        usable=known & (ratio < 1.0),
+        usable=usable,
         combination=np.arange(ratio.size),
         order=np.zeros(ratio.size),
         blocks={**shaking(k, strength[:, None], per_pga[:, None]), **_column(block)},
-        failed=failed,
+        failed=np.where(decided, failed, np.nan),
         read=np.isfinite(k),
-        outcomes=source_of_outcomes,
+        outcomes="critical values, weighted for those that are not known",
+        weights=weights,
         ranges={
             "pgv_over_pga_s": _pulse_s(source),
             str(method.block.size): table.p2,
