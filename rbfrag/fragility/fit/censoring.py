@@ -36,11 +36,11 @@ def censoring_weights(
     """Return weights of outcomes such that those known stand for those not known, shape (n, m).
 
     An outcome that is known counts 1/G: G is the share of a block's runs whose model would still
-    hold at the shaking that decides it, the failing one or, where the block stands, the asked one
+    hold at the shaking that decides it, that of its failing or, where it stands, that of the outcome
     (inverse probability of censoring: Graf, Schmoor, Sauerbrei & Schumacher 1999, Statistics in
     Medicine 18, 2529-2545). G is the product-limit estimate of each block (Kaplan & Meier 1958,
     JASA 53, 457-481), in which a failing is what ends the observation of the model's end. Weight 0:
-    not known, or G at the asked shaking below 0.2.
+    not known, or G at the shaking of the outcome below 0.2.
 
     That is right where the model's end tells nothing of the critical scale beyond strength and
     shaking; :func:`score_bounds` needs no such assumption.
@@ -56,38 +56,38 @@ def censoring_weights(
     blocks, number, rows = np.unique(block, return_inverse=True, return_counts=True)
     number = np.where(rows[number] < FEWEST_OF_A_BLOCK, blocks.size, number)
     with np.errstate(divide="ignore"):
-        shaking, asked = 1.0 / critical, 1.0 / strength
+        critical_shaking, shaking = 1.0 / critical, 1.0 / strength
     for one in np.unique(number):
         own = number == one
         # failing goes before the model's end where both are at one shaking
-        order = np.lexsort((~observed[own], shaking[own]))
-        at = shaking[own][order]
+        order = np.lexsort((~observed[own], critical_shaking[own]))
+        at = critical_shaking[own][order]
         left = at.size - np.arange(at.size)
         ends = np.where(observed[own][order], 1.0, 1.0 - 1.0 / left)
         holding = np.append(1.0, np.cumprod(ends))
-        of_failing = holding[np.searchsorted(at, shaking[own], side="left")][:, None]
-        of_asked = holding[np.searchsorted(at, asked[own], side="left")]
-        reached = asked[own] >= shaking[own][:, None]
-        fails, stands = reached & observed[own][:, None], ~reached & (asked[own] > 0.0)
+        of_failing = holding[np.searchsorted(at, critical_shaking[own], side="left")][:, None]
+        of_shaking = holding[np.searchsorted(at, shaking[own], side="left")]
+        reached = shaking[own] >= critical_shaking[own][:, None]
+        fails, stands = reached & observed[own][:, None], ~reached & (shaking[own] > 0.0)
         with np.errstate(divide="ignore"):
-            counts = np.where(fails, 1.0 / of_failing, np.where(stands, 1.0 / of_asked, 0.0))
-        weights[own] = np.where(of_asked >= LEAST_FOLLOWED, counts, 0.0)
+            counts = np.where(fails, 1.0 / of_failing, np.where(stands, 1.0 / of_shaking, 0.0))
+        weights[own] = np.where(of_shaking >= LEAST_FOLLOWED, counts, 0.0)
     return weights
 
 
-def score_bounds(judged: Judged, probability: FloatArray, asked: Mask) -> tuple[float, float]:
+def score_bounds(judged: Judged, probability: FloatArray, chosen: Mask) -> tuple[float, float]:
     """Return the mean log loss of all outcomes, those not known counted as suits best and worst.
 
     Args:
         judged: outcomes, of which some are known.
         probability: of each, shape (n, m).
-        asked: which outcomes are asked for, same shape.
+        chosen: which outcomes count, same shape.
     """
     p = np.clip(probability, CLIP, 1.0 - CLIP)
     losses = -np.log(p), -np.log1p(-p)
     known = np.where(judged.failed > 0.5, *losses)
     ends = (np.where(judged.known, known, pick(*losses)) for pick in (np.minimum, np.maximum))
-    low, high = (float(end[asked].mean()) for end in ends)
+    low, high = (float(end[chosen].mean()) for end in ends)
     return low, high
 
 
