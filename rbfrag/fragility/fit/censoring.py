@@ -36,7 +36,7 @@ def censoring_weights(
     """Return weights of outcomes such that those known stand for those not known, shape (n, m).
 
     An outcome that is known counts 1/G: G is the share of a block's runs whose model would still
-    hold at the shaking that decides it, that of its failing or, where it stands, that of the outcome
+    hold at the shaking that decides it, of its failing or, where it stands, of the outcome
     (inverse probability of censoring: Graf, Schmoor, Sauerbrei & Schumacher 1999, Statistics in
     Medicine 18, 2529-2545). G is the product-limit estimate of each block (Kaplan & Meier 1958,
     JASA 53, 457-481), in which a failing is what ends the observation of the model's end. Weight 0:
