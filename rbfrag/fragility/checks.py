@@ -97,7 +97,7 @@ class Contradiction(Finding):
 
     def about(self, value: float) -> str:
         """Return the sentence for one value."""
-        return self.ratio.contradiction(self.values, *self.fitted)
+        return self.ratio.contradiction(self.values, value, *self.fitted)
 
     def in_general(self) -> str:
         """Return the sentence for many values."""

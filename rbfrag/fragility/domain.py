@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 from rbfrag.errors import ModelError
@@ -51,15 +52,17 @@ class Ratio:
     of: tuple[str, ...]
     formula: Callable[[Mapping[str, Any]], Any]
 
-    def contradiction(self, values: Mapping[str, float], low: float, high: float) -> str:
-        """Return the sentence for values, the ratio among them, that is not in `low` to `high`."""
+    def contradiction(
+        self, values: Mapping[str, float], ratio: float, low: float, high: float
+    ) -> str:
+        """Return the sentence for values whose ratio is not between `low` and `high`."""
         first, *others = (
             f"{MEASURE_WORDS[name][0]} of {values[name]:.3g}{MEASURE_WORDS[name][1]}"
             for name in self.of
         )
         return (
             f"{first} does not go with {' and '.join(others)}: {self.symbol} is "
-            f"{values[self.name]:.2g}{self.unit}, the fitted motions hold {low:.2g} to "
+            f"{ratio:.2g}{self.unit}, the fitted motions hold {low:.2g} to "
             f"{high:.2g}{self.unit}: the answer is an extrapolation"
         )
 
@@ -70,6 +73,10 @@ class Ratio:
             f"{first} does not go with {' and '.join(others)}: {self.symbol} is outside the fitted "
             f"{low:.2g} to {high:.2g}{self.unit}: the answer is an extrapolation"
         )
+
+
+def _over(name: str, factor: float, other: str, values: Mapping[str, Any]) -> Any:
+    return values[name] * factor / values[other]
 
 
 def _sa_ratios() -> tuple[Ratio, ...]:
@@ -83,14 +90,14 @@ def _sa_ratios() -> tuple[Ratio, ...]:
                 f"{label}·g·T/2π over PGV",
                 "",
                 (name, "pgv_m_s"),
-                lambda v, name=name, c=to_velocity: v[name] * c / v["pgv_m_s"],
+                partial(_over, name, to_velocity, "pgv_m_s"),
             ),
             Ratio(
                 f"{name[:4]}_over_pga",
                 f"{label}/PGA",
                 "",
                 (name, "pga_g"),
-                lambda v, name=name: v[name] / v["pga_g"],
+                partial(_over, name, 1.0, "pga_g"),
             ),
         ]
     return tuple(result)
@@ -109,9 +116,7 @@ RATIOS: tuple[Ratio, ...] = (
         "PGV/(PGA·g·Tm/2π)",
         "",
         ("pgv_m_s", "pga_g", "tm_s"),
-        lambda v: (
-            v["pgv_m_s"] * (2.0 * math.pi / STANDARD_GRAVITY_M_S2) / (v["pga_g"] * v["tm_s"])
-        ),
+        lambda v: v["pgv_m_s"] * (2.0 * math.pi / STANDARD_GRAVITY_M_S2) / (v["pga_g"] * v["tm_s"]),
     ),
     Ratio(
         "z",

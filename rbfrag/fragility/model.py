@@ -183,8 +183,8 @@ class FragilityModel:
 
     def _implied(self, ratio: Ratio) -> bool:
         """Return whether z is in its range wherever p² and PGV/(PGA g) are in theirs."""
-        ranges = [self.row.domain.get(n) for n in (self.method.block.size, "pgv_over_pga_s")]
-        size, pulse = ranges
+        size = self.row.domain.get(self.method.block.size or "")
+        pulse = self.row.domain.get("pgv_over_pga_s")
         if ratio.name != "z" or size is None or pulse is None:
             return False
         low, high = self.row.domain["z"]

@@ -122,8 +122,9 @@ def test_measures_that_the_model_does_not_read_are_judged_too(model: FragilityMo
     assert one(row, p2=9.5, kr=0.053, pgv_m_s=0.169).in_domain
     beside = one(row, **given_)
     assert not beside.in_domain
-    assert "a PGV of 0.169 m/s does not go with a PGA of 0.906 g and a Tm of 1.4 s" in (
-        beside.warnings[0]
+    assert (
+        "a PGV of 0.169 m/s does not go with a PGA of 0.906 g and a Tm of 1.4 s"
+        in (beside.warnings[0])
     )
 
 
