@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from rbfrag.fragility.domain import RATIOS, Ratio
-from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST
+from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, SPECTRAL
 from rbfrag.fragility.methods import Eta, Numbers
 from rbfrag.fragility.model import LEAST, FragilityModel
 
@@ -42,6 +42,10 @@ _DESCRIPTIONS = {
     "pga_g": ("g", "the peak ground acceleration in g, 0 or more"),
     "pgd_m": ("m", "the peak ground displacement in m, 0 or more"),
     "tm_s": ("s", "the mean period in s, above 0"),
+    **{
+        name: ("g", f"the spectral acceleration at {period:g} s and 5 % damping in g, 0 or more")
+        for period, name in SPECTRAL.items()
+    },
     "xp_m_s": ("m/s", "the toppling spectrum X(p) in m/s, 0 or more"),
     "intensity_m_s": ("m/s", ""),
     "y_m_s": ("m/s", ""),

@@ -14,6 +14,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from rbfrag.errors import ModelError
+from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.methods import Numbers
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -25,10 +26,7 @@ MEASURE_WORDS: Mapping[str, tuple[str, str]] = {
     "pga_g": ("a PGA", " g"),
     "tm_s": ("a Tm", " s"),
     "pgd_m": ("a PGD", " m"),
-    "sa03_g": ("an SA(0.3)", " g"),
-    "sa10_g": ("an SA(1.0)", " g"),
-    "sa20_g": ("an SA(2.0)", " g"),
-    "sa30_g": ("an SA(3.0)", " g"),
+    **{name: (f"an SA({period:.1f})", " g") for period, name in SPECTRAL.items()},
     "p": ("a block's p", " 1/s"),
 }
 """What each value of a ratio is called, and its unit."""
@@ -81,7 +79,7 @@ def _over(name: str, factor: float, other: str, values: Mapping[str, Any]) -> An
 
 def _sa_ratios() -> tuple[Ratio, ...]:
     result = []
-    for name, period in (("sa03_g", 0.3), ("sa10_g", 1.0), ("sa20_g", 2.0), ("sa30_g", 3.0)):
+    for period, name in SPECTRAL.items():
         label = f"SA({period:.1f})"
         to_velocity = STANDARD_GRAVITY_M_S2 * period / (2.0 * math.pi)
         result += [

@@ -10,7 +10,7 @@ from rbfrag.errors import InputError
 NUMBERS = ("--p2", "--kr")
 SHAPE = ("--height", "--width", "--dip", "--alpha1", "--alpha3", "--r3", "--s1", "--s2", "--gamma")
 PLANES = ("--beta", "--phi", "--phi-back", "--no-back")
-MEASURES = ("--pgv", "--pga", "--tm", "--pgd")
+MEASURES = ("--pgv", "--pga", "--tm", "--pgd", "--sa03", "--sa10", "--sa20", "--sa30")
 
 ONCE = "a block is described once"
 
@@ -71,7 +71,7 @@ CONFLICTS = (
 )
 
 _NAME_IT = "name the accelerogram, too"
-_MEASURE = "give --pgv, --pga and --tm, or --pgd and --tm, too"
+_MEASURE = "give --pgv, --pga or --sa10, or --pgd and --tm, too"
 
 NEEDS = (
     Need(("--batch",), ("--out",), "--out", "--out FILE names the table of answers"),
