@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.censoring import censoring_weights
+from rbfrag.fragility.fit.domain import ranges_of, ratio_columns
 from rbfrag.fragility.fit.scores import Judged, critical_outcomes
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, Method
@@ -339,7 +340,7 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         failed=failed,
         read=points.read[chosen],
         outcomes=points.outcomes,
-        domain=_domain({name: v[chosen] for name, v in points.ranges.items()}),
+        domain=ranges_of({name: v[chosen] for name, v in points.ranges.items()}),
         n_total=int(table.p2.size),
         n_excluded=int((points.observed & ~np.isfinite(points.values["intensity_m_s"])).sum()),
         n_outside_model=int((table.status == "outside_model").sum()),
@@ -349,11 +350,6 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
     )
     _refuse_thin(data, method, term)
     return data
-
-
-def _domain(ranges: Mapping[str, FloatArray]) -> dict[str, tuple[float, float]]:
-    finite = {name: values[np.isfinite(values)] for name, values in ranges.items()}
-    return {name: (float(v.min()), float(v.max())) for name, v in finite.items() if v.size}
 
 
 def _fingerprint(
@@ -413,14 +409,6 @@ def _column(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     return {name: value[:, None] for name, value in values.items()}
 
 
-def _pulse_s(source: FitSource) -> FloatArray:
-    """Return PGV/(PGA g) of the records as they are [s]."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(
-            source.table.pgv_m_s / (source.table.pga_g * STANDARD_GRAVITY_M_S2), dtype=np.float64
-        )
-
-
 def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     """Return the points of blocks of any strength k_r and some size p²."""
     table = source.table
@@ -460,9 +448,9 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
         "intensity_m_s": x,
         "y_m_s": np.where(read, y0, np.nan)[:, some] if of_outcomes else y,
         "tm_s": table.tm_s,
+        **{name: given[name] for name in term.inputs if not np.array_equal(given[name], x, True)},
+        **ratio_columns({**given, "p": p}),
     }
-    if "pgv_m_s" in term.inputs and "pga_g" in term.inputs:
-        ranges["pgv_over_pga_s"] = _pulse_s(source)
     if not of_outcomes:
         ranges = {name: np.where(observed, v, np.nan) for name, v in ranges.items()}
     return _Points(
@@ -519,7 +507,7 @@ def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
         outcomes="critical values, weighted for those that are not known",
         weights=weights,
         ranges={
-            "pgv_over_pga_s": _pulse_s(source),
+            **ratio_columns({**_measures(source), "p": size}),
             str(method.block.size): table.p2,
             "y_m_s": block["y_m_s"],
             "k_over_pga": np.column_stack([ratio, np.ones(ratio.size)]),
@@ -558,7 +546,7 @@ def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
         read=np.ones(failed.shape, dtype=np.bool_),
         outcomes="simulated outcomes",
         ranges={
-            "pgv_over_pga_s": _pulse_s(source)[own],
+            **ratio_columns(measures),
             "pgv_m_s": values["pgv_m_s"],
             "pga_g": values["pga_g"],
             "displacement_m": np.where(observed, beyond, np.nan),
