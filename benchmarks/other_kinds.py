@@ -2,10 +2,9 @@
 
     python -m benchmarks.other_kinds DATABASE [--write]
 
-reads the campaigns of a database (toppling, slumping by 2 degrees and past recovery, sliding; with
-samples, for Arias intensity), fits the models, compares them with published regressions, and writes
-the tables and the figure of docs/theory/other-kinds.md. Toppling may be in another database, such
-as the shipped one.
+reads the campaigns of a database (toppling, slumping by 2 degrees and past recovery, sliding), fits
+the models, compares them with published regressions, and writes the tables and the figure of
+docs/theory/other-kinds.md. Toppling may be in another database, such as the shipped one.
 """
 
 from __future__ import annotations
