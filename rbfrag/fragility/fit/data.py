@@ -47,8 +47,8 @@ WIDER_STEPS = 10
 K_OVER_PGA = np.geomspace(0.02, 0.95, 25)
 """The same of blocks that the record is scaled to."""
 
-LEAST_DISPLACEMENT_M = 1e-4
-"""Displacements below this count as less than it, whether zero or not."""
+LEAST_DISPLACEMENT_M = 1e-3
+"""Displacements below this count as less than it, whether zero or not: their scatter is another."""
 
 _CENSORED = ("below_limit", "no_motion")
 
