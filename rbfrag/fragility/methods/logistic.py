@@ -45,7 +45,7 @@ def _spectral(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     return Eta(sum(map(mul, b, slopes)), slopes)
 
 
-_SPECTRAL = ("b0", "b_ln_p", "b_ln_p_squared", "b_ln_x_over_y", "b_ln_x", "b_strength")
+_SPECTRAL = ("b0", "b_size", "b_size_squared", "b_ln_x_over_y", "b_ln_x", "b_strength")
 
 
 def _of_period(a: float) -> Form:
