@@ -194,5 +194,5 @@ def show_prediction(document: dict[str, Any], *, json: bool) -> None:
     print_warnings(warnings)
 
 
-_LEFT_OUT = ("y_m_s", "median_displacement_m")
+_LEFT_OUT = ("y_m_s", "median_displacement_m", "unknown_share")
 """Keys that a table leaves out where they do not apply."""
