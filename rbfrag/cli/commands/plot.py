@@ -129,9 +129,10 @@ def plot_curve(
     ),
     db: options.Db = None,
 ) -> None:
-    """Draw the fragility curve of one block over a measure of the shaking, with its interval.
+    """Draw the fragility curve of one block over a measure of the shaking.
 
-    The other measures are held at the values given.
+    One band is the interval of P as far as the data tell it, the other the share of such blocks
+    that may fail in one single earthquake. The other measures are held at the values given.
     """
     from rbfrag.errors import InputError
     from rbfrag.fragility.lookup import find_model
