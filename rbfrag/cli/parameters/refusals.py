@@ -58,6 +58,12 @@ CONFLICTS = (
     Conflict(SHAPE[:-1], FILES, "the file has the shape"),
     Conflict(("--polygon",), ("--block",), ONCE),
     Conflict(TABLES, (*SHAPE, *FILES), ONCE),
+    Conflict(("--mesh",), (*SHAPE, *FILES), ONCE),
+    Conflict(
+        (*PLANES, "--cohesion", "--kv"),
+        ("--mesh",),
+        "a mesh stands free on level ground, in the pose that it was measured in",
+    ),
     Conflict(("--rockmass",), ("--blocks",), "one of them is enough"),
     Conflict(PLANES, NUMBERS, "numbers say all about the block"),
     Conflict(PLANES, TABLES, "the file has the planes", ("hazard", "shakemap", "nrml", "pelicun")),
@@ -105,6 +111,10 @@ NEEDS = (
         ("rockmass",),
     ),
     Need(("--exaggerate",), ("--animate",), "--animate", "it is a factor on what the film shows"),
+    Need(("--up", "--contact-mm"), ("--mesh",), "--mesh", "it is about the pose of a mesh"),
+    Need(
+        ("--out",), ("--mesh",), "--mesh", "only a mesh makes a table, of its azimuths", ("block",)
+    ),
     Need(("--n",), ("--rockmass",), "--rockmass", "only a rock mass is drawn anew"),
 )
 
