@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import refusals
+from rbfrag.fragility.intervals import checked_level
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import checked_level
 from rbfrag.fragility.predict import Model, answer_given, predict
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.rockmasses.joint_sets import Realisations

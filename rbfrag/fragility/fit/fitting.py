@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -12,12 +12,12 @@ import numpy as np
 
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.rows import CombinationTable
-from rbfrag.errors import FitError, InputError
+from rbfrag.errors import InputError
+from rbfrag.fragility.fit.clusters import cr3
 from rbfrag.fragility.fit.data import FitData, FitSource, fit_data, read_source
 from rbfrag.fragility.fit.report import FitReport, log_correlations, power_law
 from rbfrag.fragility.fit.result import MethodResult
-from rbfrag.fragility.interval_floor import interval_floor, of_motions, of_sizes
-from rbfrag.fragility.measures import TERMS, Term, intensity_term
+from rbfrag.fragility.measures import Term, intensity_term
 from rbfrag.fragility.methods import Method, method_named, methods
 from rbfrag.fragility.model import FragilityModel
 
@@ -165,13 +165,8 @@ def fit_source(
     seed: int = 0,
     estimate_m: bool = False,
     selection: Mapping[str, object] | None = None,
-    compared: bool = True,
 ) -> Fitted:
-    """Fit a model and keep its held-out probabilities.
-
-    Arguments as for :func:`fit`; `compared` says whether the model gets its table of least widths,
-    for which those that know more are fitted too: a study of scores has no use for it.
-    """
+    """Fit a model and keep its held-out probabilities; arguments as for :func:`fit`."""
     table, chosen = source.table, dict(selection or {})
     data = fit_data(source, method, term, kind=kind)
     options = {"estimate_m": True} if estimate_m else {}
@@ -186,7 +181,8 @@ def fit_source(
         term=term.name,
         method=method.name,
         coefficients=result.coefficients,
-        covariance=result.covariance,
+        covariance=tuple(tuple(line) for line in cr3(result.steps).tolist()),
+        leave_out_steps=tuple(tuple(line) for line in result.steps.tolist()),
         domain=data.domain,
         data_fingerprint=data.fingerprint,
         diagnostics={
@@ -194,7 +190,6 @@ def fit_source(
             "n": int(data.observed.sum()),
             "n_censored": int(data.censored.sum()),
             "events": _events(data, of_outcomes),
-            "degrees_of_freedom": _events(data, of_outcomes) - 1,
             "scores": result.scores,
             "warnings": [*_data_warnings(data), *result.warnings],
             "n_total": data.n_total,
@@ -215,8 +210,6 @@ def fit_source(
         },
         created=datetime.now(UTC).isoformat(timespec="seconds"),
     )
-    if compared:
-        row = _with_floor(row, source)
     return Fitted(FitReport.from_model(FragilityModel.from_row(row)), data, result)
 
 
@@ -257,50 +250,6 @@ def _events(data: FitData, of_outcomes: bool) -> int:
         data.observed if data.observed.any() or not of_outcomes else np.ones_like(data.observed)
     )
     return int(np.unique(data.event[informative]).size)
-
-
-def _with_floor(row: ModelRow, source: FitSource) -> ModelRow:
-    """Return the model with its table of least widths, where models that know more exist."""
-    table: list[float] = []
-    term = TERMS[row.term]
-    if term.richer and method_named(row.method).block.size == "p2":
-        others = [_richer_model(TERMS[name], source, row) for name in term.richer]
-        known = [other for other in others if other is not None]
-        if known:
-            sample = of_motions(source) if term.richer == ("xp",) else of_sizes(source)
-            table = interval_floor(FragilityModel.from_row(row), known, sample)
-    return replace(row, diagnostics={**row.diagnostics, "interval_floor": table})
-
-
-def _richer_model(term: Term, source: FitSource, of: ModelRow) -> FragilityModel | None:
-    """Return the best model of a term, with clustered covariance and its own table, only that."""
-    from rbfrag.fragility.fit.outcomes import fit_parameters
-
-    method = min(
-        (each for each in methods_of_kind(of.kind) if term.name in each.forms),
-        key=lambda each: each.forms[term.name].rank,
-    )
-    try:
-        data = fit_data(source, method, term, kind=of.kind)
-        names, parameters, covariance, freedom = fit_parameters(data, method, term)
-    except FitError:
-        return None
-    row = ModelRow(
-        name=term.name,
-        kind=of.kind,
-        term=term.name,
-        method=method.name,
-        coefficients=dict(zip(names, parameters.tolist(), strict=True)),
-        covariance=tuple(tuple(line) for line in covariance.tolist()),
-        domain={},
-        data_fingerprint="",
-        diagnostics={
-            "degrees_of_freedom": freedom,
-            "events": _events(data, True),
-            "vertical": of.diagnostics["vertical"],
-        },
-    )
-    return FragilityModel.from_row(_with_floor(row, source))
 
 
 def _data_warnings(data: FitData) -> list[str]:
