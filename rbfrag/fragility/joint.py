@@ -194,7 +194,8 @@ def event_ranges(
 ) -> tuple[FloatArray, FloatArray]:
     """Return `rbfrag.fragility.dependence.event_range` of many P, two arrays of their shape."""
     reach = -normal_quantile(0.5 - 0.5 * level)
-    low, high = EventSpread.of(rho_e).ends(ndtri(probability), reach, ndtr)
+    a = ndtri(np.asarray(probability, dtype=np.float64))
+    low, high = EventSpread.of(rho_e).ends(a, reach, ndtr)
     return np.asarray(low), np.asarray(high)
 
 

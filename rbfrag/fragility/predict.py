@@ -411,9 +411,11 @@ def _is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
     for bound in (*block.refuses, *block.doubts):
         if bound.holds(values):
             return False
-    return method.doubts is None or not any(
+    if method.doubts is not None and any(
         holds for holds, _, _ in method.doubts(model.parameters, values, SINGLE)
-    )
+    ):
+        return False
+    return model.spread is None or model.spread.holds(values, SINGLE)
 
 
 def _answer_with_diagnostics(

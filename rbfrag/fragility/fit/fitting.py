@@ -12,9 +12,11 @@ import numpy as np
 
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.rows import CombinationTable
-from rbfrag.errors import InputError
+from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.clusters import cr3
 from rbfrag.fragility.fit.data import FitData, FitSource, fit_data, read_source
+from rbfrag.fragility.fit.dependence import dependence_of_fit
+from rbfrag.fragility.fit.domain import joint_scatter
 from rbfrag.fragility.fit.report import FitReport, log_correlations, power_law
 from rbfrag.fragility.fit.result import MethodResult
 from rbfrag.fragility.measures import Term, intensity_term
@@ -165,12 +167,18 @@ def fit_source(
     seed: int = 0,
     estimate_m: bool = False,
     selection: Mapping[str, object] | None = None,
+    shared: bool = True,
 ) -> Fitted:
-    """Fit a model and keep its held-out probabilities; arguments as for :func:`fit`."""
+    """Fit a model and keep its held-out probabilities.
+
+    Arguments as for :func:`fit`; `shared` says whether what blocks of one earthquake share is
+    estimated too, which a study of scores has no use for.
+    """
     table, chosen = source.table, dict(selection or {})
     data = fit_data(source, method, term, kind=kind)
     options = {"estimate_m": True} if estimate_m else {}
     result: MethodResult = method.fitter()(data, method, term, seed=seed, **options)
+    dependence, unknown = _dependence(data, method, result, seed) if shared else (None, [])
     of_any_strength = method.block.strength == "kr"
     law = power_law(table) if of_any_strength else None
     correlations = log_correlations(table) if of_any_strength else {}
@@ -183,6 +191,7 @@ def fit_source(
         coefficients=result.coefficients,
         covariance=tuple(tuple(line) for line in cr3(result.steps).tolist()),
         leave_out_steps=tuple(tuple(line) for line in result.steps.tolist()),
+        dependence=dependence,
         domain=data.domain,
         data_fingerprint=data.fingerprint,
         diagnostics={
@@ -191,7 +200,7 @@ def fit_source(
             "n_censored": int(data.censored.sum()),
             "events": _events(data, of_outcomes),
             "scores": result.scores,
-            "warnings": [*_data_warnings(data), *result.warnings],
+            "warnings": [*_data_warnings(data), *result.warnings, *unknown],
             "n_total": data.n_total,
             "n_found": int((table.status == "found").sum()),
             "n_below_limit": int((table.status == "below_limit").sum()),
@@ -206,11 +215,21 @@ def fit_source(
             "doubtful_pgd": chosen.get("doubtful_pgd", False),
             "vertical": chosen.get("vertical", "without"),
             "rotation_deg": chosen.get("rotation_deg"),
+            "mahalanobis": _scatter(data, method, term),
             **result.details,
         },
         created=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     return Fitted(FitReport.from_model(FragilityModel.from_row(row)), data, result)
+
+
+def _scatter(data: FitData, method: Method, term: Term) -> dict[str, object] | None:
+    """Return how the points scatter that are fitted: what mechanics rules out is not."""
+    fitted = data.read.copy()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for bound in method.forms[term.name].bounds:
+            fitted &= ~bound.holds(data.blocks)
+    return joint_scatter((*method.block.names, *term.inputs), data.blocks, fitted)
 
 
 def _refuse_unfit(
@@ -250,6 +269,24 @@ def _events(data: FitData, of_outcomes: bool) -> int:
         data.observed if data.observed.any() or not of_outcomes else np.ones_like(data.observed)
     )
     return int(np.unique(data.event[informative]).size)
+
+
+def _dependence(
+    data: FitData, method: Method, result: MethodResult, seed: int
+) -> tuple[dict[str, object] | None, list[str]]:
+    """Return what blocks of one earthquake share as models store it, or why it is not known."""
+    try:
+        found = dependence_of_fit(data, method.block, result.held_out, seed=seed)
+    except FitError as error:
+        return None, [f"the range of one future earthquake is not known: {error}"]
+    return {
+        **asdict(found.dependence),
+        "errors": found.errors,
+        "earthquakes": found.earthquakes,
+        "pairs": list(found.pairs),
+        "replicates": found.replicates,
+        "seed": found.seed,
+    }, []
 
 
 def _data_warnings(data: FitData) -> list[str]:
