@@ -41,7 +41,8 @@ class BlockOnPlanes:
     Args:
         block: its shape and size; None where numbers describe it.
         beta_rad: dip of the base, out of the slope positive [rad].
-        phi_rad: friction angle of the base [rad].
+        phi_rad: friction angle of the base [rad]; π/2 where it is not known and the kind does
+            without.
         phi_back_rad: friction angle of the back plane [rad].
         back_fracture: whether there is a back plane.
         cohesive: whether the base has cohesion.
@@ -162,7 +163,9 @@ class Kind:
     Attributes:
         kind: its name.
         mode: failure mode of its blocks; None where no geometry chooses it.
+        free_standing: whether its blocks have no plane behind them.
         settings: options of `rbfrag.respond` that it understands.
+        numbers: what describes its block in `rbfrag.respond` without a shape, beside `parameters`.
         parameters: what describes its block in predictions; () where no fragility is fitted.
         searchable: whether it has a critical value.
         search_needs: the option without which there is no search.
@@ -173,7 +176,9 @@ class Kind:
 
     kind: str
     mode: ModeName | None = None
+    free_standing: bool = False
     settings: tuple[str, ...] = ()
+    numbers: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()
     searchable: bool = False
     search_needs: str = ""
