@@ -141,7 +141,6 @@ class Excitation:
             warnings=self.warnings,
         )
 
-
     def with_rest_after(self, duration_s: float, intervals: int) -> Excitation:
         """Return the same shaking and a stretch of rest after it, to which the last sample jumps.
 

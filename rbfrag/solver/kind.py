@@ -170,6 +170,7 @@ class Kind:
         searchable: whether it has a critical value.
         search_needs: the option without which there is no search.
         search_options: options of `rbfrag.critical` that it understands.
+        no_search: why it has no critical value; empty where there is none yet.
         campaign: whether campaigns store it.
         campaign_options: what :meth:`cases` may be asked.
     """
@@ -183,6 +184,7 @@ class Kind:
     searchable: bool = False
     search_needs: str = ""
     search_options: tuple[str, ...] = ()
+    no_search: str = ""
     campaign: bool = False
     campaign_options: tuple[str, ...] = ()
 
@@ -200,7 +202,8 @@ class Kind:
         Raises:
             InputError: there is no search, or an option is that of another kind.
         """
-        raise InputError(f"there is no search for the critical value of kind {self.kind}")
+        why = f": {self.no_search}" if self.no_search else ""
+        raise InputError(f"there is no search for the critical value of kind {self.kind}{why}")
 
     def cases(self, **request: Any) -> tuple[Case, ...]:
         """Return the combinations of a campaign, whatever the motion.
@@ -208,7 +211,8 @@ class Kind:
         Raises:
             InputError: campaigns do not store this kind, or an option is that of another one.
         """
-        raise InputError(f"campaigns of kind {self.kind} are not known to this rbfrag")
+        why = f": {self.no_search}" if self.no_search else ""
+        raise InputError(f"campaigns of kind {self.kind} are not known to this rbfrag{why}")
 
     def grid(self, case: Case, measures: Measures) -> FloatArray:
         """Return the strengths k/PGA of the outcome grid, which depend on no outcome.

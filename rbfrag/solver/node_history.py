@@ -1,4 +1,4 @@
-"""The motion in time that a kernel kept at the nodes it moved through and at events between them."""
+"""The motion in time that a kernel kept: nodes that it moved through, and events between them."""
 
 from __future__ import annotations
 

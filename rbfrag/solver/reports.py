@@ -28,7 +28,7 @@ HISTORY_COLUMNS = (
 
 def response_as_dict(response: Response) -> dict[str, Any]:
     """Return the answer with the keys of the JSON contract."""
-    return {
+    answer = {
         "kind": response.kind,
         "outcome": response.outcome.value,
         "peak_theta_n": response.peak_theta_n,
@@ -45,16 +45,21 @@ def response_as_dict(response: Response) -> dict[str, Any]:
         "peak_displacement_m": response.peak_displacement_m,
         "centroid_displacement_m": response.centroid_displacement_m,
         "stopped_s": response.stopped_s,
-        "critical_backward_deg": response.critical_backward_deg,
-        "peak_forward_rad": response.peak_forward_rad,
-        "peak_backward_rad": response.peak_backward_rad,
-        "impacts": response.impacts,
-        "sensitive": response.sensitive,
         "mode_changes": [
             {"time_s": change.time_s, "motion": change.motion} for change in response.mode_changes
         ],
         "warnings": list(response.warnings),
     }
+    # of a block with two corners only
+    if response.impacts is not None:
+        answer |= {
+            "critical_backward_deg": response.critical_backward_deg,
+            "peak_forward_rad": response.peak_forward_rad,
+            "peak_backward_rad": response.peak_backward_rad,
+            "impacts": response.impacts,
+            "sensitive": response.sensitive,
+        }
+    return answer
 
 
 MOTION_COLUMNS = (

@@ -178,8 +178,8 @@ def _remarks(judged: Stability, model: Kind) -> tuple[str, ...]:
         return judged.warnings
     return (
         *judged.warnings,
-        f"the mode of the block is {words_of_mode(judged.mode)}: by it, {model.kind} is not what it "
-        "would do",
+        f"the mode of the block is {words_of_mode(judged.mode)}: by it, {model.kind} is not what "
+        "it would do",
     )
 
 

@@ -9,12 +9,11 @@ import numpy as np
 
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Excitation
-from rbfrag.solver.integrator.free_rocking import Corner
+from rbfrag.solver.integrator.free_rocking import TOPPLED, Corner
 from rbfrag.solver.integrator.one_freedom.state import record_of
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
 from rbfrag.solver.integrator.two_corners import (
     IMPACT,
-    TOPPLED,
     RockingRun,
     Rules,
     run_rocking,

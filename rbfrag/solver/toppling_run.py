@@ -14,7 +14,7 @@ from rbfrag.solver.integrator.single_run import HANDED, TOPPLED, Run, run_toppli
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
 from rbfrag.solver.node_history import node_history, with_free_motion
 from rbfrag.solver.quantity import positive
-from rbfrag.solver.results import FloatArray, Outcome, Polarity, Response, ResponseHistory
+from rbfrag.solver.results import Outcome, Polarity, Response, ResponseHistory
 
 OUTCOMES = (Outcome.STABLE, Outcome.TOPPLED, Outcome.UNDETERMINED, Outcome.JUMP)
 """Outcome of each kernel code."""

@@ -198,7 +198,9 @@ def cross_interval(
         elif theta_end <= 0.0 or (
             not keeps_direction(u_start, u[1], u_end, v_end)
             # a history has all peaks
-            and (keeps or not simple_turn(theta, theta_end, u_start, u[1], u_end, v_end, peak.x, 0.0))
+            and (
+                keeps or not simple_turn(theta, theta_end, u_start, u[1], u_end, v_end, peak.x, 0.0)
+            )
         ):
             inside = examine_step(theta, u, order, theta_end, u_end, v_end)
             peak = higher(peak, inside.peak, abs(off.theta))
@@ -243,14 +245,62 @@ def error_after_impact(
     return Offset(-after.p * rate_after * late_s, rate_off / after.p)
 
 
+class Landed(NamedTuple):
+    """What follows an impact.
+
+    Args:
+        side: the new corner, 1 or -1; 0 for rest.
+        state: of the block about it.
+        off: error of it.
+        speed: of the block [rad/s].
+    """
+
+    side: int
+    state: State
+    off: Offset
+    speed: float
+
+
+@inner_kernel
+def through_impact(
+    record: Record,
+    place: Place,
+    side: int,
+    corner: Corner,
+    other: Corner,
+    rules: Rules,
+    crossing: Crossing,
+) -> Landed:
+    """Return what follows an impact at a place: rest, or rotation about the other corner.
+
+    Args:
+        record: the excitation.
+        place: where in it.
+        side: the present corner, 1 or -1.
+        corner: that one.
+        other: the other one.
+        rules: how to integrate.
+        crossing: how the block came to the impact.
+    """
+    rate = crossing.state.rate
+    speed = -rate * corner.p * corner.passed_on
+    if speed < rules.slowest:
+        return Landed(0, State(0.0, 0.0, corner.sin, corner.cos), Offset(0.0, 0.0), 0.0)
+    i, tau = place.interval, place.fraction
+    k_h = side * (record.k_h[i] + (record.k_h[i + 1] - record.k_h[i]) * tau)
+    w = record.w[i] + (record.w[i + 1] - record.w[i]) * tau
+    rate_after = speed / other.p
+    off = error_after_impact(crossing.off, corner, other, rate, rate_after, k_h, w)
+    return Landed(-side, State(0.0, rate_after, other.sin, other.cos), off, speed)
+
+
 @inner_kernel
 def time_of_throw(record: Record) -> float:
     """Return when 1 + k_v reaches zero [s]."""
     at, w = record.last, record.w
-    if at < 0:
-        return record.time_s[0]
-    # 1 + k_v is a straight line to its zero
-    thrown_s: float = record.time_s[at] + record.interval_s[at] * w[at] / (w[at] - w[at + 1])
+    thrown_s: float = record.time_s[max(at, 0)]
+    if at >= 0:  # 1 + k_v is a straight line to its zero
+        thrown_s += record.interval_s[at] * w[at] / (w[at] - w[at + 1])
     return thrown_s
 
 
@@ -277,8 +327,7 @@ def run_rocking(
             goes on after the verdict until the block lies beyond recovery.
         u: work, shape (9,).
     """
-    time_s, interval_s, k_h, w = record.time_s, record.interval_s, record.k_h, record.w
-    last = record.last
+    time_s, interval_s, last = record.time_s, record.interval_s, record.last
     # the drive forward is k_h - w tan(theta_c), backward it is -(k_h + w tan(theta_c))
     level = Thresholds(1.0, toe.kr, 1.0, -heel.kr, True)
     keeps = rows.shape[1] > 0
@@ -309,6 +358,9 @@ def run_rocking(
             # a jump, or a start at the very end of the interval: what follows decides
             side = 0 if state.theta == 0.0 and state.rate == 0.0 else side
             i, tau, lifting = i + 1, 0.0, False
+            if side != 0:
+                rate = side * state.rate * corner.p
+                filled = noted(rows, filled, time_s[i], side * state.theta, rate, i)
             continue
         # an impact and a new start in one interval count it once
         if i != counted:
@@ -328,29 +380,17 @@ def run_rocking(
         if crossing.impact_at >= 0.0:
             stuck = crossing.impact_at <= tau
             tau = min(crossing.impact_at, 1.0)
-            rate = crossing.state.rate
             other = heel if side > 0 else toe
-            speed = -rate * corner.p * corner.passed_on
-            now_s = time_s[i] + tau * interval_s[i]
-            if rate < 0.0:
+            landed = through_impact(record, Place(i, tau), side, corner, other, rules, crossing)
+            if crossing.state.rate < 0.0:
                 impacts += 1
-                filled = noted(rows, filled, now_s, 0.0, side * rate * corner.p, EVENT)
-            if speed < rules.slowest:
-                if rate < 0.0:
-                    filled = noted(rows, filled, now_s, 0.0, 0.0, IMPACT)
-                barred = side if stuck else 0
-                side = 0
-                state, off = State(0.0, 0.0, corner.sin, corner.cos), Offset(0.0, 0.0)
-            else:
-                rate_after = speed / other.p
-                a = side * (k_h[i] + (k_h[i + 1] - k_h[i]) * tau)
-                w_there = w[i] + (w[i + 1] - w[i]) * tau
-                off = error_after_impact(
-                    crossing.off, corner, other, rate, rate_after, a, w_there
-                )
-                side, corner = -side, other
-                state = State(0.0, rate_after, corner.sin, corner.cos)
-                filled = noted(rows, filled, now_s, 0.0, side * speed, IMPACT)
+                now_s = time_s[i] + tau * interval_s[i]
+                rate = side * crossing.state.rate * corner.p
+                filled = noted(rows, filled, now_s, 0.0, rate, EVENT)
+                filled = noted(rows, filled, now_s, 0.0, side * landed.speed, IMPACT)
+            barred = side if stuck and landed.side == 0 else 0
+            side, state, off = landed.side, landed.state, landed.off
+            corner = corner if side == 0 else other
             if tau >= 1.0:
                 i, tau = i + 1, 0.0
             continue
@@ -368,7 +408,7 @@ def run_rocking(
     outcome, fell, verdict_s = STABLE, 0, decided_s
     if not math.isnan(decided_s):
         outcome, fell = TOPPLED, side
-    elif last < k_h.size - 1:
+    elif last < record.k_h.size - 1:
         outcome, verdict_s = JUMP, time_of_throw(record)
     elif impacts > rules.most_impacts:
         outcome = UNDETERMINED

@@ -12,20 +12,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.integrator.free_rocking import Corner
 from rbfrag.solver.integrator.two_corners import RockingRun
-from rbfrag.solver.kind import BlockOnPlanes, Case, Kind, RunEnd, Runner, Shaking
+from rbfrag.solver.kind import BlockOnPlanes, Kind, RunEnd, Runner, Shaking
 from rbfrag.solver.quantity import number, positive
-from rbfrag.solver.results import CriticalResult, FloatArray, Outcome, Response, ResponseHistory
+from rbfrag.solver.results import FloatArray, Outcome, Response, ResponseHistory
 from rbfrag.solver.rocking_run import (
     MOST_IMPACTS,
     FreeBlock,
@@ -43,11 +41,6 @@ SENSITIVITY = 1e-6
 
 CHAOTIC = 1e-3
 """Error over the critical angle from which on the size of a peak means nothing."""
-
-NO_INTERVAL = (
-    "what overturns a free-standing block is no interval of k_r (up to 122 islands for one record), "
-    "and none can be certified to be the last"
-)
 
 
 def free_block(site: BlockOnPlanes) -> FreeBlock:
@@ -127,6 +120,10 @@ class Rocking(Kind):
     free_standing = True
     settings = ("restitution",)
     numbers = ("p2", "kr")
+    no_search = (
+        "what overturns a free-standing block is no interval of k_r (up to 122 islands for one "
+        "record), so that no value is certain to be the last"
+    )
 
     def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
         """Return what the block does.
@@ -188,25 +185,6 @@ class Rocking(Kind):
             )
 
         return run
-
-    def critical(self, motion: GroundMotion, **options: Any) -> CriticalResult:
-        """Refuse: there is no critical value.
-
-        Raises:
-            InputError: always, with the reason.
-        """
-        raise InputError(
-            f"there is no critical value of kind {self.kind}: {NO_INTERVAL}; run blocks of stated "
-            f"strength with  rbfrag respond --kind {self.kind}"
-        )
-
-    def cases(self, **request: Any) -> tuple[Case, ...]:
-        """Refuse: campaigns do not store this kind.
-
-        Raises:
-            InputError: always, with the reason.
-        """
-        raise InputError(f"campaigns store no blocks of kind {self.kind}: {NO_INTERVAL}")
 
     def _block(self, site: BlockOnPlanes) -> FreeBlock:
         if site.cohesive:
@@ -295,9 +273,7 @@ def _posed(block: FreeBlock, traced: RockingHistory) -> ResponseHistory:
     rise = block.centroid_m[1]
     c, s = np.cos(theta), np.sin(theta)
     centroid: FloatArray = np.stack([pivot + arm * c + rise * s, rise * c - arm * s], axis=1)
-    return replace(
-        traced.motion, centroid_m=centroid, turned_rad=-theta, impact_s=traced.impact_s
-    )
+    return replace(traced.motion, centroid_m=centroid, turned_rad=-theta, impact_s=traced.impact_s)
 
 
 def _time_or_none(time_s: float) -> float | None:
