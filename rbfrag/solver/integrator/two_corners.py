@@ -387,7 +387,7 @@ def run_rocking(
                 now_s = time_s[i] + tau * interval_s[i]
                 rate = side * crossing.state.rate * corner.p
                 filled = noted(rows, filled, now_s, 0.0, rate, EVENT)
-                filled = noted(rows, filled, now_s, 0.0, side * landed.speed, IMPACT)
+                filled = noted(rows, filled, now_s, 0.0, landed.side * landed.speed, IMPACT)
             barred = side if stuck and landed.side == 0 else 0
             side, state, off = landed.side, landed.state, landed.off
             corner = corner if side == 0 else other

@@ -85,6 +85,7 @@ def _of_shape(block: Block, beta_rad: float, given: float | None) -> FreeBlock:
                 f"the block falls {falls} at rest: {name} = {math.degrees(balance):.6g} degrees is "
                 "not above zero, and no earthquake decides about it"
             )
+    for _, name, balance in balances:
         if balance >= 0.5 * math.pi:
             raise InputError(
                 f"{name} = {math.degrees(balance):.6g} degrees: a block rocks about a corner whose "
