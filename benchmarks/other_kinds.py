@@ -2,28 +2,32 @@
 
     python -m benchmarks.other_kinds DATABASE [--write]
 
-reads the campaigns of a database (toppling, slumping by 2 degrees and past recovery, sliding), fits
-the models, compares them with published regressions, and writes the tables and the figure of
-docs/theory/other-kinds.md.
+reads the campaigns of a database (toppling, slumping by 2 degrees and past recovery, sliding; with
+samples, for Arias intensity), fits the models, compares them with published regressions, and writes
+the tables and the figure of docs/theory/other-kinds.md. Toppling may be in another database, such
+as the shipped one.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 from sqlalchemy import Connection
 
 from benchmarks.other_kinds_figure import plot_other_kinds
 from benchmarks.page import ROOT, replaced
+from benchmarks.slide_comparison import comparison
 from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
 from rbfrag.db.queries import combination_table
+from rbfrag.fragility.fit.censoring import score_bounds
 from rbfrag.fragility.fit.critical import probabilities
 from rbfrag.fragility.fit.data import FitData, read_source
 from rbfrag.fragility.fit.fitting import Fitted, fit_source, method_of_kind
@@ -35,22 +39,6 @@ FloatArray = NDArray[np.float64]
 
 PAGE = ROOT / "docs" / "theory" / "other-kinds.md"
 FIGURE = ROOT / "docs" / "figures" / "other-kinds.svg"
-
-
-def jibson_2007(values: dict[str, FloatArray]) -> FloatArray:
-    """Return P(D > d) by eq. (6) of Jibson (2007): log10 D [cm] on the ratio alone, sd 0.510."""
-    r = values["ky"] / values["pga_g"]
-    mean = 0.215 + np.log10((1.0 - r) ** 2.341 * r**-1.438)
-    return np.asarray(ndtr((mean - np.log10(100.0 * values["displacement_m"])) / 0.510))
-
-
-def saygili_rathje_2008(values: dict[str, FloatArray]) -> FloatArray:
-    """Return P(D > d) by eq. (6) of Saygili & Rathje (2008), on PGA [g] and PGV [cm/s]."""
-    r = values["ky"] / values["pga_g"]
-    mean = -1.56 - 4.58 * r - 20.84 * r**2 + 44.75 * r**3 - 30.50 * r**4
-    mean = mean - 0.64 * np.log(values["pga_g"]) + 1.55 * np.log(100.0 * values["pgv_m_s"])
-    sigma = 0.405 + 0.524 * r
-    return np.asarray(ndtr((mean - np.log(100.0 * values["displacement_m"])) / sigma))
 
 
 def fitted(
@@ -74,13 +62,57 @@ def as_slide(slump: FitData, sliding: Fitted, rotation_deg: float) -> FloatArray
 
 
 def scored(name: str, p: FloatArray, data: FitData) -> list[str]:
+    """Return the line of a model: known share, scores, and bounds where some are not known."""
     judged = data.judged
+    outcomes = judged.failed, judged.known, judged.weights
+    known = np.isfinite(data.failed)
+    every = replace(judged, known=known, failed=np.where(known, data.failed, 0.0))
+    low, high = score_bounds(every, p, data.read)
     return [
         name,
-        f"{log_loss(p, judged.failed, judged.known):.3f}",
-        f"{brier(p, judged.failed, judged.known):.3f}",
-        f"{calibration(p, judged.failed, judged.known).slope:.2f}",
+        f"{100.0 * (1.0 - known.mean()):.0f} %",
+        f"{log_loss(p, *outcomes):.3f}",
+        f"{brier(p, *outcomes):.3f}",
+        f"{calibration(p, *outcomes).slope:.2f}",
+        f"{low:.3f} to {high:.3f}",
     ]
+
+
+def class_lines(
+    name: str, p: FloatArray, data: FitData, variable: str, edges: Sequence[float]
+) -> list[list[str]]:
+    """Return calibration of the classes of a variable: slope, shares predicted and seen."""
+    judged, of = data.judged, _class_values(data)[variable]
+    lines = []
+    for low, high in pairwise(edges):
+        here = judged.known & (of >= low) & (of < high)
+        counts = judged.counts * here
+        if not counts.any():
+            continue
+        mean = [float((counts * each).sum() / counts.sum()) for each in (p, judged.failed)]
+        # where nearly all or none fail there is no slope to speak of
+        decided = not 0.01 < mean[1] < 0.99
+        slope = calibration(p, judged.failed, here, judged.counts).slope
+        text = f"{low:g} to {high:g}" if np.isfinite(high) else f"from {low:g}"
+        lines.append([
+            name, f"{variable} {text}", "" if decided else f"{slope:.2f}",
+            f"{mean[0]:.3f}", f"{mean[1]:.3f}",
+        ])  # fmt: skip
+    return lines
+
+
+def _class_values(data: FitData) -> dict[str, FloatArray]:
+    strength = next(name for name in ("ky", "ks") if name in data.blocks)
+    of = {"k/PGA": data.grid(strength) / data.grid("pga_g")}
+    for word, name in (("d [m]", "displacement_m"), ("p_s² [1/s²]", "ps2"), ("k_s", "ks")):
+        if name in data.blocks:
+            of[word] = data.grid(name)
+    return of
+
+
+CLASS_HEADS = ["model", "class", "slope", "mean P", "failed"]
+RATIOS, DISTANCES = (0.0, 0.1, 0.3, 0.6, 1.0), (0.0, 0.02, 0.1, 0.2, math.inf)
+SIZES, STRENGTHS = (0.0, 3.0, 8.0, math.inf), (0.0, 0.2, math.inf)
 
 
 def within_motion(residual: FloatArray, group: NDArray[np.intp]) -> tuple[float, float]:
@@ -106,67 +138,69 @@ def scatter(
     return within_motion(np.log(y / table.pgv_m_s)[found], group.astype(np.intp))
 
 
+def tables(database: str, toppling: str | None) -> tuple[dict[str, str], tuple[Fitted, Fitted]]:
+    """Return the tables of the page by name, and the fits that the figure draws."""
+    found: dict[str, str] = {}
+    with opened_database(database, read_only=True) as engine, engine.connect() as c:
+        slides = {term: fitted(c, "sliding", term) for term in ("pgv_pga", "pgv")}
+        source = read_source(c, method_of_kind("sliding", None).block, kind="sliding")
+        for facing in ("one", "either"):
+            found[f"sliding-{facing}"] = comparison(source, c, facing=facing)
+        slumps = {
+            (rotation, term): fitted(c, "slumping", term, rotation)
+            for rotation in (None, 2.0)
+            for term in ("pgv_pga", "pgv")
+        }
+        scatters = {
+            "slumping past recovery, 18 blocks": scatter(c, "slumping"),
+            "slumping by 2 degrees, 18 blocks": scatter(c, "slumping", 2.0),
+        }
+    with opened_database(toppling or database, read_only=True) as engine, engine.connect() as c:
+        scatters = {"toppling, six sizes": scatter(c, "toppling"), **scatters}
+    sliding, recovery = slides["pgv_pga"], slumps[None, "pgv_pga"]
+    rows = []
+    for fit in slides.values():
+        for variable, edges in (("k/PGA", RATIOS), ("d [m]", DISTANCES)):
+            rows += class_lines(_name(fit), fit.result.held_out, fit.data, variable, edges)
+    found["sliding-classes"] = markdown((CLASS_HEADS, rows))
+    rows = [scored(_name(fit), fit.result.held_out, fit.data) for fit in slumps.values()]
+    turned = slumps[2.0, "pgv_pga"].data
+    rows.append(scored("2 degrees as a slide of 2° g/p_s²", as_slide(turned, sliding, 2.0), turned))
+    heads = ["held out", "not known", "log loss", "Brier", "slope", "log loss, bounds"]
+    found["slumping-scores"] = markdown((heads, rows))
+    rows = []
+    for fit in slumps.values():
+        for variable, edges in (("k/PGA", RATIOS), ("p_s² [1/s²]", SIZES), ("k_s", STRENGTHS)):
+            rows += class_lines(_name(fit), fit.result.held_out, fit.data, variable, edges)
+    found["slumping-classes"] = markdown((CLASS_HEADS, rows))
+    cells = [
+        [name, f"{within:.2f}", f"{between:.2f}"] for name, (within, between) in scatters.items()
+    ]
+    heads = ["critical values", "between blocks under one motion", "between motions"]
+    found["y-scatter"] = markdown((heads, cells))
+    return found, (sliding, recovery)
+
+
+def _name(fit: Fitted) -> str:
+    return f"`{fit.report.name}`"
+
+
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("database")
     options.add_argument("--toppling", help="database of the toppling campaign, if it is another")
     options.add_argument("--write", action="store_true", help="write page and figure")
     chosen = options.parse_args()
-    heads = ["model", "log loss", "Brier", "calibration slope"]
-    with opened_database(chosen.database, read_only=True) as engine, engine.connect() as c:
-        sliding = fitted(c, "sliding")
-        only_pgv = fitted(c, "sliding", "pgv")
-        slumps = {
-            (rotation, term): fitted(c, "slumping", term, rotation)
-            for rotation in (None, 2.0)
-            for term in ("pgv_pga", "pgv")
-        }
-        slump_scatters = {r: scatter(c, "slumping", r) for r in (None, 2.0)}
-    recovery, turned = slumps[None, "pgv_pga"].data, slumps[2.0, "pgv_pga"].data
-    place = chosen.toppling or chosen.database
-    with opened_database(place, read_only=True) as engine, engine.connect() as c:
-        topples = scatter(c, "toppling")
-    rows = [
-        scored("`sliding-pgv_pga`, held out", sliding.result.held_out, sliding.data),
-        scored("`sliding-pgv`, held out", only_pgv.result.held_out, only_pgv.data),
-        scored(
-            "Saygili & Rathje (2008), PGA and PGV",
-            saygili_rathje_2008(sliding.data.blocks),
-            sliding.data,
-        ),
-        scored("Jibson (2007), k_y/PGA", jibson_2007(sliding.data.blocks), sliding.data),
-    ]
-    first = markdown((heads, rows))
-    rows = [
-        scored(f"`{fit.report.name}`, held out", fit.result.held_out, fit.data)
-        for fit in slumps.values()
-    ]
-    rows.append(scored("2 degrees as a slide of 2° g/p_s²", as_slide(turned, sliding, 2.0), turned))
-    second = markdown((heads, rows))
-    cells = [
-        [name, f"{within:.2f}", f"{between:.2f}"]
-        for name, (within, between) in (
-            ("toppling, six sizes", topples),
-            ("slumping past recovery, 18 blocks", slump_scatters[None]),
-            ("slumping by 2 degrees, 18 blocks", slump_scatters[2.0]),
-        )
-    ]
-    third = markdown(
-        (["critical values", "between blocks under one motion", "between motions"], cells)
-    )
-    for name, table in (
-        ("sliding-scores", first),
-        ("slumping-scores", second),
-        ("y-scatter", third),
-    ):
+    found, (sliding, slumping) = tables(chosen.database, chosen.toppling)
+    for name, table in found.items():
         print(name, table, sep="\n")
         if chosen.write:
-            PAGE.write_text(
-                replaced(PAGE.read_text(encoding="utf-8"), name, table), encoding="utf-8"
-            )
+            text = replaced(PAGE.read_text(encoding="utf-8"), name, table)
+            PAGE.write_text(text, encoding="utf-8")
     if chosen.write:
-        slump = slumps[None, "pgv_pga"].report.model
-        plot_other_kinds(sliding.report.model, sliding.data, slump, recovery, FIGURE)
+        plot_other_kinds(
+            sliding.report.model, sliding.data, slumping.report.model, slumping.data, FIGURE
+        )
         print(Path(FIGURE).relative_to(ROOT))
 
 

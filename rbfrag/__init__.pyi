@@ -10,6 +10,7 @@ from rbfrag.errors import UnknownModelError as UnknownModelError
 from rbfrag.errors import WorkFailedError as WorkFailedError
 from rbfrag.exchange.database_tables import read_table as read_table
 from rbfrag.exchange.hazard_curves import read_hazard_curves as read_hazard_curves
+from rbfrag.exchange.mesh_file import block_from_mesh as block_from_mesh
 from rbfrag.fragility.fit.stored import fit as fit
 from rbfrag.fragility.predict import predict as predict
 from rbfrag.hazards.answer import HazardAnswer as HazardAnswer
@@ -20,6 +21,7 @@ from rbfrag.motions.recognise import read_motions as read_motions
 from rbfrag.motions.toppling_spectrum import toppling_spectrum as toppling_spectrum
 from rbfrag.solver.block.arrays import BlockArray as BlockArray
 from rbfrag.solver.block.geometry import Block as Block
+from rbfrag.solver.block.mesh_block import MeshBlock as MeshBlock
 from rbfrag.solver.critical import critical as critical
 from rbfrag.solver.models.sliding import sliding_displacements as sliding_displacements
 from rbfrag.solver.respond import respond as respond

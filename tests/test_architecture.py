@@ -175,6 +175,7 @@ def test_every_folder_is_a_known_package() -> None:
         ("numba", {"solver"}),
         ("pyarrow", {"exchange"}),
         ("pyogrio", {"exchange"}),
+        ("trimesh", {"exchange"}),
         ("typer", {"cli"}),
         ("fastapi", {"service"}),
         ("uvicorn", {"service"}),
@@ -210,7 +211,7 @@ def test_package_files_import_nothing() -> None:
 def test_every_imported_library_is_declared() -> None:
     with (ROOT / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)["project"]
-    runtime = ("plot", "postgres", "parquet", "gis", "dask", "service")
+    runtime = ("plot", "postgres", "parquet", "gis", "dask", "mesh", "service")
     declared = [*project["dependencies"]]
     for extra in runtime:
         declared += project["optional-dependencies"][extra]

@@ -33,6 +33,10 @@ NUMBERS = {
     "--pga": "pga_g",
     "--tm": "tm_s",
     "--pgd": "pgd_m",
+    "--sa03": "sa03_g",
+    "--sa10": "sa10_g",
+    "--sa20": "sa20_g",
+    "--sa30": "sa30_g",
     "--level": "level",
 }
 """Options with a number, with the names that `rbfrag.predict` has for them."""

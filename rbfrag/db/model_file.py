@@ -20,6 +20,9 @@ from typing import Any
 from rbfrag.db.sqlite_file import check_sqlite_database, connect_sqlite, explained_sqlite_error
 from rbfrag.errors import DatabaseError, InputError
 
+MODEL_FORM = 2
+"""The form of the predictors that this rbfrag fits and answers with."""
+
 
 @dataclass(frozen=True)
 class ModelRow:
@@ -37,6 +40,9 @@ class ModelRow:
         is_default: True for the model of its kind that answers when none is named.
         created: UTC time of the fit, ISO 8601.
         kind: response kind of the blocks that it answers for.
+        form: which form of its predictor was fitted; only :data:`MODEL_FORM` answers.
+        leave_out_steps: change of the parameters when each earthquake is left out, a line each.
+        dependence: correlation of the blocks of one earthquake, JSON-able, by parameter.
     """
 
     name: str
@@ -50,6 +56,9 @@ class ModelRow:
     is_default: bool = False
     created: str = ""
     kind: str = "toppling"
+    form: int = MODEL_FORM
+    leave_out_steps: tuple[tuple[float, ...], ...] | None = None
+    dependence: Mapping[str, object] | None = None
 
 
 COLUMNS = (
@@ -64,6 +73,9 @@ COLUMNS = (
     "is_default",
     "created",
     "kind",
+    "form",
+    "leave_out_steps",
+    "dependence",
 )
 """The columns that make a model, in the order of :func:`decode_model`."""
 
@@ -84,29 +96,39 @@ def encode_model(row: ModelRow) -> dict[str, Any]:
     n = len(row.coefficients)
     if len(row.covariance) != n or any(len(line) != n for line in row.covariance):
         raise InputError(f"model {row.name}: the covariance is not {n} by {n}")
+    steps = row.leave_out_steps
+    if steps is not None and any(len(line) != n for line in steps):
+        raise InputError(f"model {row.name}: a step of leaving an earthquake out has not {n} parts")
     numbers = [*row.coefficients.values(), *(v for line in row.covariance for v in line)]
     numbers += [bound for pair in row.domain.values() for bound in pair]
+    numbers += [v for line in steps or () for v in line]
     for number in numbers:
         if not math.isfinite(number):
             raise InputError(f"model {row.name} holds {number}: such a fit cannot be stored")
     try:
         diagnostics = json.dumps(dict(row.diagnostics), allow_nan=False)
+        dependence = None
+        if row.dependence is not None:
+            dependence = json.dumps(dict(row.dependence), allow_nan=False)
     except (TypeError, ValueError) as error:
         raise InputError(
-            f"model {row.name}: its diagnostics cannot be stored as JSON: {error}"
+            f"model {row.name}: its diagnostics or dependence cannot be stored as JSON: {error}"
         ) from error
     return {
         "name": row.name,
         "term": row.term,
         "method": row.method,
         "coefficients": json.dumps({k: float(v) for k, v in row.coefficients.items()}),
-        "covariance": json.dumps([[float(v) for v in line] for line in row.covariance]),
+        "covariance": _lines(row.covariance),
         "domain": json.dumps({k: [float(v) for v in pair] for k, pair in row.domain.items()}),
         "data_fingerprint": row.data_fingerprint,
         "diagnostics": diagnostics,
         "is_default": bool(row.is_default),
         "created": row.created,
         "kind": row.kind,
+        "form": row.form,
+        "leave_out_steps": None if steps is None else _lines(steps),
+        "dependence": dependence,
     }
 
 
@@ -117,15 +139,14 @@ def decode_model(values: Sequence[Any]) -> ModelRow:
         DatabaseError: the row does not read as a model.
     """
     by_name: Mapping[str, Any] = dict(zip(COLUMNS, values, strict=True))
+    steps, dependence = by_name["leave_out_steps"], by_name["dependence"]
     try:
         return ModelRow(
             name=by_name["name"],
             term=by_name["term"],
             method=by_name["method"],
             coefficients={k: float(v) for k, v in json.loads(by_name["coefficients"]).items()},
-            covariance=tuple(
-                tuple(float(v) for v in line) for line in json.loads(by_name["covariance"])
-            ),
+            covariance=_numbers(by_name["covariance"]),
             domain={
                 k: (float(low), float(high))
                 for k, (low, high) in json.loads(by_name["domain"]).items()
@@ -135,11 +156,22 @@ def decode_model(values: Sequence[Any]) -> ModelRow:
             is_default=bool(by_name["is_default"]),
             created=by_name["created"],
             kind=by_name["kind"],
+            form=int(by_name["form"]),
+            leave_out_steps=None if steps is None else _numbers(steps),
+            dependence=None if dependence is None else dict(json.loads(dependence)),
         )
     except (ValueError, TypeError, AttributeError) as error:
         raise DatabaseError(
             f"model {by_name['name']} is damaged in the database ({error}): fit it again"
         ) from error
+
+
+def _lines(numbers: tuple[tuple[float, ...], ...]) -> str:
+    return json.dumps([[float(v) for v in line] for line in numbers])
+
+
+def _numbers(lines: str) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(float(v) for v in line) for line in json.loads(lines))
 
 
 def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:

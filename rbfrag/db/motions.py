@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
@@ -19,9 +20,14 @@ from rbfrag.db.rows import EarthquakeInfo, MotionRow
 from rbfrag.db.schema import earthquake, suite, suite_motion
 from rbfrag.errors import DatabaseError, InputError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.response_spectrum import PERIODS_S
+
+LATER_MEASURES = (*PERIODS_S, "cav_m_s", "arias_m_s", "d5_95_s")
+"""Measures of the tables since schema 0005; missing where it found no samples."""
 
 MEASURES = (
     "pga_g", "pgv_m_s", "pgd_m", "tm_s", "final_velocity_m_s", "final_displacement_m",
+    *LATER_MEASURES,
 )  # fmt: skip
 """Columns of a motion that are calculated from its samples."""
 
@@ -193,6 +199,12 @@ def same_source(connection: Connection, motion_id: int) -> list[int]:
     return list(connection.scalars(query))
 
 
+def measures_of(motion: GroundMotion) -> dict[str, float | None]:
+    """Return the :data:`MEASURES` of a motion, by column."""
+    values = {**asdict(motion.measures), **motion.spectral_accelerations}
+    return {name: values[name] for name in MEASURES}
+
+
 def same_measure(
     name: str, one: float | None, other: float | None, pgv_m_s: float, pgd_m: float
 ) -> bool:
@@ -241,12 +253,7 @@ def _find(connection: Connection, motion: GroundMotion) -> RowMapping | None:
 
 
 def _measured(motion: GroundMotion) -> dict[str, Any]:
-    measures = motion.measures
-    values = {
-        "dt_s": motion.dt_s,
-        "npts": motion.npts,
-        **{name: getattr(measures, name) for name in MEASURES},
-    }
+    values = {"dt_s": motion.dt_s, "npts": motion.npts, **measures_of(motion)}
     for name, value in values.items():
         if value is not None and not math.isfinite(value):
             raise InputError(

@@ -53,6 +53,14 @@ class MotionRow:
     pgv_m_s: float
     pgd_m: float
     tm_s: float | None
+    sa03_g: float | None
+    sa05_g: float | None
+    sa10_g: float | None
+    sa20_g: float | None
+    sa30_g: float | None
+    cav_m_s: float | None
+    arias_m_s: float | None
+    d5_95_s: float | None
     final_velocity_m_s: float
     final_displacement_m: float
     source_file: str

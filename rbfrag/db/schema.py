@@ -29,6 +29,8 @@ from sqlalchemy import (
 )
 from sqlalchemy.schema import SchemaItem
 
+from rbfrag.motions.response_spectrum import PERIODS_S
+
 metadata = MetaData(
     naming_convention={
         "pk": "pk_%(table_name)s",
@@ -63,6 +65,8 @@ _OUTCOME = (
     "how the run ended: stable, toppled, undetermined (closer to critical than the error), jump"
     " (1 + k_v <= 0), contact_lost, indeterminate"
 )
+
+_NOT_COMPUTED = "missing where the database was upgraded without the samples"
 
 
 def _table(name: str, meaning: str, *parts: SchemaItem, **options: Any) -> Table:
@@ -157,6 +161,28 @@ motion = _table(
         "not defined",
         "s",
     ),
+    *(
+        _optional(
+            name,
+            Double,
+            f"pseudo-spectral acceleration at {period_s:g} s, 5 % damping; {_NOT_COMPUTED}",
+            "g",
+        )
+        for name, period_s in PERIODS_S.items()
+    ),
+    _optional(
+        "cav_m_s", Double, f"cumulative absolute velocity, integral of |a|; {_NOT_COMPUTED}", "m/s"
+    ),
+    _optional(
+        "arias_m_s", Double, f"Arias intensity, pi/(2 g) integral of a²; {_NOT_COMPUTED}", "m/s"
+    ),
+    _optional(
+        "d5_95_s",
+        Double,
+        "significant duration, from 5 to 95 % of the Arias intensity; missing where the ground is "
+        "at rest, and as the measures before it",
+        "s",
+    ),
     _column("final_velocity_m_s", Double, "velocity at the last sample; a sign of quality", "m/s"),
     _column(
         "final_displacement_m", Double, "displacement at the last sample; a sign of quality", "m"
@@ -188,6 +214,11 @@ motion = _table(
     CheckConstraint("npts > 0", name="npts"),
     CheckConstraint("trace_index >= 0", name="trace_index"),
     CheckConstraint("pga_g >= 0 AND pgv_m_s >= 0 AND pgd_m >= 0 AND tm_s > 0", name="measures"),
+    CheckConstraint(
+        "sa03_g >= 0 AND sa05_g >= 0 AND sa10_g >= 0 AND sa20_g >= 0 AND sa30_g >= 0",
+        name="spectrum",
+    ),
+    CheckConstraint("cav_m_s >= 0 AND arias_m_s >= 0 AND d5_95_s >= 0", name="energy"),
     CheckConstraint("length(samples_sha256) = 64", name="samples_sha256"),
     CheckConstraint("length(source_sha256) = 64", name="source_sha256"),
     Index(None, "recording_id"),
@@ -415,9 +446,21 @@ fragility_model = _table(
         "is_default", Boolean, "true for the one model of its kind that answers when none is named"
     ),
     _column("created", Text, "UTC time of the fit"),
+    _column("form", Integer, "number of the form of its predictor; older forms do not answer"),
+    _optional(
+        "leave_out_steps",
+        Text,
+        "JSON list of lists: for each earthquake, the change of the parameters when it is left out",
+    ),
+    _optional(
+        "dependence",
+        Text,
+        "JSON object: correlation of the blocks of one earthquake, by parameter, and its errors",
+    ),
     UniqueConstraint("name"),
     CheckConstraint("name <> ''", name="name"),
     CheckConstraint(KIND, name="kind"),
+    CheckConstraint("form >= 1", name="form"),
     # At most one default of a kind: the index holds only the rows that are it.
     Index(
         "uq_fragility_model_default",

@@ -29,9 +29,10 @@ from rbfrag.exchange.block_table import (
 )
 from rbfrag.files import reading, written_whole
 from rbfrag.fragility.lookup import block_of, find_model
+from rbfrag.fragility.measures import STATED
 from rbfrag.fragility.methods import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import MEASURES, answer_given
+from rbfrag.fragility.predict import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.solver.kinds import model_of_kind
 
@@ -52,7 +53,7 @@ BLOCK_COLUMNS = {
 ANSWERS = ("probability", "ci_low", "ci_high", "in_domain", "reason")
 """The columns that are appended; a table that has them gets new ones."""
 
-NUMERIC = (*BLOCK_COLUMNS, *RECTANGLE, *MEASURES)
+NUMERIC = (*BLOCK_COLUMNS, *RECTANGLE, *STATED)
 """Columns that hold numbers."""
 
 OTHER_MODE = "the block's mode is {mode}: the {kind} model says nothing about it"
@@ -158,7 +159,7 @@ def _columns(origin: Path, header: list[str], given: Mapping[str, float]) -> dic
     doubled = [name for name in header if header.count(name) > 1]
     if doubled:
         raise InputError(f"{origin}: the column {doubled[0]} is there twice")
-    columns |= {name: name for name in MEASURES}
+    columns |= {name: name for name in STATED}
     present = {column: name for column, name in columns.items() if column in header}
     for column, name in present.items():
         if name in given:

@@ -11,7 +11,8 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST
+from rbfrag.fragility.domain import RATIOS, Ratio
+from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, SPECTRAL
 from rbfrag.fragility.methods import Eta, Numbers
 from rbfrag.fragility.model import LEAST, FragilityModel
 
@@ -41,6 +42,10 @@ _DESCRIPTIONS = {
     "pga_g": ("g", "the peak ground acceleration in g, 0 or more"),
     "pgd_m": ("m", "the peak ground displacement in m, 0 or more"),
     "tm_s": ("s", "the mean period in s, above 0"),
+    **{
+        name: ("g", f"the spectral acceleration at {period:g} s and 5 % damping in g, 0 or more")
+        for period, name in SPECTRAL.items()
+    },
     "xp_m_s": ("m/s", "the toppling spectrum X(p) in m/s, 0 or more"),
     "intensity_m_s": ("m/s", ""),
     "y_m_s": ("m/s", ""),
@@ -79,6 +84,31 @@ class Finding:
         """Return the sentence for many values."""
         return f"{self.name} {self.text}" if self.name else self.text
 
+
+@dataclass(frozen=True)
+class Contradiction(Finding):
+    """Measures that do not go together in any fitted motion.
+
+    Args:
+        ratio: what is out of its range.
+        values: the values by name.
+        fitted: least and greatest ratio of the fitted motions.
+    """
+
+    ratio: Ratio
+    values: Mapping[str, Any]
+    fitted: tuple[float, float]
+
+    def about(self, value: float) -> str:
+        """Return the sentence for one value."""
+        return self.ratio.contradiction(self.values, value, *self.fitted)
+
+    def in_general(self) -> str:
+        """Return the sentence for many values."""
+        return self.ratio.in_general(*self.fitted)
+
+
+_RATIO_NAMES = frozenset(ratio.name for ratio in RATIOS)
 
 NO_SHAKING = "no shaking: P = 0 by definition, not by the model"
 
@@ -177,7 +207,8 @@ def answer_with_findings(
     for name in ("y_m_s", "intensity_m_s", "displacement_m", "pgv_m_s"):
         if name in values:
             values[name] = ns.maximum(values[name], LEAST)
-    model.with_ratios(values)
+    above_zero = {name: ns.maximum(value, LEAST) for name, value in values.items()}
+    model.with_ratios(values, above_zero)
     no_shaking = (given[term.inputs[0]] == 0.0) & _not(missing) & _not(at_rest)
     say(no_shaking, Finding(no_shaking, "", 0.0, NO_SHAKING))
     unanswered = missing | at_rest | no_shaking
@@ -195,6 +226,10 @@ def answer_with_findings(
         holds = finding.holds & _not(ruled)
         say(holds, finding)
         in_domain = in_domain & _not(holds)
+    if model.spread is not None:
+        together = _not(model.spread.holds(above_zero, ns)) & in_domain & _not(ruled)
+        say(together, Finding(together, "", 0.0, model.spread.sentence))
+        in_domain = in_domain & _not(together)
     for finding in doubts(model, values, ns):
         say(finding.holds & _not(unanswered), finding)
     return Judgement(p, low, high, eta, values, intensity, missing, in_domain, ruled)
@@ -217,9 +252,14 @@ def _not(condition: Any) -> Any:
 
 
 def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator[Finding]:
-    """Yield the variables that lie outside their fitted range."""
+    """Yield the variables that lie outside their fitted range, and measures that contradict."""
+    for ratio in model.ratios_of(values):
+        low, high = model.row.domain.get(ratio.name, (0.0, math.inf))
+        value = values[ratio.name]
+        outside = (value < low * (1.0 - 1e-9)) | (value > high * (1.0 + 1e-9))
+        yield Contradiction(outside, "", value, "", ratio, values, (low, high))
     for name, (low, high) in model.row.domain.items():
-        if name not in values:
+        if name not in values or name in _RATIO_NAMES:
             continue
         value = values[name]
         unit = _DESCRIPTIONS[name][0]

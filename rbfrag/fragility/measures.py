@@ -128,7 +128,13 @@ TERMS: Mapping[str, Term] = {
 }
 """The terms by name: those of the dissertation, then those that know more of the motion."""
 
-MEASURES = frozenset(name for term in TERMS.values() for name in term.inputs)
+SPECTRAL = {0.3: "sa03_g", 1.0: "sa10_g", 2.0: "sa20_g", 3.0: "sa30_g"}
+"""Spectral accelerations (5 % damping, one component) that there are models of, by period [s]."""
+
+STATED = ("pgv_m_s", *SPECTRAL.values(), "pga_g", "tm_s", "pgd_m")
+"""The measures that a question may state, by name."""
+
+MEASURES = frozenset({*STATED, "xp_m_s"})
 """The names of all measures."""
 
 SINGLE_TERMS = ("pgv", "pga_tm", "pgd_tm")

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError, ModelError
+from rbfrag.fragility.domain import Ratio, Spread, ratios_of, stored_spread
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, TERMS, Term
 from rbfrag.fragility.methods import Eta, Form, Method, Numbers, method_named, method_names
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 LEAST = 1e-290
 """Velocities, accelerations and strengths are taken for at least this, for logarithms."""
@@ -51,6 +51,7 @@ class FragilityModel:
         degrees_of_freedom: of the standard errors, which the interval is widened by, at most the
             earthquakes less one; 0 for none.
         notes: what every answer says of the model, such as where it comes from.
+        spread: how the fitted points scatter; None where the row does not say it.
     """
 
     row: ModelRow
@@ -63,10 +64,15 @@ class FragilityModel:
     vertical: bool
     degrees_of_freedom: int
     notes: tuple[str, ...] = ()
+    spread: Spread | None = None
     ranges: dict[tuple[str, ...], tuple[Range, ...]] = field(
         default_factory=dict, compare=False, repr=False
     )
     """What :meth:`clear_ranges` has found for some names."""
+    ratios: dict[tuple[str, ...], tuple[Ratio, ...]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
+    """What :meth:`ratios_of` has found for some names."""
 
     @classmethod
     def from_row(cls, row: ModelRow, notes: tuple[str, ...] = ()) -> FragilityModel:
@@ -113,6 +119,7 @@ class FragilityModel:
             vertical=row.diagnostics.get("vertical", "without") != "without",
             degrees_of_freedom=freedom if isinstance(freedom, int) else 0,
             notes=notes,
+            spread=stored_spread(row.name, row.diagnostics),
         )
 
     @property
@@ -144,15 +151,45 @@ class FragilityModel:
         """Whether the exponent M was estimated: P then depends on p beside y."""
         return self.method.exponent in self.row.coefficients
 
-    def with_ratios(self, values: dict[str, Any]) -> dict[str, Any]:
-        """Add PGV/(PGA g) [s] and k/PGA where they are judged by; return the values."""
-        if "pga_g" in values:
-            pga = values["pga_g"]
-            if "pgv_m_s" in values:
-                values["pgv_over_pga_s"] = values["pgv_m_s"] / (pga * STANDARD_GRAVITY_M_S2)
-            if "k_over_pga" in self.row.domain:
-                values["k_over_pga"] = values[self.method.block.strength] / pga
+    def with_ratios(
+        self, values: dict[str, Any], of: Mapping[str, Any] | None = None
+    ) -> dict[str, Any]:
+        """Add the ratios of measures and k/PGA where they are judged by; return the values.
+
+        Args:
+            values: completed values.
+            of: the same above zero, where `values` may hold a zero that a ratio divides by.
+        """
+        above_zero = values if of is None else of
+        for ratio in self.ratios_of(above_zero):
+            values[ratio.name] = ratio.formula(above_zero)
+        if "pga_g" in values and "k_over_pga" in self.row.domain:
+            values["k_over_pga"] = values[self.method.block.strength] / values["pga_g"]
         return values
+
+    def ratios_of(self, values: Collection[str]) -> tuple[Ratio, ...]:
+        """Return the ratios of some values that the model or common sense judges by."""
+        key = tuple(values)
+        ratios = self.ratios.get(key)
+        if ratios is None:
+            judged = {*self.row.domain, *CREDIBLE}
+            ratios = tuple(
+                ratio
+                for ratio in ratios_of(key)
+                if ratio.name in judged and not self._implied(ratio)
+            )
+            self.ratios[key] = ratios
+        return ratios
+
+    def _implied(self, ratio: Ratio) -> bool:
+        """Return whether z is in its range wherever p² and PGV/(PGA g) are in theirs."""
+        size = self.row.domain.get(self.method.block.size or "")
+        pulse = self.row.domain.get("pgv_over_pga_s")
+        if ratio.name != "z" or size is None or pulse is None:
+            return False
+        low, high = self.row.domain["z"]
+        least, most = (math.sqrt(size[i]) * pulse[i] for i in (0, 1))
+        return low <= least * (1.0 + 1e-9) and most * (1.0 - 1e-9) <= high
 
     def clear_ranges(self, values: Collection[str]) -> tuple[Range, ...]:
         """Return the ranges within which nothing is to be said of the values of some names."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model, suited_models
+from rbfrag.fragility.measures import SPECTRAL, STATED
 from rbfrag.fragility.methods import SINGLE, Eta
 from rbfrag.fragility.model import FragilityModel
 
@@ -28,9 +29,6 @@ Model = ModelRow | FragilityModel | str
 Polarity = Literal["forward", "reverse", "both"]
 
 _SINGLE_TYPES = (float, int, str, bytes)
-
-MEASURES = ("pgv_m_s", "pga_g", "tm_s", "pgd_m")
-"""What may be known of a motion."""
 
 
 @dataclass(frozen=True)
@@ -119,6 +117,7 @@ def predict(
     pga_g: float | None = ...,
     tm_s: float | None = ...,
     pgd_m: float | None = ...,
+    sa_g: Mapping[float, float] | None = ...,
     motion: GroundMotion | None = ...,
     polarity: Polarity = ...,
     model: Model | None = ...,
@@ -146,6 +145,7 @@ def predict(
     pga_g: ArrayLike | None = ...,
     tm_s: ArrayLike | None = ...,
     pgd_m: ArrayLike | None = ...,
+    sa_g: Mapping[float, ArrayLike] | None = ...,
     motion: GroundMotion | None = ...,
     polarity: Polarity = ...,
     model: Model | None = ...,
@@ -172,6 +172,7 @@ def predict(
     pga_g: ArrayLike | None = None,
     tm_s: ArrayLike | None = None,
     pgd_m: ArrayLike | None = None,
+    sa_g: Mapping[float, ArrayLike] | None = None,
     motion: GroundMotion | None = None,
     polarity: Polarity = "both",
     model: Model | None = None,
@@ -208,6 +209,8 @@ def predict(
         pga_g: peak ground acceleration [g].
         tm_s: mean period [s].
         pgd_m: peak ground displacement [m].
+        sa_g: spectral accelerations of the horizontal component at 5 % damping [g] by their
+            period, 0.3, 1, 2 or 3 s: ``{1.0: 0.4}``.
         motion: the accelerogram itself, instead of its measures.
         polarity: ``forward`` or ``reverse`` where it is known how the motion points at the slope;
             ``both`` gives the mean of the two, which stand beside it (motion only).
@@ -260,6 +263,8 @@ def predict(
         given["tm_s"] = tm_s
     if pgd_m is not None:
         given["pgd_m"] = pgd_m
+    if sa_g is not None:
+        given |= spectral(sa_g)
     if motion is not None:
         return _predict_motion(
             given, motion, kind=kind, rotation_deg=rotation_deg, polarity=polarity, model=model,
@@ -267,6 +272,25 @@ def predict(
         )  # fmt: skip
     chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
     return answer_given(chosen, given, level, nan=nan, interval=interval)
+
+
+def spectral(sa_g: Mapping[float, ArrayLike]) -> dict[str, ArrayLike]:
+    """Return spectral accelerations [g] by name instead of by period [s].
+
+    Raises:
+        InputError: no mapping, or a period of which there is no model.
+    """
+    if not isinstance(sa_g, Mapping):
+        raise InputError(
+            f"sa_g = {sa_g!r}: give accelerations [g] by period [s], such as {{1: 0.4}}"
+        )
+    for period in sa_g:
+        if period not in SPECTRAL:
+            raise InputError(
+                f"sa_g has the period {period!r} s: there are models of SA at "
+                f"{', '.join(f'{each:g}' for each in SPECTRAL)} s"
+            )
+    return {SPECTRAL[period]: value for period, value in sa_g.items()}
 
 
 def answer_given(
@@ -377,9 +401,11 @@ def _is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
     for bound in (*block.refuses, *block.doubts):
         if bound.holds(values):
             return False
-    return method.doubts is None or not any(
+    if method.doubts is not None and any(
         holds for holds, _, _ in method.doubts(model.parameters, values, SINGLE)
-    )
+    ):
+        return False
+    return model.spread is None or model.spread.holds(values, SINGLE)
 
 
 def _answer_with_diagnostics(
@@ -420,7 +446,7 @@ def _predict_motion(
     # Kept apart: a motion needs numpy.
     from rbfrag.fragility.prediction_motion import measures_of
 
-    extra = [name for name in given if name in MEASURES]
+    extra = [name for name in given if name in STATED]
     if extra:
         raise InputError(
             f"{' and '.join(extra)} given beside a motion: the motion has them; leave them out"
@@ -471,7 +497,7 @@ def prediction_document(
     kind: str | None = None,
     rotation_deg: float | None = None,
     motion: GroundMotion | None = None,
-    polarity: str = "both",
+    polarity: Polarity = "both",
     model: str | None = None,
     level: float = 0.95,
     db: str | PathLike[str] | None = None,
@@ -496,15 +522,21 @@ def prediction_document(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    criterion: dict[str, Any] = {"kind": kind, "rotation_deg": rotation_deg}
     others: list[Prediction]
-    if motion is not None or model is not None:
-        ask: Any = predict
-        if motion is not None:
-            criterion |= {"motion": motion, "polarity": polarity}
-        others = [ask(**given, **criterion, model=model, level=level, db=db)]
+    if motion is not None:
+        others = [
+            _predict_motion(
+                given, motion, kind=kind, rotation_deg=rotation_deg, polarity=polarity,
+                model=model, level=level, db=db,
+            )
+        ]  # fmt: skip
     else:
-        suited = suited_models(given, db, **criterion)
+        criterion: Any = {"kind": kind, "rotation_deg": rotation_deg}
+        suited = (
+            suited_models(given, db, **criterion)
+            if model is None
+            else [find_model(model, given, db, **criterion)]
+        )
         others = [answer_given(each, given, level) for each in suited]  # type: ignore[misc]
     recommended = others[0]
     document = recommended.as_dict()

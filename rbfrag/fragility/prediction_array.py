@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from rbfrag.fragility.methods import Numbers, arrays
 from rbfrag.fragility.model import FragilityModel
 
 FloatArray = NDArray[np.float64]
+T = TypeVar("T")
 
 CHUNK = 1 << 14
 """Rows that are worked on at a time: what they need stays near the processor."""
@@ -120,35 +122,31 @@ def predict_many(
     if half_width is None:
         out.low[:] = out.high[:] = np.nan
 
-    def work(start: int) -> tuple[NDArray[np.intp], NDArray[np.object_]] | None:
+    def answer(start: int) -> NDArray[np.intp]:
         part = slice(start, min(start + CHUNK, size))
         own = {name: v if v.size == 1 else v[part] for name, v in values.items()}
         with np.errstate(all="ignore"):
-            flagged = _answer_part(model, own, half_width, part, out, ns)
-            if not flagged.size:
-                return None
-            chosen = {
-                n: v.repeat(flagged.size) if v.size == 1 else v[flagged] for n, v in own.items()
-            }
-            places = flagged + start
+            return _answer_part(model, own, half_width, part, out, ns) + start
+
+    # gathered: the words cost as much for a few elements as for thousands
+    flagged = np.concatenate([np.empty(0, dtype=np.intp), *_in_chunks(answer, size)])
+
+    def explain(start: int) -> tuple[NDArray[np.intp], NDArray[np.object_]]:
+        places = flagged[start : start + CHUNK]
+        own = {n: v.repeat(places.size) if v.size == 1 else v[places] for n, v in values.items()}
+        with np.errstate(all="ignore"):
             return places, _answer_with_diagnostics(
-                model, chosen, half_width, places, shape, out, refuse_nan=refuse_nan
+                model, own, half_width, places, shape, out, refuse_nan=refuse_nan
             )
 
-    chunks = range(0, size, CHUNK)
-    workers = min(len(chunks), os.cpu_count() or 1)
-    if workers > 1:
-        with ThreadPoolExecutor(workers) as pool:
-            results = list(pool.map(work, chunks))
-    else:
-        results = [work(start) for start in chunks]
+    reasons = _in_chunks(explain, flagged.size)
     return PredictionArray(
         kind=model.kind,
         probability=out.probability.reshape(shape),
         ci_low=out.low.reshape(shape),
         ci_high=out.high.reshape(shape),
         in_domain=out.in_domain.reshape(shape),
-        reasons=Reasons(shape, [result for result in results if result is not None]),
+        reasons=Reasons(shape, reasons),
         y_m_s=out.y.reshape(shape),
         intensity_m_s=out.x.reshape(shape),
         level=level,
@@ -157,6 +155,16 @@ def predict_many(
         method=model.method.name,
         notes=model.notes,
     )
+
+
+def _in_chunks(work: Callable[[int], T], size: int) -> list[T]:
+    """Return what a function gives for the start of every chunk, a thread for each core."""
+    chunks = range(0, size, CHUNK)
+    workers = min(len(chunks), os.cpu_count() or 1)
+    if workers <= 1:
+        return [work(start) for start in chunks]
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(work, chunks))
 
 
 def _answer_part(
@@ -182,6 +190,8 @@ def _answer_part(
         flags += [holds for holds, _, _ in method.doubts(model.parameters, values, ns)]
     for holds in flags:
         clear &= np.logical_not(holds)
+    if model.spread is not None:
+        clear &= model.spread.holds(values, ns)
     middle, low, high, _ = model.answer(values, half_width, ns)
     out.probability[part] = middle
     if half_width is not None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.motions import intensity
+from rbfrag.motions import intensity, response_spectrum
 
 FloatArray = NDArray[np.float64]
 
@@ -175,6 +175,11 @@ class GroundMotion:
     def measures(self) -> intensity.IntensityMeasures:
         """All intensity measures of the motion, as supplied (no detrending)."""
         return intensity.intensity_measures(self.acceleration_g, self.interval_s, self.dt_s)
+
+    @cached_property
+    def spectral_accelerations(self) -> Mapping[str, float]:
+        """Spectral accelerations at 5 % damping [g] by name, ``sa03_g`` for that at 0.3 s."""
+        return response_spectrum.spectral_accelerations(self.acceleration_g, self.interval_s)
 
     @property
     def pga_g(self) -> float:

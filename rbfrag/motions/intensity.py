@@ -25,6 +25,7 @@ TM_FREQUENCY_STEP_HZ = 0.05
 """Largest frequency step of the mean period [Hz]; zeros lengthen a shorter record to it."""
 
 _EDGE_TOLERANCE = 1e-9
+_BISECTIONS = 60
 _LONGEST_ZERO_FILLED_FFT = 1 << 22
 
 
@@ -39,6 +40,9 @@ class IntensityMeasures:
         tm_s: mean period [s]; None where :func:`mean_period` is not defined.
         final_velocity_m_s: velocity at the last sample [m/s]; a quality sign, 0 for rest.
         final_displacement_m: displacement at the last sample [m].
+        cav_m_s: cumulative absolute velocity, ∫|a| dt [m/s].
+        arias_m_s: Arias intensity, π/(2 g) ∫a² dt [m/s].
+        d5_95_s: significant duration, from 5 to 95 % of ∫a² dt [s]; None where that is zero.
     """
 
     pga_g: float
@@ -47,6 +51,9 @@ class IntensityMeasures:
     tm_s: float | None
     final_velocity_m_s: float
     final_displacement_m: float
+    cav_m_s: float
+    arias_m_s: float
+    d5_95_s: float | None
 
 
 def intensity_measures(
@@ -67,6 +74,7 @@ def intensity_measures(
         displacement = displacement_m(scaled, interval_s)
         inner_velocity = _velocity_extremes(scaled, interval_s, velocity)
         inner_displacement = _displacement_extremes(scaled, interval_s, velocity, displacement)
+        energy = running_energy(scaled, interval_s)
     measures = IntensityMeasures(
         pga_g=float(np.max(np.abs(acceleration_g))),
         pgv_m_s=scale * _largest(velocity, inner_velocity),
@@ -74,11 +82,15 @@ def intensity_measures(
         tm_s=None if dt_s is None else mean_period(acceleration_g, dt_s),
         final_velocity_m_s=scale * float(velocity[-1]),
         final_displacement_m=scale * float(displacement[-1]),
+        cav_m_s=scale * cumulative_absolute_velocity(scaled, interval_s),
+        arias_m_s=scale * scale * 0.5 * math.pi * STANDARD_GRAVITY_M_S2 * float(energy[-1]),
+        d5_95_s=significant_duration(scaled, interval_s, energy),
     )
-    if not (math.isfinite(measures.pgv_m_s) and math.isfinite(measures.pgd_m)):
+    if not all(map(math.isfinite, (measures.pgv_m_s, measures.pgd_m, measures.arias_m_s))):
         raise InputError(
-            f"the velocity or displacement of a motion with PGA {measures.pga_g:g} g lasting "
-            f"{float(np.sum(interval_s)):g} s is too large to compute: check units and time step"
+            f"the velocity, displacement or intensity of a motion with PGA {measures.pga_g:g} g "
+            f"lasting {float(np.sum(interval_s)):g} s is too large to compute: check units and "
+            "time step"
         )
     return measures
 
@@ -109,6 +121,68 @@ def displacement_m(acceleration_g: FloatArray, interval_s: FloatArray) -> FloatA
     bend = (STANDARD_GRAVITY_M_S2 / 6.0) * interval_s * interval_s
     steps = velocity[:-1] * interval_s + bend * (2.0 * acceleration_g[:-1] + acceleration_g[1:])
     return _running_sum(steps)
+
+
+def cumulative_absolute_velocity(acceleration_g: FloatArray, interval_s: FloatArray) -> float:
+    """Return CAV = ∫|a| dt [m/s], exact for a piecewise-linear record (EPRI 1988, NP-5930).
+
+    Args:
+        acceleration_g: samples [g], shape (n,).
+        interval_s: lengths of the intervals between them [s], shape (n - 1,).
+    """
+    a0, a1 = acceleration_g[:-1], acceleration_g[1:]
+    total = np.abs(a0) + np.abs(a1)
+    # an interval that crosses zero holds two triangles of heights |a0|, |a1|
+    crossing = np.sign(a0) * np.sign(a1) < 0.0
+    squares = np.divide(a0 * a0 + a1 * a1, total, out=np.zeros_like(total), where=crossing)
+    return 0.5 * STANDARD_GRAVITY_M_S2 * float(interval_s @ np.where(crossing, squares, total))
+
+
+def running_energy(acceleration_g: FloatArray, interval_s: FloatArray) -> FloatArray:
+    """Return ∫a² dt from the first sample to each [g²·s], shape (n,), exact.
+
+    Args:
+        acceleration_g: samples [g], shape (n,).
+        interval_s: lengths of the intervals between them [s], shape (n - 1,).
+    """
+    a0, a1 = acceleration_g[:-1], acceleration_g[1:]
+    return _running_sum(interval_s * (a0 * a0 + a0 * a1 + a1 * a1) / 3.0)
+
+
+def significant_duration(
+    acceleration_g: FloatArray, interval_s: FloatArray, energy: FloatArray
+) -> float | None:
+    """Return D5-95 [s], the time in which ∫a² dt grows from 5 to 95 % of its end.
+
+    (Trifunac & Brady 1975, Bull. Seism. Soc. Am. 65(3), 581-626), exact for a piecewise-linear
+    record.
+
+    Args:
+        acceleration_g: samples [g], shape (n,).
+        interval_s: lengths of the intervals between them [s], shape (n - 1,).
+        energy: what :func:`running_energy` returned.
+
+    Returns:
+        The duration, or None where the ground never moves.
+    """
+    total = float(energy[-1])
+    if not 0.0 < total < math.inf:
+        return None
+    times = _running_sum(interval_s)
+    reached = []
+    for share in (0.05, 0.95):
+        wanted = share * total
+        # the interval that ends above what is wanted and began at or below it
+        at = int(np.searchsorted(energy, wanted, side="right")) - 1
+        a0, slope = float(acceleration_g[at]), float(acceleration_g[at + 1] - acceleration_g[at])
+        low, high = 0.0, 1.0
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            a = a0 + middle * slope
+            part = float(interval_s[at]) * middle * (a0 * a0 + a0 * a + a * a) / 3.0
+            low, high = (middle, high) if energy[at] + part < wanted else (low, middle)
+        reached.append(float(times[at]) + high * float(interval_s[at]))
+    return reached[1] - reached[0]
 
 
 def mean_period(acceleration_g: FloatArray, dt_s: float) -> float | None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import (
@@ -30,10 +31,19 @@ AXIS = {
     "pga_g": "peak ground acceleration, PGA [g]",
     "pgd_m": "peak ground displacement, PGD [m]",
     "xp_m_s": "toppling spectrum at the block's size, $X(p)$ [m/s]",
+    **{
+        name: f"spectral acceleration, SA({period:.1f} s), 5 % damping [g]"
+        for period, name in SPECTRAL.items()
+    },
 }
-"""What a curve runs over: the measure that a model's term names first."""
+"""What a curve may run over."""
 
-FIXED = {"pga_g": "PGA = {:g} g", "tm_s": "$T_m$ = {:g} s"}
+FIXED = {
+    "pgv_m_s": "PGV = {:g} m/s",
+    "pga_g": "PGA = {:g} g",
+    "tm_s": "$T_m$ = {:g} s",
+    **{name: f"SA({period:.1f} s) = {{:g}} g" for period, name in SPECTRAL.items()},
+}
 
 _COLOURS = (RED, "#4d9221", "#e08214", "#762a83", "#636363")
 _POINTS = 241
@@ -46,6 +56,7 @@ def plot_curve(
     kr: float,
     path: str | PathLike[str],
     *,
+    over: str | None = None,
     fixed: Mapping[str, float] | None = None,
     level: float = 0.95,
     beside: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
@@ -55,10 +66,12 @@ def plot_curve(
     Outside the fitted ranges the curve is dashed.
 
     Args:
-        model: the model; the abscissa is the measure that its term names first.
+        model: the model.
         p2: frequency parameter p² of the block [1/s²].
         kr: its rocking acceleration coefficient.
         path: file to write: .png, .pdf or .svg.
+        over: the measure along the abscissa, by name; None for the one that the model's term
+            names first.
         fixed: the other measures that the term reads, by name, held at one value.
         level: confidence level of the band.
         beside: other fragilities of the same measure to be drawn for comparison, by name:
@@ -69,12 +82,18 @@ def plot_curve(
             cannot be written.
     """
     plot_path(path)
-    varied, *others = model.term.inputs
+    varied = model.term.inputs[0] if over is None else over
+    if varied not in model.term.inputs or varied not in AXIS:
+        raise InputError(
+            f"model {model.name!r} reads {' and '.join(model.term.inputs)}: no curve of it runs "
+            f"over {varied}"
+        )
+    others = [name for name in model.term.inputs if name != varied]
     missing = [name for name in others if name not in (fixed or {})]
-    if missing or varied not in AXIS:
+    if missing:
         raise InputError(
             f"model {model.name!r} reads {' and '.join(model.term.inputs)}: give "
-            f"{' and '.join(missing) or varied} for the curve"
+            f"{' and '.join(missing)} for the curve"
         )
     held = {name: float((fixed or {})[name]) for name in others}
     y = kr * STANDARD_GRAVITY_M_S2 / np.sqrt(p2)
@@ -127,7 +146,7 @@ def _right_end(
     y_m_s: float,
 ) -> float:
     """Where the curve has nearly reached its top, found by doubling."""
-    unit = y_m_s if varied in ("pgv_m_s", "xp_m_s") else kr if varied == "pga_g" else 0.1 * y_m_s
+    unit = y_m_s if varied in ("pgv_m_s", "xp_m_s") else 0.1 * y_m_s if varied == "pgd_m" else kr
     x = unit * 2.0 ** np.arange(0.0, 12.0, 0.5)
     answer = model_answers(model, p2, kr, {varied: x, **held})
     high = np.flatnonzero(answer.probability > 0.97)

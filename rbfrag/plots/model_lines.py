@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from scipy.optimize.elementwise import find_root
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import answer_given, predict
+from rbfrag.fragility.predict import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -38,11 +37,9 @@ def model_answers(
         measures: measures of the motion by name; at least one of them, or kr, an array.
         level: confidence level.
     """
-    given: dict[str, Any] = dict(measures)
-    shape = np.broadcast_shapes(np.shape(kr), *(np.shape(value) for value in given.values()))
-    answer = predict(
-        np.full(shape, p2), np.broadcast_to(kr, shape), model=model, level=level, **given
-    )
+    shape = np.broadcast_shapes(np.shape(kr), *(np.shape(value) for value in measures.values()))
+    blocks = {"p2": np.full(shape, p2), "kr": np.broadcast_to(kr, shape)}
+    answer = answer_given(model, {**blocks, **measures}, level)
     assert isinstance(answer, PredictionArray)
     return answer
 

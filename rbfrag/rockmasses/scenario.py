@@ -15,7 +15,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.checks import refusals
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import checked_level
-from rbfrag.fragility.predict import Model, predict
+from rbfrag.fragility.predict import Model, answer_given, predict
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.quantity import positive
@@ -118,11 +118,8 @@ class Scenario:
 
 def scenario(
     realisations: Realisations,
+    measures: Mapping[str, float],
     *,
-    pgv_m_s: float | None = None,
-    pga_g: float | None = None,
-    tm_s: float | None = None,
-    pgd_m: float | None = None,
     model: Model | None = None,
     level: float = 0.95,
     db: str | PathLike[str] | None = None,
@@ -138,10 +135,8 @@ def scenario(
 
     Args:
         realisations: blocks of a rock mass.
-        pgv_m_s: peak ground velocity of the horizontal component [m/s].
-        pga_g: peak ground acceleration [g].
-        tm_s: mean period [s].
-        pgd_m: peak ground displacement [m].
+        measures: what is known of the motion, by name: pgv_m_s [m/s], pga_g [g], tm_s [s], pgd_m
+            [m], sa03_g, sa10_g, sa20_g, sa30_g [g].
         model: as in :func:`rbfrag.fragility.predict.predict`.
         level: confidence level of the intervals.
         db: database of the models.
@@ -156,8 +151,7 @@ def scenario(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    options = {"pgv_m_s": pgv_m_s, "pga_g": pga_g, "tm_s": tm_s, "pgd_m": pgd_m}
-    measures = {name: float(value) for name, value in options.items() if value is not None}
+    measures = {name: float(value) for name, value in measures.items()}
     for refusal in refusals(measures, measures):
         if refusal.holds:
             raise InputError(refusal.about(refusal.value))
@@ -186,8 +180,8 @@ def scenario(
     if topples.any():
         chosen = find_model(model, measures, db)
         kr = realisations.kr_at_rest[topples]
-        shaking: dict[str, Any] = dict(measures)
-        predicted = predict(stability.p2[topples], kr, **shaking, model=chosen, level=level)
+        toppling = {"p2": stability.p2[topples], "kr": kr}
+        predicted = answer_given(chosen, {**toppling, **measures}, level)
         assert isinstance(predicted, PredictionArray)
         answer = predicted
         fill(topples, answer)

@@ -1,6 +1,7 @@
 """What operations are asked: the parameters of a query, and a body, as pydantic models.
 
-A parameter has the name of the command line's option without its dashes, and the same unit.
+A parameter has the name of the command line's option without its dashes, and the same unit;
+spectral accelerations are named as the columns of tables are.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, StrictFloat
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.methods import TOPPLING_BLOCK
 
 if TYPE_CHECKING:
@@ -52,6 +54,9 @@ PGV = _words("Peak ground velocity [m/s].")
 PGA = _words("Peak ground acceleration [g].")
 TM = _words("Mean period [s].")
 PGD = _words("Peak ground displacement [m].")
+SA03, SA10, SA20, SA30 = (
+    _words(f"Spectral acceleration at {period:g} s, 5 % damping [g].") for period in SPECTRAL
+)
 LEVEL = Field(gt=0.0, lt=1.0, description="Confidence level of the interval.")
 MODEL = _words(
     "Name of a stored model. Default: the database's default if the given measures suffice for "
@@ -59,7 +64,10 @@ MODEL = _words(
 )
 
 # keywords of rbfrag.predict and rbfrag.stability by the names of the parameters
-MEASURES = {"pgv": "pgv_m_s", "pga": "pga_g", "tm": "tm_s", "pgd": "pgd_m"}
+MEASURES = {
+    "pgv": "pgv_m_s", "pga": "pga_g", "tm": "tm_s", "pgd": "pgd_m",
+    **{name: name for name in SPECTRAL.values()},
+}  # fmt: skip
 NUMBERS = {"p2": "p2", "kr": "kr", "ky": "ky", "ks": "ks", "ps2": "ps2"}
 SLIDING = {"displacement": "displacement_m", "beta": "beta_deg"}
 RECTANGLE = {"height": "height_m", "width": "width_m", "dip": "dip_deg"}
@@ -198,6 +206,10 @@ class Motion(Parameters):
     pga: Annotated[NotNegative | None, PGA] = None
     tm: Annotated[Positive | None, TM] = None
     pgd: Annotated[NotNegative | None, PGD] = None
+    sa03_g: Annotated[NotNegative | None, SA03] = None
+    sa10_g: Annotated[NotNegative | None, SA10] = None
+    sa20_g: Annotated[NotNegative | None, SA20] = None
+    sa30_g: Annotated[NotNegative | None, SA30] = None
     model: Annotated[Text | None, MODEL] = None
 
 
@@ -230,6 +242,10 @@ class PredictRows(Parameters):
     pga: Annotated[Column | None, PGA] = None
     tm: Annotated[Column | None, TM] = None
     pgd: Annotated[Column | None, PGD] = None
+    sa03_g: Annotated[Column | None, SA03] = None
+    sa10_g: Annotated[Column | None, SA10] = None
+    sa20_g: Annotated[Column | None, SA20] = None
+    sa30_g: Annotated[Column | None, SA30] = None
     kind: Annotated[Text | None, KIND] = None
     rotation: Annotated[StrictFloat | None, ROTATION] = None
     model: Annotated[Text | None, MODEL] = None

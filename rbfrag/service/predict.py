@@ -10,7 +10,8 @@ from fastapi.concurrency import run_in_threadpool
 
 from rbfrag.db.location import locate
 from rbfrag.errors import InputError
-from rbfrag.fragility.predict import predict, prediction_document
+from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.predict import answer_given, prediction_document
 from rbfrag.service.documents import PredictAnswer, PredictArrays
 from rbfrag.service.parameters import (
     MEASURES,
@@ -80,7 +81,11 @@ def answer_many(given: dict[str, Any], chosen: dict[str, Any], db: str | None) -
         # an array of one element, so that single numbers are answered by lists too
         first = next(iter(values))
         values[first] = [values[first]]
-    answers: Any = predict(**values, **chosen, db=db)
+    model = find_model(
+        chosen.get("model"), values, db,
+        kind=chosen.get("kind"), rotation_deg=chosen.get("rotation_deg"),
+    )  # fmt: skip
+    answers: Any = answer_given(model, values, chosen["level"])
     return json_text(
         {
             "probability": _with_null(answers.probability),

@@ -88,12 +88,12 @@ def rock_mass(
     if not measures and not (model is None and level is None):
         raise InputError(
             f"{'level' if model is None else 'model'} goes with a measure of the motion: give "
-            "pgv, pga and tm, or pgd and tm, too"
+            "pgv, pga or sa10_g, or pgd and tm, too"
         )
     realisations = described.realise(query.n, query.seed)
     answer = None
     if measures:
-        answer = scenario(realisations, **measures, model=model, level=level or 0.95, db=db)
+        answer = scenario(realisations, measures, model=model, level=level or 0.95, db=db)
     return json_text(
         as_dict(realisations, mode_counts(realisations), crossings(realisations), answer)
     )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.other_kinds import jibson_2007, saygili_rathje_2008, within_motion
+from benchmarks.other_kinds import RATIOS, class_lines, within_motion
 from benchmarks.other_kinds_figure import plot_other_kinds
 from rbfrag.errors import InputError
 from rbfrag.fragility.fit.fitting import fit_source
@@ -28,20 +29,18 @@ def test_the_figure_is_written(tmp_path: Path) -> None:
         plot_other_kinds(*both, tmp_path / "kinds.txt")
 
 
-def one(**values: float) -> dict[str, np.ndarray]:
-    return {name: np.array([value]) for name, value in values.items()}
-
-
-def test_published_medians_are_exceeded_in_half_of_the_cases() -> None:
-    # log10 D [cm] = 0.215 + log10(0.5^(2.341 - 1.438)) at k_y = PGA/2
-    median_cm = 10.0**0.215 * 0.5 ** (2.341 - 1.438)
-    values = one(ky=0.2, pga_g=0.4, pgv_m_s=0.3, displacement_m=0.01 * median_cm)
-    assert jibson_2007(values)[0] == pytest.approx(0.5)
-    # ln D [cm] of the other at k_y/PGA = 0.5, PGA = 1 g, PGV = 100 cm/s
-    polynomial = -1.56 - 2.29 - 5.21 + 5.59375 - 1.90625
-    median_cm = np.exp(polynomial) * 100.0**1.55
-    values = one(ky=0.5, pga_g=1.0, pgv_m_s=1.0, displacement_m=0.01 * median_cm)
-    assert saygili_rathje_2008(values)[0] == pytest.approx(0.5)
+def test_classes_are_judged_by_their_own_outcomes() -> None:
+    fit = fit_source(drawn("sliding", "pgv_pga", 2000), TERMS["pgv_pga"], METHOD_OF["sliding"])
+    lines = class_lines("m", fit.result.held_out, fit.data, "k/PGA", RATIOS)
+    assert [line[1] for line in lines] == [
+        "k/PGA 0 to 0.1", "k/PGA 0.1 to 0.3", "k/PGA 0.3 to 0.6", "k/PGA 0.6 to 1",
+    ]  # fmt: skip
+    shares = np.array([[float(line[3]), float(line[4])] for line in lines])
+    assert shares[:, 0] == pytest.approx(shares[:, 1], abs=0.05)
+    assert shares[0, 1] > shares[-1, 1] + 0.1
+    # one class of everything
+    whole = class_lines("m", fit.result.held_out, fit.data, "d [m]", (0.0, math.inf))
+    assert float(whole[0][4]) == pytest.approx(fit.data.failed.mean(), abs=5e-4)
 
 
 def test_scatter_is_parted_between_blocks_and_motions() -> None:

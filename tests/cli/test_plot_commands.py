@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from rbfrag.db.location import REFERENCE
 from tests.cli.conftest import Refuses, Shell
 from tests.synthetic import shaking, write_at2
 
@@ -41,3 +42,14 @@ def test_every_figure_of_the_database(
     # these motions have no vertical components
     assert "--vertical both" in refuses("plot", "vertical", "--out", tmp_path / "v.png")
     assert not (tmp_path / "v.png").exists()
+
+
+def test_a_curve_runs_over_what_is_named(shell: Shell, refuses: Refuses, tmp_path: Path) -> None:
+    path = tmp_path / "over.svg"
+    block = ("--db", REFERENCE, "--p2", "3", "--kr", "0.1", "--out", path)
+    shell("plot", "curve", *block, "--over", "pga", "--pgv", "0.6")
+    text = path.read_text(encoding="utf-8")
+    assert "peak ground acceleration, PGA [g]" in text
+    assert "PGV = 0.6 m/s" in text
+    assert "runs over pgv, pga, pgd, sa03" in refuses("plot", "curve", *block, "--over", "cav")
+    assert "pgv_m_s is what the curve runs over" in refuses("plot", "curve", *block, "--pgv", "0.6")

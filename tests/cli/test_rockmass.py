@@ -90,7 +90,7 @@ def test_text_names_shares_crossing_and_impossible(shell: Shell, mass: Path) -> 
 @pytest.mark.usefixtures("stored_model")
 def test_scenario_covers_what_it_says(shell: Shell, steep: Path) -> None:
     answer = shell.json("rockmass", steep, "--pgv", "1.0", "--level", "0.9")
-    expected = scenario(read_rock_mass(steep).realise(), pgv_m_s=1.0, level=0.9)
+    expected = scenario(read_rock_mass(steep).realise(), {"pgv_m_s": 1.0}, level=0.9)
     found = answer["scenario"]
     assert (found["model"], found["term"], found["level"]) == ("line", "pgv", 0.9)
     assert found["pgv_m_s"] == 1.0
@@ -120,7 +120,7 @@ def test_the_table_holds_the_blocks_with_their_answers(
     assert columns["block_id"].tolist() == list(range(1, 401))
     assert np.array_equal(columns["kr"], made.kr_at_rest, equal_nan=True)
     assert set(columns["pgv_m_s"]) == {1.0}
-    answer = scenario(made, pgv_m_s=1.0)
+    answer = scenario(made, {"pgv_m_s": 1.0})
     assert np.array_equal(columns["probability"], answer.probability, equal_nan=True)
     assert (tmp_path / "a.svg").read_text().startswith("<?xml")
 

@@ -197,6 +197,8 @@ def model() -> ModelRow:
         data_fingerprint="f" * 64,
         diagnostics={"n": 12, "warnings": ["Zürich"], "scores": {"log": -1.5}},
         created="2024-01-01T00:00:00+00:00",
+        leave_out_steps=((0.1, -1.0 / 3.0, 5e-324), (0.0, 0.2, 1e-300)),
+        dependence={"rho_e": 1.0 / 3.0, "errors": {"rho_e": 0.1}},
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +23,20 @@ from rbfrag.db.campaigns import start_campaign
 from rbfrag.db.check.database import check_database
 from rbfrag.db.connect import unchecked_engine
 from rbfrag.db.engine import open_database
+from rbfrag.db.insert import update_rows
 from rbfrag.db.location import REVISIONS, SCHEMA_REVISION, VERSION_TABLE
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import load_model, save_model
-from rbfrag.db.motions import add_motion, load_motion, motion_rows
+from rbfrag.db.motions import (
+    LATER_MEASURES,
+    MEASURES,
+    add_motion,
+    load_motion,
+    measures_of,
+    motion_rows,
+)
 from rbfrag.db.rows import EarthquakeInfo
-from rbfrag.db.schema import combination, metadata, simulation
+from rbfrag.db.schema import combination, metadata, motion, simulation
 from rbfrag.db.upgrade import migrate, upgrade_database
 from rbfrag.motions.ground_motion import GroundMotion
 
@@ -194,7 +203,7 @@ def test_results_of_the_second_schema_stay_as_they_are(
 
     with engine.begin() as connection:
         fill(connection, [1, 2, 3])
-        save_model(connection, model)
+        save_model(connection, replace(model, form=1, leave_out_steps=None, dependence=None))
         before = content(connection)
         config = _config()
         config.attributes["connection"] = connection
@@ -246,3 +255,36 @@ def test_maps_are_no_part_of_keys_any_more(
         assert again_key in {row.natural_key for row in rows}
         assert connection.scalar(select(func.count()).select_from(combination)) == 2
     again.dispose()
+
+
+def test_measures_of_the_fourth_schema_are_computed_where_the_samples_are(
+    place: str, make_motion: Callable[..., GroundMotion], model: ModelRow
+) -> None:
+    open_database(place, create=True).dispose()
+    engine = unchecked_engine(Path(place) if "://" not in place else place, foreign_keys=False)
+    given, other = make_motion(), make_motion(2)
+    with engine.begin() as connection:
+        quake = EarthquakeInfo("E")
+        for each in (given, other):
+            add_motion(connection, each, earthquake=quake, is_vertical=False)
+        _, without = motion_rows(connection)
+        update_rows(connection, motion, motion.c.id == without.id, {"samples": None})
+        save_model(connection, model)
+        config = _config()
+        config.attributes["connection"] = connection
+        command.downgrade(config, "0004")
+        columns = {c["name"] for c in inspect(connection).get_columns("motion")}
+        assert not columns & set(LATER_MEASURES)
+    engine.dispose()
+    assert upgrade_database(place) == ("0004", SCHEMA_REVISION)
+    again = open_database(place)
+    with again.connect() as connection:
+        assert check_database(connection) == []
+        kept, empty = motion_rows(connection)
+        old = load_model(connection)
+    again.dispose()
+    assert {name: getattr(kept, name) for name in MEASURES} == measures_of(given)
+    assert {getattr(empty, name) for name in LATER_MEASURES} == {None}
+    assert kept.sa10_g is not None
+    assert kept.sa10_g > 0.0
+    assert (old.form, old.leave_out_steps, old.dependence) == (1, None, None)

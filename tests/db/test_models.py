@@ -103,6 +103,9 @@ class TestStore:
             {"domain": {"pgv_m_s": (0.0, float("inf"))}},
             {"diagnostics": {"score": float("nan")}},
             {"diagnostics": {"what": object()}},
+            {"leave_out_steps": ((1.0,),)},
+            {"leave_out_steps": ((1.0, 2.0, float("nan")),)},
+            {"dependence": {"rho_e": float("nan")}},
         ],
     )
     def test_what_cannot_be_stored(
@@ -113,7 +116,10 @@ class TestStore:
                 save_model(connection, replace(model, **change))
             assert model_rows(connection) == []
 
-    @pytest.mark.parametrize("column", ["coefficients", "covariance", "domain", "diagnostics"])
+    @pytest.mark.parametrize(
+        "column",
+        ["coefficients", "covariance", "domain", "diagnostics", "leave_out_steps", "dependence"],
+    )
     def test_a_damaged_model(self, engine: Engine, model: ModelRow, column: str) -> None:
         with engine.begin() as connection:
             save_model(connection, model)

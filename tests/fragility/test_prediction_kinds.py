@@ -117,7 +117,7 @@ def test_a_slump_is_answered_by_its_formula() -> None:
     assert still.probability == 0.0
     far = one(ks=ks, ps2=ps2, pgv_m_s=5.0, pga_g=pga, model=row_of("slumping"))
     assert not far.in_domain
-    assert any("pgv_over_pga_s" in text for text in far.warnings)
+    assert any("PGV/(PGA·g) is" in text for text in far.warnings)
 
 
 def test_the_same_warnings_and_types_as_for_toppling() -> None:

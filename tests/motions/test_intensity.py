@@ -242,3 +242,26 @@ def test_a_record_beyond_floating_point_is_refused_in_words() -> None:
 
 def test_an_absurd_interval_has_no_mean_period() -> None:
     assert mean_period(np.array([0.0, 1.0, -1.0, 0.0]), 1e-320) is None
+
+
+def test_cav_arias_and_duration_in_closed_form() -> None:
+    # a rectangle: CAV = a g T, Arias = π/2 a² g T, from 5 to 95 % of the time
+    m = GroundMotion.from_nodes([0, 0, 2, 2], [0, 0.3, 0.3, 0]).measures
+    assert m.cav_m_s == pytest.approx(0.3 * G * 2.0, rel=1e-14)
+    assert m.arias_m_s == pytest.approx(0.5 * math.pi * 0.09 * G * 2.0, rel=1e-14)
+    assert m.d5_95_s == pytest.approx(1.8, rel=1e-12)
+    # one line from -1 to 1 g in 2 s: a² = t² about its middle, |a| two triangles
+    m = GroundMotion([-1.0, 1.0], 2.0).measures
+    assert m.cav_m_s == pytest.approx(G, rel=1e-14)
+    assert m.arias_m_s == pytest.approx(0.5 * math.pi * G * 2.0 / 3.0, rel=1e-14)
+    assert m.d5_95_s == pytest.approx(2.0 * 0.9 ** (1.0 / 3.0), rel=1e-12)
+
+
+def test_cav_arias_and_duration_of_a_finer_sampling_are_the_same() -> None:
+    a = np.random.default_rng(5).normal(size=200)
+    fine = np.interp(np.arange(199 * 16 + 1) / 16.0, np.arange(200.0), a)
+    coarse, finer = GroundMotion(a, 0.01).measures, GroundMotion(fine, 0.01 / 16.0).measures
+    for name in ("cav_m_s", "arias_m_s", "d5_95_s"):
+        assert getattr(coarse, name) == pytest.approx(getattr(finer, name), rel=1e-12)
+    rest = GroundMotion(np.zeros(9), 0.01).measures
+    assert (rest.cav_m_s, rest.arias_m_s, rest.d5_95_s) == (0.0, 0.0, None)

@@ -29,7 +29,7 @@ MADE = RockMass.of(TABLE_3_4).realise(400, 3)
 def answer(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Scenario:
     monkeypatch.chdir(tmp_path_factory.mktemp("empty"))
     monkeypatch.delenv("RBFRAG_DB", raising=False)
-    return scenario(MADE, pgv_m_s=0.6, pga_g=0.7, displacement_m=0.05)
+    return scenario(MADE, {"pgv_m_s": 0.6, "pga_g": 0.7}, displacement_m=0.05)
 
 
 def test_every_stable_block_of_this_rock_mass_has_an_answer(answer: Scenario) -> None:
@@ -72,7 +72,7 @@ def test_blocks_are_answered_as_one_by_one(answer: Scenario) -> None:
 
 
 def test_a_longer_distance_is_reached_by_fewer(answer: Scenario) -> None:
-    far = scenario(MADE, pgv_m_s=0.6, pga_g=0.7, displacement_m=0.5)
+    far = scenario(MADE, {"pgv_m_s": 0.6, "pga_g": 0.7}, displacement_m=0.5)
     mean = {mode.mode: mode.covered.probability for mode in answer.modes}
     less = {mode.mode: mode.covered.probability for mode in far.modes}
     assert less["slide"] < mean["slide"]  # type: ignore[operator]
@@ -80,16 +80,16 @@ def test_a_longer_distance_is_reached_by_fewer(answer: Scenario) -> None:
 
 
 def test_no_shaking_moves_nothing_that_stands() -> None:
-    still = scenario(MADE, pgv_m_s=0.0, pga_g=0.0, displacement_m=0.05)
+    still = scenario(MADE, {"pgv_m_s": 0.0, "pga_g": 0.0}, displacement_m=0.05)
     stands = MADE.stability.state_code == STABLE
     assert np.all(still.probability[stands] == 0.0)
 
 
 def test_what_the_models_lack_is_refused() -> None:
     with pytest.raises(InputError, match="displacement_m"):
-        scenario(MADE, pgv_m_s=0.6, displacement_m=0.0)
+        scenario(MADE, {"pgv_m_s": 0.6}, displacement_m=0.0)
     with pytest.raises(InputError, match="read PGV"):
-        scenario(MADE, pga_g=0.6, tm_s=0.5, displacement_m=0.1)
-    without = scenario(MADE, pgv_m_s=0.6)
+        scenario(MADE, {"pga_g": 0.6, "tm_s": 0.5}, displacement_m=0.1)
+    without = scenario(MADE, {"pgv_m_s": 0.6})
     assert without.covered_share < 1.0
     assert math.isclose(sum(without.uncovered_share.values()), 1.0 - without.covered_share)

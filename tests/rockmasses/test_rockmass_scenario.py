@@ -34,7 +34,7 @@ def made() -> Realisations:
 
 
 def test_average_is_that_of_single_predictions(made: Realisations, model: FragilityModel) -> None:
-    answer = scenario(made, pgv_m_s=0.4, model=model, level=0.9)
+    answer = scenario(made, {"pgv_m_s": 0.4}, model=model, level=0.9)
     singles: dict[str, list[tuple[float, float, float]]] = {}
     for i in range(made.n):
         found = made.stability
@@ -76,7 +76,7 @@ def test_average_is_that_of_single_predictions(made: Realisations, model: Fragil
 
 
 def test_shares_of_covered_and_uncovered_add_up(made: Realisations, model: FragilityModel) -> None:
-    answer = scenario(made, pgv_m_s=0.4, model=model)
+    answer = scenario(made, {"pgv_m_s": 0.4}, model=model)
     assert sum(mode.count for mode in answer.modes) == made.n_blocks
     assert sum(answer.uncovered_share.values()) + answer.covered_share == pytest.approx(1.0)
     assert set(answer.uncovered_share) == {"slide", "slump", "confined_topple"}
@@ -90,7 +90,8 @@ def test_shares_of_covered_and_uncovered_add_up(made: Realisations, model: Fragi
 def test_the_sampling_error_is_that_of_repeated_samples(model: FragilityModel) -> None:
     mass = RockMass.of({**WILD, "base.dip_deg": 2.0, "back.dip_deg": 88.0})
     answers = [
-        scenario(mass.realise(300, seed), pgv_m_s=1.2, model=model).covered for seed in range(60)
+        scenario(mass.realise(300, seed), {"pgv_m_s": 1.2}, model=model).covered
+        for seed in range(60)
     ]
     assert 0.05 < np.mean([a.probability for a in answers]) < 0.95  # type: ignore[arg-type]
     spread = np.std([a.probability for a in answers], ddof=1)  # type: ignore[arg-type]
@@ -100,7 +101,7 @@ def test_the_sampling_error_is_that_of_repeated_samples(model: FragilityModel) -
 def test_doubts_about_the_blocks_are_told_with_their_number(model: FragilityModel) -> None:
     mass = RockMass.of({**WILD, "block.size_factor": {**UNIFORM, "low": 0.02, "high": 2.0}})
     made = mass.realise(800, 1)
-    answer = scenario(made, pgv_m_s=0.4, model=model)
+    answer = scenario(made, {"pgv_m_s": 0.4}, model=model)
     asked = np.array([reason != UNCOVERED for reason in answer.reason])
     small = int(np.sum(["p2 is outside the fitted range" in r for r in answer.reason[asked]]))
     assert small > 0
@@ -114,10 +115,10 @@ def test_doubts_about_the_blocks_are_told_with_their_number(model: FragilityMode
 def test_no_model_is_looked_up_where_no_block_needs_one(tmp_path: Path) -> None:
     place = tmp_path / "none.db"
     slumps = RockMass.of({**SLOPE, "friction.phi_deg": 1.0}).realise(200, 1)
-    answer = scenario(slumps, pgv_m_s=0.4, db=place)
+    answer = scenario(slumps, {"pgv_m_s": 0.4}, db=place)
     assert answer.model is None
     with pytest.raises(DatabaseNotFoundError):
-        scenario(RockMass.of(WILD).realise(200, 1), pgv_m_s=0.4, db=place)
+        scenario(RockMass.of(WILD).realise(200, 1), {"pgv_m_s": 0.4}, db=place)
     assert not place.exists()
 
 
@@ -128,7 +129,6 @@ def test_no_model_is_looked_up_where_no_block_needs_one(tmp_path: Path) -> None:
         ({"pgv_m_s": math.nan}, "pgv_m_s = nan m/s is not a number"),
         ({"pgv_m_s": -1.0}, "pgv_m_s = -1 m/s is negative"),
         ({"pgd_m": 0.1, "tm_s": 0.0}, "tm_s = 0 s is not above zero"),
-        ({"pgv_m_s": 0.4, "level": 1.0}, "level = 1.0"),
         ({"pga_g": 0.4}, "pgv_m_s"),
     ],
 )
@@ -136,19 +136,24 @@ def test_refusals(
     made: Realisations, model: FragilityModel, measures: dict[str, float], words: str
 ) -> None:
     with pytest.raises(InputError, match=words):
-        scenario(made, model=model, **measures)  # type: ignore[arg-type]
+        scenario(made, measures, model=model)
+
+
+def test_a_level_that_is_none_is_refused(made: Realisations, model: FragilityModel) -> None:
+    with pytest.raises(InputError, match=r"level = 1\.0"):
+        scenario(made, {"pgv_m_s": 0.4}, model=model, level=1.0)
 
 
 def test_vertical_acceleration_of_the_file_is_refused(model: FragilityModel) -> None:
     made = RockMass.of({**WILD, "block.kv": 0.1}).realise(100, 1)
     with pytest.raises(InputError, match=r"block\.kv does not belong"):
-        scenario(made, pgv_m_s=0.4, model=model)
+        scenario(made, {"pgv_m_s": 0.4}, model=model)
 
 
 def test_no_shaking_topples_what_is_unstable_and_nothing_else(
     made: Realisations, model: FragilityModel
 ) -> None:
-    answer = scenario(made, pgv_m_s=0.0, model=model)
+    answer = scenario(made, {"pgv_m_s": 0.0}, model=model)
     falls = made.is_block & (made.stability.state == "unstable")
     covered = np.isfinite(answer.probability)
     assert np.array_equal(answer.probability[covered] == 1.0, falls[covered])
@@ -156,7 +161,7 @@ def test_no_shaking_topples_what_is_unstable_and_nothing_else(
 
 
 def test_the_block_table_has_every_realisation(made: Realisations, model: FragilityModel) -> None:
-    answer = scenario(made, pgv_m_s=0.4, model=model)
+    answer = scenario(made, {"pgv_m_s": 0.4}, model=model)
     plain, full = block_columns(made), block_columns(made, answer)
     assert list(plain)[:5] == ["block_id", "p2_1_s2", "kr", "mode", "weight"]
     assert list(full)[-5:] == ["probability", "ci_low", "ci_high", "in_domain", "reason"]
@@ -175,7 +180,7 @@ def test_the_report_is_plain_and_doubts_many_impossible_blocks(
     made: Realisations, model: FragilityModel
 ) -> None:
     document = as_dict(
-        made, mode_counts(made), crossings(made), scenario(made, pgv_m_s=0.4, model=model)
+        made, mode_counts(made), crossings(made), scenario(made, {"pgv_m_s": 0.4}, model=model)
     )
     assert document["realisations"] == 1_500
     assert document["blocks"] + sum(document["impossible"].values()) == 1_500

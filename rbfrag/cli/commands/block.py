@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from rbfrag.cli.output import print_json, print_pairs, print_warnings
+from rbfrag.cli.output import check_files, print_json, print_pairs, print_table, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import WAYS, ShapeOptions
+from rbfrag.cli.parameters.block import WAYS, MeshOptions, ShapeOptions
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.errors import InputError
 
@@ -15,12 +15,13 @@ EXAMPLE = "Example:  rbfrag block --s1 1 --s2 0.6 --gamma 25 --beta 20 --phi 40"
 def block(
     *,
     shape: ShapeOptions,
+    mesh: MeshOptions,
     cohesion: float | None = option("Cohesion of the base [Pa], with --density."),
     density: float | None = option("Density of the rock [kg/m3]."),
     kv: float | None = option("Vertical acceleration of the ground, up positive [g]."),
     plot: str | None = option(
-        "Draw the block on its planes with its contacts and the resultant at yield "
-        "(.png, .pdf, .svg)."
+        "Draw the block on its planes with its contacts and the resultant at yield, or the "
+        "contacts of a mesh and k_r over azimuth (.png, .pdf, .svg)."
     ),
     json: options.Json = False,
 ) -> None:
@@ -28,12 +29,17 @@ def block(
 
     Angles in degrees, lengths in m, accelerations in g, the size parameter p2 in 1/s2. A block
     that topples is backed by a slope; a free-standing one rocks, and fails at weaker shaking.
+    Of a mesh, which stands free: volume, mass, inertia, and for each azimuth kr, p2 and
+    restitution about its contacts with the ground.
     """
+    if mesh.mesh is not None:
+        _mesh(mesh.mesh, mesh, density, plot, json=json)
+        return
     from rbfrag.solver.stability.single import stability, stability_as_dict
 
     described = shape.described(cohesion_pa=cohesion, density_kg_m3=density, kv=kv)
     if described is None:
-        raise InputError(f"no block: describe it by {WAYS}")
+        raise InputError(f"no block: describe it by {WAYS}, or by --mesh FILE")
     body, conditions = described.on_planes()
     result = stability(body, **conditions)
     if plot is not None:
@@ -53,3 +59,32 @@ def block(
             f"{margin['mode']} if {margin['variable']} changes by {margin['change_deg']:+.6g} deg"
         )
     print_warnings(result.warnings)
+
+
+def _mesh(
+    path: str, about: MeshOptions, density: float | None, plot: str | None, *, json: bool
+) -> None:
+    """Answer for a mesh: its weakest azimuth, and what the height of contact changes."""
+    from rbfrag.exchange.mesh_file import block_from_mesh
+
+    check_files(table=about.out, plot=plot)
+    body = block_from_mesh(path, up=about.up, contact_mm=about.contact_mm, density_kg_m3=density)
+    if about.out is not None:
+        from rbfrag.exchange.block_table import write_block_table
+
+        write_block_table(body.columns(), about.out)
+    if plot is not None:
+        from rbfrag.plots.mesh_block import plot_mesh_block
+
+        plot_mesh_block(body, plot)
+    answer = body.as_dict()
+    if json:
+        print_json(answer)
+        return
+    for name in ("azimuths", "inertia_m2", "warnings"):
+        answer.pop(name)
+    rows = answer.pop("sensitivity")
+    print_pairs(answer)
+    print()
+    print_table(list(rows[0]), [list(row.values()) for row in rows])
+    print_warnings(body.warnings)

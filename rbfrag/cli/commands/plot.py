@@ -38,6 +38,13 @@ class Held:
     )
 
 
+VARIED = {
+    "pgv": "pgv_m_s", "pga": "pga_g", "pgd": "pgd_m", "sa03": "sa03_g", "sa10": "sa10_g",
+    "sa20": "sa20_g", "sa30": "sa30_g",
+}  # fmt: skip
+"""What a curve may run over."""
+
+
 @app.command("fit", epilog="Example:  rbfrag plot fit --model wls-pgv --out fit.png")
 @stacked
 def plot_fit(
@@ -108,8 +115,11 @@ def plot_curve(
     *,
     out: Out,
     block: BlockOptions,
-    pga: options.Pga = None,
-    tm: options.Tm = None,
+    held: options.Measures,
+    over: str | None = option(
+        "What the curve runs over: pgv, pga, pgd, sa03, sa10, sa20 or sa30. Default: pgv, or what "
+        "--model reads first."
+    ),
     model: str | None = option("Name of the model. Default: the best for what is given."),
     level: options.Level = 0.95,
     beside: str | None = option(
@@ -119,23 +129,36 @@ def plot_curve(
     ),
     db: options.Db = None,
 ) -> None:
-    """Draw the fragility curve of one block over PGV, with its confidence band.
+    """Draw the fragility curve of one block over a measure of the shaking, with its interval.
 
-    PGA and Tm are held at the values given. A model of another measure runs over that one.
+    The other measures are held at the values given.
     """
+    from rbfrag.errors import InputError
     from rbfrag.fragility.lookup import find_model
+    from rbfrag.fragility.measures import MEASURES
     from rbfrag.plots.curve import plot_curve as draw
 
     p2, kr, remarks = block.toppling()
-    held = {name: value for name, value in (("pga_g", pga), ("tm_s", tm)) if value is not None}
-    varied = ["pgv_m_s"] if model is None else ["pgv_m_s", "pga_g", "pgd_m", "xp_m_s"]
-    chosen = find_model(model, [*varied, *held], db)
+    fixed = held.given()
+    varied = None if over is None else VARIED.get(over)
+    if over is not None and varied is None:
+        raise InputError(f"--over {over}: a curve runs over {', '.join(VARIED)}")
+    if model is None:
+        varied = varied or "pgv_m_s"
+        chosen = find_model(None, [varied, *fixed], db)
+    else:
+        chosen = find_model(model, MEASURES, db)
+        varied = varied or chosen.term.inputs[0]
+    if varied in fixed:
+        raise InputError(
+            f"{varied} is what the curve runs over: leave its value out, or add --over"
+        )
     others = {}
     if beside is not None:
         from rbfrag.exchange.other_fragilities import of_measure
 
-        others = of_measure(beside, chosen.term.inputs[0])
-    draw(chosen, p2, kr, out, fixed=held, level=level, beside=others)
+        others = of_measure(beside, varied)
+    draw(chosen, p2, kr, out, over=varied, fixed=fixed, level=level, beside=others)
     print_warnings(remarks)
     print(out)
 

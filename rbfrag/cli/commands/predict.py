@@ -53,8 +53,9 @@ class Table:
 
     batch: str | None = option(
         "Block table (.csv or .parquet) with columns p2_1_s2 and kr (or height_m and "
-        "width_m; or ky and displacement_m; or ks and ps2_1_s2) and any of pgv_m_s, pga_g, "
-        "tm_s, pgd_m; what is the same for all rows may be an option.",
+        "width_m; or ky and displacement_m; or ks and ps2_1_s2) and any of pgv_m_s, sa03_g, "
+        "sa10_g, sa20_g, sa30_g, pga_g, tm_s, pgd_m; what is the same for all rows may be an "
+        "option.",
         metavar="FILE",
     )
     out: str | None = option(
@@ -77,8 +78,9 @@ def predict(
 ) -> None:
     """Print the probability that a block fails, with its interval.
 
-    What is known of the motion decides which model answers: PGV; PGV and PGA; these and Tm; or
-    the motion itself. Where the measures suffice for several terms, each is answered.
+    What is known of the motion decides which model answers: PGV, alone or with PGA and Tm; a
+    spectral acceleration; PGA; PGA with spectral accelerations; or the motion itself. Where the
+    measures suffice for several models, each is answered.
 
     Toppling answers are for blocks backed by a slope; free-standing blocks fail at weaker
     shaking.

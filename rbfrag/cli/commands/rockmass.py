@@ -156,7 +156,7 @@ def rockmass(
     about: list[str] = []
     if measures.given():
         answer = scenario(
-            blocks, **measures.given(), model=answering.model, level=answering.level,
+            blocks, measures.given(), model=answering.model, level=answering.level,
             db=answering.db, displacement_m=limits.displacement, rotation_deg=limits.rotation,
         )  # fmt: skip
     if shaken.motion is not None:
@@ -258,8 +258,10 @@ def _print(document: dict[str, Any]) -> None:
 
 
 def _print_scenario(scenario: dict[str, Any]) -> None:
+    from rbfrag.fragility.measures import STATED
+
     print()
-    names = ("pgv_m_s", "pga_g", "tm_s", "pgd_m", "model", "level")
+    names = (*STATED, "model", "level")
     others = {f"model of {_words(mode)}": name for mode, name in scenario["other_models"].items()}
     print_pairs({**{name: scenario[name] for name in names if name in scenario}, **others})
     rows = [

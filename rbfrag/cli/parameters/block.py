@@ -79,6 +79,25 @@ class ShapeOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MeshOptions:
+    """A free-standing block by its surface."""
+
+    mesh: str | None = option(
+        "Closed mesh [m] of a free-standing block in its measured resting pose on level ground "
+        "(.obj, .ply, .stl).",
+        metavar="FILE",
+    )
+    up: str = option("Axis of the mesh that points up: x, y or z.", "z")
+    contact_mm: float = option(
+        "Height above the lowest vertex up to which vertices touch the ground [mm].", 10.0
+    )
+    out: str | None = option(
+        "Write the table of a mesh's blocks, one row for each azimuth (.csv, .parquet).",
+        metavar="FILE",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class NumberOptions:
     """A toppling block by two numbers."""
 

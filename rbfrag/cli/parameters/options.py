@@ -60,6 +60,12 @@ Pga = Annotated[float | None, typer.Option("--pga", help="Peak ground accelerati
 
 Tm = Annotated[float | None, typer.Option("--tm", help="Mean period [s].")]
 
+_SA = "Spectral acceleration at {} s, 5 % damping [g]."
+Sa03 = Annotated[float | None, typer.Option("--sa03", help=_SA.format("0.3"))]
+Sa10 = Annotated[float | None, typer.Option("--sa10", help=_SA.format("1"))]
+Sa20 = Annotated[float | None, typer.Option("--sa20", help=_SA.format("2"))]
+Sa30 = Annotated[float | None, typer.Option("--sa30", help=_SA.format("3"))]
+
 Model = Annotated[
     str | None,
     typer.Option(
@@ -112,10 +118,17 @@ class Measures:
     pga: Pga = None
     tm: Tm = None
     pgd: float | None = option("Peak ground displacement [m].")
+    sa03: Sa03 = None
+    sa10: Sa10 = None
+    sa20: Sa20 = None
+    sa30: Sa30 = None
 
     def given(self) -> dict[str, float]:
-        """Return those that were given, by the names of `rbfrag.predict`."""
-        values = {"pgv_m_s": self.pgv, "pga_g": self.pga, "tm_s": self.tm, "pgd_m": self.pgd}
+        """Return those that were given, by name."""
+        values = {
+            "pgv_m_s": self.pgv, "sa03_g": self.sa03, "sa10_g": self.sa10, "sa20_g": self.sa20,
+            "sa30_g": self.sa30, "pga_g": self.pga, "tm_s": self.tm, "pgd_m": self.pgd,
+        }  # fmt: skip
         return {name: value for name, value in values.items() if value is not None}
 
 

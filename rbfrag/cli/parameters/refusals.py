@@ -10,7 +10,7 @@ from rbfrag.errors import InputError
 NUMBERS = ("--p2", "--kr")
 SHAPE = ("--height", "--width", "--dip", "--alpha1", "--alpha3", "--r3", "--s1", "--s2", "--gamma")
 PLANES = ("--beta", "--phi", "--phi-back", "--no-back")
-MEASURES = ("--pgv", "--pga", "--tm", "--pgd")
+MEASURES = ("--pgv", "--pga", "--tm", "--pgd", "--sa03", "--sa10", "--sa20", "--sa30")
 
 ONCE = "a block is described once"
 
@@ -58,6 +58,12 @@ CONFLICTS = (
     Conflict(SHAPE[:-1], FILES, "the file has the shape"),
     Conflict(("--polygon",), ("--block",), ONCE),
     Conflict(TABLES, (*SHAPE, *FILES), ONCE),
+    Conflict(("--mesh",), (*SHAPE, *FILES), ONCE),
+    Conflict(
+        (*PLANES, "--cohesion", "--kv"),
+        ("--mesh",),
+        "a mesh stands free on level ground, in the pose that it was measured in",
+    ),
     Conflict(("--rockmass",), ("--blocks",), "one of them is enough"),
     Conflict(PLANES, NUMBERS, "numbers say all about the block"),
     Conflict(PLANES, TABLES, "the file has the planes", ("hazard", "shakemap", "nrml", "pelicun")),
@@ -71,7 +77,7 @@ CONFLICTS = (
 )
 
 _NAME_IT = "name the accelerogram, too"
-_MEASURE = "give --pgv, --pga and --tm, or --pgd and --tm, too"
+_MEASURE = "give --pgv, --pga or --sa10, or --pgd and --tm, too"
 
 NEEDS = (
     Need(("--batch",), ("--out",), "--out", "--out FILE names the table of answers"),
@@ -105,6 +111,10 @@ NEEDS = (
         ("rockmass",),
     ),
     Need(("--exaggerate",), ("--animate",), "--animate", "it is a factor on what the film shows"),
+    Need(("--up", "--contact-mm"), ("--mesh",), "--mesh", "it is about the pose of a mesh"),
+    Need(
+        ("--out",), ("--mesh",), "--mesh", "only a mesh makes a table, of its azimuths", ("block",)
+    ),
     Need(("--n",), ("--rockmass",), "--rockmass", "only a rock mass is drawn anew"),
 )
 

@@ -13,7 +13,7 @@ import numpy as np
 from sqlalchemy import Connection, select
 
 from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
-from rbfrag.db.motions import MEASURES, load_motion, same_measure
+from rbfrag.db.motions import load_motion, measures_of, same_measure
 from rbfrag.db.schema import motion, toppling_spectrum
 from rbfrag.errors import InputError, RbfragError
 from rbfrag.motions.ground_motion import GroundMotion
@@ -66,13 +66,14 @@ def _problems(row: Any) -> Iterator[str]:
 
 def _measure_problems(row: Any, samples: np.ndarray) -> Iterator[str]:
     try:
-        measures = GroundMotion(samples.astype(np.float64), row["dt_s"]).measures
+        record = GroundMotion(samples.astype(np.float64), row["dt_s"])
+        measures = measures_of(record)
     except InputError as error:
         yield f"the samples are no accelerogram: {error}"
         return
-    for name in MEASURES:
-        stored, now = row[name], getattr(measures, name)
-        if not same_measure(name, stored, now, measures.pgv_m_s, measures.pgd_m):
+    for name, now in measures.items():
+        stored = row[name]
+        if not same_measure(name, stored, now, record.pgv_m_s, record.pgd_m):
             yield f"{name} is {stored!r}, the samples give {now!r}"
 
 

@@ -9,7 +9,7 @@ from sqlalchemy import Connection, RowMapping, Select, func, select
 
 from rbfrag.db.insert import insert_if_new, insert_row, update_rows
 from rbfrag.db.merge.ledger import Ledger, Merge
-from rbfrag.db.motions import MEASURES, delete_orphans, same_measure
+from rbfrag.db.motions import LATER_MEASURES, MEASURES, delete_orphans, same_measure
 from rbfrag.db.schema import earthquake, motion, recording, suite, suite_motion
 
 _OWN = ("id", "recording_id", "dt_s", "npts", "samples_sha256", "samples", "added", "digest")
@@ -37,6 +37,13 @@ def merge_motions(merge: Merge) -> None:
         if ours["samples_sha256"] != theirs["samples_sha256"]:
             merge.other_bits[theirs["id"]] = ours["samples_sha256"]
         _compare_measures(ours, theirs, ledger)
+        missing = {
+            name: theirs[name]
+            for name in LATER_MEASURES
+            if ours[name] is None and theirs[name] is not None
+        }
+        if missing:
+            update_rows(target, motion, motion.c.id == ours["id"], missing)
         same_bits = theirs["id"] not in merge.other_bits
         if same_bits and ours["no_samples"] and not theirs["no_samples"]:
             samples = {"samples": _samples(source, theirs["id"])}
@@ -186,7 +193,8 @@ def _compare_measures(ours: RowMapping, theirs: RowMapping, ledger: Ledger) -> N
     if ours["npts"] != theirs["npts"]:
         ledger.conflict("motion", _name(ours), "npts", ours["npts"], theirs["npts"])
     for column in MEASURES:
-        if not same_measure(column, ours[column], theirs[column], *peaks):
+        unknown = column in LATER_MEASURES and None in (ours[column], theirs[column])
+        if not unknown and not same_measure(column, ours[column], theirs[column], *peaks):
             ledger.conflict("motion", _name(ours), column, ours[column], theirs[column])
 
 

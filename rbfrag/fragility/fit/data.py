@@ -19,6 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
+from rbfrag.fragility.fit.censoring import censoring_weights
+from rbfrag.fragility.fit.domain import ranges_of, ratio_columns
 from rbfrag.fragility.fit.scores import Judged, critical_outcomes
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, Method
@@ -218,6 +220,8 @@ class FitData:
         n_outside_model: combinations for which the block model does not apply.
         guessed_events: number of earthquakes read off file headers.
         fingerprint: hash of natural keys and fitted values.
+        weights: what each outcome counts where it is judged, shape (n, m), so that those known
+            stand for those not known; None: each the same.
     """
 
     kind: str
@@ -236,6 +240,7 @@ class FitData:
     n_outside_model: int = 0
     guessed_events: int = 0
     fingerprint: str = ""
+    weights: FloatArray | None = None
 
     @property
     def x(self) -> FloatArray:
@@ -261,7 +266,10 @@ class FitData:
     def judged(self) -> Judged:
         """What the fit is judged on."""
         known = np.isfinite(self.failed) & self.read
-        return Judged(np.where(known, self.failed, 0.0), known, self.event, self.outcomes)
+        if self.weights is not None:
+            known &= self.weights > 0.0
+        failed = np.where(known, self.failed, 0.0)
+        return Judged(failed, known, self.event, self.outcomes, self.weights)
 
     def grid(self, name: str) -> FloatArray:
         """Return a value of the blocks of the grid, shape (n, m)."""
@@ -282,6 +290,7 @@ class _Points:
     read: NDArray[np.bool_]
     outcomes: str
     ranges: dict[str, FloatArray]
+    weights: FloatArray | None = None
 
 
 def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None = None) -> FitData:
@@ -331,20 +340,16 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         failed=failed,
         read=points.read[chosen],
         outcomes=points.outcomes,
-        domain=_domain({name: v[chosen] for name, v in points.ranges.items()}),
+        domain=ranges_of({name: v[chosen] for name, v in points.ranges.items()}),
         n_total=int(table.p2.size),
         n_excluded=int((points.observed & ~np.isfinite(points.values["intensity_m_s"])).sum()),
         n_outside_model=int((table.status == "outside_model").sum()),
         guessed_events=len(set(table.event_id[own][table.event_guessed[own]].tolist())),
         fingerprint=_fingerprint(keys[chosen], names[event], values, observed, failed, of_outcomes),
+        weights=None if points.weights is None else points.weights[chosen],
     )
     _refuse_thin(data, method, term)
     return data
-
-
-def _domain(ranges: Mapping[str, FloatArray]) -> dict[str, tuple[float, float]]:
-    finite = {name: values[np.isfinite(values)] for name, values in ranges.items()}
-    return {name: (float(v.min()), float(v.max())) for name, v in finite.items() if v.size}
 
 
 def _fingerprint(
@@ -404,14 +409,6 @@ def _column(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     return {name: value[:, None] for name, value in values.items()}
 
 
-def _pulse_s(source: FitSource) -> FloatArray:
-    """Return PGV/(PGA g) of the records as they are [s]."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(
-            source.table.pgv_m_s / (source.table.pga_g * STANDARD_GRAVITY_M_S2), dtype=np.float64
-        )
-
-
 def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     """Return the points of blocks of any strength k_r and some size p²."""
     table = source.table
@@ -451,9 +448,9 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
         "intensity_m_s": x,
         "y_m_s": np.where(read, y0, np.nan)[:, some] if of_outcomes else y,
         "tm_s": table.tm_s,
+        **{name: given[name] for name in term.inputs if not np.array_equal(given[name], x, True)},
+        **ratio_columns({**given, "p": p}),
     }
-    if "pgv_m_s" in term.inputs and "pga_g" in term.inputs:
-        ranges["pgv_over_pga_s"] = _pulse_s(source)
     if not of_outcomes:
         ranges = {name: np.where(observed, v, np.nan) for name, v in ranges.items()}
     return _Points(
@@ -471,7 +468,11 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
 
 
 def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
-    """Return the points of blocks of known strength and size under scaled records."""
+    """Return the points of blocks of known strength and size under scaled records.
+
+    A block that fails under a scale of the record counts as failing under all greater ones, also
+    where the model would end before: P is that of failing at this shaking or at weaker.
+    """
     table = source.table
     assert source.strength_g is not None
     strength = source.strength_g
@@ -482,28 +483,31 @@ def _scaled_records(source: FitSource, method: Method, term: Term) -> _Points:
     size = np.sqrt(table.p2)
     block = {method.block.strength: strength, str(method.block.size): table.p2, "p": size}
     block["y_m_s"] = strength * STANDARD_GRAVITY_M_S2 / size
-    k = source.k_over_pga if source.k_over_pga.shape[1] else np.tile(K_OVER_PGA, (ratio.size, 1))
+    stored = source.k_over_pga
+    k = stored if stored.shape[1] else np.tile(K_OVER_PGA, (ratio.size, 1))
+    usable = known & (ratio < 1.0)
+    failed, decided = critical_outcomes(ratio, observed, k)
+    weights = np.zeros(k.shape)
+    weights[usable] = censoring_weights(*(part[usable] for part in (ratio, observed, k, strength)))
 
     def shaking(k: FloatArray, strength: FloatArray, per_pga: FloatArray) -> dict[str, FloatArray]:
         # the scaled record: its PGA is k over the ratio, and PGV goes with it
         of_record = {"pga_g": strength / k, "pgv_m_s": strength / k * per_pga}
         return {**of_record, "intensity_m_s": term.intensity_m_s(of_record)}
 
-    if not source.k_over_pga.shape[1]:
-        source = FitSource(table, source.xp_m_s, k, np.full(k.shape, np.nan))
-    failed, source_of_outcomes = source.judged_outcomes(k, ratio)
     return _Points(
         values={**shaking(ratio, strength, per_pga), **block},
         observed=observed,
-        usable=known & (ratio < 1.0),
+        usable=usable,
         combination=np.arange(ratio.size),
         order=np.zeros(ratio.size),
         blocks={**shaking(k, strength[:, None], per_pga[:, None]), **_column(block)},
-        failed=failed,
+        failed=np.where(decided, failed, np.nan),
         read=np.isfinite(k),
-        outcomes=source_of_outcomes,
+        outcomes="critical values, weighted for those that are not known",
+        weights=weights,
         ranges={
-            "pgv_over_pga_s": _pulse_s(source),
+            **ratio_columns({**_measures(source), "p": size}),
             str(method.block.size): table.p2,
             "y_m_s": block["y_m_s"],
             "k_over_pga": np.column_stack([ratio, np.ones(ratio.size)]),
@@ -542,7 +546,7 @@ def _displacements(source: FitSource, method: Method, term: Term) -> _Points:
         read=np.ones(failed.shape, dtype=np.bool_),
         outcomes="simulated outcomes",
         ranges={
-            "pgv_over_pga_s": _pulse_s(source)[own],
+            **ratio_columns(measures),
             "pgv_m_s": values["pgv_m_s"],
             "pga_g": values["pga_g"],
             "displacement_m": np.where(observed, beyond, np.nan),

@@ -14,6 +14,7 @@ from rbfrag.db.model_file import ModelRow
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.data import FitData, FitSource, fit_data, read_source
+from rbfrag.fragility.fit.domain import joint_scatter
 from rbfrag.fragility.fit.report import FitReport, log_correlations, power_law
 from rbfrag.fragility.fit.result import MethodResult
 from rbfrag.fragility.interval_floor import interval_floor, of_motions, of_sizes
@@ -211,6 +212,7 @@ def fit_source(
             "doubtful_pgd": chosen.get("doubtful_pgd", False),
             "vertical": chosen.get("vertical", "without"),
             "rotation_deg": chosen.get("rotation_deg"),
+            "mahalanobis": _scatter(data, method, term),
             **result.details,
         },
         created=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -218,6 +220,15 @@ def fit_source(
     if compared:
         row = _with_floor(row, source)
     return Fitted(FitReport.from_model(FragilityModel.from_row(row)), data, result)
+
+
+def _scatter(data: FitData, method: Method, term: Term) -> dict[str, object] | None:
+    """Return how the points scatter that are fitted: what mechanics rules out is not."""
+    fitted = data.read.copy()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        for bound in method.forms[term.name].bounds:
+            fitted &= ~bound.holds(data.blocks)
+    return joint_scatter((*method.block.names, *term.inputs), data.blocks, fitted)
 
 
 def _refuse_unfit(

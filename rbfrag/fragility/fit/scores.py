@@ -31,12 +31,20 @@ class Judged:
         known: where the outcome is known.
         event: number of each row's earthquake, shape (n,).
         source: where the outcomes come from.
+        weights: what each known outcome counts, shape (n, m); None: each the same.
     """
 
     failed: FloatArray
     known: Mask
     event: NDArray[np.intp]
     source: str
+    weights: FloatArray | None = None
+
+    @property
+    def counts(self) -> FloatArray:
+        """What each outcome counts, 0 where it is not known, shape (n, m)."""
+        known = self.known.astype(np.float64)
+        return known if self.weights is None else known * self.weights
 
 
 def critical_outcomes(
@@ -54,21 +62,29 @@ def critical_outcomes(
     return (reached & observed[:, None]).astype(np.float64), known
 
 
-def log_loss(probability: FloatArray, outcome: FloatArray, known: Mask) -> float:
-    """Return the mean log loss of the known outcomes."""
+def log_loss(
+    probability: FloatArray, outcome: FloatArray, known: Mask, weights: FloatArray | None = None
+) -> float:
+    """Return the mean log loss of the known outcomes; `weights` None for equal ones."""
     p = np.clip(probability[known], CLIP, 1.0 - CLIP)
     hit = outcome[known] > 0.0
-    return float(-np.mean(np.log(np.where(hit, p, 1.0 - p))))
+    return _mean(-np.log(np.where(hit, p, 1.0 - p)), known, weights)
 
 
-def brier(probability: FloatArray, outcome: FloatArray, known: Mask) -> float:
+def brier(
+    probability: FloatArray, outcome: FloatArray, known: Mask, weights: FloatArray | None = None
+) -> float:
     """Return the Brier score, the mean squared error of the probability."""
-    return float(np.mean((probability[known] - outcome[known]) ** 2))
+    return _mean((probability[known] - outcome[known]) ** 2, known, weights)
 
 
-def sharpness(probability: FloatArray, known: Mask) -> float:
+def sharpness(probability: FloatArray, known: Mask, weights: FloatArray | None = None) -> float:
     """Return the mean of P (1 - P): what the Brier score would be of a calibrated model."""
-    return float(np.mean(probability[known] * (1.0 - probability[known])))
+    return _mean(probability[known] * (1.0 - probability[known]), known, weights)
+
+
+def _mean(values: FloatArray, known: Mask, weights: FloatArray | None) -> float:
+    return float(np.mean(values) if weights is None else np.average(values, weights=weights[known]))
 
 
 @dataclass(frozen=True)
@@ -117,16 +133,16 @@ def scores_of(judged: Judged, in_sample: FloatArray, held_out: FloatArray) -> di
         in_sample: probabilities by the fit to all data, shape (n, m).
         held_out: probabilities by fits without the earthquake concerned.
     """
-    failed, known = judged.failed, judged.known
-    line = calibration(held_out, failed, known)
+    outcomes = judged.failed, judged.known, judged.weights
+    line = calibration(held_out, *outcomes)
     result = {
-        "log_loss_in_sample": log_loss(in_sample, failed, known),
-        "log_loss_held_out": log_loss(held_out, failed, known),
-        "brier_in_sample": brier(in_sample, failed, known),
-        "brier_held_out": brier(held_out, failed, known),
+        "log_loss_in_sample": log_loss(in_sample, *outcomes),
+        "log_loss_held_out": log_loss(held_out, *outcomes),
+        "brier_in_sample": brier(in_sample, *outcomes),
+        "brier_held_out": brier(held_out, *outcomes),
         "calibration_slope_held_out": line.slope,
         "calibration_intercept_held_out": line.intercept,
-        "sharpness_held_out": sharpness(held_out, known),
+        "sharpness_held_out": sharpness(held_out, judged.known, judged.weights),
     }
     return {name: value for name, value in result.items() if np.isfinite(value)}
 
@@ -136,7 +152,8 @@ def score_intervals(judged: Judged, held_out: FloatArray, *, seed: int) -> dict[
     random = np.random.default_rng(seed)
     g = int(judged.event.max()) + 1
     drawn = random.multinomial(g, np.full(g, 1.0 / g), size=RESAMPLES).astype(np.float64)
-    count = np.bincount(judged.event, judged.known.sum(axis=1), minlength=g)
+    counts = judged.counts
+    count = np.bincount(judged.event, counts.sum(axis=1), minlength=g)
     p = np.clip(held_out, CLIP, 1.0 - CLIP)
     losses = {
         "log_loss_held_out": -np.where(judged.failed > 0.5, np.log(p), np.log1p(-p)),
@@ -144,7 +161,7 @@ def score_intervals(judged: Judged, held_out: FloatArray, *, seed: int) -> dict[
     }
     result = {}
     for name, loss in losses.items():
-        lost = np.where(judged.known, loss, 0.0).sum(axis=1)
+        lost = (counts * loss).sum(axis=1)
         means = (drawn @ np.bincount(judged.event, lost, minlength=g)) / np.maximum(
             drawn @ count, 1.0
         )
@@ -192,7 +209,7 @@ def calibration_bins(judged: Judged, held_out: FloatArray, *, seed: int = 0) -> 
     """
     used = judged.known & np.isfinite(held_out)
     event = np.broadcast_to(judged.event[:, None], held_out.shape)[used]
-    p, failed = held_out[used], judged.failed[used]
+    p, failed, counts = held_out[used], judged.failed[used], judged.counts[used]
     number = np.clip(np.searchsorted(EDGES, p, side="right") - 1, 0, EDGES.size - 2)
     events, which = np.unique(event, return_inverse=True)
     shape = (events.size, EDGES.size - 1)
@@ -202,7 +219,7 @@ def calibration_bins(judged: Judged, held_out: FloatArray, *, seed: int = 0) -> 
         counted = np.bincount(cell, weights, minlength=shape[0] * shape[1])
         return counted.reshape(shape).astype(np.float64)
 
-    count, failures, expected = table(None), table(failed), table(p)
+    count, failures, expected = table(counts), table(counts * failed), table(counts * p)
 
     def failed_fraction(chosen: NDArray[np.int64]) -> FloatArray:
         total = count[chosen].sum(axis=0)
@@ -216,15 +233,15 @@ def calibration_bins(judged: Judged, held_out: FloatArray, *, seed: int = 0) -> 
     draws = [
         failed_fraction(rng.integers(events.size, size=events.size)) for _ in range(REPLICATIONS)
     ]
-    total = count.sum(axis=0)
-    kept = total >= FEWEST_BLOCKS
+    total, number_of = count.sum(axis=0), table(None).sum(axis=0)
+    kept = number_of >= FEWEST_BLOCKS
     low, high = np.nanquantile(np.array(draws)[:, kept], (0.025, 0.975), axis=0)
     return CalibrationBins(
         predicted=expected.sum(axis=0)[kept] / total[kept],
         observed=failures.sum(axis=0)[kept] / total[kept],
         low=low,
         high=high,
-        blocks=total[kept].astype(np.intp),
+        blocks=number_of[kept].astype(np.intp),
         events=int(events.size),
     )
 

@@ -6,14 +6,13 @@ Revision: 0004
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Mapping
 
 import sqlalchemy as sa
 from alembic import op
 
-from rbfrag.db.insert import table_digests
 from rbfrag.db.keys import canonical_json, key_of_row
+from rbfrag.migrations.tables import execute_many, fill_digests, rebuild_table, reflected
 
 revision = "0004"
 down_revision = "0003"
@@ -24,7 +23,6 @@ _TABLES = (
     "campaign", "combination", "earthquake", "fragility_model", "motion", "outcome_interval",
     "recording", "response", "simulation", "suite", "suite_motion", "toppling_spectrum",
 )  # fmt: skip
-_OF_ARRAYS = ("motion", "response")
 _KIND = "kind IN ('toppling', 'sliding', 'slumping', 'confined_toppling')"
 _STATUS = "status IN ('found', 'below_limit', 'no_motion', 'outside_model')"
 _AFTER: Mapping[str, Mapping[str, str]] = {
@@ -68,7 +66,7 @@ def upgrade() -> None:
     _number_curves_of_sliding(connection)
     for name in _TABLES:
         op.add_column(name, sa.Column("digest", sa.BigInteger(), nullable=True))
-        _fill_digests(connection, name)
+        fill_digests(connection, name)
         nullable = {"digest": False}
         if name == "combination":
             nullable |= {"reentrant": True, "search_limit": True}
@@ -99,7 +97,7 @@ def downgrade() -> None:
 
 def _take_maps_out_of_keys(connection: sa.Connection) -> None:
     """Key combinations without how their map was made; of two that differ in it, keep the finer."""
-    combination, motion = _reflected(connection, "combination"), _reflected(connection, "motion")
+    combination, motion = reflected(connection, "combination"), reflected(connection, "motion")
     vertical = motion.alias("vertical")
     query = sa.select(
         combination,
@@ -127,11 +125,11 @@ def _take_maps_out_of_keys(connection: sa.Connection) -> None:
         if other is None or order < other[0]:
             best[key] = (order, row["id"], text)
     for table in ("simulation", "outcome_interval"):
-        _execute_many(
+        execute_many(
             connection, f"DELETE FROM {table} WHERE combination_id = :id", {"id": superseded}
         )
-    _execute_many(connection, "DELETE FROM combination WHERE id = :id", {"id": superseded})
-    _execute_many(
+    execute_many(connection, "DELETE FROM combination WHERE id = :id", {"id": superseded})
+    execute_many(
         connection,
         "UPDATE combination SET natural_key = :key, settings = :settings WHERE id = :id",
         {
@@ -160,46 +158,11 @@ def _number_curves_of_sliding(connection: sa.Connection) -> None:
         if len(strengths) == _STRENGTHS_OF_SLIDING
         for number, strength in enumerate(strengths)
     ]
-    _execute_many(
+    execute_many(
         connection,
         "UPDATE simulation SET grid = :grid WHERE combination_id = :id AND kr_over_pga = :strength",
         dict(zip(("grid", "id", "strength"), map(list, zip(*numbers, strict=True)), strict=False)),
     )
-
-
-def _fill_digests(connection: sa.Connection, name: str) -> None:
-    table = _reflected(connection, name)
-    columns = [column.name for column in table.c]
-    keys = [column.name for column in table.primary_key.columns]
-    condition = " AND ".join(f"{key} = :{key}" for key in keys)
-    for rows in _batches(connection, table):
-        values = {key: [row[columns.index(key)] for row in rows] for key in keys}
-        values["digest"] = table_digests(table, columns, rows)
-        _execute_many(connection, f"UPDATE {name} SET digest = :digest WHERE {condition}", values)
-
-
-def _batches(connection: sa.Connection, table: sa.Table) -> Iterator[list[tuple[Any, ...]]]:
-    # read by key and not by one open cursor, which writing to the same table would disturb
-    keys = list(table.primary_key.columns)
-    at_once = 16 if table.name in _OF_ARRAYS else 20_000
-    query = sa.select(table).order_by(*keys).limit(at_once)
-    rows = connection.execute(query).all()
-    while rows:
-        yield [tuple(row) for row in rows]
-        last = [rows[-1]._mapping[key] for key in keys]
-        rows = connection.execute(query.where(sa.tuple_(*keys) > sa.tuple_(*last))).all()
-
-
-def _reflected(connection: sa.Connection, name: str) -> sa.Table:
-    return sa.Table(name, sa.MetaData(), autoload_with=connection, resolve_fks=False)
-
-
-def _execute_many(
-    connection: sa.Connection, statement: str, values: Mapping[str, list[Any]]
-) -> None:
-    parameters = [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
-    if parameters:
-        connection.execute(sa.text(statement), parameters)
 
 
 def _change(
@@ -211,8 +174,7 @@ def _change(
 ) -> None:
     """Change which columns a table has or may leave empty, and its named checks."""
     if op.get_context().dialect.name == "sqlite":
-        dropped = {f"ck_{name}_{each}" for each in checks_before}
-        _rebuild(name, nullable, dropped, checks_after, left_out)
+        rebuild_table(name, nullable, tuple(checks_before), checks_after, left_out=left_out)
         return
     for each in checks_before:
         op.drop_constraint(op.f(f"ck_{name}_{each}"), name, type_="check")
@@ -224,57 +186,3 @@ def _change(
         op.alter_column(name, column, nullable=may_be)
     for each, rule in checks_after.items():
         op.create_check_constraint(op.f(f"ck_{name}_{each}"), name, rule)
-
-
-def _rebuild(
-    name: str,
-    nullable: Mapping[str, bool],
-    dropped: set[str],
-    checks: Mapping[str, str],
-    left_out: tuple[str, ...],
-) -> None:
-    """Make an SQLite table anew as it is, but for what changes, and move its rows."""
-    connection = op.get_bind()
-    inspector = sa.inspect(connection)
-    old = _reflected(connection, name)
-    indexes = connection.scalars(
-        sa.text("SELECT sql FROM sqlite_master WHERE type = 'index' AND tbl_name = :name "
-                "AND sql IS NOT NULL"), {"name": name},
-    ).all()  # fmt: skip
-    rules = {
-        str(check["name"]): check["sqltext"]
-        for check in inspector.get_check_constraints(name)
-        if check["name"] not in dropped
-    } | {f"ck_{name}_{each}": rule for each, rule in checks.items()}
-    columns = [column.name for column in old.c if column.name not in left_out]
-    op.create_table(
-        f"{name}_rebuilt",
-        *(
-            sa.Column(each, old.c[each].type, nullable=nullable.get(each, old.c[each].nullable))
-            for each in columns
-        ),
-        *(sa.CheckConstraint(rule, name=op.f(each)) for each, rule in sorted(rules.items())),
-        *(
-            sa.ForeignKeyConstraint(
-                key["constrained_columns"],
-                [f"{key['referred_table']}.{column}" for column in key["referred_columns"]],
-                name=op.f(str(key["name"])),
-                ondelete=key["options"]["ondelete"],
-            )
-            for key in inspector.get_foreign_keys(name)
-        ),
-        sa.PrimaryKeyConstraint(
-            *(column.name for column in old.primary_key.columns), name=op.f(f"pk_{name}")
-        ),
-        *(
-            sa.UniqueConstraint(*unique["column_names"], name=op.f(str(unique["name"])))
-            for unique in inspector.get_unique_constraints(name)
-        ),
-        sqlite_with_rowid=inspector.get_table_options(name).get("sqlite_with_rowid", True),
-    )
-    listed = ", ".join(columns)
-    op.execute(f"INSERT INTO {name}_rebuilt ({listed}) SELECT {listed} FROM {name}")
-    op.drop_table(name)
-    op.rename_table(f"{name}_rebuilt", name)
-    for statement in indexes:
-        op.execute(statement)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -54,15 +55,33 @@ def test_leaving_the_censored_rows_out_would_be_wrong() -> None:
     assert np.abs(right - true).max() < 0.5 * np.abs(wrong - true).max()
 
 
-def test_a_slump_is_judged_by_the_outcomes_that_are_stored() -> None:
+def test_what_is_not_known_of_a_slump_is_weighed_bounded_and_told() -> None:
     source = drawn("slumping", "pgv_pga", n=600)
-    by_critical = fit(source, kind="slumping", term="pgv_pga")
-    assert by_critical.details["judged_on"] == "critical values (safe islands are not seen)"
     k = np.tile(np.geomspace(0.02, 0.95, 25), (600, 1))
-    failed = (source.table.kr_over_pga[:, None] >= k).astype(float)
-    stored = fit(replace(source, k_over_pga=k, failed=failed), kind="slumping", term="pgv_pga")
-    assert stored.details["judged_on"] == "simulated outcomes"
-    assert stored.coefficients == by_critical.coefficients
+    found = (source.table.status == "found")[:, None]
+    limit = source.table.search_limit[:, None]
+    report = fit(replace(source, k_over_pga=k, failed=k * np.nan), kind="slumping", term="pgv_pga")
+    assert "critical values" in str(report.details["judged_on"])
+    unknown: Any = report.details["unknown_outcomes"]
+    assert unknown["share"] == pytest.approx(np.mean(~found & (k <= limit)))
+    assert 0.02 < unknown["share"] < 0.6
+    assert any(f"{100 * unknown['share']:.0f} % of the outcomes are not known" in text
+               for text in report.warnings)  # fmt: skip
+    low, high = (report.scores[f"log_loss_held_out_{end}"] for end in ("least", "most"))
+    assert low < report.scores["log_loss_held_out"] < high
+    # a block that fails does so under all stronger shaking, also where its model ends before
+    data = fit_data(source, METHOD_OF["slumping"], TERMS["pgv_pga"])
+    asked = data.grid("ks") / data.grid("pga_g")
+    critical = (data.values["ks"] / data.values["pga_g"])[:, None]
+    fails = data.observed[:, None] & (asked <= critical)
+    assert np.array_equal(data.failed == 1.0, fails)
+    assert np.array_equal(np.isnan(data.failed), ~data.observed[:, None] & (asked <= critical))
+
+
+def test_a_slide_has_no_unknown_outcomes() -> None:
+    report = fit(drawn("sliding", "pgv_pga", n=600), kind="sliding", term="pgv_pga")
+    assert "unknown_outcomes" not in report.details
+    assert "log_loss_held_out_least" not in report.scores
 
 
 @pytest.mark.parametrize("kind", ["toppling", "sliding", "slumping"])

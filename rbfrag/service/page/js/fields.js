@@ -1,5 +1,8 @@
 /** The fields of the form: texts in, texts out, and what is wrong beside the field. */
 
+import { byId } from "./page.js";
+import { MEASURES, SPECTRAL } from "./question.js";
+
 /**
  * @typedef {import("./question.js").Question} Question
  * @typedef {import("./question.js").Shape} Shape
@@ -7,7 +10,7 @@
 
 const NAMES = [
   ...["p2", "kr", "alpha1", "alpha3", "r3", "s1", "s2", "gamma", "beta", "phi"],
-  ...["pgv", "pga", "tm", "pgd", "model", "level", "units", "dt", "trace"],
+  ...[...MEASURES, "model", "level", "units", "dt", "trace"],
 ];
 
 /** Names of fields as they stand in the service's sentences, with or without their unit. */
@@ -44,6 +47,9 @@ export function formFields(form, changed) {
       const text = question.values[input.id] ?? "";
       if (input.type === "checkbox") input.checked = text === "true";
       else if (input.value.trim() !== text) offer(input, text);
+    }
+    if (SPECTRAL.some((name) => question.values[name])) {
+      byId("spectral").toggleAttribute("open", true);
     }
     for (const radio of shapes()) radio.checked = radio.value === shape;
     for (const part of form.querySelectorAll("[data-shape]")) {

@@ -3,14 +3,18 @@
 import { fromField, ratios } from "./numbers.js";
 
 /**
- * @typedef {"pgv" | "pga" | "pgd"} Across the measure that runs across
+ * @typedef {"pgv" | "pga" | "pgd" | "sa03_g" | "sa10_g" | "sa20_g" | "sa30_g"} Across the measure that runs across
  * @typedef {{across: Across, x: [number, number], y: [number, number], perKr: number, p2: number,
  *   toIntensity: number, xEdges: number[], yEdges: number[]}} Plane
  *   x and y are the ranges shown, y being the toppling velocity [m/s]; perKr is y over k_r at this
  *   p2, toIntensity the model's intensity over x; the edges are ends of the fitted ranges
  */
 
-const PLAIN = { pgv: [0.05, 3], pga: [0.03, 3], pgd: [0.003, 3] };
+const SA = [0.03, 3];
+const PLAIN = {
+  ...{ pgv: [0.05, 3], pga: [0.03, 3], pgd: [0.003, 3] },
+  ...{ sa03_g: SA, sa10_g: SA, sa20_g: SA, sa30_g: SA },
+};
 const PLAIN_Y = [0.02, 3];
 const MARGIN = 1.35;
 const BEYOND = 1.06;
@@ -25,6 +29,10 @@ const LABELS = {
   pgv: ["peak ground velocity PGV", "m/s"],
   pga: ["peak ground acceleration PGA", "g"],
   pgd: ["peak ground displacement PGD", "m"],
+  sa03_g: ["spectral acceleration SA(0.3 s)", "g"],
+  sa10_g: ["spectral acceleration SA(1 s)", "g"],
+  sa20_g: ["spectral acceleration SA(2 s)", "g"],
+  sa30_g: ["spectral acceleration SA(3 s)", "g"],
 };
 
 /**
@@ -110,12 +118,15 @@ function lines([low, high], edges, count) {
 }
 
 /**
+ * The measure that a term's intensity is of.
  * @param {string} term
  * @returns {Across}
  */
 function acrossOf(term) {
   if (term.startsWith("pgd")) return "pgd";
-  return term === "pga_tm" ? "pga" : "pgv";
+  if (/(^|_)sa10(_|$)/.test(term)) return "sa10_g";
+  if (/^sa[0-9]/.test(term)) return /** @type {Across} */ (`${term}_g`);
+  return term.startsWith("pga") ? "pga" : "pgv";
 }
 
 /**

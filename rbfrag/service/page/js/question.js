@@ -12,7 +12,9 @@ export const BLOCK_FIELDS = {
   fractures: ["s1", "s2", "gamma", "beta", "phi", "no_back"],
 };
 
-export const MEASURES = ["pgv", "pga", "tm", "pgd"];
+export const SPECTRAL = ["sa03_g", "sa10_g", "sa20_g", "sa30_g"];
+
+export const MEASURES = ["pgv", "pga", "tm", "pgd", ...SPECTRAL];
 
 export const MODEL_FIELDS = ["model", "level"];
 
@@ -33,6 +35,10 @@ export const DEFAULTS = {
   pga: "",
   tm: "",
   pgd: "",
+  sa03_g: "",
+  sa10_g: "",
+  sa20_g: "",
+  sa30_g: "",
   model: "",
   level: "0.95",
 };

@@ -1,0 +1,219 @@
+"""Where a model's answers rest on data, jointly: ratios of measures, and the distance from the fit.
+
+A range of each variable by itself says nothing of values that do not go together. The ratios here
+do not change when a motion is scaled and name what contradicts what; the distance of Mahalanobis
+(1936) in the logarithms of block and measures says the rest. No library is loaded here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple
+
+from rbfrag.errors import ModelError
+from rbfrag.fragility.measures import SPECTRAL
+from rbfrag.fragility.methods import Numbers
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+INSIDE = 0.995
+"""Share of the fitted points that lie within the fitted distance."""
+
+MEASURE_WORDS: Mapping[str, tuple[str, str]] = {
+    "pgv_m_s": ("a PGV", " m/s"),
+    "pga_g": ("a PGA", " g"),
+    "tm_s": ("a Tm", " s"),
+    "pgd_m": ("a PGD", " m"),
+    **{name: (f"an SA({period:.1f})", " g") for period, name in SPECTRAL.items()},
+    "p": ("a block's p", " 1/s"),
+}
+"""What each value of a ratio is called, and its unit."""
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """A ratio of measures that does not change when the motion is scaled.
+
+    Args:
+        name: its name in the stored domain.
+        symbol: its formula for people.
+        unit: its unit, empty for none.
+        of: the values that it is made of; the first is the one that does not go with the others.
+        formula: the ratio from the values by name.
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    of: tuple[str, ...]
+    formula: Callable[[Mapping[str, Any]], Any]
+
+    def contradiction(
+        self, values: Mapping[str, float], ratio: float, low: float, high: float
+    ) -> str:
+        """Return the sentence for values whose ratio is not between `low` and `high`."""
+        first, *others = (
+            f"{MEASURE_WORDS[name][0]} of {values[name]:.3g}{MEASURE_WORDS[name][1]}"
+            for name in self.of
+        )
+        return (
+            f"{first} does not go with {' and '.join(others)}: {self.symbol} is "
+            f"{ratio:.2g}{self.unit}, the fitted motions hold {low:.2g} to "
+            f"{high:.2g}{self.unit}: the answer is an extrapolation"
+        )
+
+    def in_general(self, low: float, high: float) -> str:
+        """Return the sentence for many values."""
+        first, *others = (MEASURE_WORDS[name][0].partition(" ")[2] for name in self.of)
+        return (
+            f"{first} does not go with {' and '.join(others)}: {self.symbol} is outside the fitted "
+            f"{low:.2g} to {high:.2g}{self.unit}: the answer is an extrapolation"
+        )
+
+
+def _over(name: str, factor: float, other: str, values: Mapping[str, Any]) -> Any:
+    return values[name] * factor / values[other]
+
+
+def _sa_ratios() -> tuple[Ratio, ...]:
+    result = []
+    for period, name in SPECTRAL.items():
+        label = f"SA({period:.1f})"
+        to_velocity = STANDARD_GRAVITY_M_S2 * period / (2.0 * math.pi)
+        result += [
+            Ratio(
+                f"v{name[2:4]}_over_pgv",
+                f"{label}·g·T/2π over PGV",
+                "",
+                (name, "pgv_m_s"),
+                partial(_over, name, to_velocity, "pgv_m_s"),
+            ),
+            Ratio(
+                f"{name[:4]}_over_pga",
+                f"{label}/PGA",
+                "",
+                (name, "pga_g"),
+                partial(_over, name, 1.0, "pga_g"),
+            ),
+        ]
+    return tuple(result)
+
+
+RATIOS: tuple[Ratio, ...] = (
+    Ratio(
+        "pgv_over_pga_s",
+        "PGV/(PGA·g)",
+        " s",
+        ("pgv_m_s", "pga_g"),
+        lambda v: v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2),
+    ),
+    Ratio(
+        "pgv_over_pga_tm",
+        "PGV/(PGA·g·Tm/2π)",
+        "",
+        ("pgv_m_s", "pga_g", "tm_s"),
+        lambda v: v["pgv_m_s"] * (2.0 * math.pi / STANDARD_GRAVITY_M_S2) / (v["pga_g"] * v["tm_s"]),
+    ),
+    Ratio(
+        "z",
+        "z = p·PGV/(PGA·g)",
+        "",
+        ("p", "pgv_m_s", "pga_g"),
+        lambda v: v["p"] * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2),
+    ),
+    Ratio(
+        "pgd_pga_over_pgv2",
+        "PGD·PGA·g/PGV²",
+        "",
+        ("pgd_m", "pgv_m_s", "pga_g"),
+        lambda v: v["pgd_m"] / v["pgv_m_s"] * (v["pga_g"] * STANDARD_GRAVITY_M_S2 / v["pgv_m_s"]),
+    ),
+    *_sa_ratios(),
+)
+"""The ratios that are fitted and judged; PGD·PGA/PGV² after Newmark and Rosenblueth (1971)."""
+
+
+def ratios_of(known: Collection[str]) -> tuple[Ratio, ...]:
+    """Return the ratios that some values suffice for."""
+    return tuple(ratio for ratio in RATIOS if all(name in known for name in ratio.of))
+
+
+class Spread(NamedTuple):
+    """How the fitted points scatter: an ellipsoid in the logarithms of block and measures.
+
+    Args:
+        names: the values that the model reads.
+        centre: mean logarithms.
+        packed: inverse covariance of the logarithms on and below its diagonal, row by row, those
+            off it doubled.
+        radius2: squared distance within which the share `INSIDE` of the points lies.
+    """
+
+    names: tuple[str, ...]
+    centre: tuple[float, ...]
+    packed: tuple[float, ...]
+    radius2: float
+
+    def holds(self, values: Mapping[str, Any], ns: Numbers) -> Any:
+        """Return whether (where) values above zero lie within the fitted distance."""
+        return self.distance2(values, ns) <= self.radius2
+
+    def distance2(self, values: Mapping[str, Any], ns: Numbers) -> Any:
+        """Return the squared distance of Mahalanobis from the centre of the fitted points."""
+        log, packed = ns.log, self.packed
+        before: list[Any] = []
+        total, k = 0.0, 0
+        for name, middle in zip(self.names, self.centre):  # noqa: B905  (strict takes longer)
+            own = log(values[name]) - middle
+            before.append(own)
+            inner = 0.0
+            for each in before:
+                inner = inner + packed[k] * each
+                k += 1
+            total = total + inner * own
+        return total
+
+    @property
+    def sentence(self) -> str:
+        """What is said outside of it."""
+        *others, last = self.names
+        return (
+            f"{', '.join(others)} and {last} together lie further from the fitted ones than "
+            f"{100.0 * INSIDE:g} % of those do: the answer is an extrapolation"
+        )
+
+
+def stored_spread(name: str, diagnostics: Mapping[str, Any]) -> Spread | None:
+    """Return the scatter of the points that a stored model was fitted to; None if it has none.
+
+    Args:
+        name: the model's name.
+        diagnostics: what is stored with it.
+
+    Raises:
+        ModelError: it is not whole.
+    """
+    stored = diagnostics.get("mahalanobis")
+    if stored is None:
+        return None
+    try:
+        names, centre = tuple(stored["names"]), tuple(float(v) for v in stored["centre"])
+        packed = _packed(stored["inverse_covariance"], len(names))
+        radius = float(stored["radius"])
+        if len(centre) != len(names):
+            raise ValueError
+    except (KeyError, TypeError, ValueError, IndexError):
+        raise ModelError(
+            f"model {name!r} does not say whole how its points scatter: fit it again"
+        ) from None
+    return Spread(names, centre, packed, radius * radius)
+
+
+def _packed(matrix: Sequence[Sequence[float]], size: int) -> tuple[float, ...]:
+    if len(matrix) != size or any(len(line) != size for line in matrix):
+        raise ValueError
+    return tuple(
+        float(matrix[i][j]) * (1.0 if i == j else 2.0) for i in range(size) for j in range(i + 1)
+    )

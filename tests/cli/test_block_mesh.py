@@ -1,0 +1,113 @@
+"""`rbfrag block --mesh`: the answers of Python, a table that other commands read, refusals."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rbfrag
+from rbfrag.exchange.block_table import read_columns
+from tests.cli.conftest import Refuses, Shell
+from tests.conftest import ROOT
+from tests.meshes import box, write_obj
+
+BOULDER = ROOT / "docs" / "examples" / "boulder.obj"
+PAGE = ROOT / "docs" / "howto" / "block-from-mesh.md"
+
+
+def test_json_is_the_python_answer(shell: Shell) -> None:
+    answer = shell.json(
+        "block", "--mesh", BOULDER, "--density", "2650", "--contact-mm", "20", "--up", "z"
+    )
+    block = rbfrag.block_from_mesh(BOULDER, density_kg_m3=2650.0, contact_mm=20.0)
+    assert answer == block.as_dict()
+    weakest = block.hull.weakest()
+    assert (answer["kr"], answer["p2"], answer["azimuth_deg"]) == (
+        weakest.kr,
+        weakest.p2,
+        weakest.azimuth_deg,
+    )
+    assert answer["mass_kg"] == 2650.0 * answer["volume_m3"]
+    assert [row["contact_mm"] for row in answer["sensitivity"]] == [5.0, 10.0, 20.0, 30.0]
+    assert len(answer["azimuths"]) == 36
+    assert answer["kr"] <= min(row["kr"] for row in answer["azimuths"])
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_the_table_is_one_of_blocks(shell: Shell, suffix: str) -> None:
+    shell("block", "--mesh", BOULDER, "--out", f"blocks.{suffix}", "--plot", "block.png")
+    assert Path("block.png").stat().st_size > 10_000
+    shell("predict", "--batch", f"blocks.{suffix}", "--pgv", "0.9", "--out", "answers.csv")
+    block = rbfrag.block_from_mesh(BOULDER)
+    rocking = block.rocking()
+    found = read_columns(
+        "answers.csv", ("p2_1_s2", "kr", "restitution", "probability"), texts=("block_id",)
+    )
+    np.testing.assert_array_equal(found["kr"], np.minimum(rocking.kr_forward, rocking.kr_backward))
+    np.testing.assert_array_equal(found["p2_1_s2"], rocking.p2)
+    np.testing.assert_array_equal(found["restitution"], rocking.restitution)
+    assert found["block_id"][:2].tolist() == ["boulder-000", "boulder-005"]
+    assert np.all((found["probability"] >= 0.0) & (found["probability"] <= 1.0))
+    # shaking along an azimuth and its opposite is one line
+    other = block.hull.rocking(rocking.azimuth_deg + 180.0)
+    np.testing.assert_allclose(other.kr_forward, rocking.kr_backward, rtol=1e-12)
+    np.testing.assert_allclose(other.restitution_forward, rocking.restitution_backward, rtol=1e-12)
+
+
+def test_the_page_prints_what_the_command_prints(
+    shell: Shell, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    (printed,) = re.findall(r"^```text\n(.*?)^```", text, re.M | re.S)
+    assert "$ rbfrag block --mesh boulder.obj --density 2650 --out blocks.csv" in text
+    Path("boulder.obj").write_bytes(BOULDER.read_bytes())
+    result = shell("block", "--mesh", "boulder.obj", "--density", "2650", "--out", "blocks.csv")
+    assert printed == result.stdout + result.stderr
+    with Path("blocks.csv").open() as file:
+        assert f"`{file.readline().strip()}`" in text
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--s1", "1"), "--mesh does not go with --s1: a block is described once"),
+        (("--block", "b.toml"), "--mesh does not go with --block"),
+        (("--beta", "5"), "--beta does not go with --mesh"),
+        (("--no-back",), "--no-back does not go with --mesh"),
+        (("--kv", "0.1"), "--kv does not go with --mesh"),
+        (("--cohesion", "1"), "--cohesion does not go with --mesh"),
+        (("--up", "w"), "up = 'w'"),
+        (("--up", "y"), "not its resting pose"),
+        (("--contact-mm", "0"), "contact_mm = 0 is not above zero"),
+        (("--density", "0"), "density_kg_m3 = 0"),
+        (("--out", "blocks.xlsx"), "blocks.xlsx"),
+        (("--plot", "block.jpg"), "block.jpg"),
+    ],
+)
+def test_refused(refuses: Refuses, options: tuple[str, ...], words: str) -> None:
+    assert words in refuses("block", "--mesh", BOULDER, *options)
+
+
+@pytest.mark.parametrize("option", [("--up", "y"), ("--contact-mm", "5"), ("--out", "a.csv")])
+def test_options_of_a_mesh_need_one(refuses: Refuses, option: tuple[str, str]) -> None:
+    message = refuses("block", "--height", "2", "--width", "1", *option)
+    assert f"{option[0]} goes with --mesh" in message
+
+
+@pytest.mark.parametrize("suffix", ["obj", "ply", "stl"])
+@pytest.mark.parametrize("content", [b"", b"\xff\x00" * 200, b"solid a\nfacet normal\n"])
+def test_rubbish_is_refused(refuses: Refuses, suffix: str, content: bytes, tmp_path: Path) -> None:
+    (tmp_path / f"a.{suffix}").write_bytes(content)
+    assert f"a.{suffix}" in refuses("block", "--mesh", f"a.{suffix}")
+
+
+def test_doubts_go_to_standard_error(shell: Shell, tmp_path: Path) -> None:
+    vertices, faces = box(0.4, 0.5, 1.1)
+    write_obj(tmp_path / "a.obj", (1800.0 * vertices, faces[:, ::-1]))
+    result = shell("block", "--mesh", "a.obj")
+    assert "1980 m across" in result.stderr
+    assert "12 of 12 faces pointed inwards and were turned" in result.stderr
+    assert "mass_kg          -" in result.stdout

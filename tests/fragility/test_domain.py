@@ -1,0 +1,235 @@
+"""The joint domain: measures that do not go together, and points far from those of the fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rbfrag.db.model_file import ModelRow
+from rbfrag.errors import ModelError
+from rbfrag.fragility.domain import RATIOS, ratios_of
+from rbfrag.fragility.fit.data import FitData, fit_data
+from rbfrag.fragility.fit.domain import joint_scatter
+from rbfrag.fragility.fit.fitting import fit_source
+from rbfrag.fragility.measures import TERMS
+from rbfrag.fragility.methods import SINGLE, method_named
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.predict import Prediction, predict
+from rbfrag.fragility.prediction_array import PredictionArray
+from tests.fragility.outcome_draws import drawn_outcomes
+
+METHOD, TERM = method_named("bounded"), TERMS["pgv_pga_tm"]
+TRUE = (2.9, 2.3, 4.3, 2.6, 1.6, 1.3)
+
+REFERENCE_DOMAIN = {
+    "p2": (0.1, 30.0),
+    "intensity_m_s": (0.005, 1.77),
+    "y_m_s": (0.0005, 7.08),
+    "tm_s": (0.108, 1.912),
+    "pga_g": (0.004, 1.22),
+    "pgv_over_pga_s": (0.016, 0.4326),
+    "pgv_over_pga_tm": (0.4993, 2.818),
+}
+"""What 265 recorded motions hold."""
+
+
+def given_by_issue() -> dict[str, float]:
+    return {"p2": 9.5, "kr": 0.053, "pgv_m_s": 0.169, "pga_g": 0.906, "tm_s": 1.605}
+
+
+@pytest.fixture(scope="module")
+def source() -> Any:
+    return drawn_outcomes("bounded", "pgv_pga_tm", TRUE, events=20, motions=3)
+
+
+@pytest.fixture(scope="module")
+def data(source: Any) -> FitData:
+    return fit_data(source, METHOD, TERM)
+
+
+@pytest.fixture(scope="module")
+def fitted(source: Any) -> FragilityModel:
+    return fit_source(source, TERM, METHOD, compared=False).report.model
+
+
+def one(model: FragilityModel | ModelRow, **asked: float) -> Prediction:
+    answer = predict(**asked, model=model)
+    assert isinstance(answer, Prediction)
+    return answer
+
+
+def columns_of(data: FitData) -> dict[str, np.ndarray]:
+    names = ("p2", "kr", "pgv_m_s", "pga_g", "tm_s")
+    return {name: data.grid(name)[data.read] for name in names}
+
+
+def many(model: FragilityModel, columns: dict[str, np.ndarray]) -> PredictionArray:
+    answer = predict(**columns, model=model)
+    assert isinstance(answer, PredictionArray)
+    return answer
+
+
+def test_points_of_the_fit_are_in_the_domain(fitted: FragilityModel, data: FitData) -> None:
+    columns = columns_of(data)
+    answer = many(fitted, columns)
+    allowed = (columns["kr"] < columns["pga_g"]) & (answer.y_m_s < 2.0 * columns["pgv_m_s"])
+    assert 0.9949 <= answer.in_domain[allowed].mean() < 1.0
+    told = {text for text in answer.reason[allowed] if text}
+    assert told == {
+        "p2, kr, pgv_m_s, pga_g and tm_s together lie further from the fitted ones than 99.5 % of "
+        "those do: the answer is an extrapolation"
+    }
+
+
+def test_contradictory_measures_are_named() -> None:
+    form = METHOD.forms["pgv_pga_tm"]
+    size = len(form.parameters)
+    row = ModelRow(
+        name="bounded-pgv_pga_tm", term="pgv_pga_tm", method="bounded",
+        coefficients=dict(zip(form.parameters, TRUE, strict=True)),
+        covariance=tuple(tuple(0.01 * (i == j) for j in range(size)) for i in range(size)),
+        domain=REFERENCE_DOMAIN, data_fingerprint="f",
+    )  # fmt: skip
+    answer = one(row, **given_by_issue())
+    assert not answer.in_domain
+    assert answer.warnings == (
+        "a PGV of 0.169 m/s does not go with a PGA of 0.906 g and a Tm of 1.6 s: "
+        "PGV/(PGA·g·Tm/2π) is 0.074, the fitted motions hold 0.5 to 2.8: the answer is an "
+        "extrapolation",
+    )
+    as_array = predict(**{name: [v] for name, v in given_by_issue().items()}, model=row)
+    assert isinstance(as_array, PredictionArray)
+    assert not as_array.in_domain[0]
+    assert as_array.probability[0] == pytest.approx(answer.probability, rel=1e-12)
+    assert as_array.reason[0] == (
+        "PGV does not go with PGA and Tm: PGV/(PGA·g·Tm/2π) is outside the fitted 0.5 to 2.8: the "
+        "answer is an extrapolation"
+    )
+    # a motion that goes together, and one number that is out of its range by itself
+    assert one(row, **{**given_by_issue(), "pgv_m_s": 1.6}).in_domain
+    size_alone = one(row, **{**given_by_issue(), "pgv_m_s": 1.6, "p2": 40.0})
+    assert [text.split(" is ")[0] for text in size_alone.warnings] == ["p2 = 40 1/s²"]
+
+
+def test_measures_that_the_model_does_not_read_are_judged_too(model: FragilityModel) -> None:
+    row = replace(model.row, domain={**model.row.domain, "pgv_over_pga_tm": (0.5, 2.8)})
+    given_ = {**given_by_issue(), "tm_s": 1.4}
+    assert one(row, p2=9.5, kr=0.053, pgv_m_s=0.169).in_domain
+    beside = one(row, **given_)
+    assert not beside.in_domain
+    assert (
+        "a PGV of 0.169 m/s does not go with a PGA of 0.906 g and a Tm of 1.4 s"
+        in (beside.warnings[0])
+    )
+
+
+@settings(max_examples=80, deadline=None)
+@given(i=st.integers(0, 10**6), factor=st.floats(8.0, 100.0))
+def test_scaling_pgv_alone_leaves_the_domain(
+    fitted: FragilityModel, data: FitData, i: int, factor: float
+) -> None:
+    columns = columns_of(data)
+    own = {name: float(v[i % v.size]) for name, v in columns.items()}
+    own["kr"] = min(own["kr"], 0.5 * own["pga_g"])
+    answer = one(fitted, **{**own, "pgv_m_s": own["pgv_m_s"] * factor})
+    assert not answer.in_domain
+    assert any("a PGV of" in text and "does not go with" in text for text in answer.warnings)
+    # the whole motion scaled, the block's strength with it, contradicts nothing
+    scaled = {name: own[name] * factor for name in ("kr", "pgv_m_s", "pga_g")}
+    assert not any("does not go" in text for text in one(fitted, **{**own, **scaled}).warnings)
+
+
+def test_arrays_agree_with_scalars(fitted: FragilityModel, data: FitData) -> None:
+    random, n = np.random.default_rng(7), 300
+    rows = random.integers(0, int(data.read.sum()), n)
+    columns = {
+        name: v[rows] * np.exp(random.normal(0.0, 0.7, n)) for name, v in columns_of(data).items()
+    }
+    answer = many(fitted, columns)
+    assert 20 < answer.in_domain.sum() < n - 20
+    for i in range(n):
+        alone = one(fitted, **{name: float(v[i]) for name, v in columns.items()})
+        assert [answer.probability[i], answer.ci_low[i], answer.ci_high[i]] == pytest.approx(
+            [alone.probability, alone.ci_low, alone.ci_high], rel=1e-12, abs=1e-250
+        )
+        assert answer.in_domain[i] == alone.in_domain
+        assert len(alone.warnings) == len([r for r in answer.reason[i].split("; ") if r])
+
+
+def test_a_single_block_under_many_motions(fitted: FragilityModel, data: FitData) -> None:
+    columns = columns_of(data)
+    motions = {name: columns[name][:50] for name in ("pgv_m_s", "pga_g", "tm_s")}
+    held = predict(3.0, 0.01, **motions, model=fitted)
+    full = predict(np.full(50, 3.0), np.full(50, 0.01), **motions, model=fitted)
+    assert isinstance(held, PredictionArray)
+    assert isinstance(full, PredictionArray)
+    assert held.in_domain.tolist() == full.in_domain.tolist()
+    assert held.reason.tolist() == full.reason.tolist()
+
+
+def test_the_distance_is_that_of_mahalanobis(fitted: FragilityModel, data: FitData) -> None:
+    from scipy.spatial.distance import mahalanobis
+
+    spread = fitted.spread
+    assert spread is not None
+    stored: Any = fitted.row.diagnostics["mahalanobis"]
+    columns = columns_of(data)
+    logs = np.log(np.stack([columns[name] for name in stored["names"]], axis=-1))
+    numbers = {name: float(v[5]) for name, v in columns.items()}
+    assert spread.distance2(numbers, SINGLE) == pytest.approx(
+        mahalanobis(logs[5], stored["centre"], stored["inverse_covariance"]) ** 2, rel=1e-9
+    )
+
+
+def test_a_direction_without_scatter_counts_nothing() -> None:
+    random = np.random.default_rng(0)
+    a = np.exp(random.normal(size=(500, 1)))
+    values = {"a": a, "b": 2.0 * a, "c": np.full((500, 1), 3.0)}
+    found: Any = joint_scatter(("a", "b", "c"), values, np.ones((500, 1), dtype=np.bool_))
+    inverse = np.array(found["inverse_covariance"])
+    assert np.isfinite(inverse).all()
+    assert np.abs(inverse[2]).max() < 1e-30
+    inside = np.abs(np.log(a) - found["centre"][0]) / np.log(a).std(ddof=1) <= found["radius"]
+    assert inside.sum() == 498  # 99.5 % of 500, the point at the edge included
+
+
+def test_z_is_judged_only_where_its_range_says_more(model: FragilityModel) -> None:
+    known = ("p", "pgv_m_s", "pga_g")
+    wide = {"pgv_over_pga_s": (0.01, 0.4), "z": (0.003, 2.2)}
+    assert [r.name for r in ratios_of(known)] == ["pgv_over_pga_s", "z"]
+    for z, judged in (((0.003, 2.2), False), ((0.01, 2.2), True), ((0.003, 1.0), True)):
+        row = replace(model.row, domain={**model.row.domain, **wide, "z": z})
+        names = [ratio.name for ratio in FragilityModel.from_row(row).ratios_of(known)]
+        assert ("z" in names) is judged
+
+
+def test_ratios_do_not_change_with_the_scale_of_the_motion() -> None:
+    values = {
+        "pgv_m_s": 0.3, "pga_g": 0.4, "tm_s": 0.5, "pgd_m": 0.1, "p": 1.7, "sa03_g": 0.8,
+        "sa10_g": 0.4, "sa20_g": 0.2, "sa30_g": 0.1,
+    }  # fmt: skip
+    motion = [name for name in values if name not in ("tm_s", "p")]
+    twice = {**values, **{name: 2.0 * values[name] for name in motion}}
+    assert len(ratios_of(values)) == len(RATIOS)
+    for ratio in RATIOS:
+        assert ratio.formula(twice) == pytest.approx(ratio.formula(values), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [{}, {"names": ["p2", "kr"]}, {"centre": [0.0]}, {"inverse_covariance": [[1.0]]}],
+)
+def test_a_scatter_that_is_not_whole_is_refused(model: FragilityModel, broken: Any) -> None:
+    whole = {
+        "names": ["p2", "kr", "pgv_m_s"], "centre": [0.0, -3.0, -1.0],
+        "inverse_covariance": np.eye(3).tolist(), "radius": 3.0,
+    }  # fmt: skip
+    assert FragilityModel.from_row(replace(model.row, diagnostics={"mahalanobis": whole})).spread
+    stored = {**whole, **broken} if broken else {}
+    with pytest.raises(ModelError, match="fit it again"):
+        FragilityModel.from_row(replace(model.row, diagnostics={"mahalanobis": stored}))
