@@ -95,7 +95,7 @@ def respond(
     if files.animate is not None:
         if body is None:
             raise InputError(
-                "--animate needs the shape of the block, and its --phi unless it stands free"
+                "--animate needs the shape of the block and its --phi, unless it stands free"
             )
         from rbfrag.plots.film import film_path
 
