@@ -331,11 +331,16 @@ def coefficient_table(models: Mapping[str, Model]) -> str:
 
 
 def domain_table(models: Mapping[str, Model]) -> str:
-    """Return the ranges that models cover."""
-    return markdown((["model", "covers"], [
-        [name, ", ".join(f"`{v}` {low:.3g} to {high:.3g}" for v, (low, high) in one.domain.items())]
-        for name, one in models.items()
-    ]))  # fmt: skip
+    """Return the range of each variable and ratio, with the models that it is that of."""
+    covering: dict[tuple[str, float, float], list[str]] = {}
+    for name, one in models.items():
+        for variable, ends in one.domain.items():
+            covering.setdefault((variable, *ends), []).append(name)
+    cells = [
+        [f"`{variable}`", f"{low:.3g} to {high:.3g}", ", ".join(names)]
+        for (variable, low, high), names in sorted(covering.items())
+    ]
+    return markdown((["variable", "range", "models"], cells))
 
 
 def exponent_table(source: FitSource) -> str:
