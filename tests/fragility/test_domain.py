@@ -22,6 +22,7 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Prediction, predict
 from rbfrag.fragility.prediction_array import PredictionArray
 from tests.fragility.outcome_draws import drawn_outcomes
+from tests.fragility.portfolio_draws import SHARED
 
 METHOD, TERM = method_named("bounded"), TERMS["pgv_pga_tm"]
 TRUE = (2.9, 2.3, 4.3, 2.6, 1.6, 1.3)
@@ -54,7 +55,7 @@ def data(source: Any) -> FitData:
 
 @pytest.fixture(scope="module")
 def fitted(source: Any) -> FragilityModel:
-    return fit_source(source, TERM, METHOD, compared=False).report.model
+    return fit_source(source, TERM, METHOD, shared=False).report.model
 
 
 def one(model: FragilityModel | ModelRow, **asked: float) -> Prediction:
@@ -93,7 +94,7 @@ def test_contradictory_measures_are_named() -> None:
         name="bounded-pgv_pga_tm", term="pgv_pga_tm", method="bounded",
         coefficients=dict(zip(form.parameters, TRUE, strict=True)),
         covariance=tuple(tuple(0.01 * (i == j) for j in range(size)) for i in range(size)),
-        domain=REFERENCE_DOMAIN, data_fingerprint="f",
+        domain=REFERENCE_DOMAIN, data_fingerprint="f", dependence=SHARED,
     )  # fmt: skip
     answer = one(row, **given_by_issue())
     assert not answer.in_domain
