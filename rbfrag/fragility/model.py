@@ -257,14 +257,14 @@ class FragilityModel:
             quantiles: of the confidence level; None for P and eta alone.
             ns: functions for the kind of number given.
         """
-        found, h = self.form.unscaled(self.parameters, values, ns)
-        eta = found.eta * h
+        unscaled, h = self.form.unscaled(self.parameters, values, ns)
+        eta = unscaled.eta * h
         link = self.method.link.probability
         middle = link(eta, ns)
-        formula = found._replace(eta=eta)
+        formula = unscaled._replace(eta=eta)
         if quantiles is None:
             return Answer(middle, None, None, None, None, formula)
-        reach = h * self.errors.half_width(found.slopes, quantiles, ns)
+        reach = h * self.errors.half_width(unscaled.slopes, quantiles, ns)
         low, high = link(eta - reach, ns), link(eta + reach, ns)
         spread = self.event_spread
         if spread is None:
@@ -275,17 +275,17 @@ class FragilityModel:
 
 def _fit_line(row: ModelRow) -> str:
     """Return the command that fits a stored model again."""
-    asked = row.diagnostics
+    selection = row.diagnostics
     words = ["rbfrag fit"]
     if row.kind != TOPPLING_BLOCK.kind:
         words.append(f"--kind {row.kind}")
     words += [f"--term {row.term}", f"--method {row.method}"]
     for option, name in (("suite", "suite"), ("rotation", "rotation_deg")):
-        if asked.get(name) is not None:
-            words.append(f"--{option} {shlex.quote(str(asked[name]))}")
-    if asked.get("vertical", "without") != "without":
-        words.append(f"--vertical {asked['vertical']}")
-    if asked.get("doubtful_pgd"):
+        if selection.get(name) is not None:
+            words.append(f"--{option} {shlex.quote(str(selection[name]))}")
+    if selection.get("vertical", "without") != "without":
+        words.append(f"--vertical {selection['vertical']}")
+    if selection.get("doubtful_pgd"):
         words.append("--doubtful-pgd")
     try:
         exponent = method_named(row.method).exponent

@@ -206,7 +206,7 @@ def _answer_part(
     if model.spread is not None:
         clear &= model.spread.holds(values, ns)
     answer = model.answer(values, quantiles, ns)
-    for column, value in zip(_asked(out), answer, strict=False):
+    for column, value in zip(_answered(out), answer, strict=False):
         if value is not None:
             column[part] = value
     out.y[part] = values.get("y_m_s", np.nan)
@@ -249,7 +249,7 @@ def _answer_with_diagnostics(
         say=say, refuse=refuse, unstable=unstable,
         nothing=np.zeros(places.size, dtype=np.bool_),
     )  # fmt: skip
-    for column, answer in zip(_asked(out), judgement.answer, strict=False):
+    for column, answer in zip(_answered(out), judgement.answer, strict=False):
         if answer is None:
             continue
         values = np.where(judgement.ruled, 0.0, answer)
@@ -263,7 +263,7 @@ def _answer_with_diagnostics(
     return sentences.texts()
 
 
-def _asked(out: _Columns) -> tuple[FloatArray, ...]:
+def _answered(out: _Columns) -> tuple[FloatArray, ...]:
     """Return the columns that a model answers, in the order of its answer."""
     return out.probability, out.low, out.high, out.event_low, out.event_high
 

@@ -6,15 +6,22 @@ import shlex
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
+from typer.main import get_command
 
+from rbfrag.cli.main import app
 from rbfrag.db.engine import opened_database
 from rbfrag.db.model_file import MODEL_FORM, ModelRow
 from rbfrag.db.models import save_model
 from rbfrag.errors import ModelError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import predict
+
+
+def app_command(name: str) -> Any:
+    return get_command(app).get_command(None, name)  # type: ignore[attr-defined, arg-type]
 
 
 @pytest.mark.parametrize(
@@ -49,12 +56,7 @@ def test_the_line_fits_it_again(
     assert str(refused.value).endswith(line)
     assert len(str(refused.value)) < 500
     words = shlex.split(line)[2:]
-    from typer.main import get_command
-
-    from rbfrag.cli.main import app
-
-    command = get_command(app).commands["fit"]  # type: ignore[attr-defined]
-    asked = command.make_context("fit", words).params
+    asked = app_command("fit").make_context("fit", words).params
     assert asked["name"] == changes.get("name", "mine")
     assert asked["replace"] is True
 

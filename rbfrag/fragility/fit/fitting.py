@@ -275,16 +275,16 @@ def _dependence(
 ) -> tuple[dict[str, object] | None, list[str]]:
     """Return what blocks of one earthquake share as models store it, or why it is not known."""
     try:
-        found = dependence_of_fit(data, method.block, result.held_out, seed=seed)
+        estimate = dependence_of_fit(data, method.block, result.held_out, seed=seed)
     except FitError as error:
         return None, [f"the range of one future earthquake is not known: {error}"]
     return {
-        **asdict(found.dependence),
-        "errors": found.errors,
-        "earthquakes": found.earthquakes,
-        "pairs": list(found.pairs),
-        "replicates": found.replicates,
-        "seed": found.seed,
+        **asdict(estimate.dependence),
+        "errors": estimate.errors,
+        "earthquakes": estimate.earthquakes,
+        "pairs": list(estimate.pairs),
+        "replicates": estimate.replicates,
+        "seed": estimate.seed,
     }, []
 
 

@@ -272,13 +272,14 @@ class Form:
             values: completed values by name.
             ns: functions for the kind of number given.
         """
-        found = self.formula(parameters, values, ns)
-        return found, 1.0 if self.size_factor is None else self.size_factor.of(values["p"], ns)
+        formula = self.formula(parameters, values, ns)
+        return formula, 1.0 if self.size_factor is None else self.size_factor.of(values["p"], ns)
 
     def eta(self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers) -> Eta:
         """Return eta and its slopes; arguments as for :meth:`unscaled`."""
-        found, h = self.unscaled(parameters, values, ns)
-        return found._replace(eta=h * found.eta, slopes=tuple(h * each for each in found.slopes))
+        unscaled, h = self.unscaled(parameters, values, ns)
+        slopes = tuple(h * each for each in unscaled.slopes)
+        return unscaled._replace(eta=h * unscaled.eta, slopes=slopes)
 
 
 @dataclass(frozen=True)
