@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rbfrag.db.location import REFERENCE
+from rbfrag.db.model_file import read_models
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.checks import CREDIBLE
 from rbfrag.fragility.fit.data import Y0_OVER_PGV, FitSource, fit_data
@@ -39,6 +41,48 @@ LEVELS = {
     "sa30": np.geomspace(0.003, 0.6, 60), "sa03": np.geomspace(0.02, 4.0, 60),
     "pga": np.geomspace(0.02, 2.0, 60), "pgv_kr": np.geomspace(0.02, 3.0, 60),
 }  # fmt: skip
+
+
+SCORES = {
+    "sa10": (0.221, 0.93, 1.07), "sa20": (0.258, 0.93, 1.07), "sa30": (0.277, 0.93, 1.07),
+    "sa03": (0.336, 0.83, 0.97), "pga": (0.339, 0.83, 0.97), "pgv_kr": (0.164, 0.93, 1.07),
+    "pga_sa10": (0.199, 0.93, 1.07), "pga_sa03_sa10_sa30": (0.174, 0.93, 1.07),
+}  # fmt: skip
+"""Log loss on earthquakes left out, and the least and greatest calibration slope."""
+
+
+@pytest.mark.parametrize(("method", "term"), COEFFICIENTS)
+def test_shipped_models_score_what_is_asked(method: str, term: str) -> None:
+    (row,) = (row for row in read_models(REFERENCE) if row.name == f"{method}-{term}")
+    assert list(row.coefficients.values()) == pytest.approx(COEFFICIENTS[method, term], abs=0.02)
+    scores = row.diagnostics["scores"]
+    assert isinstance(scores, dict)
+    log_loss, least, greatest = SCORES[term]
+    assert scores["log_loss_held_out"] == pytest.approx(log_loss, abs=0.005)
+    assert least <= scores["calibration_slope_held_out"] <= greatest
+    assert row.dependence is not None
+    assert row.leave_out_steps is not None
+
+
+@pytest.mark.parametrize(
+    ("measures", "term"),
+    [
+        ({"pgv_m_s": 0.4}, "pgv_kr"),
+        ({"pgv_m_s": 0.4, "pga_g": 0.3}, "pgv_pga"),
+        ({"pgv_m_s": 0.4, "sa10_g": 0.3}, "pgv_kr"),
+        ({"pga_g": 0.3}, "pga"),
+        ({"pga_g": 0.3, "tm_s": 0.5}, "pga_tm"),
+        ({"pga_g": 0.3, "sa10_g": 0.3}, "pga_sa10"),
+        ({"pga_g": 0.3, "sa03_g": 0.6, "sa10_g": 0.3, "sa30_g": 0.06}, "pga_sa03_sa10_sa30"),
+        ({"sa10_g": 0.3, "sa20_g": 0.1}, "sa10"),
+        ({"sa03_g": 0.6, "sa30_g": 0.06}, "sa30"),
+        ({"sa03_g": 0.6}, "sa03"),
+    ],
+)
+def test_what_is_known_chooses_the_model(measures: dict[str, float], term: str) -> None:
+    assert predict(3.0, 0.1, **arguments(term, measures), db=REFERENCE).term == term
+    with_pgv = predict(3.0, 0.1, pgv_m_s=0.4, model="bounded-pgv", db=REFERENCE)
+    assert with_pgv.term == "pgv"
 
 
 def shipped_form(method: str, term: str) -> FragilityModel:
