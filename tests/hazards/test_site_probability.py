@@ -16,11 +16,12 @@ FloatArray = NDArray[np.float64]
 
 PGV = np.array([0.0, 0.3, 0.7, 1.2])
 PGA = np.array([0.0, 0.3, 0.5, 0.9])
+SHAKING = {"pgv_m_s": PGV, "pga_g": PGA}
 
 
 def test_certain_shaking_is_plain_prediction(model: FragilityModel) -> None:
     p2, kr = np.array([3.0, 10.0]), np.array([0.1, 0.2])
-    found = site_probability(PGV, PGA, p2, kr, component=component("single"), model=model,
+    found = site_probability(SHAKING, p2, kr, component=component("single"), model=model,
                              weight=np.array([3.0, 1.0]))  # fmt: skip
     each = predict(p2[None, :], kr[None, :], pgv_m_s=PGV[:, None], model=model).probability
     assert found.probability == pytest.approx(each @ [0.75, 0.25], rel=1e-14)
@@ -30,7 +31,7 @@ def test_certain_shaking_is_plain_prediction(model: FragilityModel) -> None:
 def test_own_blocks(model: FragilityModel) -> None:
     p2, kr = np.full(4, 3.0), np.array([0.05, 0.08, 0.1, 0.15])
     found = site_probability(
-        PGV, PGA, p2, kr, component=component("single"), model=model, own_block=True
+        SHAKING, p2, kr, component=component("single"), model=model, own_block=True
     )
     assert found.probability == pytest.approx(predict(p2, kr, pgv_m_s=PGV, model=model).probability)
 
@@ -40,7 +41,8 @@ def test_only_sites_where_nothing_can_fail_are_left_out(
 ) -> None:
     def answer() -> FloatArray:
         return site_probability(
-            np.geomspace(0.01, 1.0, 40), np.full(40, 0.5), np.array([3.0, 1.0]),
+            {"pgv_m_s": np.geomspace(0.01, 1.0, 40), "pga_g": np.full(40, 0.5)},
+            np.array([3.0, 1.0]),
             np.array([0.1, 0.05]), component=component("larger"), model=model,
         ).probability  # fmt: skip
 
@@ -60,8 +62,8 @@ def test_uncertain_shaking_is_the_mean(model: FragilityModel, name: str) -> None
     random = np.random.default_rng(5)
     pgv, std = np.array([0.5, 0.7]), np.array([0.3, 0.5])
     found = site_probability(
-        pgv, np.array([0.4, 0.5]), np.array([3.0]), np.array([0.1]), component=meaning,
-        std_ln_pgv=std, std_ln_pga=np.array([0.4, 0.4]), model=model,
+        {"pgv_m_s": pgv, "pga_g": np.array([0.4, 0.5])}, np.array([3.0]), np.array([0.1]),
+        component=meaning, std_ln={"pgv_m_s": std, "pga_g": np.array([0.4, 0.4])}, model=model,
     )  # fmt: skip
     draws = random.standard_normal((2, 200_000)) * np.hypot(std, meaning.scatter)[:, None]
     shaken = (pgv / meaning.ratio)[:, None] * np.exp(draws)
