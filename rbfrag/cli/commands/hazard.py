@@ -80,8 +80,8 @@ def hazard(
     answers = [
         answer(
             one, table["p2_1_s2"], table["kr"], convert=meaning.convert,
-            convert_sigma=meaning.convert_sigma, component=meaning.component, years=years, model=answering.model,
-            level=answering.level, db=answering.db, one_class=is_class,
+            convert_sigma=meaning.convert_sigma, component=meaning.component, years=years,
+            model=answering.model, level=answering.level, db=answering.db, one_class=is_class,
         )
         for one in curves
     ]  # fmt: skip
