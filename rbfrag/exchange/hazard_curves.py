@@ -214,6 +214,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     if not years > 0.0:
         raise InputError(f"{source}, line 1: investigation_time = {years:g}: give years above zero")
     kind = openquake_type(_stated("imt", head, source), f"{source}, line 1")
+    statistic = _stated("kind", head, source, "")
     if len(rows) < 2:
         raise InputError(f"{source}: ends after line 1, before the names of the columns")
     names = [name.strip() for name in rows[1]]
@@ -256,6 +257,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
                 site=place_of.get("custom_site_id", place_of.get("site_id", "")),
                 lon=_coordinate(place_of, "lon", 180.0, where),
                 lat=_coordinate(place_of, "lat", 90.0, where),
+                statistic=statistic,
             )
         )
     if not curves:
@@ -263,9 +265,11 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     return curves
 
 
-def _stated(name: str, head: str, source: str) -> str:
+def _stated(name: str, head: str, source: str, default: str | None = None) -> str:
     match = re.search(rf"\b{name}\s*=\s*(?:'([^']*)'|\"+([^\"]*)\"+|([^,\s]+))", head)
     if match is None:
+        if default is not None:
+            return default
         raise InputError(f"{source}, line 1: {name} is not stated")
     return next(group for group in match.groups() if group is not None)
 

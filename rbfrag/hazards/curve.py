@@ -35,6 +35,8 @@ class HazardCurve:
         lat: latitude of the site [deg], or None.
         source: where the curve comes from, for messages.
         warnings: what was noticed on reading it.
+        statistic: what of a logic tree the curve is, as OpenQuake names it: mean, quantile-0.84,
+            rlz-001; empty where that is not stated.
     """
 
     measure: str
@@ -47,6 +49,7 @@ class HazardCurve:
     lat: float | None = None
     source: str = "hazard curve"
     warnings: tuple[str, ...] = ()
+    statistic: str = ""
 
     @property
     def imt(self) -> str:
@@ -103,6 +106,7 @@ def hazard_curve(
     site: str = "",
     lon: float | None = None,
     lat: float | None = None,
+    statistic: str = "",
 ) -> HazardCurve:
     """Return a checked hazard curve; levels that say nothing are left out with a warning.
 
@@ -118,6 +122,7 @@ def hazard_curve(
         site: name of the site.
         lon: longitude [deg].
         lat: latitude [deg].
+        statistic: what of a logic tree the curve is.
 
     Raises:
         InputError: levels or rates that make no hazard curve, with the offending value.
@@ -162,6 +167,7 @@ def hazard_curve(
         lat=lat,
         source=source,
         warnings=tuple(warnings),
+        statistic=statistic,
     )
 
 
