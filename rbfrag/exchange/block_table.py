@@ -165,7 +165,8 @@ def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
 
     Args:
         path: file with ``p2_1_s2`` [1/s²] and ``kr``, or ``height_m`` and ``width_m`` (and
-            ``dip_deg``), and ``block_id``, ``p2_sigma``, ``kr_sigma``, ``weight``, ``lon`` and ``lat`` [deg] if it has them.
+            ``dip_deg``), and ``block_id``, ``p2_sigma``, ``kr_sigma``, ``weight``, ``lon`` and
+            ``lat`` [deg] if it has them.
 
     Returns:
         Columns of one length; ``block_id`` are texts, numbers from 1 on where there are none.
@@ -230,7 +231,10 @@ def _numbers(path: str | os.PathLike[str], name: str, values: list[Any]) -> NDAr
 
 def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     columns = read_columns(
-        path, (), optional=(*NUMBERS, *SIGMAS, *RECTANGLE, "lon", "lat", "weight"), texts=("block_id",)
+        path,
+        (),
+        optional=(*NUMBERS, *SIGMAS, *RECTANGLE, "lon", "lat", "weight"),
+        texts=("block_id",),
     )
     if is_of_rectangles(columns):
         columns |= rectangle_columns(columns)

@@ -260,7 +260,8 @@ def _moments(
 
 def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Dependence) -> Any:
     """Return the sum of covariances over all pairs of blocks of one earthquake, shape (...)."""
-    a, total, n = ndtri(p), 0.0, blocks.size
+    a, n = ndtri(p), blocks.size
+    total: Any = 0.0
     rows = max(1, _PAIRS_AT_ONCE // max(p.size, 1))
     for start in range(0, n, rows):
         i, j = np.nonzero(np.arange(start, min(start + rows, n))[:, None] < np.arange(n))
@@ -307,7 +308,7 @@ def _probability_any(n: int, mean: Any, variance: Any, least: Any) -> FloatArray
         )
     none = np.where(rho >= 1.0, 1.0 - share, none)
     any_of_them = np.minimum(np.clip(1.0 - none, least, mean), 1.0)
-    return np.where((share > 0.0) & (share < 1.0), any_of_them, share)
+    return np.asarray(np.where((share > 0.0) & (share < 1.0), any_of_them, share))
 
 
 def checked(

@@ -11,25 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.hazards.annual_rate import checked_years, failure_rate, normal_steps, probability_in
-from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
-from rbfrag.hazards.conversions import component as component_named
-from rbfrag.hazards.curve import ANSWERED, HazardCurve
+from rbfrag.hazards.annual_rate import checked_years, failure_rate, probability_in
+from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.shaking import NOTABLE, Shaking, warn_of_ends
 
 FloatArray = NDArray[np.float64]
 
-_SCATTER_POINTS = 17
-_REACH = 4.0
-"""Standard deviations of the scatter that are integrated over, to both sides."""
-_STEP = 0.1
-"""Greatest step of the measure's logarithm."""
 _CHUNK = 512
-_NOTABLE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,25 +111,9 @@ def hazard(
     """
     p2s, krs = (np.ravel(values) for values in np.broadcast_arrays(p2, kr))
     checked_years(years)
-    warnings = list(curve.warnings)
-    name, factor, spread = _measure(curve, convert, convert_sigma, warnings)
-    meaning = component_named("single" if component is None else component)
-    if component is None:
-        warnings.append(
-            "the curve's horizontal component is taken as a single one, which the models are "
-            "fitted on; hazard products often mean rotd50 or the geometric mean: say which"
-        )
-    else:
-        warnings.append(
-            f"the curve is of {meaning.title}; Beyer and Bommer (2006) relate it to one component"
-            if meaning.name != "single"
-            else "the curve is of a single component, as the models are"
-        )
-    scatter = math.hypot(meaning.scatter, spread)
-    steps = max(_SCATTER_POINTS, 2 * math.ceil(_REACH * scatter / _STEP) + 1)
-    xi, weight = normal_steps(1 if scatter == 0.0 else steps, _REACH)
-    shift = factor / meaning.ratio * np.exp(scatter * xi)
-
+    reading = Shaking.of(curve, convert=convert, convert_sigma=convert_sigma, component=component)
+    name, shift, weight = reading.name, reading.shift, reading.weight
+    warnings = list(reading.warnings)
     chosen = find_model(model, ("p2", "kr", name), db)
     warnings += chosen.notes
     parts = []
@@ -165,14 +141,14 @@ def hazard(
     rate, low, high = (joined("annual_rate", row) for row in range(3))
     contribution, below = joined("contribution"), joined("below")
     above, above_at_most = joined("above"), joined("above_at_most")
-    _tails(curve, rate, above, above_at_most, below, warnings)
+    warn_of_ends(curve, rate, above, above_at_most, below, warnings)
     edges = parts[0][1].edges
-    shaking = {name: factor / meaning.ratio * np.sqrt(edges[None, 1:] * edges[None, :-1])}
+    shaking = {name: reading.median * np.sqrt(edges[None, 1:] * edges[None, :-1])}
     outside = ~_predicted(p2s[:, None], krs[:, None], shaking, chosen, level).in_domain
     if one_class:
         outside = outside.mean(axis=0, keepdims=True)
     part = (outside * contribution).sum(axis=1) / np.maximum(rate, np.finfo(np.float64).tiny)
-    if (part > _NOTABLE).any():
+    if (part > NOTABLE).any():
         warnings.append(
             f"up to {100.0 * float(part.max()):.3g} % of the rate comes from blocks and shaking "
             "outside the ranges that the model was fitted on"
@@ -193,52 +169,6 @@ def hazard(
         above_at_most=above_at_most,
         measure=curve.measure,
         warnings=tuple(warnings),
-    )
-
-
-def _measure(
-    curve: HazardCurve, convert: str | None, sigma: float | None, warnings: list[str]
-) -> tuple[str, float, float]:
-    """Return predict's argument, the factor from the curve's unit, and the scatter about it."""
-    if convert is None:
-        if sigma is not None:
-            raise InputError("--convert-sigma belongs to --convert: leave it out")
-        if curve.known_as is None:
-            raise InputError(_no_model(curve))
-        return curve.known_as, 1.0, 0.0
-    if curve.measure != "sa_g":
-        raise InputError(
-            f"{curve.source}: --convert {convert} is for spectral accelerations; the curve is of "
-            f"{curve.imt}"
-        )
-    used = velocity_conversion(convert)
-    if not curve.is_of(used.period_s):
-        raise InputError(
-            f"{curve.source}: {used.name} is for SA({used.period_s:g}), not for {curve.imt}: "
-            f"choose the curve with --imt 'SA({used.period_s:g})'"
-        )
-    spread = used.scatter if sigma is None else sigma
-    if not 0.0 < spread < math.inf:
-        raise InputError(
-            f"--convert-sigma = {spread:g}: give the standard deviation of ln PGV about the "
-            "conversion, above zero; no conversion is without scatter"
-        )
-    warnings.append(
-        f"PGV = {used.factor:.4g} m/s per g times {curve.imt} in the median ({used.source}); "
-        f"ln PGV scatters about it by {spread:g}, which is integrated"
-    )
-    if curve.known_as is not None:
-        warnings.append(
-            f"there are models of {curve.imt} itself: without --convert nothing is converted"
-        )
-    return "pgv_m_s", used.factor, spread
-
-
-def _no_model(curve: HazardCurve) -> str:
-    also = [item.name for item in CONVERSIONS.values() if curve.is_of(item.period_s)]
-    converted = f", or convert it to PGV with --convert {' or '.join(also)}" if also else ""
-    return (
-        f"{curve.source}: no model reads {curve.imt}: give a curve of one of {ANSWERED}{converted}"
     )
 
 
@@ -284,26 +214,3 @@ def _predicted(
     answer = answer_given(model, {"p2": p2, "kr": kr, **shaking}, level)
     assert isinstance(answer, PredictionArray)
     return answer
-
-
-def _tails(
-    curve: HazardCurve,
-    rate: FloatArray,
-    above: FloatArray,
-    above_at_most: FloatArray,
-    below: FloatArray,
-    warnings: list[str],
-) -> None:
-    unit = curve.measure.replace("sa_g", curve.imt + " in g")
-    open_above = above_at_most - above > _NOTABLE * rate
-    if open_above.any():
-        worst = float((above_at_most - above)[open_above].max())
-        warnings.append(
-            f"the curve ends at {unit} = {curve.levels[-1]:g}: stronger shaking may add up to "
-            f"{worst:.3g} failures a year to the answer"
-        )
-    if (below > _NOTABLE).any():
-        warnings.append(
-            f"the curve begins at {unit} = {curve.levels[0]:g}, where the probability of failure "
-            f"is already {float(below.max()):.3g}: weaker shaking is not counted"
-        )

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.standing import Standing
 from rbfrag.hazards.survival import BranchSurvival, SurvivalAnswer
 from rbfrag.plots.canvas import (
     BLUE,
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 
 _COLOURS = (BLUE, "#d98c1f", "#4c8f4c", "#8c2d4f", "#2c9fad", "#7a6fae", "#6b6b6b", "#b59a2e")
 _LINES = ("-", "--", "-.", ":")
-_FACTORS = np.geomspace(1e-4, 1e4, 801)
+_FACTORS = np.geomspace(1e-4, 1e4, 401)
 _LEAST_RATE = 1e-7
 
 
@@ -78,7 +80,7 @@ def _short(name: str) -> str:
 def _draw_curves(axes: Axes, curves: Sequence[HazardCurve], answer: SurvivalAnswer) -> None:
     for i, (curve, branch) in enumerate(zip(curves, answer.branches, strict=True)):
         label = _short(branch.name)
-        axes.loglog(curve.levels, curve.annual_rate, label=label, lw=1.5, **_style(i))  # type: ignore[arg-type]
+        axes.loglog(curve.levels, curve.annual_rate, label=label, lw=1.5, **_style(i))
     highest = max(float(curve.annual_rate.max()) for curve in curves)
     lowest = min(float(curve.annual_rate.min()) for curve in curves)
     axes.set_ylim(max(lowest, _LEAST_RATE), 2.0 * highest)
@@ -89,8 +91,11 @@ def _draw_curves(axes: Axes, curves: Sequence[HazardCurve], answer: SurvivalAnsw
 
 def _draw_survival(axes: Axes, answer: SurvivalAnswer) -> None:
     for i, branch in enumerate(answer.branches):
-        shares = np.exp([branch.standing.log_probability(factor) for factor in _FACTORS])
-        axes.semilogx(_FACTORS, 100.0 * shares, lw=1.5, **_style(i))  # type: ignore[arg-type]
+        axes.semilogx(_FACTORS, _percent(branch.standing), lw=1.3, **_style(i))
+    if len(answer.branches) > 1:
+        axes.semilogx(
+            _FACTORS, _percent(answer.standing), color="black", lw=2.2, label=answer.hazard
+        )
     axes.axvline(1.0, color="#333333", lw=0.8)
     for percent, factor in ((5.0, answer.factor_5_percent), (50.0, answer.factor_50_percent)):
         axes.axhline(percent, color="#888888", lw=0.7, ls=":")
@@ -107,6 +112,11 @@ def _draw_survival(axes: Axes, answer: SurvivalAnswer) -> None:
     axes.set_xlabel("factor on all hazard rates")
     axes.set_ylabel("probability of standing [%]")
     axes.set_title("survival", fontsize=10)
+
+
+def _percent(standing: Standing) -> NDArray[np.float64]:
+    logs = [standing.log_probability(factor) for factor in _FACTORS.tolist()]
+    return np.asarray(100.0 * np.exp(logs))
 
 
 def _draw_weights(axes: Axes, branches: Sequence[BranchSurvival]) -> None:

@@ -101,14 +101,14 @@ def _one_curve(path: str, meaning: CurveOptions) -> HazardCurve:
     from rbfrag.hazards.conversions import velocity_conversion
 
     period = None if meaning.convert is None else velocity_conversion(meaning.convert).period_s
-    found = suited_curves(
+    suited = suited_curves(
         read_hazard_curves(path, imt=meaning.imt, site=meaning.site), converted_period_s=period
     )
-    if len(found) > 1:
+    if len(suited) > 1:
         raise InputError(
-            f"{path} has {len(found)} sites, and the blocks stand at one: choose it with --site"
+            f"{path} has {len(suited)} sites, and the blocks stand at one: choose it with --site"
         )
-    return found[0]
+    return suited[0]
 
 
 def _print(answer: SurvivalAnswer) -> None:
@@ -118,7 +118,7 @@ def _print(answer: SurvivalAnswer) -> None:
     rate = answer.annual_rate_any
     often = "never fails" if rate == 0.0 else f"fails once in {1.0 / rate:.4g} years on average"
     print(
-        f"If {answer.hazard} is right, {who} for {answer.age_years:g} years{sd} with a "
+        f"{_condition(answer)}, {who} for {answer.age_years:g} years{sd} with a "
         f"probability of {answer.probability_standing:.3g}; "
         f"{'it' if answer.blocks == 1 else 'one of them'} {often}."
     )
@@ -156,3 +156,10 @@ def _verdict(answer: SurvivalAnswer) -> str:
         f"Standing does not contradict it: all rates of the hazard would have to be {five:.3g} "
         "times as high to leave 5 %."
     )
+
+
+def _condition(answer: SurvivalAnswer) -> str:
+    if len(answer.branches) == 1:
+        return "If the hazard is right"
+    weighted = answer.branches[0].name != answer.hazard
+    return f"Over {answer.hazard}" if weighted else f"If the hazard of {answer.hazard} is right"

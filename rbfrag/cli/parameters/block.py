@@ -173,9 +173,7 @@ class BlocksOptions(TableOptions):
         "Rock mass file (.toml, .csv): the mean over its stable toppling blocks.", metavar="FILE"
     )
 
-    def toppling_blocks(
-        self, *, name: str | None = None, n: int | None = None
-    ) -> TopplingBlocks:
+    def toppling_blocks(self, *, name: str | None = None, n: int | None = None) -> TopplingBlocks:
         """Return the blocks that the options describe.
 
         Args:
