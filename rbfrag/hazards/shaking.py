@@ -16,8 +16,8 @@ from rbfrag.hazards.curve import ANSWERED, HazardCurve
 
 FloatArray = NDArray[np.float64]
 
-_SCATTER_POINTS = 17
-_REACH = 4.0
+_SCATTER_POINTS = 25
+_REACH = 6.0
 """Standard deviations of the scatter that are integrated over, to both sides."""
 _STEP = 0.1
 """Greatest step of the measure's logarithm."""

@@ -14,12 +14,12 @@ from tests.fragility.conftest import model as model
 from tests.fragility.conftest import row as row
 
 COEFFICIENTS: dict[str, tuple[str, tuple[float, ...]]] = {
+    "pgv_kr": ("bounded", (-0.817, 0.128, -0.240, 2.410, 2.113, -1.211)),
     "sa10": ("logistic", (-3.006, 0.348, -0.275, 3.618, -0.412, -2.700)),
     "sa20": ("logistic", (-2.019, 0.388, -0.206, 3.106, -0.449, -3.771)),
     "sa30": ("logistic", (-1.400, 0.425, -0.168, 2.860, -0.500, -4.602)),
     "sa03": ("logistic", (-0.589, 0.280, -0.168, 2.372, 0.107, -2.711)),
     "pga": ("bounded", (-3.897, 1.627, -0.160, 1.659)),
-    "pgv_kr": ("bounded", (-0.817, 0.128, -0.240, 2.410, 2.113, -1.211)),
     "pga_sa10": ("bounded", (-2.964, 2.038, -0.235, 2.727, 1.895, -0.327)),
     "pga_sa03_sa10_sa30": (
         "bounded",

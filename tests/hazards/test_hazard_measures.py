@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,7 @@ def test_each_measure_is_answered_by_its_own_model(measures_db: str, term: str) 
     row = measure_row(term)
     # λ_f = ∫ P K B x^-B d(ln x), past the lowest level at which the block may fail
     total, edges = 0.0, np.linspace(math.log(1e-5), math.log(1e5), 41)
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges.tolist()):
         total += quad(
             lambda u: probability(row, name, math.exp(u)) * K * B * math.exp(-B * u),
             low, high, epsabs=1e-13, epsrel=1e-9, limit=200,
