@@ -32,7 +32,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _NEAR_ONE = 0.99
 _PANELS = (0.0, *(0.25**k for k in range(5, -1, -1)))
 _FARTHEST = 38.0
-_LEAST_RHO = 1e-9
+_LEAST_RHO, _MOST_RHO = 1e-9, 1.0 - 1e-12
 _PAIRS_AT_ONCE = 2**18
 
 
@@ -306,7 +306,7 @@ def _probability_any(n: int, mean: Any, variance: Any, least: Any) -> FloatArray
         none = np.where(
             rho > _LEAST_RHO, np.exp(betaln(alpha, beta + n) - betaln(alpha, beta)), binomial
         )
-    none = np.where(rho >= 1.0, 1.0 - share, none)
+    none = np.where(rho >= _MOST_RHO, 1.0 - share, none)
     any_of_them = np.minimum(np.clip(1.0 - none, least, mean), 1.0)
     return np.asarray(np.where((share > 0.0) & (share < 1.0), any_of_them, share))
 

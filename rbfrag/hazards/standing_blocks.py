@@ -16,7 +16,7 @@ from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import UNKNOWN, Placement, any_failure
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import Model, predict
+from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.annual_rate import Fragility, failure_rate, normal_steps
 from rbfrag.hazards.curve import HazardCurve
@@ -263,7 +263,7 @@ class ModelBlocks:
     def _predicted(
         self, p2: FloatArray, kr: FloatArray, shaking: Mapping[str, Any]
     ) -> PredictionArray:
-        answer = predict(p2, kr, **shaking, model=self.model, level=self.level)
+        answer = answer_given(self.model, {"p2": p2, "kr": kr, **shaking}, self.level)
         assert isinstance(answer, PredictionArray)
         return answer
 

@@ -65,7 +65,7 @@ def survival(
     ),
     json: options.Json = False,
 ) -> None:
-    """Print how likely blocks are to stand after an age, if a hazard is right.
+    """Print how likely standing blocks are under a seismic hazard.
 
     Several blocks of --blocks stand at one site. The factors are those on all rates of the hazard
     at which the blocks stand with 5 % and 50 %. With --weights the branches of a logic tree are
