@@ -51,7 +51,7 @@ class SiteProbability:
         method: how it was fitted.
         measures: the measures that it read.
         integrated: those of them whose standard deviations were integrated over.
-        notes: what every answer says of the model.
+        advice: what is to be said of a measure that tells little; empty for nothing.
     """
 
     probability: FloatArray
@@ -64,7 +64,7 @@ class SiteProbability:
     method: str
     measures: tuple[str, ...]
     integrated: tuple[str, ...]
-    notes: tuple[str, ...]
+    advice: str
 
 
 def site_probability(
@@ -160,7 +160,7 @@ def site_probability(
         method=chosen.row.method,
         measures=names,
         integrated=tuple(given),
-        notes=chosen.notes,
+        advice=chosen.term.advice,
     )
 
 
