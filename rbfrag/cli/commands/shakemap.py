@@ -123,6 +123,8 @@ def shakemap(
         "probability": placed(answer.probability),
         "ci_low": placed(answer.ci_low),
         "ci_high": placed(answer.ci_high),
+        "event_low": placed(answer.event_low),
+        "event_high": placed(answer.event_high),
         "in_domain": placed(answer.in_domain, False),
     }
     outside = int((~answer.in_domain & (answer.probability > 1e-4)).sum())
