@@ -37,13 +37,13 @@ def test_certain_shaking_is_plain_prediction(model: FragilityModel) -> None:
 def test_the_range_of_one_earthquake_is_taken_at_p(model: FragilityModel) -> None:
     known = replace(model, event_spread=EventSpread.of(0.2))
     found = site_probability(
-        PGV, PGA, np.array([3.0]), np.array([0.1]), component=component("rotd50"), model=known
+        SHAKING, np.array([3.0]), np.array([0.1]), component=component("rotd50"), model=known
     )
     ends = [event_range(float(p), 0.2) for p in found.probability]
     assert found.event_low == pytest.approx([low for low, _ in ends], rel=1e-9)
     assert found.event_high == pytest.approx([high for _, high in ends], rel=1e-9)
     nothing = site_probability(
-        PGV, PGA, np.array([3.0]), np.array([0.1]), component=component("rotd50"),
+        SHAKING, np.array([3.0]), np.array([0.1]), component=component("rotd50"),
         model=replace(model, event_spread=None),
     )  # fmt: skip
     assert np.isnan([nothing.event_low, nothing.event_high]).all()
