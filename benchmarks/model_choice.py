@@ -60,7 +60,7 @@ def judged(source: FitSource, method: str, term: str, vertical: str, *, free_m: 
         method_named(method),
         estimate_m=free_m,
         selection={"vertical": vertical},
-        compared=False,
+        shared=False,
     )
     seen = fitted.data.judged
     p = np.clip(fitted.result.held_out, scores.CLIP, 1.0 - scores.CLIP)

@@ -21,7 +21,9 @@ from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism
 from rbfrag.solver.integrator.one_freedom.follow import follow
 from rbfrag.solver.kind import BlockOnPlanes
-from rbfrag.solver.models import confined_toppling, sliding, slumping
+from rbfrag.solver.models import confined_toppling, rocking, sliding, slumping
+from rbfrag.solver.respond import block_of_numbers
+from rbfrag.solver.rocking_run import simulate
 from rbfrag.solver.toppling_run import runner
 
 REPEATS = 7
@@ -73,6 +75,7 @@ def models(drive: Excitation) -> dict[str, Run]:
     """Return runs of blocks whose strength is a fifth of PGA, or a little less, by model."""
     k = 0.2 * drive.pga_g
     topple = runner(drive, p2=3.0)
+    stands = rocking.free_block(block_of_numbers(3.0, k, {}))
     mechanisms = {
         "sliding": sliding.mechanism(planes(None, 0.0, math.degrees(math.atan(k)))),
         "slumping": slumping.mechanism(at_strength(Block.from_angles(45, 65, 2.0), k, slumping)),
@@ -86,6 +89,7 @@ def models(drive: Excitation) -> dict[str, Run]:
 
     return {
         "toppling": lambda: topple(k).samples_moved,
+        "rocking": lambda: simulate(drive, stands).samples_moved,
         **{name: runs(mechanism) for name, mechanism in mechanisms.items()},
     }
 

@@ -2,8 +2,8 @@
 
 Outcomes and critical values are drawn from known models, with scatter that earthquakes share,
 for as many earthquakes as the reference set has (47). Each method is fitted to each draw. The
-table counts how often the 95 % intervals (the clustered standard error times Student's t for the
-degrees of freedom that the fit reports) hold the truth.
+table counts how often the 95 % intervals (the standard error by leaving earthquakes out times
+Student's t for the degrees of freedom of that parameter) hold the truth.
 """
 
 from __future__ import annotations
@@ -15,39 +15,41 @@ from numpy.typing import NDArray
 
 from benchmarks.page import parser, report
 from rbfrag.bench.tables import markdown
-from rbfrag.fragility.fit.clusters import cr3, effective_freedom, jackknife_steps
+from rbfrag.fragility.fit.clusters import cr3, jackknife_steps, left_out
 from rbfrag.fragility.fit.data import fit_data
-from rbfrag.fragility.fit.likelihood import censored_line, from_olsen, maximise
-from rbfrag.fragility.fit.line import Bins, clustered_line, iterate
-from rbfrag.fragility.fit.outcomes import fit_parameters
+from rbfrag.fragility.fit.likelihood import censored_line, from_olsen, maximise, most_likely
+from rbfrag.fragility.fit.line import Bins, iterate
+from rbfrag.fragility.fit.outcomes import outcome_rows, parameter_names
+from rbfrag.fragility.intervals import ParameterErrors, packed, quantiles_of
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.methods import method_named
-from rbfrag.fragility.model import student_half_width
+from rbfrag.fragility.methods import arrays, method_named
 from tests.fragility.conftest import critical_values
 from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
 
 EVENTS = 47
+LEVEL = quantiles_of(0.95)
 SHARED = 0.1
 
 FloatArray = NDArray[np.float64]
 
-
-Draw = tuple[FloatArray, FloatArray, FloatArray, int]
+Draw = tuple[FloatArray, FloatArray, FloatArray]
+"""Estimate, truth, and the steps of leaving each earthquake out, of one draw."""
 
 
 def outcomes(method: str, term: str, seed: int) -> Draw:
-    """Return estimate, standard errors, truth and degrees of freedom of one draw of outcomes."""
+    """Fit one draw of outcomes."""
     truth = np.array(TRUTH[method, term])
     source = drawn_outcomes(
         method, term, TRUTH[method, term], events=EVENTS, motions=2, shared=SHARED, seed=seed
     )
     how, of = method_named(method), TERMS[term]
-    _, b, covariance, freedom = fit_parameters(fit_data(source, how, of), how, of)
-    return b, np.sqrt(np.diag(covariance)), truth, freedom
+    rows = outcome_rows(fit_data(source, how, of), how, of, parameter_names(how, of)).data
+    b = most_likely(rows)
+    return b, truth, jackknife_steps(rows, b)
 
 
 def lognormal(seed: int) -> Draw:
-    """Return the same of one censored lognormal draw."""
+    """Fit one censored lognormal draw."""
     random = np.random.default_rng(seed)
     truth = np.array([-0.4, 0.95, np.log(0.29)])
     event = np.repeat(np.arange(EVENTS), 24)
@@ -65,20 +67,18 @@ def lognormal(seed: int) -> Draw:
     )
     theta, _ = maximise(rows, start)
     b, jacobian = from_olsen(theta)
-    steps = jackknife_steps(rows, theta) @ jacobian.T
-    return b, np.sqrt(np.diag(cr3(steps))), truth, effective_freedom(steps)
+    return b, truth, jackknife_steps(rows, theta) @ jacobian.T
 
 
 def straight_line(seed: int) -> Draw:
-    """Return the same of the line of one heteroscedastic draw."""
+    """Fit the line of one heteroscedastic draw."""
     table = critical_values(events=EVENTS, motions=2, event_share=0.3, seed=seed)
     order = np.argsort(table.pgv_m_s)
-    x, y = table.pgv_m_s[order], table.y_m_s[order]
+    bins, y = Bins.equal_count(table.pgv_m_s[order]), table.y_m_s[order]
     events = np.unique(table.event_id[order].astype(str), return_inverse=True)[1].astype(np.intp)
-    fit = iterate(Bins.equal_count(x), y, np.ones(x.size), 1)
-    weights = 1.0 / (fit.parameters[2] + fit.parameters[3] * x)
-    line, covariance, *_ = clustered_line(x, y, weights, events)
-    return line, np.sqrt(np.diag(covariance)), np.array([0.002, 0.72]), EVENTS - 1
+    b = iterate(bins, y, np.ones(y.size), 1).parameters
+    others = left_out(events, lambda rest: iterate(bins, y, rest.astype(float), 1, b).parameters)
+    return b[:2], np.array([0.002, 0.72]), (np.array(list(others.values())) - b)[:, :2]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -92,13 +92,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
         found, reach = [], []
         for seed in range(chosen.replications):
             if name in draws:
-                b, error, truth, freedom = outcomes(*draws[name], seed)
+                b, truth, steps = outcomes(*draws[name], seed)
             else:
-                b, error, truth, freedom = (straight_line if name == "wls-pgv" else lognormal)(seed)
+                b, truth, steps = (straight_line if name == "wls-pgv" else lognormal)(seed)
+            covariance = cr3(steps)
+            error = np.sqrt(np.diag(covariance))
+            errors = ParameterErrors(packed(covariance.tolist()), tuple(map(tuple, steps.tolist())))
             found.append((b - truth) / error)
-            reach.append(student_half_width(0.95, freedom))
+            # of each parameter alone
+            reach.append(errors.half_width([*np.eye(b.size)], LEVEL, arrays()) / error)
         z = np.array(found)
-        covered = (np.abs(z) <= np.array(reach)[:, None]).mean(axis=0)
+        covered = (np.abs(z) <= np.array(reach)).mean(axis=0)
         cells.append([
             name,
             str(chosen.replications),

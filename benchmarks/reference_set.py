@@ -52,7 +52,7 @@ MODELS: tuple[dict[str, Any], ...] = (
     {"method": "bounded", "term": "pgv_pga"},
     {"method": "bounded", "term": "pgv_pga_tm"},
     {"method": "record", "term": "xp"},
-    {"method": "weibull", "term": "pgv"},
+    {"method": "bounded", "term": "pgv"},
     {"method": "lognormal", "term": "pgv"},
     {"method": "wls", "term": "pgv"},
     {"method": "logistic", "term": "pga_tm"},

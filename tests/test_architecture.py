@@ -58,7 +58,7 @@ def drawing() -> ModuleType:
     return module
 
 
-KINDS = {"toppling", "sliding", "slumping", "confined_toppling"}
+KINDS = {"toppling", "rocking", "sliding", "slumping", "confined_toppling"}
 QUOTED_KIND = re.compile(f"['\"]({'|'.join(sorted(KINDS))})['\"]")
 
 

@@ -19,8 +19,8 @@ from benchmarks.claims.claim import (
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError
 from rbfrag.fragility.fit.fitting import fit
+from rbfrag.fragility.intervals import student_half_width
 from rbfrag.fragility.measures import TERMS
-from rbfrag.fragility.model import student_half_width
 from rbfrag.plots.critical_strength import lobe_line
 
 FEWEST_EVENTS = 5

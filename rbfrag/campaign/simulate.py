@@ -218,7 +218,10 @@ def _cases(kind: str, described: dict[str, Any], extras: Sequence[str]) -> tuple
     """Ask the kind for its combinations; it refuses the options of others."""
     known = {name: model for name, model in models().items() if model.campaign}
     if kind not in known:
-        raise InputError(f"--kind {kind}: campaigns are of {', '.join(sorted(known))}")
+        why = models()[kind].no_search if kind in models() else ""
+        raise InputError(
+            f"--kind {kind}: campaigns are of {', '.join(sorted(known))}{': ' if why else ''}{why}"
+        )
     for name in [*described, *extras]:
         if name not in known[kind].campaign_options:
             owners = [each for each, model in known.items() if name in model.campaign_options]

@@ -177,15 +177,15 @@ def show_prediction(document: dict[str, Any], *, json: bool) -> None:
     answers = document.pop("answers")
     polarities = document.pop("polarities", None)
     warnings = document.pop("warnings")
+    for sentence in prediction_in_words(document):
+        print(sentence)
+    print()
     print_pairs({name: value for name, value in document.items() if name not in _LEFT_OUT or value})
     if polarities:
         print()
         print_table(
-            ("polarity", "probability", "ci_low", "ci_high", "intensity_m_s"),
-            [
-                (name, p["probability"], p["ci_low"], p["ci_high"], p["intensity_m_s"])
-                for name, p in polarities.items()
-            ],
+            ("polarity", *_OF_POLARITY),
+            [(name, *map(answer.get, _OF_POLARITY)) for name, answer in polarities.items()],
         )
     if len(answers) > 1:
         print()
@@ -193,6 +193,46 @@ def show_prediction(document: dict[str, Any], *, json: bool) -> None:
         print_table(columns, [tuple(answer[name] for name in columns) for answer in answers])
     print_warnings(warnings)
 
+
+def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return what P, its interval and the range of one earthquake mean, in counts of blocks.
+
+    Args:
+        document: an answer under the keys of the JSON contract.
+    """
+    p, level = document["probability"], f"{100.0 * document['level']:g} %"
+    low, high = document["ci_low"], document["ci_high"]
+    event_low, event_high = document["event_low"], document["event_high"]
+    of = next((n for n in (100, 1000) if p * n >= 1.0 and (1.0 - p) * n >= 1.0), 10_000)
+    if high == 0.0:
+        return ("P: no such block fails.",)
+    return (
+        f"P: of {of} such blocks {_count(p, of)} fail, over all earthquakes and sites with these "
+        "measures.",
+        f"Interval of P ({level}): {_range(low, high, of)} of {of}, as far as the data tell it.",
+        "In one single earthquake: not known."
+        if event_low is None
+        else f"In one single earthquake {_range(event_low, event_high, of)} of {of} such blocks "
+        f"fail ({level}).",
+    )
+
+
+def _count(share: float, of: int) -> str:
+    count = round(share * of)
+    if count in (0, of) and 0.0 < share < 1.0:
+        return "fewer than 1" if count == 0 else "nearly all"
+    return str(count)
+
+
+def _range(low: float, high: float, of: int) -> str:
+    ends = _count(low, of), _count(high, of)
+    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
+
+
+_OF_POLARITY = (
+    "probability", "ci_low", "ci_high", "event_low", "event_high", "intensity_m_s",
+)  # fmt: skip
+"""Keys that are shown of each polarity."""
 
 _LEFT_OUT = ("y_m_s", "median_displacement_m")
 """Keys that a table leaves out where they do not apply."""

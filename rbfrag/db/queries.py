@@ -135,6 +135,12 @@ def combination_table(
     )
 
 
+def recordings_of_motions(connection: Connection) -> dict[int, int]:
+    """Return the recording, which is the site in an earthquake, that each motion is of."""
+    rows = connection.execute(select(motion.c.id, motion.c.recording_id))
+    return {int(row.id): int(row.recording_id) for row in rows}
+
+
 @dataclass(frozen=True, eq=False)
 class OutcomeGrid:
     """The blocks of a kind's grid, of shape (n, m): combination by number in the grid.

@@ -50,7 +50,9 @@ BLOCK_COLUMNS = {
 }
 """Columns that describe blocks, with the names that `predict` has for them."""
 
-ANSWERS = ("probability", "ci_low", "ci_high", "in_domain", "reason")
+NUMBERS_OF_ANSWERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
+
+ANSWERS = (*NUMBERS_OF_ANSWERS, "in_domain", "reason")
 """The columns that are appended; a table that has them gets new ones."""
 
 NUMERIC = (*BLOCK_COLUMNS, *RECTANGLE, *STATED)
@@ -191,17 +193,11 @@ def _answer(
         values |= {BLOCK_COLUMNS[name]: value for name, value in numbers_of.items()}
     predicted = answer_given(model, {**values, **given}, level)
     assert isinstance(predicted, PredictionArray)
-    answer: dict[str, NDArray[Any]] = {
-        "probability": predicted.probability,
-        "ci_low": predicted.ci_low,
-        "ci_high": predicted.ci_high,
-        "in_domain": predicted.in_domain,
-        "reason": predicted.reason,
-    }
+    answer: dict[str, NDArray[Any]] = {name: getattr(predicted, name) for name in ANSWERS}
     if "mode" in part:
         modes = np.array(["" if m is None else str(m).strip() for m in part["mode"]], dtype=object)
         other = ~np.isin(modes.astype(str), ("", str(model_of_kind(model.kind).mode)))
-        for name in ("probability", "ci_low", "ci_high"):
+        for name in NUMBERS_OF_ANSWERS:
             answer[name][other] = np.nan
         answer["in_domain"][other] = False
         for i in np.flatnonzero(other).tolist():

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from rbfrag.fragility.domain import RATIOS, Ratio
+from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, SPECTRAL
-from rbfrag.fragility.methods import Eta, Numbers
-from rbfrag.fragility.model import LEAST, FragilityModel
+from rbfrag.fragility.methods import Numbers
+from rbfrag.fragility.model import LEAST, Answer, FragilityModel
 
 _SIZE = "p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m"
 _STRENGTH = (
@@ -136,10 +137,7 @@ class Judgement(NamedTuple):
     """An answer with what was found about the question.
 
     Args:
-        probability: P.
-        low: lower end of its interval.
-        high: upper end.
-        eta: argument of the link, or None where nothing had to be evaluated.
+        answer: what the model says.
         values: the completed values.
         intensity_m_s: the intensity term as it is [m/s].
         missing: where no answer is possible.
@@ -147,10 +145,7 @@ class Judgement(NamedTuple):
         ruled: where the answer is not the model's.
     """
 
-    probability: Any
-    low: Any
-    high: Any
-    eta: Eta | None
+    answer: Answer
     values: dict[str, Any]
     intensity_m_s: Any
     missing: Any
@@ -162,7 +157,7 @@ def answer_with_findings(
     model: FragilityModel,
     given: Mapping[str, Any],
     needed: Collection[str],
-    half_width: float | None,
+    quantiles: Quantiles | None,
     ns: Numbers,
     *,
     say: Callable[[Any, Finding], None],
@@ -176,7 +171,7 @@ def answer_with_findings(
         model: the model that answers.
         given: what is given, by name: numbers, or arrays of one shape.
         needed: names of the values without which there is no answer.
-        half_width: quantile of the confidence level; None for no interval.
+        quantiles: of the confidence level; None for no interval.
         ns: functions for the kind of number given.
         say: called with where a sentence holds, and the finding.
         refuse: the same for what makes an answer impossible.
@@ -220,7 +215,7 @@ def answer_with_findings(
         holds = bound.holds(values) & _not(ruled)
         say(holds, Finding(holds, bound.about, values.get(bound.about), bound.text))
         ruled = ruled | holds
-    p, low, high, eta = _answer(model, values, half_width, ns, ruled)
+    answer = _never(model) if ruled is True else model.answer(values, quantiles, ns)
     in_domain = _not(missing)
     for finding in outside_domain(model, values):
         holds = finding.holds & _not(ruled)
@@ -232,19 +227,13 @@ def answer_with_findings(
         in_domain = in_domain & _not(together)
     for finding in doubts(model, values, ns):
         say(finding.holds & _not(unanswered), finding)
-    return Judgement(p, low, high, eta, values, intensity, missing, in_domain, ruled)
+    return Judgement(answer, values, intensity, missing, in_domain, ruled)
 
 
-def _answer(
-    model: FragilityModel,
-    values: Mapping[str, Any],
-    half_width: float | None,
-    ns: Numbers,
-    ruled: Any,
-) -> tuple[Any, Any, Any, Eta | None]:
-    if ruled is True:
-        return 0.0, 0.0, 0.0, None
-    return model.answer(values, half_width, ns)
+def _never(model: FragilityModel) -> Answer:
+    """Return the answer where a single number is ruled: P = 0."""
+    of_event = None if model.event_spread is None else 0.0
+    return Answer(0.0, 0.0, 0.0, of_event, of_event, None)
 
 
 def _not(condition: Any) -> Any:

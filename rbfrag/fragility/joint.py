@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import betaln, ndtr, ndtri
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.dependence import Dependence, event_range
+from rbfrag.fragility.dependence import Dependence, EventSpread, normal_quantile
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -194,14 +194,10 @@ def event_ranges(
     probability: ArrayLike, rho_e: float, level: float = 0.95
 ) -> tuple[FloatArray, FloatArray]:
     """Return `rbfrag.fragility.dependence.event_range` of many P, two arrays of their shape."""
-    p = np.asarray(probability, dtype=np.float64)
-    if rho_e in (0.0, 1.0):
-        ends = np.array([event_range(one, rho_e, level) for one in p.ravel().tolist()])
-        low, high = ends.reshape(*p.shape, 2).transpose(-1, *range(p.ndim))
-        return low, high
-    a, scale = ndtri(p), np.sqrt(1.0 - rho_e)
-    reach = np.sqrt(rho_e) * ndtri(0.5 + 0.5 * level)
-    return np.asarray(ndtr((a - reach) / scale)), np.asarray(ndtr((a + reach) / scale))
+    reach = -normal_quantile(0.5 - 0.5 * level)
+    a = ndtri(np.asarray(probability, dtype=np.float64))
+    low, high = EventSpread.of(rho_e).ends(a, reach, ndtr)
+    return np.asarray(low), np.asarray(high)
 
 
 def count_moments(

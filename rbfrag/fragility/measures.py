@@ -27,8 +27,6 @@ class Term:
         formula: the term from its inputs, in the order of `inputs`.
         variance_degree: degree of the dissertation's variance polynomial in this term.
         level: how much it knows of the motion: 3 the record itself, 0 one number.
-        richer: the terms of the models that know more, directly or by their own table of least
-            widths of the interval.
     """
 
     name: str
@@ -38,7 +36,6 @@ class Term:
     formula: Callable[..., Any]
     variance_degree: int
     level: int = 0
-    richer: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
@@ -81,7 +78,6 @@ TERMS: Mapping[str, Term] = {
             pgv_m_s,
             1,
             0,
-            ("pgv_pga", "pgv_pga_tm"),
         ),
         Term(
             "pga_tm",
@@ -91,7 +87,6 @@ TERMS: Mapping[str, Term] = {
             pga_tm_m_s,
             1,
             0,
-            ("pgv_pga_tm",),
         ),
         Term(
             "pgd_tm",
@@ -101,7 +96,6 @@ TERMS: Mapping[str, Term] = {
             pgd_tm_m_s,
             2,
             0,
-            ("xp",),
         ),
         Term(
             "pgv_pga",
@@ -111,7 +105,6 @@ TERMS: Mapping[str, Term] = {
             first_m_s,
             1,
             1,
-            ("pgv_pga_tm",),
         ),
         Term(
             "pgv_pga_tm",
@@ -121,7 +114,6 @@ TERMS: Mapping[str, Term] = {
             first_m_s,
             1,
             2,
-            ("xp",),
         ),
         Term("xp", "toppling spectrum", "X(p)", ("xp_m_s", "pga_g"), first_m_s, 1, 3),
     )

@@ -3,26 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+import shlex
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any, NamedTuple
 
-from rbfrag.db.model_file import ModelRow
+from rbfrag.db.model_file import MODEL_FORM, ModelRow
 from rbfrag.errors import InputError, ModelError
+from rbfrag.fragility.dependence import EventSpread
 from rbfrag.fragility.domain import Ratio, Spread, ratios_of, stored_spread
+from rbfrag.fragility.intervals import ParameterErrors, Quantiles, packed
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, TERMS, Term
-from rbfrag.fragility.methods import Eta, Form, Method, Numbers, method_named, method_names
+from rbfrag.fragility.methods import (
+    TOPPLING_BLOCK,
+    Eta,
+    Form,
+    Method,
+    Numbers,
+    method_named,
+    method_names,
+)
 
 LEAST = 1e-290
 """Velocities, accelerations and strengths are taken for at least this, for logarithms."""
 
-FLOOR_NODES = 41
-"""Nodes at which the least width of an interval, over its quantile, is tabulated: by eta, and by
-y/2x, the share of twice the velocity."""
-FLOOR_FROM, FLOOR_STEP = -10.0, 0.5
-"""The first node of eta, and from one to the next."""
-FLOOR_SHARE_STEP = 0.025
+
+NO_EVENT_RANGE = (
+    "no estimate of what the blocks of one earthquake share is stored with this model (too few "
+    "earthquakes, sites or components were fitted): the range of one future earthquake is not known"
+)
 
 
 class Range(NamedTuple):
@@ -31,6 +40,27 @@ class Range(NamedTuple):
     name: str
     low: float
     high: float
+
+
+class Answer(NamedTuple):
+    """What a model says of a block and a motion, numbers or arrays.
+
+    Args:
+        probability: P.
+        low: lower end of the confidence interval of P.
+        high: upper end of it.
+        event_low: lower end of the share failing in one future earthquake; None where the model
+            does not know it.
+        event_high: upper end of it.
+        eta: argument of the link; None where nothing had to be evaluated.
+    """
+
+    probability: Any
+    low: Any
+    high: Any
+    event_low: Any
+    event_high: Any
+    eta: Eta | None
 
 
 @dataclass(frozen=True)
@@ -43,13 +73,9 @@ class FragilityModel:
         method: how it was fitted.
         form: the method's formula on that term.
         parameters: values of the coefficients.
-        packed_covariance: the covariance on and below its diagonal, row by row, those off it
-            doubled.
-        floor: least widths of the interval over its quantile at the nodes of eta, and at those of
-            y/2x; empty for none.
+        errors: how well they are known.
+        event_spread: what one earthquake may do; None where it is not known.
         vertical: whether it was fitted with vertical motion.
-        degrees_of_freedom: of the standard errors, which the interval is widened by, at most the
-            earthquakes less one; 0 for none.
         notes: what every answer says of the model, such as where it comes from.
         spread: how the fitted points scatter; None where the row does not say it.
     """
@@ -59,10 +85,9 @@ class FragilityModel:
     method: Method
     form: Form
     parameters: tuple[float, ...]
-    packed_covariance: tuple[float, ...]
-    floor: tuple[tuple[float, ...], ...]
+    errors: ParameterErrors
+    event_spread: EventSpread | None
     vertical: bool
-    degrees_of_freedom: int
     notes: tuple[str, ...] = ()
     spread: Spread | None = None
     ranges: dict[tuple[str, ...], tuple[Range, ...]] = field(
@@ -79,9 +104,14 @@ class FragilityModel:
         """Return the model of a stored row.
 
         Raises:
-            ModelError: this rbfrag does not know the model's term or method, or the row is
-                not whole.
+            ModelError: the model is of an older form, this rbfrag does not know its term or
+                method, or the row is not whole.
         """
+        if row.form < MODEL_FORM:
+            raise ModelError(
+                f"model {row.name!r} was fitted by an older rbfrag, in a form that does not answer "
+                f"any more: fit it again with  {_fit_line(row)}"
+            )
         try:
             method: Method | None = method_named(row.method)
         except InputError:
@@ -107,18 +137,24 @@ class FragilityModel:
                 f"model {row.name!r} has the coefficients {', '.join(row.coefficients)}, but "
                 f"method {row.method} on {row.term} has {', '.join(names)}: fit it again"
             )
-        freedom = row.diagnostics.get("degrees_of_freedom")
+        steps = row.leave_out_steps or ()
+        if len(steps) == 1 or any(len(step) != size for step in steps):
+            raise ModelError(
+                f"model {row.name!r} has {size} coefficients but steps of leaving earthquakes out "
+                "of another size: fit it again"
+            )
+        rho_e = None if row.dependence is None else row.dependence.get("rho_e")
+        event_spread = EventSpread.of(rho_e) if isinstance(rho_e, int | float) else None
         return cls(
             row=row,
             term=TERMS[row.term],
             method=method,
             form=form,
             parameters=parameters,
-            packed_covariance=packed(row.covariance),
-            floor=_floor(row),
+            errors=ParameterErrors(packed(row.covariance), steps),
+            event_spread=event_spread,
             vertical=row.diagnostics.get("vertical", "without") != "without",
-            degrees_of_freedom=freedom if isinstance(freedom, int) else 0,
-            notes=notes,
+            notes=notes if event_spread is not None else (*notes, NO_EVENT_RANGE),
             spread=stored_spread(row.name, row.diagnostics),
         )
 
@@ -210,152 +246,48 @@ class FragilityModel:
             low, high = max(low, least), min(high, most)
         return Range(name, low, high)
 
-    def half_width(self, level: float) -> float:
-        """Return the quantile that the interval reaches to.
-
-        Raises:
-            InputError: the level is not a number between 0 and 1.
-        """
-        return student_half_width(checked_level(level), self.degrees_of_freedom)
-
-    def answer(
-        self, values: Mapping[str, Any], half_width: float | None, ns: Numbers
-    ) -> tuple[Any, Any, Any, Eta]:
-        """Return P, the ends of its interval, and eta.
+    def answer(self, values: Mapping[str, Any], quantiles: Quantiles | None, ns: Numbers) -> Answer:
+        """Return P with its interval, the range of one future earthquake, and eta.
 
         Args:
             values: completed values, within what the bounds allow.
-            half_width: quantile of the confidence level; None for no interval.
+            quantiles: of the confidence level; None for P and eta alone.
             ns: functions for the kind of number given.
         """
-        formula = self.form.eta(self.parameters, values, ns)
-        link, eta = self.method.link.probability, formula.eta
+        unscaled, h = self.form.unscaled(self.parameters, values, ns)
+        eta = unscaled.eta * h
+        link = self.method.link.probability
         middle = link(eta, ns)
-        if half_width is None:
-            return middle, middle, middle, formula
-        error = standard_error(self.packed_covariance, formula.slopes, ns)
-        low, high = link(eta - half_width * error, ns), link(eta + half_width * error, ns)
-        if self.floor:
-            by_eta, by_ratio = self.floor
-            ratio = values["y_m_s"] / (2.0 * values["intensity_m_s"])
-            least = ns.minimum(
-                ns.between(eta, FLOOR_FROM, FLOOR_STEP, by_eta),
-                ns.between(ratio, 0.0, FLOOR_SHARE_STEP, by_ratio),
-            )
-            low, high = widened(half_width * least, middle, low, high, ns)
-        return middle, low, high, formula
+        formula = unscaled._replace(eta=eta)
+        if quantiles is None:
+            return Answer(middle, None, None, None, None, formula)
+        reach = h * self.errors.half_width(unscaled.slopes, quantiles, ns)
+        low, high = link(eta - reach, ns), link(eta + reach, ns)
+        spread = self.event_spread
+        if spread is None:
+            return Answer(middle, low, high, None, None, formula)
+        ends = spread.ends(ns.ndtri(middle), quantiles.normal, ns.ndtr)
+        return Answer(middle, low, high, *ends, formula)
 
 
-def standard_error(packed_covariance: Sequence[float], slopes: Sequence[Any], ns: Numbers) -> Any:
-    """Return sqrt(fᵀ Σ f) for the slopes f and a packed covariance Σ."""
-    total, k = 0.0, 0
-    for i, slope in enumerate(slopes):
-        inner = packed_covariance[k + i] * slope
-        for j in range(i):
-            inner = inner + packed_covariance[k + j] * slopes[j]
-        total = total + inner * slope
-        k += i + 1
-    return ns.sqrt(ns.maximum(total, 0.0))
-
-
-def widened(least: Any, middle: Any, low: Any, high: Any, ns: Numbers) -> tuple[Any, Any]:
-    """Return the ends of an interval of at least some width, inside 0 and 1.
-
-    What lacks is added in proportion to what is left below and above the middle.
-    """
-    lacking = ns.maximum(least - (high - low), 0.0)
-    low, high = low - lacking * middle, high + lacking * (1.0 - middle)
-    below, above = ns.maximum(-low, 0.0), ns.maximum(high - 1.0, 0.0)
-    return ns.maximum(low - above, 0.0), ns.minimum(high + below, 1.0)
-
-
-def packed(covariance: tuple[tuple[float, ...], ...]) -> tuple[float, ...]:
-    """Return a covariance as :func:`standard_error` reads it."""
-    return tuple(
-        float(covariance[i][j]) * (1.0 if i == j else 2.0)
-        for i in range(len(covariance))
-        for j in range(i + 1)
-    )
-
-
-def _floor(row: ModelRow) -> tuple[tuple[float, ...], ...]:
-    floor = row.diagnostics.get("interval_floor") or ()
-    if isinstance(floor, list | tuple) and len(floor) == FLOOR_NODES:
-        # stored before there was a second table, which must not be the lower one then
-        floor = [*floor, *[max(floor)] * FLOOR_NODES]
-    if not isinstance(floor, list | tuple) or len(floor) not in (0, 2 * FLOOR_NODES):
-        raise ModelError(
-            f"model {row.name!r} holds a table of least widths of another size: fit it again"
-        )
-    values = tuple(float(value) for value in floor)
-    return (values[:FLOOR_NODES], values[FLOOR_NODES:]) if values else ()
-
-
-# Quantiles by own code: `rbfrag predict` takes 50 ms from the shell, and loading scipy.special for
-# stdtrit would add 310, loading statistics for NormalDist 11. Arrays read the same number, so that
-# they answer as single ones do: stdtrit differs by 1e-11 at level .999999, and is out by 1e-4 at
-# level 1e-6 with 4 degrees of freedom. The tests compare with scipy.stats.
-
-FEWEST_FREEDOMS = 2
-"""With fewer degrees of freedom the normal quantile answers."""
-
-
-def checked_level(level: object) -> float:
-    """Return a confidence level, or refuse what is none."""
-    if not isinstance(level, int | float) or not 0.0 < level < 1.0:
-        raise InputError(
-            f"level = {level!r}: a confidence level lies between 0 and 1, such as 0.95"
-        )
-    return level
-
-
-@lru_cache(maxsize=256)
-def student_half_width(level: float, degrees_of_freedom: int) -> float:
-    """Return t such that a Student number lies within ±t with probability `level`.
-
-    Clustered errors come from as many independent numbers as there are earthquakes: their
-    intervals reach to Student's t with one degree of freedom less, not to the normal quantile.
-
-    Args:
-        level: confidence level, between 0 and 1.
-        degrees_of_freedom: earthquakes less one; 0 for the normal quantile.
-    """
-    target = 0.5 * (1.0 - checked_level(level))
-    t = _where_tail_is(target, 0, 1.0)
-    if degrees_of_freedom < FEWEST_FREEDOMS:
-        return t
-    start = t * (1.0 + (t * t + 1.0) / (4.0 * degrees_of_freedom))
-    return _where_tail_is(target, degrees_of_freedom, start)
-
-
-def _where_tail_is(target: float, nu: int, t: float) -> float:
-    """Return the t beyond which lies a probability, by Newton's method on its logarithm."""
-    for _ in range(100):
-        tail, density = _upper_tail(t, nu)
-        # the logarithm bends one way: the steps end from one side
-        step = tail / density * math.log(tail / target)
-        t += step
-        if abs(step) <= 1e-14 * t:
-            break
-    return t
-
-
-def _upper_tail(t: float, nu: int) -> tuple[float, float]:
-    """Return the probability of more than t, and the density there."""
-    if nu < FEWEST_FREEDOMS:
-        density = math.exp(-0.5 * t * t) / math.sqrt(2.0 * math.pi)
-        return 0.5 * math.erfc(t * math.sqrt(0.5)), density
-    scale = math.lgamma(0.5 * (nu + 1)) - math.lgamma(0.5 * nu) - 0.5 * math.log(nu * math.pi)
-    density = math.exp(scale - 0.5 * (nu + 1) * math.log1p(t * t / nu))
-    # For whole nu the distribution function is a finite sum (Abramowitz & Stegun 26.7.3-4),
-    # subtracted from a half; the tail of interest is far from rounding.
-    theta = math.atan(t / math.sqrt(nu))
-    cos2, remainder = math.cos(theta) ** 2, nu % 2
-    term, total = (math.cos(theta) if remainder else 1.0), 0.0
-    for k in range(remainder, nu - 1, 2):
-        total += term
-        term *= cos2 * (k + 1) / (k + 2)
-    inside = math.sin(theta) * total
-    if remainder:
-        inside = (theta + inside) * 2.0 / math.pi
-    return max(0.5 * (1.0 - inside), 1e-300), density
+def _fit_line(row: ModelRow) -> str:
+    """Return the command that fits a stored model again."""
+    selection = row.diagnostics
+    words = ["rbfrag fit"]
+    if row.kind != TOPPLING_BLOCK.kind:
+        words.append(f"--kind {row.kind}")
+    words += [f"--term {row.term}", f"--method {row.method}"]
+    for option, name in (("suite", "suite"), ("rotation", "rotation_deg")):
+        if selection.get(name) is not None:
+            words.append(f"--{option} {shlex.quote(str(selection[name]))}")
+    if selection.get("vertical", "without") != "without":
+        words.append(f"--vertical {selection['vertical']}")
+    if selection.get("doubtful_pgd"):
+        words.append("--doubtful-pgd")
+    try:
+        exponent = method_named(row.method).exponent
+    except InputError:
+        exponent = None
+    if exponent in row.coefficients:
+        words.append("--free-m")
+    return " ".join([*words, f"--name {shlex.quote(row.name)}", "--replace"])

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
+from rbfrag.fragility.intervals import Quantiles, checked_level, quantiles_of
 from rbfrag.fragility.lookup import find_model, suited_models
 from rbfrag.fragility.measures import SPECTRAL, STATED
-from rbfrag.fragility.methods import SINGLE, Eta
+from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel
 
 if TYPE_CHECKING:
@@ -38,9 +39,13 @@ class Prediction:
     Args:
         kind: how the block fails.
         probability: P, between 0 and 1.
-        ci_low: lower end of the confidence interval of P.
+        ci_low: lower end of the confidence interval of P: how well the share of such blocks that
+            fail over all earthquakes and sites is known.
         ci_high: upper end of it.
-        level: confidence level of the interval.
+        event_low: lower end of the share of such blocks at many sites that fails in one single
+            earthquake; None where the model does not know what its blocks share.
+        event_high: upper end of it.
+        level: confidence level of the interval, and probability of the range of one earthquake.
         model: name of the model that answered.
         term: its intensity term.
         method: how it was fitted.
@@ -59,6 +64,8 @@ class Prediction:
     probability: float
     ci_low: float
     ci_high: float
+    event_low: float | None
+    event_high: float | None
     level: float
     model: str
     term: str
@@ -183,11 +190,13 @@ def predict(
 ) -> Prediction | PredictionArray:
     """Return the probability that a block fails, with its confidence interval.
 
-    P = F(eta), with eta and F of the model's method (docs/theory/fragility.md). The interval is
-    F(eta ± t s), s being the standard error of eta by the delta method from the covariance of
-    all parameters and t Student's quantile for as many earthquakes as were fitted; it is never
-    narrower than that of a model which knows more. Without shaking, and where mechanics
-    forbids failure (k >= PGA, say), P is 0 whatever the model says.
+    P = F(eta), with eta and F of the model's method (docs/theory/fragility.md), is the share of
+    such blocks that fail over all earthquakes and sites with these measures. The interval
+    F(eta ± t s) says how well that is known, s being the standard error of eta from the fits that
+    each leave an earthquake out and t Student's quantile for as many earthquakes as tell of this
+    block. The range of one earthquake says what share of such blocks at many sites fails in one
+    single earthquake. Without shaking, and where mechanics forbids failure (k >= PGA, say), P is 0
+    whatever the model says.
 
     A block is given by p2 and kr (it topples), by ky and displacement_m (it slides further than
     that), or by ks and ps2 (it slumps); each is a number or an array.
@@ -216,13 +225,14 @@ def predict(
             ``both`` gives the mean of the two, which stand beside it (motion only).
         model: a model, the name of a stored one, or None for the best one that what is given
             suffices for: the database's default where it suffices for no less than any other.
-        level: confidence level of the interval, between 0 and 1.
+        level: confidence level of the interval and of the range of one earthquake, between 0
+            and 1.
         db: database of the model: a path or SQLAlchemy URL; None for ``RBFRAG_DB``, or else
             ``rbfrag.db`` in the current folder, or else the reference that is shipped.
         nan: in arrays, ``propagate`` answers NaN with its reason where the input cannot be
             used, ``raise`` refuses such arrays.
-        interval: in arrays, False leaves the interval out (its ends are then NaN), which takes
-            less time.
+        interval: in arrays, False leaves interval and range out (their ends are then NaN), which
+            takes less time.
 
     Returns:
         :class:`Prediction` when every argument is a single number (with `motion` and both
@@ -308,7 +318,7 @@ def answer_given(
                 f"{name} is missing: a block of kind {model.kind} is given by "
                 f"{' and '.join(model.method.block.names)}"
             )
-    half_width = model.half_width(level)
+    quantiles = quantiles_of(checked_level(level))
     singles: dict[str, float] = {}
     for name, value in given.items():
         if type(value) is float:  # for speed
@@ -318,13 +328,11 @@ def answer_given(
         else:
             break
     else:
-        return _predict_one(model, singles, level, half_width)
+        return _predict_one(model, singles, quantiles)
     # Kept apart so that single numbers do not load numpy.
     from rbfrag.fragility.prediction_array import predict_many
 
-    return predict_many(
-        model, given, level, half_width if interval else None, refuse_nan=nan == "raise"
-    )
+    return predict_many(model, given, quantiles, interval=interval, refuse_nan=nan == "raise")
 
 
 def is_single(value: object) -> bool:
@@ -348,22 +356,22 @@ def single(name: str, value: object) -> float:
 
 
 def _predict_one(
-    model: FragilityModel, given: dict[str, float], level: float, half_width: float
+    model: FragilityModel, given: dict[str, float], quantiles: Quantiles
 ) -> Prediction:
     method, warnings = model.method, model.notes
-    eta: Eta | None
     try:
         values = model.with_ratios(method.block.completed(given, model.term, SINGLE))
         clear = _is_clear(model, values)
     except (ArithmeticError, ValueError):  # the checks find the words
         clear = False
     if clear:
-        probability, low, high, eta = model.answer(values, half_width, SINGLE)
+        answer = model.answer(values, quantiles, SINGLE)
         x, in_domain = values["intensity_m_s"], True
     else:
-        judgement, sentences = _answer_with_diagnostics(model, given, half_width)
-        probability, low, high, eta, values, x, _, in_domain, _ = judgement
+        judgement, sentences = _answer_with_diagnostics(model, given, quantiles)
+        answer, values, x, _, in_domain, _ = judgement
         warnings = (*warnings, *sentences)
+    probability, low, high, event_low, event_high, eta = answer
     median = None
     if method.median_of is not None and eta is not None:
         # the asked value, not the one that is adjusted for the base's dip
@@ -373,7 +381,9 @@ def _predict_one(
         probability,
         low,
         high,
-        level,
+        event_low,
+        event_high,
+        quantiles.level,
         model.row.name,
         model.term.name,
         method.name,
@@ -409,7 +419,7 @@ def _is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
 
 
 def _answer_with_diagnostics(
-    model: FragilityModel, given: dict[str, float], half_width: float
+    model: FragilityModel, given: dict[str, float], quantiles: Quantiles
 ) -> tuple[Judgement, list[str]]:
     # Kept apart: most questions need no words.
     from rbfrag.fragility.checks import answer_with_findings
@@ -425,7 +435,7 @@ def _answer_with_diagnostics(
             raise InputError(finding.about(finding.value))
 
     judgement = answer_with_findings(
-        model, given, tuple(given), half_width, SINGLE,
+        model, given, tuple(given), quantiles, SINGLE,
         say=say, refuse=refuse, unstable=refuse, nothing=False,
     )  # fmt: skip
     return judgement, sentences
@@ -473,12 +483,18 @@ def _predict_motion(
 
 
 def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
-    def mean(name: str) -> float:
-        return 0.5 * (float(getattr(forward, name)) + float(getattr(reverse, name)))
+    def mean(name: str) -> float | None:
+        one, other = getattr(forward, name), getattr(reverse, name)
+        return None if one is None or other is None else 0.5 * (float(one) + float(other))
 
     warnings = [f"forward: {text}" for text in forward.warnings]
     warnings += [f"reverse: {text}" for text in reverse.warnings]
-    means = {name: mean(name) for name in ("probability", "ci_low", "ci_high", "intensity_m_s")}
+    means: dict[str, Any] = {
+        name: mean(name)
+        for name in (
+            "probability", "ci_low", "ci_high", "event_low", "event_high", "intensity_m_s"
+        )
+    }  # fmt: skip
     return MotionPrediction(
         **{
             **vars(forward),
@@ -541,7 +557,10 @@ def prediction_document(
     recommended = others[0]
     document = recommended.as_dict()
     document["warnings"] = [*remarks, *recommended.warnings]
-    columns = ("model", "term", "method", "probability", "ci_low", "ci_high", "in_domain")
+    columns = (
+        "model", "term", "method", "probability", "ci_low", "ci_high", "event_low", "event_high",
+        "in_domain",
+    )  # fmt: skip
     document["answers"] = [
         {**{name: getattr(each, name) for name in columns}, "recommended": each is recommended}
         for each in others

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import Finding, answer_with_findings
+from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.methods import Numbers, arrays
 from rbfrag.fragility.model import FragilityModel
 
@@ -50,6 +51,9 @@ class PredictionArray:
         probability: P; NaN where the input cannot be used.
         ci_low: lower end of the confidence interval of P; NaN where none was asked for.
         ci_high: upper end of it.
+        event_low: lower end of the share of such blocks at many sites that fails in one single
+            earthquake; NaN where the model does not know it and where none was asked for.
+        event_high: upper end of it.
         in_domain: True where block and motion lie in the ranges that were fitted.
         reasons: why an answer is missing, ruled or to be doubted; read them by :attr:`reason`.
         y_m_s: velocity k g/p of the blocks [m/s]; NaN where they have no size.
@@ -65,6 +69,8 @@ class PredictionArray:
     probability: FloatArray
     ci_low: FloatArray
     ci_high: FloatArray
+    event_low: FloatArray
+    event_high: FloatArray
     in_domain: NDArray[np.bool_]
     reasons: Reasons
     y_m_s: FloatArray
@@ -88,6 +94,8 @@ class _Columns:
     probability: FloatArray
     low: FloatArray
     high: FloatArray
+    event_low: FloatArray
+    event_high: FloatArray
     y: FloatArray
     x: FloatArray
     in_domain: NDArray[np.bool_]
@@ -96,9 +104,9 @@ class _Columns:
 def predict_many(
     model: FragilityModel,
     given: Mapping[str, object],
-    level: float,
-    half_width: float | None,
+    quantiles: Quantiles,
     *,
+    interval: bool,
     refuse_nan: bool,
 ) -> PredictionArray:
     """Return the answers for broadcast arrays; see :func:`rbfrag.fragility.predict.predict`.
@@ -106,8 +114,8 @@ def predict_many(
     Args:
         model: the model that answers.
         given: block and measures of the motion by name, numbers or arrays.
-        level: confidence level of the interval.
-        half_width: the quantile that belongs to it; None for no interval.
+        quantiles: of the confidence level.
+        interval: whether interval and range of one earthquake are asked for.
         refuse_nan: raise instead of answering NaN.
 
     Raises:
@@ -117,16 +125,19 @@ def predict_many(
     values, shape = _flat(given)
     size = int(np.prod(shape))
     ns = arrays()
-    p, low, high, y, x = np.empty((5, size))
-    out = _Columns(p, low, high, y, x, np.ones(size, dtype=np.bool_))
-    if half_width is None:
+    p, low, high, event_low, event_high, y, x = np.empty((7, size))
+    out = _Columns(p, low, high, event_low, event_high, y, x, np.ones(size, dtype=np.bool_))
+    reach = quantiles if interval else None
+    if not interval:
         out.low[:] = out.high[:] = np.nan
+    if not interval or model.event_spread is None:
+        out.event_low[:] = out.event_high[:] = np.nan
 
     def answer(start: int) -> NDArray[np.intp]:
         part = slice(start, min(start + CHUNK, size))
         own = {name: v if v.size == 1 else v[part] for name, v in values.items()}
         with np.errstate(all="ignore"):
-            return _answer_part(model, own, half_width, part, out, ns) + start
+            return _answer_part(model, own, reach, part, out, ns) + start
 
     # gathered: the words cost as much for a few elements as for thousands
     flagged = np.concatenate([np.empty(0, dtype=np.intp), *_in_chunks(answer, size)])
@@ -136,7 +147,7 @@ def predict_many(
         own = {n: v.repeat(places.size) if v.size == 1 else v[places] for n, v in values.items()}
         with np.errstate(all="ignore"):
             return places, _answer_with_diagnostics(
-                model, own, half_width, places, shape, out, refuse_nan=refuse_nan
+                model, own, reach, places, shape, out, refuse_nan=refuse_nan
             )
 
     reasons = _in_chunks(explain, flagged.size)
@@ -145,11 +156,13 @@ def predict_many(
         probability=out.probability.reshape(shape),
         ci_low=out.low.reshape(shape),
         ci_high=out.high.reshape(shape),
+        event_low=out.event_low.reshape(shape),
+        event_high=out.event_high.reshape(shape),
         in_domain=out.in_domain.reshape(shape),
         reasons=Reasons(shape, reasons),
         y_m_s=out.y.reshape(shape),
         intensity_m_s=out.x.reshape(shape),
-        level=level,
+        level=quantiles.level,
         model=model.name,
         term=model.term.name,
         method=model.method.name,
@@ -170,7 +183,7 @@ def _in_chunks(work: Callable[[int], T], size: int) -> list[T]:
 def _answer_part(
     model: FragilityModel,
     given: Mapping[str, FloatArray],
-    half_width: float | None,
+    quantiles: Quantiles | None,
     part: slice,
     out: _Columns,
     ns: Numbers,
@@ -192,10 +205,10 @@ def _answer_part(
         clear &= np.logical_not(holds)
     if model.spread is not None:
         clear &= model.spread.holds(values, ns)
-    middle, low, high, _ = model.answer(values, half_width, ns)
-    out.probability[part] = middle
-    if half_width is not None:
-        out.low[part], out.high[part] = low, high
+    answer = model.answer(values, quantiles, ns)
+    for column, value in zip(_answered(out), answer, strict=False):
+        if value is not None:
+            column[part] = value
     out.y[part] = values.get("y_m_s", np.nan)
     out.x[part] = values["intensity_m_s"]
     return np.flatnonzero(~clear)
@@ -204,7 +217,7 @@ def _answer_part(
 def _answer_with_diagnostics(
     model: FragilityModel,
     given: dict[str, FloatArray],
-    half_width: float | None,
+    quantiles: Quantiles | None,
     places: NDArray[np.intp],
     shape: tuple[int, ...],
     out: _Columns,
@@ -232,14 +245,13 @@ def _answer_with_diagnostics(
     block = model.method.block
     needed = [*block.names, *model.term.inputs, *(o for o in block.options if o in given)]
     judgement = answer_with_findings(
-        model, given, needed, half_width, arrays(),
+        model, given, needed, quantiles, arrays(),
         say=say, refuse=refuse, unstable=unstable,
         nothing=np.zeros(places.size, dtype=np.bool_),
     )  # fmt: skip
-    columns = [(out.probability, judgement.probability)]
-    if half_width is not None:
-        columns += [(out.low, judgement.low), (out.high, judgement.high)]
-    for column, answer in columns:
+    for column, answer in zip(_answered(out), judgement.answer, strict=False):
+        if answer is None:
+            continue
         values = np.where(judgement.ruled, 0.0, answer)
         values[at_rest] = 1.0
         values[judgement.missing] = np.nan
@@ -249,6 +261,11 @@ def _answer_with_diagnostics(
         column[places] = np.where(judgement.missing, np.nan, value)
     out.in_domain[places] = judgement.in_domain
     return sentences.texts()
+
+
+def _answered(out: _Columns) -> tuple[FloatArray, ...]:
+    """Return the columns that a model answers, in the order of its answer."""
+    return out.probability, out.low, out.high, out.event_low, out.event_high
 
 
 class _Sentences:

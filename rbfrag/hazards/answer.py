@@ -115,7 +115,8 @@ def hazard(
     name, shift, weight = reading.name, reading.shift, reading.weight
     warnings = list(reading.warnings)
     chosen = find_model(model, ("p2", "kr", name), db)
-    warnings += chosen.notes
+    if chosen.term.advice:
+        warnings.append(chosen.term.advice)
     parts = []
     for start in range(0, 0 if one_class else p2s.size, _CHUNK):
         some = slice(start, start + _CHUNK)

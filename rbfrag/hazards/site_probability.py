@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.fragility.joint import event_ranges
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
@@ -42,8 +43,11 @@ class SiteProbability:
 
     Args:
         probability: P at each site, the mean over the blocks of a class, shape (n,).
-        ci_low: lower end of the confidence interval (parameters of the model alone).
+        ci_low: lower end of its interval, as far as the data tell the parameters of the model.
         ci_high: upper end.
+        event_low: lower end of the share of such blocks at many such sites that fails in one single
+            earthquake, taken at P; NaN where the model does not know it.
+        event_high: upper end.
         in_domain: whether every block and the site's shaking lie in the ranges fitted.
         level: confidence level.
         model: name of the model that answered.
@@ -51,12 +55,14 @@ class SiteProbability:
         method: how it was fitted.
         measures: the measures that it read.
         integrated: those of them whose standard deviations were integrated over.
-        notes: what every answer says of the model.
+        advice: what is to be said of a measure that tells little; empty for nothing.
     """
 
     probability: FloatArray
     ci_low: FloatArray
     ci_high: FloatArray
+    event_low: FloatArray
+    event_high: FloatArray
     in_domain: NDArray[np.bool_]
     level: float
     model: str
@@ -64,7 +70,7 @@ class SiteProbability:
     method: str
     measures: tuple[str, ...]
     integrated: tuple[str, ...]
-    notes: tuple[str, ...]
+    advice: str
 
 
 def site_probability(
@@ -149,10 +155,15 @@ def site_probability(
         probability[sites] = (answer.probability @ both) @ mean
         low[sites] = (answer.ci_low @ both) @ mean
         high[sites] = (answer.ci_high @ both) @ mean
+    event_low = event_high = np.full(n, np.nan)
+    if chosen.event_spread is not None:
+        event_low, event_high = event_ranges(probability, chosen.event_spread.root**2, level)
     return SiteProbability(
         probability=probability,
         ci_low=low,
         ci_high=high,
+        event_low=event_low,
+        event_high=event_high,
         in_domain=in_domain,
         level=level,
         model=chosen.name,
@@ -160,7 +171,7 @@ def site_probability(
         method=chosen.row.method,
         measures=names,
         integrated=tuple(given),
-        notes=chosen.notes,
+        advice=chosen.term.advice,
     )
 
 

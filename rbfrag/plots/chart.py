@@ -38,13 +38,13 @@ def plot_chart(
 ) -> Path:
     """Draw lines of equal probability of toppling over intensity and block.
 
-    The ordinate is the block's toppling velocity k_r g/p: one chart of a model of one number
-    serves blocks of every size and strength. A model of PGV with PGA is drawn over PGV, with
-    block size, PGA and Tm held; the caption says at what. Outside the ranges that were fitted
-    the sheet is shaded.
+    The ordinate is the block's toppling velocity k_r g/p. What the model reads beside it and the
+    intensity is held: the size of the block, and PGA and Tm of a model of PGV with PGA, which is
+    drawn over PGV; the caption says at what. Outside the ranges that were fitted the sheet is
+    shaded.
 
     Args:
-        model: a model of pgv, pga_tm, pgd_tm, pgv_pga or pgv_pga_tm.
+        model: a model of one number, pgv_pga or pgv_pga_tm.
         path: file to write: .png, .pdf or .svg.
         held: what is held; None for the middle of the fitted ranges.
     """

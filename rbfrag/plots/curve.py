@@ -45,6 +45,7 @@ FIXED = {
     **{name: f"SA({period:.1f} s) = {{:g}} g" for period, name in SPECTRAL.items()},
 }
 
+EVENT = "#b8b8b8"
 _COLOURS = (RED, "#4d9221", "#e08214", "#762a83", "#636363")
 _POINTS = 241
 _START = 1e-6
@@ -61,9 +62,12 @@ def plot_curve(
     level: float = 0.95,
     beside: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
 ) -> Path:
-    """Draw the fragility curve of one block with its confidence band.
+    """Draw the fragility curve of one block with two bands.
 
-    Outside the fitted ranges the curve is dashed.
+    The narrow band is the interval of P: the share of such blocks that fail over all earthquakes
+    and sites with this shaking, as far as the data tell it. The wide one is the share that may
+    fail in one single earthquake, taken at P; it is left out where the model does not know it.
+    With few earthquakes the first may be the wider. Outside the fitted ranges the curve is dashed.
 
     Args:
         model: the model.
@@ -73,7 +77,7 @@ def plot_curve(
         over: the measure along the abscissa, by name; None for the one that the model's term
             names first.
         fixed: the other measures that the term reads, by name, held at one value.
-        level: confidence level of the band.
+        level: level of both bands.
         beside: other fragilities of the same measure to be drawn for comparison, by name:
             probabilities at levels of it.
 
@@ -104,15 +108,21 @@ def plot_curve(
     known = answer.in_domain
     figure = new_figure(7.0, 4.6)
     axes = figure.add_subplot()
+    percent = f"{100.0 * level:g} %"
+    if not np.isnan(answer.event_low).all():
+        axes.fill_between(
+            x, answer.event_low, answer.event_high, color=EVENT, alpha=0.35, lw=0.0,
+            label=f"share failing in one single earthquake ({percent})",
+        )  # fmt: skip
     axes.fill_between(
-        x, answer.ci_low, answer.ci_high, color=BLUE, alpha=0.2, lw=0.0,
-        label=f"{100.0 * level:g} % confidence in the curve",
+        x, answer.ci_low, answer.ci_high, color=BLUE, alpha=0.35, lw=0.0,
+        label=f"interval of P, as far as the data tell it ({percent})",
     )  # fmt: skip
     if not known.all():
         outside = "outside the fitted range"
         axes.plot(x, answer.probability, "--", color=BLUE, lw=1.2, label=outside)
     fitted = np.where(known, answer.probability, np.nan)
-    axes.plot(x, fitted, color=BLUE, lw=2.0, label="probability of toppling")
+    axes.plot(x, fitted, color=BLUE, lw=2.0, label="P: share over all earthquakes and sites")
     for i, (name, other) in enumerate((beside or {}).items()):
         style = ("-", "--", "-.", ":")[i // len(_COLOURS) % 4]
         colour = _COLOURS[i % len(_COLOURS)]
@@ -133,7 +143,7 @@ def plot_curve(
         + f"\nmodel {model.name}{counts}",
         fontsize=10,
     )
-    legend_below(figure, 3)
+    legend_below(figure, 2)
     return save_figure(figure, path)
 
 

@@ -24,7 +24,7 @@ from rbfrag.plots.canvas import (
     save_figure,
 )
 from rbfrag.plots.model_lines import (
-    ONE_NUMBER_TERMS,
+    depends_on_size,
     failure_line,
     predicted_strengths,
     running_medians,
@@ -76,7 +76,7 @@ def plot_fit(
             f"model {model.name} is of blocks known by {' and '.join(block.names)}: the figure is "
             f"that of blocks known by {' and '.join(TOPPLING_BLOCK.names)}"
         )
-    alone = term.name in ONE_NUMBER_TERMS and not model.has_exponent
+    alone = not depends_on_size(model)
     spectrum = np.full(table.p2.shape, np.nan) if xp_m_s is None else xp_m_s
     x = (
         np.asarray(

@@ -12,6 +12,7 @@ from scipy.optimize.elementwise import find_root
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
+from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
@@ -44,13 +45,13 @@ def model_answers(
     return answer
 
 
-ONE_NUMBER_TERMS = ("pgv", "pga_tm", "pgd_tm")
-"""Terms for which a probability depends on y and the term alone."""
+ONE_NUMBER_TERMS = ("pgv", "pgv_kr", "pga", "sa03", "sa10", "sa20", "sa30", "pga_tm", "pgd_tm")
+"""Terms that are one number."""
 
 MORE_TERMS = ("pgv_pga", "pgv_pga_tm")
 """Terms that are drawn over PGV, all else held."""
 
-# Neither matters to models of one number; large blocks and short periods keep k_r below PGA.
+# Not to be seen in models of y and one number; large blocks and short periods keep k_r below PGA.
 _ANY_P2 = 0.1
 _ANY_TM_S = 0.05
 
@@ -75,21 +76,20 @@ class HeldMeasures:
 
     def measures(self, model: FragilityModel, x_m_s: FloatArray) -> dict[str, FloatArray]:
         """Return the measures of motions of some intensities x [m/s], shape (n,)."""
-        name = model.term.name
-        tm = np.full(x_m_s.shape, self.tm_s)
-        if name == "pga_tm":
-            return {"pga_g": x_m_s * (2.0 * math.pi) / (STANDARD_GRAVITY_M_S2 * tm), "tm_s": tm}
-        if name == "pgd_tm":
-            return {"pgd_m": x_m_s * tm / (2.0 * math.pi), "tm_s": tm}
-        measures = {"pgv_m_s": x_m_s}
-        if name in MORE_TERMS:
+        first, *others = model.term.inputs
+        one = dict.fromkeys(model.term.inputs, 1.0)
+        one |= {"tm_s": self.tm_s, "p2": self.p2, "kr": 1.0}
+        # every term is in proportion to its first measure
+        unit = model.method.block.completed(one, model.term, SINGLE)["intensity_m_s"]
+        measures = {first: x_m_s / unit}
+        if "pga_g" in others:
             measures["pga_g"] = (
                 x_m_s / (self.pgv_over_pga_s * STANDARD_GRAVITY_M_S2)
                 if self.pga_g is None
                 else np.full(x_m_s.shape, self.pga_g)
             )
-        if name == "pgv_pga_tm":
-            measures["tm_s"] = tm
+        if "tm_s" in others:
+            measures["tm_s"] = np.full(x_m_s.shape, self.tm_s)
         return measures
 
     def fitted_range(
@@ -138,12 +138,8 @@ def held_measures(
             "cannot stand for them: this figure draws models of "
             f"{', '.join((*ONE_NUMBER_TERMS, *MORE_TERMS))}"
         )
-    if model.has_exponent:
-        raise InputError(
-            f"model {model.name!r} has an estimated exponent M: its probability depends on the "
-            "size of the block too; draw one fitted with M = 1"
-        )
-    read = {"p2": name in MORE_TERMS, "pga": name in MORE_TERMS, "tm": name == "pgv_pga_tm"}
+    more, of_size = name in MORE_TERMS, depends_on_size(model)
+    read = {"p2": of_size, "pga": more, "tm": name == "pgv_pga_tm"}
     for option, value in (("p2", p2), ("pga", pga_g), ("tm", tm_s)):
         if value is None:
             continue
@@ -154,17 +150,40 @@ def held_measures(
             )
         if not 0.0 < value < math.inf:
             raise InputError(f"--{option} = {value:g} is not above zero")
-    if name not in MORE_TERMS:
+    if not of_size:
         return HeldMeasures()
     size = _middle(model, "p2") if p2 is None else p2
-    ratio = _middle(model, "pgv_over_pga_s")
     words = [f"p² = {size:.3g} 1/s²"]
+    if not more:
+        return HeldMeasures(size, words=f"at {words[0]}")
+    ratio = _middle(model, "pgv_over_pga_s")
     words.append(f"PGA = {pga_g:g} g" if pga_g is not None else f"PGV/(PGA g) = {ratio:.3g} s")
     period = _ANY_TM_S
     if name == "pgv_pga_tm":
         period = _middle(model, "tm_s") if tm_s is None else tm_s
         words.append(f"Tm = {period:.3g} s")
     return HeldMeasures(size, pga_g, ratio, period, "at " + ", ".join(words))
+
+
+def depends_on_size(model: FragilityModel) -> bool:
+    """Return whether P of a model depends on p² where y and the intensity are the same."""
+    if model.term.name not in ONE_NUMBER_TERMS:
+        return True
+    x = np.ones(_RATIOS.size)
+    least, most = (
+        model_answers(
+            model,
+            p2,
+            _RATIOS * math.sqrt(p2) / STANDARD_GRAVITY_M_S2,
+            HeldMeasures(p2).measures(model, x),
+        ).probability
+        for p2 in (0.3, 10.0)
+    )
+    return not np.allclose(least, most, rtol=1e-9, atol=1e-12)
+
+
+_RATIOS = np.geomspace(0.02, 2.0, 9)
+"""y over the intensity at which two sizes are compared."""
 
 
 def _middle(model: FragilityModel, name: str) -> float:

@@ -202,3 +202,74 @@ def _motion_verdict(response: Response) -> str:
     if response.outcome is not Outcome.STABLE:
         where += f" when the model ended ({response.outcome.value})"
     return where
+
+
+def plot_rocking(
+    response: Response, path: str | os.PathLike[str], *, title: str = "", reverse: bool = False
+) -> None:
+    """Draw the response of a free-standing block and write it to `path`.
+
+    The upper panel shows the driving acceleration k_h/(1 + k_v) against the strength left about
+    either corner: the block speeds up forward where it is above the upper line, backward where it
+    is below the lower one. The lower panel shows the rotation over the critical angle of its
+    sense, forward positive, and the impacts.
+
+    Args:
+        response: a response asked for with its history.
+        path: .png, .pdf or .svg.
+        title: name of the motion.
+        reverse: polarity was reversed, for the title.
+    """
+    history = response.history
+    if history is None or history.impact_s is None:
+        raise InputError("this response holds no impacts in time: ask for its history")
+    assert response.critical_angle_deg is not None
+    assert response.critical_backward_deg is not None
+    toe, heel = map(math.radians, (response.critical_angle_deg, response.critical_backward_deg))
+    theta = history.theta_rad
+    # tan runs away beyond 90 degrees past balance, where strength means nothing any more
+    forward = np.tan(np.clip(toe - np.maximum(theta, 0.0), -1.4, 1.4))
+    backward = -np.tan(np.clip(heel - np.maximum(-theta, 0.0), -1.4, 1.4))
+    label = "strength about toe and heel"
+    figure, upper, lower = _panels(history, forward, label, max(math.tan(toe), math.tan(heel)))
+    upper.plot(history.time_s, backward, color=STRENGTH, lw=1.3)
+    ratio = np.where(theta >= 0.0, theta / toe, theta / heel)
+    lower.plot(history.time_s, ratio, color=BLOCK, lw=1.2)
+    lower.plot(
+        history.impact_s, np.zeros(history.impact_s.size), "|", color="black", ms=6, mew=0.7,
+        label=f"{history.impact_s.size} impacts",
+    )  # fmt: skip
+    lower.legend(loc="upper right", fontsize=8, framealpha=0.9)
+    for balance, name in ((1.0, "balance on the toe"), (-1.0, "balance on the heel")):
+        lower.axhline(balance, color=STRENGTH, lw=0.8, ls="--")
+        lower.annotate(
+            name, (0.005, balance), xycoords=("axes fraction", "data"), va="bottom", fontsize=8,
+            color=STRENGTH,
+        )  # fmt: skip
+    lower.set_ylabel(r"rotation $\theta/\theta_c$, forward up")
+    lower.set_ylim(-1.4, 1.6)
+    if response.toppled_s is not None:
+        for axes in (upper, lower):
+            axes.axvline(response.toppled_s, color="black", lw=0.8, ls=":")
+        lower.annotate(
+            f"overturning certain at {response.toppled_s:.2f} s",
+            (response.toppled_s, 0.03), xycoords=("data", "axes fraction"), rotation=90,
+            ha="right", va="bottom", fontsize=8,
+        )  # fmt: skip
+    lower.set_xlim(*_window(history.time_s, np.abs(ratio), response))
+    figure.suptitle(_title(title, reverse, _rocking_verdict(response)), fontsize=10)
+    save_figure(figure, path)
+
+
+def _rocking_verdict(response: Response) -> str:
+    kind = mode_title(response.kind)
+    if response.started_s is None:
+        return f"{kind}: the block never lifts off its base"
+    if response.outcome is Outcome.TOPPLED:
+        over = "forward over its toe" if response.peak_forward_rad is None else "over its heel"
+        verdict = f"{kind}: overturns {over}"
+    elif response.peak_theta_n is None:
+        return f"{kind}: {response.outcome.value}"
+    else:
+        verdict = f"{kind}: stays, peak rotation {response.peak_theta_n:.3g} of the critical angle"
+    return f"{verdict} (sensitive)" if response.sensitive else verdict

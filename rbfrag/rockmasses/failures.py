@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.fragility.model import checked_level
+from rbfrag.fragility.intervals import checked_level
 from rbfrag.rockmasses.report import block_columns
 from rbfrag.rockmasses.shaking import AT_REST, OPEN, OUTCOMES, ShakenMass
 from rbfrag.solver.stability.modes import MODES, ModeName

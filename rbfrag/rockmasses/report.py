@@ -112,7 +112,7 @@ def block_columns(
     Args:
         realisations: the realisations.
         answer: the answers to a scenario of theirs, which add the measures of the motion and
-            ``probability, ci_low, ci_high, in_domain``.
+            ``probability, ci_low, ci_high, event_low, event_high, in_domain``.
     """
     stability, is_block = realisations.stability, realisations.is_block
 
@@ -149,6 +149,8 @@ def block_columns(
         "probability": answer.probability,
         "ci_low": answer.ci_low,
         "ci_high": answer.ci_high,
+        "event_low": answer.event_low,
+        "event_high": answer.event_high,
         "in_domain": answer.in_domain,
         "reason": answer.reason,
     }

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import refusals
+from rbfrag.fragility.intervals import checked_level
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import checked_level
 from rbfrag.fragility.predict import Model, answer_given, predict
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.rockmasses.joint_sets import Realisations
@@ -40,8 +40,8 @@ class Average:
         probability: mean of their probabilities; None without blocks.
         standard_error: its standard error from the finite number of realisations; None
             without at least two blocks.
-        ci_low: mean of the lower ends of their confidence intervals, which express the
-            uncertainty of the model's coefficients alone.
+        ci_low: mean of the lower ends of their intervals, which say how well the data tell the
+            parameters of the model.
         ci_high: mean of the upper ends.
     """
 
@@ -92,6 +92,9 @@ class Scenario:
         probability: by realisation; NaN without an answer; shape (n,).
         ci_low: lower ends of the confidence intervals, shape (n,).
         ci_high: upper ends, shape (n,).
+        event_low: lower ends of the shares of such blocks that fail in one single earthquake; NaN
+            where that is not known, shape (n,).
+        event_high: upper ends, shape (n,).
         in_domain: True where a model answered in the range that was fitted, shape (n,).
         reason: why an answer is missing, ruled or to be doubted, shape (n,).
         warnings: sentences on the whole answer.
@@ -110,6 +113,8 @@ class Scenario:
     probability: FloatArray
     ci_low: FloatArray
     ci_high: FloatArray
+    event_low: FloatArray
+    event_high: FloatArray
     in_domain: NDArray[np.bool_]
     reason: NDArray[np.object_]
     warnings: tuple[str, ...]
@@ -163,17 +168,18 @@ def scenario(
     unstable = realisations.is_block & (stability.state_code == UNSTABLE)
     topples = realisations.of_mode("topple", "stable")
 
-    probability, low, high = (np.full(realisations.n, np.nan) for _ in range(3))
+    columns = np.full((5, realisations.n), np.nan)
+    probability, low, high, event_low, event_high = columns
     in_domain = np.zeros(realisations.n, dtype=np.bool_)
     reason = np.where(realisations.is_block, UNCOVERED, realisations.reason)
     reason[realisations.is_block & np.isposinf(stability.yield_acceleration)] = LOCKED
-    for array in (probability, low, high):
-        array[unstable] = 1.0
+    columns[:, unstable] = 1.0
     reason[unstable] = "unstable"
 
     def fill(blocks: NDArray[np.bool_], answers: PredictionArray) -> None:
         probability[blocks], reason[blocks] = answers.probability, answers.reason
         low[blocks], high[blocks] = answers.ci_low, answers.ci_high
+        event_low[blocks], event_high[blocks] = answers.event_low, answers.event_high
         in_domain[blocks] = answers.in_domain
 
     answer: PredictionArray | None = None
@@ -228,6 +234,8 @@ def scenario(
         probability=probability,
         ci_low=low,
         ci_high=high,
+        event_low=event_low,
+        event_high=event_high,
         in_domain=in_domain,
         reason=reason,
         warnings=tuple(_warnings(missing, reason[topples], modelled)),

@@ -36,17 +36,27 @@ class ModelAnswer(_Fitted):
     probability: float
     ci_low: float
     ci_high: float
+    event_low: float | None
+    event_high: float | None
     in_domain: bool
     recommended: bool
 
 
 class PredictAnswer(_Document):
-    """Probability that one block fails: what `rbfrag predict --json` prints, in its order."""
+    """Probability that one block fails: what `rbfrag predict --json` prints, in its order.
+
+    `probability` is the share of such blocks that fail over all earthquakes and sites with these
+    measures, `ci_low` and `ci_high` the interval of that share as far as the data tell it,
+    `event_low` and `event_high` between which shares fail in one single earthquake; null where that
+    is not known.
+    """
 
     kind: str
     probability: float
     ci_low: float
     ci_high: float
+    event_low: float | None
+    event_high: float | None
     level: float
     model: str
     term: str
@@ -67,6 +77,8 @@ class PredictArrays(_Fitted):
     probability: list[float | None]
     ci_low: list[float | None]
     ci_high: list[float | None]
+    event_low: list[float | None]
+    event_high: list[float | None]
     in_domain: list[bool]
     reason: list[str]
     kind: str

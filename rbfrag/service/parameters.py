@@ -57,7 +57,9 @@ PGD = _words("Peak ground displacement [m].")
 SA03, SA10, SA20, SA30 = (
     _words(f"Spectral acceleration at {period:g} s, 5 % damping [g].") for period in SPECTRAL
 )
-LEVEL = Field(gt=0.0, lt=1.0, description="Confidence level of the interval.")
+LEVEL = Field(
+    gt=0.0, lt=1.0, description="Level of the interval of P, and of the range of one earthquake."
+)
 MODEL = _words(
     "Name of a stored model. Default: the database's default if the given measures suffice for "
     "it, else the best that they suffice for."

@@ -91,6 +91,8 @@ def answer_many(given: dict[str, Any], chosen: dict[str, Any], db: str | None) -
             "probability": _with_null(answers.probability),
             "ci_low": _with_null(answers.ci_low),
             "ci_high": _with_null(answers.ci_high),
+            "event_low": _with_null(answers.event_low),
+            "event_high": _with_null(answers.event_high),
             "in_domain": answers.in_domain.tolist(),
             "reason": answers.reason.tolist(),
             "kind": answers.kind,

@@ -45,6 +45,10 @@ TAKEN_TO_TOPPLE = (
     "mode is checked"
 )
 
+TAKEN_NOT_TO_SLIP = (
+    "no friction angle is given: the corners of the free-standing rectangle are taken not to slip"
+)
+
 
 @dataclass(frozen=True)
 class DescribedBlock:

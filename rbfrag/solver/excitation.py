@@ -82,6 +82,13 @@ class Excitation:
         return np.ascontiguousarray(np.minimum.accumulate(filled[::-1])[::-1][:-1])
 
     @cached_property
+    def tail_max_q(self) -> FloatArray:
+        """Greatest q from each node to the end, rest included; infinite where a jump is to come."""
+        filled = np.append(self.q, 0.0)
+        filled[self.jump_node : self.w.size] = np.inf
+        return np.ascontiguousarray(np.maximum.accumulate(filled[::-1])[::-1][:-1])
+
+    @cached_property
     def block_max_q(self) -> FloatArray:
         """Greatest q of each block of `BLOCK` nodes."""
         n = self.q.size
@@ -132,6 +139,23 @@ class Excitation:
             w=1.0 + factor * (self.w - 1.0),
             pga_g=factor * self.pga_g,
             warnings=self.warnings,
+        )
+
+    def with_rest_after(self, duration_s: float, intervals: int) -> Excitation:
+        """Return the same shaking and a stretch of rest after it, to which the last sample jumps.
+
+        Args:
+            duration_s: length of the rest [s].
+            intervals: number of intervals of it.
+        """
+        end = self.time_s[-1]
+        tail_s = end + duration_s * np.arange(1, intervals + 1) / intervals
+        return Excitation(
+            time_s=np.concatenate([self.time_s, [end], tail_s]),
+            interval_s=np.concatenate([self.interval_s, [0.0], np.diff(tail_s, prepend=end)]),
+            k_h=np.concatenate([self.k_h, np.zeros(intervals + 1)]),
+            w=np.concatenate([self.w, np.ones(intervals + 1)]),
+            pga_g=self.pga_g,
         )
 
 

@@ -41,7 +41,8 @@ class BlockOnPlanes:
     Args:
         block: its shape and size; None where numbers describe it.
         beta_rad: dip of the base, out of the slope positive [rad].
-        phi_rad: friction angle of the base [rad].
+        phi_rad: friction angle of the base [rad]; π/2 where it is not known and the kind does
+            without.
         phi_back_rad: friction angle of the back plane [rad].
         back_fracture: whether there is a back plane.
         cohesive: whether the base has cohesion.
@@ -162,22 +163,28 @@ class Kind:
     Attributes:
         kind: its name.
         mode: failure mode of its blocks; None where no geometry chooses it.
+        free_standing: whether its blocks have no plane behind them.
         settings: options of `rbfrag.respond` that it understands.
+        numbers: what describes its block in `rbfrag.respond` without a shape, beside `parameters`.
         parameters: what describes its block in predictions; () where no fragility is fitted.
         searchable: whether it has a critical value.
         search_needs: the option without which there is no search.
         search_options: options of `rbfrag.critical` that it understands.
+        no_search: why it has no critical value; empty where there is none yet.
         campaign: whether campaigns store it.
         campaign_options: what :meth:`cases` may be asked.
     """
 
     kind: str
     mode: ModeName | None = None
+    free_standing: bool = False
     settings: tuple[str, ...] = ()
+    numbers: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()
     searchable: bool = False
     search_needs: str = ""
     search_options: tuple[str, ...] = ()
+    no_search: str = ""
     campaign: bool = False
     campaign_options: tuple[str, ...] = ()
 
@@ -195,7 +202,8 @@ class Kind:
         Raises:
             InputError: there is no search, or an option is that of another kind.
         """
-        raise InputError(f"there is no search for the critical value of kind {self.kind}")
+        why = f": {self.no_search}" if self.no_search else ""
+        raise InputError(f"there is no search for the critical value of kind {self.kind}{why}")
 
     def cases(self, **request: Any) -> tuple[Case, ...]:
         """Return the combinations of a campaign, whatever the motion.
@@ -203,7 +211,8 @@ class Kind:
         Raises:
             InputError: campaigns do not store this kind, or an option is that of another one.
         """
-        raise InputError(f"campaigns of kind {self.kind} are not known to this rbfrag")
+        why = f": {self.no_search}" if self.no_search else ""
+        raise InputError(f"campaigns of kind {self.kind} are not known to this rbfrag{why}")
 
     def grid(self, case: Case, measures: Measures) -> FloatArray:
         """Return the strengths k/PGA of the outcome grid, which depend on no outcome.

@@ -31,6 +31,14 @@ def model_of_kind(kind: str) -> Kind:
     return known[kind]
 
 
-def model_of_mode(mode: ModeName) -> Kind:
-    """Return the model of blocks that fail in this mode."""
-    return next(model for model in models().values() if model.mode == mode)
+def model_of_mode(mode: ModeName, *, back_fracture: bool = True) -> Kind:
+    """Return the model of blocks that fail in this mode.
+
+    Args:
+        mode: the failure mode.
+        back_fracture: whether there is a plane behind the block, which decides where the mode has
+            a model of each kind.
+    """
+    of_mode = [model for model in models().values() if model.mode == mode]
+    # False comes first: the model that fits, or the only one there is
+    return min(of_mode, key=lambda model: model.free_standing == back_fracture)

@@ -9,6 +9,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rbfrag.errors import InputError
 from rbfrag.files import written_whole
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -26,7 +28,7 @@ HISTORY_COLUMNS = (
 
 def response_as_dict(response: Response) -> dict[str, Any]:
     """Return the answer with the keys of the JSON contract."""
-    return {
+    answer = {
         "kind": response.kind,
         "outcome": response.outcome.value,
         "peak_theta_n": response.peak_theta_n,
@@ -48,6 +50,16 @@ def response_as_dict(response: Response) -> dict[str, Any]:
         ],
         "warnings": list(response.warnings),
     }
+    # of a block with two corners only
+    if response.impacts is not None:
+        answer |= {
+            "critical_backward_deg": response.critical_backward_deg,
+            "peak_forward_rad": response.peak_forward_rad,
+            "peak_backward_rad": response.peak_backward_rad,
+            "impacts": response.impacts,
+            "sensitive": response.sensitive,
+        }
+    return answer
 
 
 MOTION_COLUMNS = (
@@ -110,8 +122,13 @@ def _rows(response: Response, history: ResponseHistory) -> Iterator[tuple[float 
 def _over_critical(response: Response, history: ResponseHistory) -> list[float] | list[str]:
     if response.critical_angle_deg is None:
         return [""] * history.time_s.size
-    ratio: list[float] = (history.theta_rad / math.radians(response.critical_angle_deg)).tolist()
-    return ratio
+    theta = history.theta_rad
+    ratio = theta / math.radians(response.critical_angle_deg)
+    if response.critical_backward_deg is not None:
+        backward = theta / math.radians(response.critical_backward_deg)
+        ratio = np.where(theta < 0.0, backward, ratio)
+    over: list[float] = ratio.tolist()
+    return over
 
 
 NOT_PROVEN = (

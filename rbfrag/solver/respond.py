@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from rbfrag.errors import InputError
@@ -35,34 +36,39 @@ def respond(
     kind: str | None = None,
     two_way: bool = False,
     horizontal: bool = False,
+    restitution: float | None = None,
     history: bool = False,
 ) -> Response:
     """Return what a block does under a ground motion.
 
-    The block is given in one of three ways: `p2` and `kr` (it topples), `ky` (it slides), or
-    `block` with `beta_deg` and `phi_deg`, whose failure mode chooses the model. It has more than
-    ten parameters, because scripts name each quantity that a user states; a kind refuses those of
-    another.
+    The block is given in one of three ways: `p2` and `kr` (it topples, or rocks on level ground if
+    `kind` says so), `ky` (it slides), or `block` with `beta_deg` and `phi_deg`, whose failure mode
+    chooses the model. It has more than ten parameters, because scripts name each quantity that a
+    user states; a kind refuses those of another.
 
     Args:
         motion: horizontal ground motion.
-        p2: frequency parameter p² of a toppling block [1/s²], > 0.
+        p2: frequency parameter p² of a toppling or rocking block [1/s²], > 0.
         kr: its rocking acceleration coefficient k_r = tan(critical angle), > 0.
         ky: yield acceleration coefficient tan(φ - β) of a block that slides, whatever its
             shape, on a plane that dips by `beta_deg` (default 0), > 0.
         block: shape and size.
         beta_deg: dip of the base, out of the slope positive [deg].
-        phi_deg: friction angle of the base [deg].
+        phi_deg: friction angle of the base [deg]; None where `kind` is ``rocking`` and the base
+            is taken not to slip.
         phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
-        back_fracture: False for a block without a plane behind it.
+        back_fracture: False for a block without a plane behind it: one that topples rocks about
+            both corners.
         cohesion_pa: cohesion of the base [Pa]; only a block that topples may have any.
         density_kg_m3: density of the rock [kg/m³], needed with a cohesion.
         vertical: vertical motion of the same recording, upward positive.
         polarity: ``forward`` (positive samples drive forward motion) or ``reverse``.
-        kind: ``toppling``, ``sliding``, ``slumping`` or ``confined_toppling``; None for the
-            model of the failure mode.
+        kind: ``toppling``, ``rocking``, ``sliding``, ``slumping`` or ``confined_toppling``; None
+            for the model of the failure mode.
         two_way: sliding up the base too, where the ground drives the block that way.
         horizontal: sliding without the factor cos(φ - β)/cos φ, as Newmark's horizontal block.
+        restitution: rocking: speed after an impact over that before it, above 0 and up to 1;
+            None for what angular momentum leaves at each corner.
         history: keep the motion in time.
 
     Raises:
@@ -70,7 +76,12 @@ def respond(
             fails at rest or that nothing moves, an unknown kind or polarity, an option of
             another model, components that cannot be brought together.
     """
-    settings = {"two_way": two_way, "horizontal": horizontal}
+    settings = {
+        "two_way": two_way or None,
+        "horizontal": horizontal or None,
+        "restitution": restitution,
+    }
+    free_standing = kind is not None and model_of_kind(kind).free_standing
     conditions = {
         "beta_deg": beta_deg,
         "phi_deg": phi_deg,
@@ -82,19 +93,27 @@ def respond(
         for name, value in (("p2", p2), ("kr", kr), ("ky", ky)):
             if value is not None:
                 raise InputError(f"{name} does not go with a block, which is given by its shape")
-        if beta_deg is None or phi_deg is None:
+        if beta_deg is None or (phi_deg is None and not free_standing):
             name = "beta_deg" if beta_deg is None else "phi_deg"
             raise InputError(f"{name} is missing: the mode of a block depends on dip and friction")
         judged = stability(
             block,
             beta_deg=beta_deg,
-            phi_deg=phi_deg,
+            phi_deg=_rough_deg(block) if phi_deg is None else phi_deg,
             phi_back_deg=phi_back_deg,
-            back_fracture=back_fracture,
+            back_fracture=back_fracture and not free_standing,
             cohesion_pa=cohesion_pa,
             density_kg_m3=density_kg_m3,
         )
-        return _by_mode(block, judged, kind, settings, Shaking(motion, vertical, polarity, history))
+        if kind is None:
+            model = model_of_mode(judged.mode, back_fracture=back_fracture)
+        else:
+            model = model_of_kind(kind)
+        site = _site(block, judged, model, _known(model, settings))
+        if phi_deg is None:
+            site = replace(site, phi_rad=0.5 * math.pi)
+        remarks = _remarks(judged, model)
+        return model.respond(site, Shaking(motion, vertical, polarity, history, remarks))
     shaking = Shaking(motion, vertical, polarity, history)
     if ky is not None:
         if p2 is not None or kr is not None:
@@ -120,8 +139,8 @@ def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> Block
     return BlockOnPlanes(
         block=None,
         beta_rad=0.0,
-        phi_rad=0.0,
-        phi_back_rad=0.0,
+        phi_rad=0.5 * math.pi,
+        phi_back_rad=0.5 * math.pi,
         back_fracture=True,
         cohesive=False,
         yield_g=kr,
@@ -130,24 +149,18 @@ def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> Block
     )
 
 
-def _by_mode(
-    block: Block,
-    judged: Stability,
-    kind: str | None,
-    settings: dict[str, bool],
-    shaking: Shaking,
-) -> Response:
-    """Run the model that a block's mode calls for, or the one that was asked for."""
-    model = model_of_mode(judged.mode) if kind is None else model_of_kind(kind)
-    _refuse_what_no_motion_decides(judged)
-    remarks = judged.warnings
-    if model.mode != judged.mode:
-        remarks = (
-            *remarks,
-            f"the mode of the block is {words_of_mode(judged.mode)}: by it, {model.kind} is not "
-            "what it would do",
-        )
-    site = BlockOnPlanes(
+def _rough_deg(block: Block) -> float:
+    """Return a friction angle with which a block does not slip [deg]."""
+    return 0.5 * (90.0 + max(block.alpha1_deg, block.alpha3_deg, 0.0))
+
+
+def _site(
+    block: Block, judged: Stability, model: Kind, settings: Mapping[str, Any]
+) -> BlockOnPlanes:
+    """Return the block on its planes as the model that its mode calls for, or another, sees it."""
+    if not model.free_standing:
+        _refuse_what_no_motion_decides(judged)
+    return BlockOnPlanes(
         block=block,
         beta_rad=math.radians(judged.beta_deg),
         phi_rad=math.radians(judged.phi_deg),
@@ -155,10 +168,18 @@ def _by_mode(
         back_fracture=judged.back_fracture,
         cohesive=judged.cohesion is not None,
         yield_g=judged.yield_acceleration if model.mode == judged.mode else None,
-        settings=_known(model, settings),
+        settings=settings,
     )
-    return model.respond(
-        site, Shaking(shaking.motion, shaking.vertical, shaking.polarity, shaking.history, remarks)
+
+
+def _remarks(judged: Stability, model: Kind) -> tuple[str, ...]:
+    """Return what is known about the block that the answer of a model should say."""
+    if model.mode == judged.mode:
+        return judged.warnings
+    return (
+        *judged.warnings,
+        f"the mode of the block is {words_of_mode(judged.mode)}: by it, {model.kind} is not what "
+        "it would do",
     )
 
 
@@ -189,7 +210,7 @@ def _by_numbers(kind: str | None, mode: ModeName, numbers: tuple[str, ...]) -> K
     if kind is None:
         return model_of_mode(mode)
     model = model_of_kind(kind)
-    if not set(numbers) <= set(model.parameters):
+    if not set(numbers) <= {*model.numbers, *model.parameters}:
         raise InputError(
             f"{kind} needs the shape of the block: give a block with beta_deg and phi_deg instead "
             f"of {' and '.join(numbers)}, which mean {model_of_mode(mode).kind}"
@@ -197,8 +218,8 @@ def _by_numbers(kind: str | None, mode: ModeName, numbers: tuple[str, ...]) -> K
     return model
 
 
-def _known(model: Kind, settings: dict[str, bool]) -> dict[str, Any]:
-    given = {name: value for name, value in settings.items() if value}
+def _known(model: Kind, settings: Mapping[str, Any]) -> dict[str, Any]:
+    given = {name: value for name, value in settings.items() if value is not None}
     unknown = sorted(set(given) - set(model.settings))
     if unknown:
         understood = " and ".join(model.settings) or "no such option"

@@ -66,7 +66,8 @@ class ResponseHistory:
 
     Args:
         time_s: times [s], shape (n,).
-        theta_rad: forward rotation [rad], shape (n,).
+        theta_rad: forward rotation, of a rocking block backward rotation below zero [rad],
+            shape (n,).
         theta_dot_rad_s: rotation rate [rad/s], shape (n,).
         k_h: driving horizontal acceleration, polarity applied [g], shape (n,).
         k_v: vertical acceleration, upwards positive [g], shape (n,).
@@ -79,6 +80,7 @@ class ResponseHistory:
             the right [rad], shape (n,); None for toppling, which turns by -theta_rad.
         strength_g: driving acceleration at which the block, where it is, neither speeds up nor
             slows down while 1 + k_v = 1 [g], shape (n,); None for toppling.
+        impact_s: times of the impacts of a rocking block [s], shape (m,); None for other kinds.
     """
 
     time_s: FloatArray
@@ -91,6 +93,7 @@ class ResponseHistory:
     centroid_m: FloatArray | None = None
     turned_rad: FloatArray | None = None
     strength_g: FloatArray | None = None
+    impact_s: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -113,8 +116,10 @@ class Response:
     Args:
         kind: the model that was run (``toppling``).
         outcome: how it ended.
-        peak_theta_n: peak rotation over the critical angle; None when the block topples.
-        peak_theta_rad: peak rotation [rad]; None when the block topples, and for sliding.
+        peak_theta_n: peak rotation over the critical angle (rocking: the greater ratio of both
+            senses, each to its own); None when the block topples.
+        peak_theta_rad: peak rotation, of either sense [rad]; None when the block topples, and for
+            sliding.
         critical_angle_deg: rotation at which the block at rest has no strength left: it
             balances on its toe, or slumps of itself [deg]; None where there is none.
         started_s: time of the first motion [s]; None if the block never moves.
@@ -137,6 +142,12 @@ class Response:
         stopped_s: time of the last standstill, or at which the model ended [s]; None if the
             block never moved, and for toppling.
         mode_changes: what the block did after its first motion, one entry a change.
+        critical_backward_deg: rotation at which a rocking block balances on its heel [deg]; None
+            for other kinds, as are the four that follow.
+        peak_forward_rad: greatest rotation about the toe [rad]; None where it overturns that way.
+        peak_backward_rad: greatest rotation about the heel [rad]; None likewise.
+        impacts: impacts within the record; the free motion after it is decided in closed form.
+        sensitive: whether the outcome is another one for the motion times 1 + 1e-6 or 1 - 1e-6.
     """
 
     kind: str
@@ -158,6 +169,11 @@ class Response:
     centroid_displacement_m: float | None = None
     stopped_s: float | None = None
     mode_changes: tuple[ModeChange, ...] = ()
+    critical_backward_deg: float | None = None
+    peak_forward_rad: float | None = None
+    peak_backward_rad: float | None = None
+    impacts: int | None = None
+    sensitive: bool | None = None
 
 
 @dataclass(frozen=True, eq=False)

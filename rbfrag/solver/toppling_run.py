@@ -12,8 +12,9 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.integrator.single_run import HANDED, TOPPLED, Run, run_toppling
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
+from rbfrag.solver.node_history import node_history, with_free_motion
 from rbfrag.solver.quantity import positive
-from rbfrag.solver.results import FloatArray, Outcome, Polarity, Response, ResponseHistory
+from rbfrag.solver.results import Outcome, Polarity, Response, ResponseHistory
 
 OUTCOMES = (Outcome.STABLE, Outcome.TOPPLED, Outcome.UNDETERMINED, Outcome.JUMP)
 """Outcome of each kernel code."""
@@ -23,9 +24,6 @@ _NO_HISTORY = np.empty((4, 0))
 
 MOST_STEPS = 1e8
 """Steps of one run beyond which p² cannot be meant: a real record takes some thousands."""
-
-TAIL_PERIODS = 12.0
-"""Length of the free motion shown after the record, in units of 1/p."""
 
 
 def respond(
@@ -120,48 +118,12 @@ def refuse_endless(excited: Excitation, p2: float) -> None:
 def _history(excited: Excitation, *, p2: float, kr: float) -> ResponseHistory:
     """Run again over the record and a stretch of rest after it, keeping every node."""
     p = math.sqrt(p2)
-    end = excited.time_s[-1]
-    n_tail = 400
-    tail_s = end + TAIL_PERIODS / p * np.arange(1, n_tail + 1) / n_tail
-    longer = Excitation(
-        time_s=np.concatenate([excited.time_s, [end], tail_s]),
-        interval_s=np.concatenate([excited.interval_s, [0.0], np.diff(tail_s, prepend=end)]),
-        k_h=np.concatenate([excited.k_h, np.zeros(n_tail + 1)]),
-        w=np.concatenate([excited.w, np.ones(n_tail + 1)]),
-        pga_g=excited.pga_g,
-    )
+    longer = with_free_motion(excited, p)
     # nodes, and at most a start, a peak and an impact twice in an interval
-    store = np.empty((4, 7 * longer.time_s.size + 8))
-    run = Run(*run_toppling(longer.nodes, kr, p, ORDER, PH_MAX, store, _TO_THE_END, np.empty(9)))
-    store = store[:, : run.history_length]
-    # The kernel skips rest. Its nodes are put back, as far as the record goes.
-    at_node = store[3] >= 0.0
-    theta = np.zeros(longer.time_s.size)
-    rate = np.zeros(longer.time_s.size)
-    moved = store[3, at_node].astype(np.int64)
-    theta[moved] = store[1, at_node]
-    rate[moved] = store[2, at_node]
-    shown = max(excited.time_s.size, int(moved[-1]) + 1) if moved.size else excited.time_s.size
-    if run.outcome == TOPPLED and moved.size:
-        shown = int(moved[-1]) + 1
-    event = store[:3, ~at_node]
-    time_s = np.concatenate([longer.time_s[:shown], event[0]])
-    order = np.argsort(time_s, kind="stable")
-
-    def merged(at_nodes: FloatArray, at_events: FloatArray) -> FloatArray:
-        return np.concatenate([at_nodes[:shown], at_events])[order]
-
-    def between(values: FloatArray) -> FloatArray:
-        there: FloatArray = np.interp(event[0], longer.time_s, values)
-        return there
-
-    return ResponseHistory(
-        time_s=time_s[order],
-        theta_rad=merged(theta, event[1]),
-        theta_dot_rad_s=merged(rate, event[2]),
-        k_h=merged(longer.k_h, between(longer.k_h)),
-        k_v=merged(longer.w - 1.0, between(longer.w - 1.0)),
-    )
+    rows = np.empty((4, 7 * longer.time_s.size + 8))
+    run = Run(*run_toppling(longer.nodes, kr, p, ORDER, PH_MAX, rows, _TO_THE_END, np.empty(9)))
+    kept = rows[:, : run.history_length]
+    return node_history(excited, longer, kept, toppled=run.outcome == TOPPLED)
 
 
 def _time_or_none(time_s: float) -> float | None:

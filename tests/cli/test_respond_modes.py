@@ -106,3 +106,57 @@ def test_cohesion_is_refused_where_motion_breaks_it(refuses: Refuses, record: Pa
         "cohesion_pa = 100\ndensity_kg_m3 = 2700\n"
     )
     assert "cohesion_pa" in refuses("respond", record, "--block", "b.toml")
+
+
+def test_a_block_without_a_back_plane_rocks(shell: Shell, record: Path, tmp_path: Path) -> None:
+    block = ("--alpha1", "-17", "--alpha3", "20", "--r3", "2", "--beta", "1", "--phi", "35")
+    files = ("--csv", "m.csv", "--plot", "m.png", "--animate", "m.gif")
+    answer = shell.json("respond", record, *block, "--no-back", *files)
+    assert (answer["kind"], answer["outcome"]) == ("rocking", "stable")
+    assert answer["peak_forward_rad"] > 0.0 < answer["peak_backward_rad"]
+    assert answer["peak_theta_rad"] == max(answer["peak_forward_rad"], answer["peak_backward_rad"])
+    assert answer["critical_backward_deg"] == pytest.approx(18.0)
+    assert answer["impacts"] > 1
+    assert answer["sensitive"] is False
+    assert shell.json("respond", record, *block, "--kind", "rocking") == answer
+    assert (tmp_path / "m.gif").stat().st_size > 10_000
+    assert (tmp_path / "m.png").stat().st_size > 10_000
+    rows = [line.split(",") for line in (tmp_path / "m.csv").read_text().splitlines()]
+    theta, ratio = (rows[0].index(name) for name in ("theta_rad", "theta_over_critical"))
+    least = min(rows[1:], key=lambda row: float(row[theta]))
+    assert float(least[theta]) == pytest.approx(-answer["peak_backward_rad"], rel=1e-12)
+    assert float(least[ratio]) == pytest.approx(float(least[theta]) / math.radians(18.0), rel=1e-9)
+
+
+def test_a_free_standing_rectangle_needs_no_friction(
+    shell: Shell, refuses: Refuses, record: Path
+) -> None:
+    sides = ("--height", "1.2", "--width", "0.3")
+    free = shell("respond", record, *sides, "--no-back", "--json")
+    assert "taken not to slip" in free.stdout
+    asked = shell.json("respond", record, *sides, "--kind", "rocking")
+    assert asked["kind"] == "rocking"
+    less = shell.json("respond", record, *sides, "--kind", "rocking", "--restitution", "0.6")
+    assert less["peak_theta_rad"] != asked["peak_theta_rad"]
+    by_numbers = shell.json(
+        "respond", record, "--kind", "rocking", "--kr", "0.25", "--p2",
+        repr(0.75 * 9.80665 / (0.5 * math.hypot(1.2, 0.3))),
+    )  # fmt: skip
+    assert by_numbers["outcome"] == asked["outcome"]
+    assert by_numbers["impacts"] == asked["impacts"]
+    leans = ("--kind", "rocking", "--dip", "15")
+    assert "falls forward over its toe at rest" in refuses("respond", record, *sides, *leans)
+    words = "restitution = 0: give the speed"
+    assert words in refuses("respond", record, *sides, "--no-back", "--restitution", "0")
+
+
+def test_a_rocking_block_that_overturns_is_drawn(
+    shell: Shell, record: Path, tmp_path: Path
+) -> None:
+    numbers = ("--kind", "rocking", "--p2", "3", "--kr", "0.03")
+    answer = shell.json("respond", record, *numbers, "--plot", "falls.svg")
+    assert answer["outcome"] == "toppled"
+    missing = [name for name in ("peak_forward_rad", "peak_backward_rad") if answer[name] is None]
+    assert len(missing) == 1
+    assert answer["toppled_s"] is not None
+    assert (tmp_path / "falls.svg").read_text().count("<path") > 20

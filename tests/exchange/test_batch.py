@@ -14,7 +14,7 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange import batch_table
-from rbfrag.exchange.batch import predict_table
+from rbfrag.exchange.batch import ANSWERS, predict_table
 from rbfrag.exchange.block_table import read_columns, write_block_table
 from rbfrag.fragility.predict import predict
 from tests.fragility.conftest import model_row
@@ -61,12 +61,28 @@ def test_rows_are_answered_or_say_why_not(answer: Answer, tmp_path: Path) -> Non
     expected = predict(3.0, 0.1, pgv_m_s=0.6, db=str(tmp_path / "model.db"))
     assert float(first["probability"]) == pytest.approx(expected.probability, rel=1e-12)
     assert float(first["ci_low"]) == pytest.approx(expected.ci_low, rel=1e-12)
+    assert [*first][-7:] == [*ANSWERS]
+    for name in ("event_low", "event_high"):
+        assert float(first[name]) == pytest.approx(getattr(expected, name), rel=1e-12)
+    assert second["event_low"] == ""
     assert (first["in_domain"], first["reason"]) == ("true", "")
     assert second["probability"] == ""
     assert "pgv_m_s" in second["reason"]
     assert (float(third["probability"]), third["reason"]) == (1.0, "unstable")
     assert float(fourth["probability"]) == 0.0
     assert "no shaking" in fourth["reason"]
+
+
+def test_a_range_of_one_earthquake_that_is_not_known_is_an_empty_cell(tmp_path: Path) -> None:
+    database = tmp_path / "model.db"
+    with opened_database(str(database), create=True) as engine, engine.begin() as connection:
+        save_model(connection, model_row(dependence=None))
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    source.write_text(f"{HEAD}\n1,3.0,0.1,0.6\n")
+    told = predict_table(source, target, given={}, model=None, level=0.9, db=str(database))
+    (row,) = rows_of(target)
+    assert row["event_low"] == row["event_high"] == ""
+    assert "no estimate of what the blocks of one earthquake share" in str(told["warnings"])
 
 
 def test_parts_join_without_a_seam(

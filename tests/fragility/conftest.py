@@ -10,6 +10,7 @@ import pytest
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.model import FragilityModel
+from tests.fragility.portfolio_draws import SHARED
 
 G = 9.80665
 P2 = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1)
@@ -93,6 +94,7 @@ def model_row(term: str = "pgv", **changes: object) -> ModelRow:
             "tm_s": (0.1, 1.5),
         },
         "data_fingerprint": "0" * 64,
+        "dependence": SHARED,
     }
     return ModelRow(**{**values, **changes})  # type: ignore[arg-type]
 

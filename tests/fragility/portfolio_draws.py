@@ -10,6 +10,11 @@ from rbfrag.fragility.joint import Placement
 LAW = Dependence(0.055, 0.162, 0.270, 0.513, 1.7, 2.5, 5.1, 0.67)
 
 
+SHARED = {"rho_e": 0.136, "rho_s": 0.236, "rho_v": 0.219, "rho_o": 0.409,
+          "l_e": 1.0, "l_v": 2.5, "l_o": 6.7, "l_y": 0.5}  # fmt: skip
+"""A copula as models store it."""
+
+
 def anywhere(n: int, seed: int) -> Placement:
     """Return blocks of two earthquakes, three sites and two components, on both sides."""
     random = np.random.default_rng(seed)

@@ -95,7 +95,7 @@ def test_range_of_one_earthquake_is_that_of_simulated_earthquakes() -> None:
 def test_range_of_one_earthquake_at_its_limits() -> None:
     assert event_range(0.0, 0.2) == (0.0, 0.0)
     assert event_range(1.0, 0.2) == (1.0, 1.0)
-    assert event_range(0.3, 0.0) == (0.3, 0.3)
+    assert event_range(0.3, 0.0) == pytest.approx((0.3, 0.3), rel=1e-14)
     assert event_range(0.3, 1.0) == (0.0, 1.0)
     assert event_range(0.001, 1.0) == (0.0, 0.0)
     with pytest.raises(InputError, match="level"):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 from scipy.special import ndtr
@@ -87,14 +85,6 @@ def test_links_are_distribution_functions_for_numbers_and_arrays(link):
         assert link.probability(value, SINGLE) == pytest.approx(probability, rel=1e-12, abs=1e-300)
     assert link.probability(-1e4, SINGLE) == 0.0
     assert link.probability(1e4, SINGLE) == 1.0
-
-
-def test_a_table_is_read_on_the_lines_between_its_nodes():
-    table = (0.0, 1.0, 4.0, 2.0)
-    x = [-5.0, 1.0, 1.2, 1.5, 1.75, 2.5, 9.0, math.nan]
-    expected = np.interp(x, [1.0, 1.5, 2.0, 2.5], table)
-    assert arrays().between(np.array(x), 1.0, 0.5, table) == pytest.approx(expected, nan_ok=True)
-    assert [SINGLE.between(v, 1.0, 0.5, table) for v in x[:-1]] == pytest.approx(expected[:-1])
 
 
 def test_every_file_is_a_method_and_fits_by_a_function_that_is_there():

@@ -1,8 +1,6 @@
-"""Answers of the outcome models: monotone, bounded, the same for one and many, never narrower
-for knowing less."""
+"""Answers of the outcome models: monotone, bounded, the same for one and many."""
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,16 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbfrag.db.model_file import ModelRow
-from rbfrag.errors import InputError, ModelError
-from rbfrag.fragility import interval_floor, prediction_array
-from rbfrag.fragility.fit import outcomes as outcome_method
-from rbfrag.fragility.fit.fitting import fit
+from rbfrag.errors import InputError
+from rbfrag.fragility import prediction_array
 from rbfrag.fragility.methods import method_named
-from rbfrag.fragility.model import FLOOR_FROM, FLOOR_NODES, FLOOR_STEP, FragilityModel
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import MotionPrediction, answer_given, predict
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
-from tests.fragility.outcome_draws import TRUTH, drawn_outcomes
+from tests.fragility.outcome_draws import TRUTH
+from tests.fragility.portfolio_draws import SHARED
 
 G = 9.80665
 COEFFICIENTS = {
@@ -29,7 +26,7 @@ COEFFICIENTS = {
     ("logistic", "xp"): (-0.9, 5.9),
     ("lognormal", "pgv"): (-0.41, 0.95, -1.25),
     ("lognormal", "pga_tm"): (-0.21, 0.98, -1.16, -0.1),
-    ("bounded", "pgv"): (-1.1, 2.4, 2.2),
+    ("bounded", "pgv"): (-1.1, 2.7, 2.2, 0.04, -0.27),
     ("bounded", "pgv_pga_tm"): (3.6, 1.9, 4.8, 3.0, 1.4, 1.2),
 }
 
@@ -48,6 +45,7 @@ def model_of(method, term, **diagnostics):
             covariance=tuple(map(tuple, covariance.tolist())),
             domain={"p2": (0.1, 30.0), "intensity_m_s": (0.01, 2.0), "tm_s": (0.05, 2.0)},
             data_fingerprint="",
+            dependence=SHARED,
             diagnostics=diagnostics,
         )
     )
@@ -116,6 +114,7 @@ def test_mechanics_is_stated(name, kr, words):
     if name == "record-xp":
         answer = predict_known(model, 3.0, 0.2, known)
     assert (answer.probability, answer.ci_low, answer.ci_high) == (0.0, 0.0, 0.0)
+    assert (answer.event_low, answer.event_high) == (0.0, 0.0)
     assert words in answer.warnings[0]
     assert answer.in_domain
 
@@ -170,81 +169,6 @@ def test_many_chunks_are_one_answer(monkeypatch):
         predict(3.0, kr.reshape(20, 50), pgv_m_s=0.5, pga_g=0.4, model=model, nan="raise")
 
 
-def test_the_least_width_is_kept_inside_zero_and_one():
-    floor = [0.2] * (2 * FLOOR_NODES)
-    wide = model_of("logistic", "pgv", interval_floor=floor)
-    for kr in np.geomspace(1e-3, 1.0, 40):
-        answer = predict(3.0, float(kr), pgv_m_s=0.5, model=wide)
-        assert 0.0 <= answer.ci_low <= answer.probability <= answer.ci_high <= 1.0
-        width = answer.ci_high - answer.ci_low
-        assert width >= 0.2 * 1.959963 - 1e-12
-    assert FLOOR_FROM + FLOOR_STEP * (FLOOR_NODES - 1) == 10.0
-
-
-def test_knowing_less_is_never_narrower(monkeypatch):
-    monkeypatch.setattr(outcome_method, "REPLICATES", 2)
-    source = drawn_outcomes(
-        "bounded", "pgv_pga_tm", COEFFICIENTS["bounded", "pgv_pga_tm"], shared=0.2, motions=1
-    )
-    models = [
-        fit(source, term=term, method=method).model
-        for method, term in (
-            ("weibull", "pgv"), ("bounded", "pgv_pga"), ("bounded", "pgv_pga_tm"), ("record", "xp")
-        )
-    ]  # fmt: skip
-    table = source.table
-    narrower = 0
-    for i in range(0, table.p2.size, 7):
-        for share in (0.15, 0.4, 0.6, 0.9, 1.3):
-            y = share * float(table.pgv_m_s[i])
-            p2 = float(table.p2[i])
-            widths = []
-            for model in models:
-                known = measures(
-                    model,
-                    float(table.pgv_m_s[i]),
-                    float(table.pga_g[i]),
-                    float(table.tm_s[i]),
-                    float(source.xp_m_s[i]),
-                )
-                answer = predict_known(model, p2, y * math.sqrt(p2) / G, known)
-                widths.append(answer.ci_high - answer.ci_low)
-            narrower += any(a < b - 1e-12 for a, b in pairwise(widths))
-    assert narrower == 0
-
-
-def test_the_lower_of_the_two_tables_holds():
-    low, high = [0.05] * FLOOR_NODES, [0.3] * FLOOR_NODES
-    for floor in (low + high, high + low):
-        narrow = model_of("logistic", "pgv", interval_floor=floor)
-        plain = predict(3.0, 1.2, pgv_m_s=0.5, model=MODELS["logistic-pgv"])
-        answer = predict(3.0, 1.2, pgv_m_s=0.5, model=narrow)
-        assert plain.ci_high - plain.ci_low < 0.05
-        assert answer.ci_high - answer.ci_low == pytest.approx(0.05 * 1.959963985, rel=1e-9)
-
-
-def test_a_table_of_before_there_were_two_still_holds():
-    once = model_of("logistic", "pgv", interval_floor=[0.1, *[0.2] * (FLOOR_NODES - 1)])
-    for kr in (0.02, 0.3, 1.2):
-        answer = predict(3.0, kr, pgv_m_s=0.5, model=once)
-        width = answer.ci_high - answer.ci_low
-        assert width == pytest.approx((0.1 if kr > 1.0 else 0.2) * 1.959963985, rel=1e-6)
-    with pytest.raises(ModelError, match="another size"):
-        model_of("logistic", "pgv", interval_floor=[0.1] * 7)
-
-
-def test_few_earthquakes_do_not_widen_to_the_widest():
-    random = np.random.default_rng(2)
-    place, width = np.full(1000, 20.3), random.uniform(0.0, 1.0, 1000)
-    widest, nine_in_ten = (interval_floor._table(place, width, share) for share in (1.0, 0.9))
-    # both nodes of the cell, and rounded off a little beyond
-    assert widest[20] == widest[21] == width.max()
-    assert max(nine_in_ten) == np.quantile(width, 0.9) < 0.95 < width.max()
-    assert [i for i, value in enumerate(widest) if value > 0.0] == list(range(17, 25))
-    assert widest[:21] == sorted(widest[:21])
-    assert widest[21:] == sorted(widest[21:], reverse=True)
-
-
 def shaking(n=800, dt=0.01):
     time = np.arange(n) * dt
     envelope = np.exp(-(((time - 3.0) / 1.5) ** 2))
@@ -260,6 +184,7 @@ def test_a_motion_is_answered_by_its_spectrum():
         assert one.intensity_m_s == x
         eta = 4.1 + 3.2 * math.log(x / one.y_m_s)
         eta += 1.3 * math.log(math.sqrt(3.0) * x / (motion.pga_g * G))
+        eta *= math.sqrt(3.0) ** 0.3
         assert one.probability == pytest.approx(1 / (1 + math.exp(-eta)), rel=1e-9)
         assert predict(3.0, 0.05, motion=motion, polarity=name, model=model) == one
     assert both.probability == 0.5 * (both.forward.probability + both.reverse.probability)

@@ -56,8 +56,9 @@ def test_probability_and_interval_against_scipy(row, term, level):
 def test_keys_of_the_json_contract(row):
     answer = predict(3.0, 0.1, pgv_m_s=0.6, model=row())
     assert list(answer.as_dict()) == [
-        "kind", "probability", "ci_low", "ci_high", "level", "model", "term", "method", "failure",
-        "y_m_s", "intensity_m_s", "in_domain", "warnings", "pgv_over_pga_s",
+        "kind", "probability", "ci_low", "ci_high", "event_low", "event_high", "level", "model",
+        "term", "method", "failure", "y_m_s", "intensity_m_s", "in_domain", "warnings",
+        "pgv_over_pga_s",
         "median_displacement_m",
     ]  # fmt: skip
     assert (answer.kind, answer.failure, answer.median_displacement_m) == (

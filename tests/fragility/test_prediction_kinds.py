@@ -19,6 +19,7 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import MotionPrediction, Prediction, predict
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from tests.fragility.portfolio_draws import SHARED
 from tests.fragility.test_outcome_prediction import shaking
 
 METHODS = {"sliding": "displacement", "slumping": "capacity"}
@@ -37,7 +38,8 @@ def row_of(kind: str, term: str = "pgv_pga", **changes: Any) -> ModelRow:
         "covariance": covariance,
         "domain": {"pgv_over_pga_s": (0.02, 0.4), "k_over_pga": (0.01, 1.0)},
         "data_fingerprint": "f",
-        "diagnostics": {"degrees_of_freedom": 40, "rotation_deg": None},
+        "dependence": SHARED,
+        "diagnostics": {"rotation_deg": None},
     }
     return ModelRow(**{**values, **changes})
 

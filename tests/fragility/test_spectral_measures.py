@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.dependence import EventSpread
+from rbfrag.fragility.intervals import ParameterErrors
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.methods import LOGIT, OF_OUTCOME, TOPPLING_BLOCK, Eta, Form, Method
 from rbfrag.fragility.model import FragilityModel
@@ -47,10 +49,9 @@ def model() -> FragilityModel:
         method=method,
         form=form,
         parameters=(0.1, 3.0),
-        packed_covariance=(0.01, 0.0, 0.04),
-        floor=(),
+        errors=ParameterErrors((0.01, 0.0, 0.04), ()),
+        event_spread=EventSpread.of(0.1),
         vertical=False,
-        degrees_of_freedom=40,
     )
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rbfrag.fragility.dependence import EventSpread, event_range
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import answer_given, predict
@@ -29,6 +32,21 @@ def test_certain_shaking_is_plain_prediction(model: FragilityModel) -> None:
     each = predict(p2[None, :], kr[None, :], pgv_m_s=PGV[:, None], model=model).probability
     assert found.probability == pytest.approx(each @ [0.75, 0.25], rel=1e-14)
     assert found.probability[0] == 0.0
+
+
+def test_the_range_of_one_earthquake_is_taken_at_p(model: FragilityModel) -> None:
+    known = replace(model, event_spread=EventSpread.of(0.2))
+    found = site_probability(
+        SHAKING, np.array([3.0]), np.array([0.1]), component=component("rotd50"), model=known
+    )
+    ends = [event_range(float(p), 0.2) for p in found.probability]
+    assert found.event_low == pytest.approx([low for low, _ in ends], rel=1e-9)
+    assert found.event_high == pytest.approx([high for _, high in ends], rel=1e-9)
+    nothing = site_probability(
+        SHAKING, np.array([3.0]), np.array([0.1]), component=component("rotd50"),
+        model=replace(model, event_spread=None),
+    )  # fmt: skip
+    assert np.isnan([nothing.event_low, nothing.event_high]).all()
 
 
 def test_own_blocks(model: FragilityModel) -> None:

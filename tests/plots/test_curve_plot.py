@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.dependence import EventSpread
 from rbfrag.fragility.predict import predict
 from rbfrag.plots import curve as module
 from rbfrag.plots.curve import plot_curve
@@ -24,11 +27,31 @@ def test_curve_and_band_are_those_of_predict(tmp_path, caught) -> None:
         answer = predict(3.0, 0.1, pgv_m_s=float(x[i]), model=model, level=0.9)
         assert y[i] == pytest.approx(answer.probability, rel=1e-12)
         assert inside[i] == answer.in_domain
-        band = axes.collections[0].get_paths()[0].vertices
+        (interval,) = axes.collections  # of one earthquake this model knows nothing
+        band = interval.get_paths()[0].vertices
         here = band[np.isclose(band[:, 0], x[i], rtol=1e-12)][:, 1]
         assert (here.min(), here.max()) == pytest.approx((answer.ci_low, answer.ci_high))
     assert y[-1] > 0.95
     assert "360 critical blocks of 7 earthquakes" in axes.get_title()
+
+
+def test_the_range_of_one_earthquake_is_a_second_band(tmp_path, caught) -> None:
+    figures = caught(module)
+    model = replace(straight_line_model(), event_spread=EventSpread.of(0.1))
+    plot_curve(model, 3.0, 0.1, tmp_path / "c.png", level=0.9)
+    axes = figures[0].axes[0]
+    event, interval = axes.collections
+    assert "one single earthquake (90 %)" in event.get_label()
+    assert "interval of P" in interval.get_label()
+    x = axes.lines[0].get_xdata()[150]
+    answer = predict(3.0, 0.1, pgv_m_s=float(x), model=model, level=0.9)
+    for band, ends in (
+        (event, (answer.event_low, answer.event_high)),
+        (interval, (answer.ci_low, answer.ci_high)),
+    ):
+        outline = band.get_paths()[0].vertices
+        here = outline[np.isclose(outline[:, 0], x, rtol=1e-12)][:, 1]
+        assert (here.min(), here.max()) == pytest.approx(ends)
 
 
 def test_other_measures_are_held(tmp_path, caught) -> None:

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import predict
-from rbfrag.plots.model_lines import failure_line
+from rbfrag.plots.model_lines import failure_line, held_measures
 from tests.plots.critical_values import straight_line_model
 
 X = np.array([0.05, 0.3, 1.0])
@@ -40,10 +39,19 @@ def test_a_line_below_zero_is_none() -> None:
     assert np.isnan(failure_line(straight_line_model(), np.array([1e-3]), 0.999)).all()
 
 
-def test_an_estimated_exponent_is_refused() -> None:
+def test_an_estimated_exponent_holds_the_size() -> None:
     row = straight_line_model().row
     names = ("ln_median", "slope", "ln_sigma", "m_minus_1")
     coefficients = dict(zip(names, (-0.2, 1.0, -1.2, 0.1), strict=True))
     row = replace(row, method="lognormal", coefficients=coefficients)
-    with pytest.raises(InputError, match="exponent"):
-        failure_line(FragilityModel.from_row(row), X, 0.5)
+    model = FragilityModel.from_row(row)
+    lines = []
+    for p2 in (0.3, 10.0):
+        held = held_measures(model, p2=p2)
+        assert held.words == f"at p² = {p2:g} 1/s²"
+        lines.append(failure_line(model, X, 0.5, held))
+        for x, y in zip(X, lines[-1], strict=True):
+            answer = predict(p2, y * p2**0.5 / 9.80665, model=model, pgv_m_s=float(x))
+            assert answer.probability == pytest.approx(0.5, rel=1e-9)
+    # ln y has 0.1 ln p beside the line in ln x
+    assert lines[1] / lines[0] == pytest.approx((10.0 / 0.3) ** 0.05, rel=1e-9)

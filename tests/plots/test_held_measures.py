@@ -42,7 +42,8 @@ WITH_TM = model_of(
     "pgv_pga_tm", ("b0", "b_logit_r", "b_ln_z", "b_ln_zt"), (1.0, 3.3, 2.6, 1.0), "weibull"
 )
 WITH_PGA = model_of("pgv_pga", ("b0", "b_logit_r", "b_ln_z"), (0.7, 3.3, 3.8), "weibull")
-ALONE = model_of("pgv", ("b0", "b_logit_share"), (-1.0, 2.5), "weibull")
+OF_SIZE = model_of("pgv", ("b0", "b_logit_share"), (-1.0, 2.5), "weibull")
+ALONE = model_of("pgv", ("c0", "c1", "v0", "v1"), (0.002, 0.72, 1e-4, 2e-3), "wls")
 
 
 def test_what_is_not_given_is_the_middle_of_the_fitted_range() -> None:
@@ -51,16 +52,19 @@ def test_what_is_not_given_is_the_middle_of_the_fitted_range() -> None:
     assert held.pgv_over_pga_s == pytest.approx(0.08)
     assert held.tm_s == pytest.approx(0.4)
     assert held.words == "at p² = 1 1/s², PGV/(PGA g) = 0.08 s, Tm = 0.4 s"
+    assert held_measures(OF_SIZE).words == "at p² = 1 1/s²"
     assert held_measures(ALONE).words == ""
 
 
-@pytest.mark.parametrize("model", [WITH_PGA, WITH_TM])
+@pytest.mark.parametrize("model", [OF_SIZE, WITH_PGA, WITH_TM])
 @pytest.mark.parametrize("pga", [None, 0.5])
 def test_blocks_on_a_line_have_its_probability(model, pga) -> None:
-    held = held_measures(model, p2=3.0, pga_g=pga)
+    held = held_measures(model, p2=3.0, pga_g=None if model is OF_SIZE else pga)
     x = np.array([0.05, 0.2, 0.6])
     for pgv, y in zip(x, failure_line(model, x, 0.25, held), strict=True):
-        known = {"pgv_m_s": float(pgv), "pga_g": pgv / (0.08 * G) if pga is None else pga}
+        known = {"pgv_m_s": float(pgv)}
+        if model is not OF_SIZE:
+            known["pga_g"] = pgv / (0.08 * G) if pga is None else pga
         if model is WITH_TM:
             known["tm_s"] = 0.4
         answer = predict(3.0, y * 3.0**0.5 / G, model=model, **known)
@@ -78,7 +82,7 @@ def test_no_line_reaches_what_pga_cannot_lift() -> None:
     ("model", "given", "words"),
     [
         (ALONE, {"p2": 3.0}, "--p2 = 3 changes nothing"),
-        (ALONE, {"pga_g": 0.3}, "--pga = 0.3 changes nothing"),
+        (OF_SIZE, {"pga_g": 0.3}, "--pga = 0.3 changes nothing"),
         (WITH_PGA, {"tm_s": 0.3}, "--tm = 0.3 changes nothing"),
         (WITH_TM, {"tm_s": 0.0}, "--tm = 0 is not above zero"),
         (WITH_TM, {"pga_g": float("nan")}, "--pga = nan is not above zero"),

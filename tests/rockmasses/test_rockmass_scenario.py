@@ -164,7 +164,15 @@ def test_the_block_table_has_every_realisation(made: Realisations, model: Fragil
     answer = scenario(made, {"pgv_m_s": 0.4}, model=model)
     plain, full = block_columns(made), block_columns(made, answer)
     assert list(plain)[:5] == ["block_id", "p2_1_s2", "kr", "mode", "weight"]
-    assert list(full)[-5:] == ["probability", "ci_low", "ci_high", "in_domain", "reason"]
+    assert list(full)[-7:] == [
+        "probability",
+        "ci_low",
+        "ci_high",
+        "event_low",
+        "event_high",
+        "in_domain",
+        "reason",
+    ]
     assert {column.shape for column in full.values()} == {(made.n,)}
     assert plain["weight"].sum() == made.n_blocks < made.n
     bad = ~made.is_block

@@ -28,7 +28,8 @@ def block(
     """Print a block's failure mode, yield accelerations and size.
 
     Angles in degrees, lengths in m, accelerations in g, the size parameter p2 in 1/s2. A block
-    that topples is backed by a slope; a free-standing one rocks, and fails at weaker shaking.
+    that topples is backed by a slope; a free-standing one rocks, and fails at weaker shaking
+    (rbfrag respond --kind rocking).
     Of a mesh, which stands free: volume, mass, inertia, and for each azimuth kr, p2 and
     restitution about its contacts with the ground.
     """

@@ -172,6 +172,8 @@ def _chosen_kind(kind: str | None, of_shape: dict[str, Any], displacement: str |
 def _refuse_options_of_other_kinds(model: Kind, given: dict[str, bool]) -> None:
     from rbfrag.solver.kinds import models
 
+    if model.no_search:
+        raise InputError(f"--kind {model.kind} has no critical value: {model.no_search}")
     for word, is_given in given.items():
         if is_given and SEARCH_OPTION[word] not in model.search_options:
             name = SEARCH_OPTION[word]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -137,6 +138,7 @@ def print_report(report: FitReport, *, json: bool) -> None:
             f"{name.replace('_', ' ')} {value:.3f}" for name, value in scatter.items()
         )
         print(f"scatter of ln y about the median: {parts}")
+    print_dependence(report.model.row.dependence)
     intervals = details.get("score_intervals") or {}
     print(f"scores, judged on {details.get('judged_on', 'critical values')}:")
     for name, value in report.scores.items():
@@ -146,3 +148,15 @@ def print_report(report: FitReport, *, json: bool) -> None:
         ends = f"  ({cell(around[0])} to {cell(around[1])} by earthquakes)" if around else ""
         print(f"  {name}: {cell(value)}{ends}")
     print_warnings(report.warnings)
+
+
+def print_dependence(dependence: Mapping[str, Any] | None) -> None:
+    """Print what the blocks of one earthquake share."""
+    if dependence is None:
+        return
+    errors = dependence["errors"]
+    print_table(
+        ("shared by the blocks of one earthquake", "value", "standard error"),
+        [(name, dependence[name], error) for name, error in errors.items()],
+    )
+    print()

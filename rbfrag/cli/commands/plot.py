@@ -88,21 +88,21 @@ def plot_chart(
     out: Out,
     held: Held,
     model: str | None = option(
-        "Model of PGV, PGA*Tm, PGD/Tm, or PGV with PGA (and Tm). Default: the one that "
-        "answers for PGV."
+        "Model of one measure (PGV, SA(1), PGA, ...), or of PGV with PGA (and Tm). Default: the "
+        "one that answers for PGV."
     ),
     db: options.Db = None,
 ) -> None:
     """Draw lines of equal probability of toppling over intensity and block, to read by hand.
 
-    A model of PGV with PGA is drawn over PGV, with --p2, --pga and --tm held.
+    What the model reads beside them is held: --p2, and of a model of PGV with PGA --pga and --tm.
     """
     from rbfrag.fragility.lookup import find_model
+    from rbfrag.fragility.measures import MEASURES
     from rbfrag.plots.chart import plot_chart as draw
     from rbfrag.plots.model_lines import held_measures
 
-    given = ["pgv_m_s"] if model is None else ["pgv_m_s", "pga_g", "tm_s", "pgd_m"]
-    chosen = find_model(model, given, db)
+    chosen = find_model(model, ["pgv_m_s"] if model is None else MEASURES, db)
     draw(chosen, out, held_measures(chosen, p2=held.p2, pga_g=held.pga, tm_s=held.tm))
     print(out)
 
@@ -129,9 +129,10 @@ def plot_curve(
     ),
     db: options.Db = None,
 ) -> None:
-    """Draw the fragility curve of one block over a measure of the shaking, with its interval.
+    """Draw the fragility curve of one block over a measure of the shaking.
 
-    The other measures are held at the values given.
+    One band is the interval of P as far as the data tell it, the other the share of such blocks
+    that may fail in one single earthquake. The other measures are held at the values given.
     """
     from rbfrag.errors import InputError
     from rbfrag.fragility.lookup import find_model

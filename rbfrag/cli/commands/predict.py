@@ -60,7 +60,7 @@ class Table:
     )
     out: str | None = option(
         "With --batch: table to write, the same columns with probability, ci_low, "
-        "ci_high, in_domain and reason.",
+        "ci_high, event_low, event_high, in_domain and reason.",
         metavar="FILE",
     )
 
@@ -76,7 +76,11 @@ def predict(
     answering: options.Answering,
     json: options.Json = False,
 ) -> None:
-    """Print the probability that a block fails, with its interval.
+    """Print the probability that a block fails.
+
+    P is the share of such blocks that fail over all earthquakes and sites with these measures, its
+    interval how well the data tell that share, and the range of one earthquake what share of such
+    blocks at many sites may fail in one single earthquake.
 
     What is known of the motion decides which model answers: PGV, alone or with PGA and Tm; a
     spectral acceleration; PGA; PGA with spectral accelerations; or the motion itself. Where the

@@ -12,7 +12,7 @@ from rbfrag.cli.parameters.block import WAYS, BlockOptions
 from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.errors import InputError
-from rbfrag.solver.described import TAKEN_TO_TOPPLE, toppling_rectangle
+from rbfrag.solver.described import TAKEN_NOT_TO_SLIP, TAKEN_TO_TOPPLE, toppling_rectangle
 
 if TYPE_CHECKING:
     from rbfrag.solver.block.geometry import Block
@@ -30,6 +30,16 @@ class Sliding:
         "Sliding: leave out the factor cos(phi - beta)/cos(phi), as Newmark's horizontal "
         "block does.",
         False,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rocking:
+    """How a free-standing block rocks."""
+
+    restitution: float | None = option(
+        "Rocking: speed after an impact over that before it, above 0 and up to 1. Default: what "
+        "angular momentum leaves at each corner."
     )
 
 
@@ -57,6 +67,7 @@ def respond(
     motion: options.Motion,
     block: BlockOptions,
     sliding: Sliding,
+    rocking: Rocking,
     direction: options.Direction,
     files: Files,
     reading: options.Reading,
@@ -65,24 +76,27 @@ def respond(
         "plane of dip --beta (default 0), whatever its shape."
     ),
     kind: str | None = option(
-        "Response model: toppling, sliding, slumping or confined_toppling. Default: that "
-        "of the block's failure mode."
+        "Response model: toppling, rocking, sliding, slumping or confined_toppling. Default: "
+        "that of the block's failure mode; of a block that topples with --no-back, rocking."
     ),
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
     """Run one block under one accelerogram.
 
-    The block is --p2 and --kr (toppling), --ky (sliding), or its shape, from which the failure
-    mode and with it the model follow; of a rectangle without --phi, that it topples.
+    The block is --p2 and --kr (toppling, or with --kind rocking a free-standing one on level
+    ground), --ky (sliding), or its shape, from which the failure mode and with it the model follow;
+    of a rectangle without --phi, that it topples.
     """
     from rbfrag.solver.reports import response_as_dict, write_history
     from rbfrag.solver.respond import respond as run
 
-    body, what, remarks = _body(block, ky)
+    body, what, remarks = _body(block, ky, kind)
     if files.animate is not None:
         if body is None:
-            raise InputError("--animate needs the shape of the block and its --phi")
+            raise InputError(
+                "--animate needs the shape of the block and its --phi, unless it stands free"
+            )
         from rbfrag.plots.film import film_path
 
         film_path(files.animate)
@@ -93,9 +107,9 @@ def respond(
             ground,
             vertical=upward,
             polarity=direction.polarity,
-            kind=kind,
             two_way=sliding.two_way,
             horizontal=sliding.horizontal,
+            restitution=rocking.restitution,
             history=any((files.csv, files.plot, files.animate)),
             **what,
         )
@@ -130,16 +144,32 @@ def respond(
 
 
 def _body(
-    block: BlockOptions, ky: float | None
+    block: BlockOptions, ky: float | None, kind: str | None
 ) -> tuple[Block | None, dict[str, Any], tuple[str, ...]]:
     """Return the block where its shape decides, the keywords that say it, and warnings."""
+    from rbfrag.solver.kinds import model_of_kind, model_of_mode
+
     described = block.described()
-    if described is not None and not described.only_topples:
-        body, conditions = described.without_kv().on_planes()
-        return body, {"block": body, **conditions}, ()
+    if described is not None and described.only_topples:
+        conditions = described.without_kv().conditions
+        backed = conditions.get("back_fracture", True)
+        model = (
+            model_of_mode("topple", back_fracture=backed) if kind is None else model_of_kind(kind)
+        )
+        if not model.free_standing:
+            return None, {"kind": kind, **toppling_rectangle(described)}, (TAKEN_TO_TOPPLE,)
+        free = {"kind": model.kind, "block": described.block, **conditions}
+        return described.block, free, (TAKEN_NOT_TO_SLIP,)
     if described is not None:
-        return None, toppling_rectangle(described), (TAKEN_TO_TOPPLE,)
-    what = {"p2": block.p2, "kr": block.kr, "ky": ky, "beta_deg": block.beta}
+        body, conditions = described.without_kv().on_planes()
+        return body, {"kind": kind, "block": body, **conditions}, ()
+    what: dict[str, Any] = {
+        "kind": kind,
+        "p2": block.p2,
+        "kr": block.kr,
+        "ky": ky,
+        "beta_deg": block.beta,
+    }
     what = {name: value for name, value in what.items() if value is not None}
     if not what.keys() & {"p2", "kr", "ky"}:
         raise InputError(f"no block: give --p2 and --kr, or --ky, or describe it by {WAYS}")
@@ -152,7 +182,13 @@ def _body(
 def _draw(
     response: Response, path: str, p2: float | None, kr: float | None, title: str, reverse: bool
 ) -> None:
-    if response.history is not None and response.history.displacement_m is not None:
+    history = response.history
+    if history is not None and history.impact_s is not None:
+        from rbfrag.plots.response import plot_rocking
+
+        plot_rocking(response, path, title=title, reverse=reverse)
+        return
+    if history is not None and history.displacement_m is not None:
         from rbfrag.plots.response import plot_motion
 
         plot_motion(response, path, title=title, reverse=reverse)

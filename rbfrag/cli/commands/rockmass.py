@@ -139,7 +139,7 @@ def rockmass(
     the blocks of each mode for which there is a fragility model.
     """
     from rbfrag.exchange.block_table import write_block_table
-    from rbfrag.fragility.model import checked_level
+    from rbfrag.fragility.intervals import checked_level
     from rbfrag.rockmasses.counts import crossings, mode_counts
     from rbfrag.rockmasses.failures import (
         failures,

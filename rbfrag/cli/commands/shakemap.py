@@ -93,7 +93,8 @@ def shakemap(
         std_ln={name: values[on_map] for name, values in std_ln.items()},
         model=answering.model, level=answering.level, db=answering.db,
     )  # fmt: skip
-    warnings += answer.notes
+    if answer.advice:
+        warnings.append(answer.advice)
     if "pgv_m_s" not in measures:
         read = " and ".join(name.partition("_")[0].upper() for name in answer.measures)
         warnings.append(f"the map has no PGV, which tells most: a model of {read} answers")
@@ -122,6 +123,8 @@ def shakemap(
         "probability": placed(answer.probability),
         "ci_low": placed(answer.ci_low),
         "ci_high": placed(answer.ci_high),
+        "event_low": placed(answer.event_low),
+        "event_high": placed(answer.event_high),
         "in_domain": placed(answer.in_domain, False),
     }
     outside = int((~answer.in_domain & (answer.probability > 1e-4)).sum())

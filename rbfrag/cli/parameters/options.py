@@ -75,7 +75,10 @@ Model = Annotated[
     ),
 ]
 
-Level = Annotated[float, typer.Option("--level", help="Confidence level of the interval.")]
+Level = Annotated[
+    float,
+    typer.Option("--level", help="Level of the interval of P, and of the range of one earthquake."),
+]
 
 Jobs = Annotated[
     int | None,

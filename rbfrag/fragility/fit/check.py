@@ -123,7 +123,7 @@ def held_out_of(connection: Connection, name: str | None, *, seed: int = 0) -> H
         seed=seed,
         estimate_m=method.exponent in row.coefficients,
         selection=selection_of(row),
-        compared=False,
+        shared=False,
     )
     judged = fitted.data.judged
     bins = calibration_bins(judged, fitted.result.held_out, seed=seed)

@@ -53,26 +53,6 @@ def sandwich(rows: Likelihood, b: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.asarray(factor * bread @ (scores.T @ scores) @ bread), np.asarray(bread)
 
 
-def effective_freedom(steps: FloatArray) -> int:
-    """Return the degrees of freedom of a variance Σ d², of the parameter that has fewest.
-
-    The variance is a sum over G earthquakes, of which a few may make up most. It scatters like a
-    chi-square number of 2V²/Var(V) degrees of freedom (Satterthwaite 1946, Biometrics Bulletin
-    2(6), 110-114), with V = Σ d² and Var(V) = Σ d⁴ - V²/G from the steps themselves: G for normal
-    steps. No more than G - 1, and no less than 4.
-
-    Args:
-        steps: the d of each earthquake, shape (G, k).
-    """
-    g = steps.shape[0]
-    squares = steps * steps
-    total = squares.sum(axis=0)
-    spread = (squares * squares).sum(axis=0) - total * total / g
-    with np.errstate(divide="ignore", invalid="ignore"):
-        each = np.where(spread > 0.0, 2.0 * total * total / spread, np.inf)
-    return int(np.clip(each.min(), min(4, g - 1), g - 1))
-
-
 def bootstrap(
     event: NDArray[np.intp],
     fit: Callable[[FloatArray], FloatArray],

@@ -14,14 +14,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import FitError
 from rbfrag.fragility.fit.censoring import score_bounds, unknown_shares
-from rbfrag.fragility.fit.clusters import (
-    bootstrap,
-    cr3,
-    effective_freedom,
-    jackknife_steps,
-    left_out,
-    sandwich,
-)
+from rbfrag.fragility.fit.clusters import bootstrap, jackknife_steps, left_out, sandwich
 from rbfrag.fragility.fit.data import FitData
 from rbfrag.fragility.fit.likelihood import (
     CensoredNormal,
@@ -86,7 +79,7 @@ def fit_lognormal(
     steps = jackknife_steps(rows, theta) @ jacobian.T
     cr1, naive = (np.sqrt(np.diag(jacobian @ c @ jacobian.T)) for c in sandwich(rows, theta))
     estimates = Estimates(
-        names, b, cr3(steps), effective_freedom(steps),
+        names, b, steps,
         bootstrap(
             rows.event, lambda times: natural(maximise(rows, theta, times=times)[0]),
             replicates=REPLICATES, seed=seed,
@@ -133,10 +126,9 @@ def fit_censored(data: FitData, method: Method, term: Term, *, seed: int) -> Met
     rows = censored_rows(data, form)
     b = most_likely(rows, np.array(form.start))
     others = left_out(rows.event, lambda rest: most_likely(rows.only(rest), b))
-    parameters = np.array(list(others.values()))
     cr1, naive = (np.sqrt(np.diag(c)) for c in sandwich(rows, b))
     estimates = Estimates(
-        form.parameters, b, cr3(parameters - parameters.mean(axis=0)), len(others) - 1,
+        form.parameters, b, np.array(list(others.values())) - b,
         bootstrap(
             rows.event, lambda times: maximise(rows, b, times=times, tolerance=1e-7)[0],
             replicates=REPLICATES // 4, seed=seed,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -65,6 +65,8 @@ class FitSource:
         displacement_m: how far they slide [m], same shape; None where they do not.
         strength_g: yield acceleration of the stored block [g], shape (n,); None where the
             combination is about blocks of any strength.
+        recording: number of the recording that each combination's motion is of, shape (n,); None
+            where that is not known.
     """
 
     table: CombinationTable
@@ -73,6 +75,7 @@ class FitSource:
     failed: FloatArray
     displacement_m: FloatArray | None = None
     strength_g: FloatArray | None = None
+    recording: NDArray[np.int64] | None = None
 
     @classmethod
     def of_table(cls, table: CombinationTable) -> FitSource:
@@ -83,7 +86,7 @@ class FitSource:
     def only(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> FitSource:
         """Return some of the combinations."""
         part = {f.name: getattr(self.table, f.name)[chosen] for f in fields(self.table)}
-        slid, strength = self.displacement_m, self.strength_g
+        slid, strength, recording = self.displacement_m, self.strength_g, self.recording
         return FitSource(
             CombinationTable(**part),
             self.xp_m_s[chosen],
@@ -91,6 +94,7 @@ class FitSource:
             self.failed[chosen],
             None if slid is None else slid[chosen],
             None if strength is None else strength[chosen],
+            None if recording is None else recording[chosen],
         )
 
     def judged_outcomes(self, strength: FloatArray, critical: FloatArray) -> tuple[FloatArray, str]:
@@ -142,7 +146,7 @@ def read_source(
         vertical: ``without`` vertical motion, ``with`` it, or ``both``.
         doubtful_pgd: read the PGD of records with a doubtful baseline too.
     """
-    from rbfrag.db.queries import combination_table, outcome_grid
+    from rbfrag.db.queries import combination_table, outcome_grid, recordings_of_motions
     from rbfrag.db.spectra import spectrum_values
 
     kind_read = kind or block.kind
@@ -157,6 +161,7 @@ def read_source(
     spectra = spectrum_values(connection)
     keys = zip(table.motion_id.tolist(), table.polarity, table.p2.tolist(), strict=True)
     grid = outcome_grid(connection, table.combination_id)
+    recordings = recordings_of_motions(connection)
     source = FitSource(
         table,
         np.array([spectra.get(key, np.nan) for key in keys], dtype=np.float64),
@@ -164,9 +169,11 @@ def read_source(
         grid.outcome,
         grid.displacement_m,
         np.array([_yield_g(kind_read, block or "{}") for block in table.block], dtype=np.float64),
+        np.array([recordings[motion] for motion in table.motion_id.tolist()], dtype=np.int64),
     )
     if grid.outcome.shape[1] == 0 and block.strength == "kr":
-        return FitSource(table, source.xp_m_s, *_nothing_known(table))
+        k, failed = _nothing_known(table)
+        return replace(source, k_over_pga=k, failed=failed, displacement_m=None, strength_g=None)
     return source
 
 
@@ -210,6 +217,8 @@ class FitData:
         event: number of the earthquake, shape (n,).
         event_names: the earthquakes by that number.
         motion: number of the motion, shape (n,).
+        polarity: +1 forward, -1 reverse, shape (n,).
+        recording: number of the motion's recording, shape (n,); None where that is not known.
         blocks: what formulas read of the blocks of the grid, shape (n, m) or (n, 1).
         failed: what they do: 1 fails, 0 does not, NaN not known, shape (n, m).
         read: which of them this fit may read, same shape.
@@ -230,6 +239,8 @@ class FitData:
     event: NDArray[np.intp]
     event_names: tuple[str, ...]
     motion: NDArray[np.int64]
+    polarity: FloatArray
+    recording: NDArray[np.int64] | None
     blocks: dict[str, FloatArray]
     failed: FloatArray
     read: NDArray[np.bool_]
@@ -336,6 +347,8 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         event=event.astype(np.intp),
         event_names=tuple(names.tolist()),
         motion=np.unique(table.motion_id[own], return_inverse=True)[1].astype(np.int64),
+        polarity=np.where(table.polarity[own] == "forward", 1.0, -1.0),
+        recording=None if source.recording is None else source.recording[own],
         blocks={name: v[chosen] for name, v in points.blocks.items()},
         failed=failed,
         read=points.read[chosen],

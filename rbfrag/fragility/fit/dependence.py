@@ -18,7 +18,9 @@ from scipy.special import ndtri
 
 from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.dependence import Dependence
+from rbfrag.fragility.fit.data import FitData
 from rbfrag.fragility.fit.pair_tables import KINDS, PairRows, PairTable, pair_table
+from rbfrag.fragility.methods import BlockParameters
 
 FloatArray = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -75,7 +77,7 @@ def estimate_dependence(
 
     Earthquake and site (ρ_e, ρ_s, λ_e) come from pairs of different components, what components
     share from pairs of one component; ρ_v is what is left of 1. Every pair counts the same. Where
-    an earthquake has more than 100,000 pairs of a kind, as many are drawn at random and weighted.
+    an earthquake has more than 40,000 pairs of a kind, as many are drawn at random and weighted.
 
     Args:
         probability: P of each block, predicted without its earthquake, shape (n,).
@@ -110,6 +112,44 @@ def estimate_dependence(
         earthquakes=events,
         pairs=(tables.far.pairs, tables.near.pairs, tables.own.pairs),
         replicates=replicates,
+        seed=seed,
+    )
+
+
+def dependence_of_fit(
+    data: FitData, block: BlockParameters, held_out: FloatArray, *, seed: int
+) -> DependenceEstimate:
+    """Estimate the copula of the blocks that a model was fitted to.
+
+    Blocks without a size count as those of one size, their strength as their velocity.
+
+    Args:
+        data: the rows of the fit.
+        block: what describes its blocks.
+        held_out: probabilities of the blocks of the grid without their earthquake, shape (n, m).
+        seed: of pairs drawn and of resamples.
+
+    Raises:
+        FitError: too few earthquakes or pairs, or it is not known which motions are of one site.
+    """
+    if data.recording is None:
+        raise FitError("which motions are components of one recording is not known")
+    shape = data.failed.shape
+
+    def each(column: NDArray[np.generic]) -> NDArray[np.generic]:
+        return np.broadcast_to(column[:, None], shape).ravel()
+
+    size = np.ones(shape) if block.size is None else data.grid(block.size)
+    strength = data.grid("y_m_s" if "y_m_s" in data.blocks else block.strength)
+    return estimate_dependence(
+        held_out.ravel(),
+        np.where(data.read, data.failed, np.nan).ravel(),
+        each(data.event),
+        each(data.recording),
+        each(data.motion),
+        each(data.polarity),
+        size.ravel(),
+        strength.ravel(),
         seed=seed,
     )
 

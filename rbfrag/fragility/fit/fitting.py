@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -13,12 +13,13 @@ import numpy as np
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
+from rbfrag.fragility.fit.clusters import cr3
 from rbfrag.fragility.fit.data import FitData, FitSource, fit_data, read_source
+from rbfrag.fragility.fit.dependence import dependence_of_fit
 from rbfrag.fragility.fit.domain import joint_scatter
 from rbfrag.fragility.fit.report import FitReport, log_correlations, power_law
 from rbfrag.fragility.fit.result import MethodResult
-from rbfrag.fragility.interval_floor import interval_floor, of_motions, of_sizes
-from rbfrag.fragility.measures import TERMS, Term, intensity_term
+from rbfrag.fragility.measures import Term, intensity_term
 from rbfrag.fragility.methods import Method, method_named, methods
 from rbfrag.fragility.model import FragilityModel
 
@@ -166,17 +167,18 @@ def fit_source(
     seed: int = 0,
     estimate_m: bool = False,
     selection: Mapping[str, object] | None = None,
-    compared: bool = True,
+    shared: bool = True,
 ) -> Fitted:
     """Fit a model and keep its held-out probabilities.
 
-    Arguments as for :func:`fit`; `compared` says whether the model gets its table of least widths,
-    for which those that know more are fitted too: a study of scores has no use for it.
+    Arguments as for :func:`fit`; `shared` says whether what blocks of one earthquake share is
+    estimated too, which a study of scores has no use for.
     """
     table, chosen = source.table, dict(selection or {})
     data = fit_data(source, method, term, kind=kind)
     options = {"estimate_m": True} if estimate_m else {}
     result: MethodResult = method.fitter()(data, method, term, seed=seed, **options)
+    dependence, unknown = _dependence(data, method, result, seed) if shared else (None, [])
     of_any_strength = method.block.strength == "kr"
     law = power_law(table) if of_any_strength else None
     correlations = log_correlations(table) if of_any_strength else {}
@@ -187,7 +189,9 @@ def fit_source(
         term=term.name,
         method=method.name,
         coefficients=result.coefficients,
-        covariance=result.covariance,
+        covariance=tuple(tuple(line) for line in cr3(result.steps).tolist()),
+        leave_out_steps=tuple(tuple(line) for line in result.steps.tolist()),
+        dependence=dependence,
         domain=data.domain,
         data_fingerprint=data.fingerprint,
         diagnostics={
@@ -195,9 +199,8 @@ def fit_source(
             "n": int(data.observed.sum()),
             "n_censored": int(data.censored.sum()),
             "events": _events(data, of_outcomes),
-            "degrees_of_freedom": _events(data, of_outcomes) - 1,
             "scores": result.scores,
-            "warnings": [*_data_warnings(data), *result.warnings],
+            "warnings": [*_data_warnings(data), *result.warnings, *unknown],
             "n_total": data.n_total,
             "n_found": int((table.status == "found").sum()),
             "n_below_limit": int((table.status == "below_limit").sum()),
@@ -217,8 +220,6 @@ def fit_source(
         },
         created=datetime.now(UTC).isoformat(timespec="seconds"),
     )
-    if compared:
-        row = _with_floor(row, source)
     return Fitted(FitReport.from_model(FragilityModel.from_row(row)), data, result)
 
 
@@ -270,48 +271,22 @@ def _events(data: FitData, of_outcomes: bool) -> int:
     return int(np.unique(data.event[informative]).size)
 
 
-def _with_floor(row: ModelRow, source: FitSource) -> ModelRow:
-    """Return the model with its table of least widths, where models that know more exist."""
-    table: list[float] = []
-    term = TERMS[row.term]
-    if term.richer and method_named(row.method).block.size == "p2":
-        others = [_richer_model(TERMS[name], source, row) for name in term.richer]
-        known = [other for other in others if other is not None]
-        if known:
-            sample = of_motions(source) if term.richer == ("xp",) else of_sizes(source)
-            table = interval_floor(FragilityModel.from_row(row), known, sample)
-    return replace(row, diagnostics={**row.diagnostics, "interval_floor": table})
-
-
-def _richer_model(term: Term, source: FitSource, of: ModelRow) -> FragilityModel | None:
-    """Return the best model of a term, with clustered covariance and its own table, only that."""
-    from rbfrag.fragility.fit.outcomes import fit_parameters
-
-    method = min(
-        (each for each in methods_of_kind(of.kind) if term.name in each.forms),
-        key=lambda each: each.forms[term.name].rank,
-    )
+def _dependence(
+    data: FitData, method: Method, result: MethodResult, seed: int
+) -> tuple[dict[str, object] | None, list[str]]:
+    """Return what blocks of one earthquake share as models store it, or why it is not known."""
     try:
-        data = fit_data(source, method, term, kind=of.kind)
-        names, parameters, covariance, freedom = fit_parameters(data, method, term)
-    except FitError:
-        return None
-    row = ModelRow(
-        name=term.name,
-        kind=of.kind,
-        term=term.name,
-        method=method.name,
-        coefficients=dict(zip(names, parameters.tolist(), strict=True)),
-        covariance=tuple(tuple(line) for line in covariance.tolist()),
-        domain={},
-        data_fingerprint="",
-        diagnostics={
-            "degrees_of_freedom": freedom,
-            "events": _events(data, True),
-            "vertical": of.diagnostics["vertical"],
-        },
-    )
-    return FragilityModel.from_row(_with_floor(row, source))
+        estimate = dependence_of_fit(data, method.block, result.held_out, seed=seed)
+    except FitError as error:
+        return None, [f"the range of one future earthquake is not known: {error}"]
+    return {
+        **asdict(estimate.dependence),
+        "errors": estimate.errors,
+        "earthquakes": estimate.earthquakes,
+        "pairs": list(estimate.pairs),
+        "replicates": estimate.replicates,
+        "seed": estimate.seed,
+    }, []
 
 
 def _data_warnings(data: FitData) -> list[str]:

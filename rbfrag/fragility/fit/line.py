@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import FitError
-from rbfrag.fragility.fit.clusters import bootstrap, left_out
+from rbfrag.fragility.fit.clusters import bootstrap, cr3, left_out
 from rbfrag.fragility.fit.critical import probabilities
 from rbfrag.fragility.fit.data import FitData
-from rbfrag.fragility.fit.result import MethodResult, few_events, scatter_of
+from rbfrag.fragility.fit.result import CLUSTERED, MethodResult, few_events, scatter_of
 from rbfrag.fragility.fit.scores import score_intervals, scores_of
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.methods import Method, arrays
@@ -232,9 +232,8 @@ def clustered_line(
 def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodResult:
     """Fit y* = c0 + c1 x with variance v(x), as the dissertation does.
 
-    Censored points are left out of the fit (and bias it upwards); standard errors of the
-    line are clustered by earthquake; the covariance of all parameters comes from a
-    bootstrap by earthquake.
+    Censored points are left out of the fit (and bias it upwards). The covariance is that of the
+    fits that each leave an earthquake out; a bootstrap by earthquake is reported beside it.
 
     Args:
         data: the rows.
@@ -263,9 +262,8 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
     samples, unstable = event_bootstrap(
         bins, y, events, degree, fit.parameters, replicates=REPLICATES, seed=seed
     )
-    covariance = np.cov(samples, rowvar=False)
     names = form.parameters
-    spread = dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    spread = dict(zip(names, samples.std(axis=0, ddof=1).tolist(), strict=True))
     judged = data.judged
     in_sample = probabilities(method, form, data, fit.parameters)
     # An earthquake with censored points only has no share in the fit: it is left out already.
@@ -277,17 +275,15 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
         here, own = data.event == event, events == event
         held_out[here] = probabilities(method, form, data, part)[here]
         density[own] = _log_density(part, x[own], y[own])
+    steps = np.array(list(others.values())) - fit.parameters
     mean = mean_m_s(parameters, data.x)
     with np.errstate(divide="ignore", invalid="ignore"):
         ln_residual = np.where(data.observed & (mean > 0.0) & (data.y > 0.0),
                                np.log(data.y / mean), np.nan)  # fmt: skip
     return MethodResult(
         coefficients=dict(zip(names, fit.parameters.tolist(), strict=True)),
-        covariance=tuple(tuple(row) for row in covariance.tolist()),
-        standard_errors={
-            **spread,
-            **dict(zip(names, np.sqrt(np.diag(clustered.covariance)).tolist(), strict=False)),
-        },
+        steps=steps,
+        standard_errors=dict(zip(names, np.sqrt(np.diag(cr3(steps))).tolist(), strict=True)),
         scores={
             "log_density_in_sample": float(_log_density(fit.parameters, x, y).mean()),
             "log_density_held_out": float(density.mean()),
@@ -303,10 +299,10 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
             ),
             "intercept_m_s": float(clustered.line[0]),
             "slope": float(clustered.line[1]),
-            "standard_error_kinds": {
-                name: "clustered by earthquake" if name in ("c0", "c1") else "bootstrap"
-                for name in names
-            },
+            "standard_error_kinds": dict.fromkeys(names, CLUSTERED),
+            "cr1_standard_errors": dict(
+                zip(("c0", "c1"), np.sqrt(np.diag(clustered.covariance)).tolist(), strict=True)
+            ),
             "bootstrap": {
                 "standard_errors": spread,
                 "replicates": REPLICATES,
@@ -399,8 +395,8 @@ def _warnings(
         result.append(f"line and variance did not become stable in {fit.iterations} iterations")
     if unstable > 0.05 * REPLICATES:
         result.append(
-            f"{unstable} of {REPLICATES} bootstrap fits did not become stable: the confidence "
-            "intervals are rough"
+            f"{unstable} of {REPLICATES} bootstrap fits did not become stable: the standard "
+            "errors of the bootstrap are rough"
         )
     result += few_events(n_events)
     doubtful = negative_probability(fit.parameters.tolist(), x, arrays()) > NEGATIVE_LIMIT

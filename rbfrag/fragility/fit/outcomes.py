@@ -14,15 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import FitError
-from rbfrag.fragility.fit.clusters import (
-    bootstrap,
-    cr3,
-    effective_freedom,
-    jackknife_steps,
-    left_out,
-)
+from rbfrag.fragility.fit.clusters import bootstrap, jackknife_steps, left_out
 from rbfrag.fragility.fit.data import FitData
-from rbfrag.fragility.fit.likelihood import Binomial, fit_by_statsmodels, maximise, most_likely
+from rbfrag.fragility.fit.likelihood import Binomial, fit_by_statsmodels, maximise
 from rbfrag.fragility.fit.result import Estimates, MethodResult, method_result
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.methods import LOGLOG, Form, Method, arrays
@@ -90,7 +84,7 @@ def fit_outcomes(
 
     samples = bootstrap(rows.data.event, resampled, replicates=REPLICATES, seed=seed)
     estimates = Estimates(
-        names, b, cr3(steps), effective_freedom(steps), samples, seed,
+        names, b, steps, samples, seed,
         {"cr1_standard_errors": np.sqrt(np.diag(cr1)),
          "naive_standard_errors": np.sqrt(np.diag(naive))},
     )  # fmt: skip
@@ -113,17 +107,6 @@ def fit_outcomes(
         },
         warnings=_warnings(data, rows, estimates),
     )
-
-
-def fit_parameters(
-    data: FitData, method: Method, term: Term
-) -> tuple[tuple[str, ...], FloatArray, FloatArray, int]:
-    """Return names and values of the parameters, their covariance and its degrees of freedom."""
-    names = parameter_names(method, term)
-    rows = outcome_rows(data, method, term, names).data
-    b = most_likely(rows)
-    steps = jackknife_steps(rows, b)
-    return names, b, cr3(steps), effective_freedom(steps)
 
 
 def parameter_names(method: Method, term: Term, *, estimate_m: bool = False) -> tuple[str, ...]:

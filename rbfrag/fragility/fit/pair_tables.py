@@ -20,7 +20,7 @@ Indices = NDArray[np.intp]
 KINDS = OTHER_SITE, OTHER_COMPONENT, SAME_COMPONENT = (0, 1, 2)
 """Kinds of pairs: of different sites, of the two components of a site, of one component."""
 
-MOST_PAIRS = 100_000
+MOST_PAIRS = 40_000
 """Pairs of one kind and earthquake; of more as many are drawn at random, and count for all."""
 
 ANGLES = np.linspace(-1.0, 1.0, 41) * np.arcsin(0.999)

@@ -83,6 +83,7 @@ class FitReport:
             "warnings": list(self.warnings),
             **details,
             "covariance": [list(line) for line in row.covariance],
+            "dependence": None if row.dependence is None else dict(row.dependence),
             "domain": {name: list(edges) for name, edges in row.domain.items()},
             "data_fingerprint": row.data_fingerprint,
             "is_default": row.is_default,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.fragility.fit.clusters import cr3
 from rbfrag.fragility.fit.data import FEW_EVENTS, FitData
 from rbfrag.fragility.fit.scores import nested_scatter, score_intervals, scores_of
 
@@ -22,7 +23,7 @@ class MethodResult:
 
     Args:
         coefficients: value of each parameter by name, in the order of the formula.
-        covariance: covariance of the parameters in that order.
+        steps: change of the parameters without each earthquake, shape (G, k).
         standard_errors: standard error of each parameter by name.
         scores: how well the model predicts, by name.
         details: everything else the report states, JSON-able.
@@ -32,7 +33,7 @@ class MethodResult:
     """
 
     coefficients: dict[str, float]
-    covariance: tuple[tuple[float, ...], ...]
+    steps: FloatArray
     standard_errors: dict[str, float]
     scores: dict[str, float]
     details: dict[str, object]
@@ -47,8 +48,7 @@ class Estimates:
     Args:
         names: of the parameters.
         values: shape (k,).
-        covariance: clustered by earthquake, shape (k, k).
-        degrees_of_freedom: of the covariance.
+        steps: change of the parameters without each earthquake, shape (G, k).
         samples: of a bootstrap by earthquake, shape (replicates, k).
         seed: seed of the bootstrap.
         others: further standard errors by what the report calls them.
@@ -56,11 +56,15 @@ class Estimates:
 
     names: Sequence[str]
     values: FloatArray
-    covariance: FloatArray
-    degrees_of_freedom: int
+    steps: FloatArray
     samples: FloatArray
     seed: int
     others: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance clustered by earthquake, shape (k, k)."""
+        return cr3(self.steps)
 
     @property
     def errors(self) -> FloatArray:
@@ -98,11 +102,10 @@ def method_result(
     judged, spread = data.judged, estimates.samples.std(axis=0, ddof=1)
     return MethodResult(
         coefficients=estimates.named(estimates.values),
-        covariance=tuple(tuple(line) for line in estimates.covariance.tolist()),
+        steps=estimates.steps,
         standard_errors=estimates.named(estimates.errors),
         scores={**(scores or {}), **scores_of(judged, in_sample, held_out)},
         details={
-            "degrees_of_freedom": estimates.degrees_of_freedom,
             "judged_on": judged.source,
             "judged_outcomes": int(judged.known.sum()),
             "score_intervals": score_intervals(judged, held_out, seed=estimates.seed),

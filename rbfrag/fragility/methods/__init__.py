@@ -15,10 +15,10 @@ from importlib import import_module
 from typing import Any, Literal, NamedTuple
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.dependence import normal_quantile, normal_share
 from rbfrag.fragility.measures import Term
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
-_ROOT_HALF = math.sqrt(0.5)
 _LARGEST_EXPONENT = 709.0
 
 
@@ -35,8 +35,9 @@ class Numbers(NamedTuple):
         minimum: the smaller of two.
         sin: sine of an angle [rad].
         cos: its cosine.
-        between: ``between(x, first, step, table)`` is the value of a table with nodes in equal
-            steps, on the line from node to node and constant beyond the ends.
+        ndtri: its inverse.
+        fourth_powers: Σ (x·d)⁴ over the steps d of parameters that leave earthquakes out, from
+            :class:`rbfrag.fragility.intervals.ParameterErrors` and the slopes x.
     """
 
     log: Callable[[Any], Any]
@@ -48,29 +49,18 @@ class Numbers(NamedTuple):
     minimum: Callable[[Any, Any], Any]
     sin: Callable[[Any], Any]
     cos: Callable[[Any], Any]
-    between: Callable[[Any, float, float, Sequence[float]], Any]
+    ndtri: Callable[[Any], Any]
+    fourth_powers: Callable[[Any, Sequence[Any]], Any]
 
 
 def _exp(x: float) -> float:
     return math.exp(x) if x < _LARGEST_EXPONENT else math.inf
 
 
-def _ndtr(z: float) -> float:
-    return 0.5 * math.erfc(-z * _ROOT_HALF)
-
-
-def _between(x: float, first: float, step: float, table: Sequence[float]) -> float:
-    at = (x - first) / step
-    last = len(table) - 1
-    if not 0.0 < at < last:
-        return table[last if at > 0.0 else 0]
-    node = int(at)
-    return table[node] + (at - node) * (table[node + 1] - table[node])
-
-
 SINGLE = Numbers(
-    math.log, _exp, math.sqrt, _ndtr, math.expm1, max, min, math.sin, math.cos, _between
-)
+    math.log, _exp, math.sqrt, normal_share, math.expm1, max, min, math.sin, math.cos,
+    normal_quantile, lambda errors, x: errors.fourth_powers(*x),
+)  # fmt: skip
 """For single numbers."""
 
 
@@ -78,17 +68,18 @@ SINGLE = Numbers(
 def arrays() -> Numbers:
     """Return the same functions for numpy arrays."""
     import numpy as np
-    from scipy.special import ndtr
+    from scipy.special import ndtr, ndtri
 
-    def between(x: Any, first: float, step: float, table: Sequence[float]) -> Any:
-        nodes = np.array([*table, table[-1]])
-        at = np.clip((x - first) / step, 0.0, len(table) - 1.0)
-        node = np.nan_to_num(at).astype(np.intp)  # what is not a number stays so in `at`
-        return nodes[node] + (at - node) * np.diff(nodes, append=0.0)[node]
+    def fourth_powers(errors: Any, x: Sequence[Any]) -> Any:
+        # more terms than earthquakes: here the products are faster than the polynomial
+        squares = np.array(errors.steps) @ np.stack(np.broadcast_arrays(*x))
+        squares *= squares
+        return np.einsum("en,en->n", squares, squares)
 
     return Numbers(
-        np.log, np.exp, np.sqrt, ndtr, np.expm1, np.maximum, np.minimum, np.sin, np.cos, between
-    )
+        np.log, np.exp, np.sqrt, ndtr, np.expm1, np.maximum, np.minimum, np.sin, np.cos,
+        ndtri, fourth_powers,
+    )  # fmt: skip
 
 
 class Eta(NamedTuple):
@@ -215,24 +206,74 @@ TOPPLING_BLOCK = BlockParameters(
 """Blocks known by p² [1/s²] and the yield acceleration coefficient k_r."""
 
 
+class SizeFactor(NamedTuple):
+    """What eta is multiplied by: h(p) = exp(A l - B l²), l = ln p with p in 1/s.
+
+    Without it a model is too vague for small blocks and too sure for large ones. A factor on all of
+    eta keeps P monotone in the block's strength and in the shaking, which factors on single terms
+    do not. Outside p² from 0.1 to 30 1/s² it stays at its value at the edge.
+
+    A and B are chosen, not estimated: such that the calibration slope of each block size is level
+    on earthquakes left out (docs/theory/fragility.md).
+
+    Args:
+        a: A.
+        b: B.
+    """
+
+    a: float
+    b: float = 0.0
+
+    def of(self, p: Any, ns: Numbers) -> Any:
+        """Return h of the frequency parameter p [1/s]."""
+        l = ns.log(ns.minimum(ns.maximum(p, _LEAST_P), _GREATEST_P))  # noqa: E741  as in the formula
+        return ns.exp((self.a - self.b * l) * l)
+
+
+_LEAST_P, _GREATEST_P = math.sqrt(0.1), math.sqrt(30.0)
+"""Ends of the sizes that A and B were chosen for [1/s]."""
+
+
 @dataclass(frozen=True)
 class Form:
     """A method on one measure.
 
     Args:
         parameters: their names; the method's `exponent` stands last and may be missing.
-        eta: eta and its slopes, from the parameters, values by name and functions.
+        formula: eta before the size factor and its slopes, from the parameters, values by name and
+            functions.
         rank: place among the methods on this measure by falling skill on held-out earthquakes
             (docs/theory/model-choice.md).
         bounds: what mechanics forbids.
         start: where the search for the likeliest parameters begins; empty where none is needed.
+        size_factor: what eta is multiplied by; None for nothing.
     """
 
     parameters: tuple[str, ...]
-    eta: Callable[[Sequence[float], Mapping[str, Any], Numbers], Eta]
+    formula: Callable[[Sequence[float], Mapping[str, Any], Numbers], Eta]
     rank: int
     bounds: tuple[Bound, ...] = ()
     start: tuple[float, ...] = ()
+    size_factor: SizeFactor | None = None
+
+    def unscaled(
+        self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers
+    ) -> tuple[Eta, Any]:
+        """Return eta and its slopes before the size factor, and the factor.
+
+        Args:
+            parameters: of the formula, in its order.
+            values: completed values by name.
+            ns: functions for the kind of number given.
+        """
+        formula = self.formula(parameters, values, ns)
+        return formula, 1.0 if self.size_factor is None else self.size_factor.of(values["p"], ns)
+
+    def eta(self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers) -> Eta:
+        """Return eta and its slopes; arguments as for :meth:`unscaled`."""
+        unscaled, h = self.unscaled(parameters, values, ns)
+        slopes = tuple(h * each for each in unscaled.slopes)
+        return unscaled._replace(eta=h * unscaled.eta, slopes=slopes)
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,11 @@
 """The method ``bounded``: outcomes, with P falling to 0 at the bounds of mechanics.
 
     P = exp(-exp(-eta))
-    eta = b0 - b1 ln r + b2 ln(1 - r) + b3 ln(1 - s) + b4 ln z + b5 ln z_T
+    eta = h(p) [b0 - b1 ln r + b2 ln(1 - r) + b3 ln(1 - v) + b4 ln z + b5 ln z_T]
 
-r = k_r/PGA, s = y/2PGV, z = p PGV/(PGA g), z_T = p T_m/2π; with PGV alone
-eta = b0 - b1 ln s + b2 ln(1 - s). (7) of docs/theory/fragility.md.
+r = k_r/PGA, v = y/2PGV, z = p PGV/(PGA g), z_T = p T_m/2π; with PGV alone
+eta = h(p) [b0 - b1 ln v + b2 ln(1 - v) + b3 l + b4 l²] with l = ln p.
+h(p) = exp(.18 l - .06 l²). (7) of docs/theory/fragility.md.
 """
 
 from __future__ import annotations
@@ -23,14 +24,16 @@ from rbfrag.fragility.methods import (
     Form,
     Method,
     Numbers,
+    SizeFactor,
 )
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
 def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     ratio = v["y_m_s"] / (2.0 * v["intensity_m_s"])
-    f1, f2 = -ns.log(ratio), ns.log(1.0 - ratio)
-    return Eta(b[0] + b[1] * f1 + b[2] * f2, (1.0, f1, f2))
+    f1, f2, f3 = -ns.log(ratio), ns.log(1.0 - ratio), ns.log(v["p"])
+    f4 = f3 * f3
+    return Eta(b[0] + b[1] * f1 + b[2] * f2 + b[3] * f3 + b[4] * f4, (1.0, f1, f2, f3, f4))
 
 
 def _pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
@@ -49,6 +52,7 @@ def _pgv_pga_tm(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
 
 
 _BOUNDS = (NOT_LIFTED, ABOVE_TWICE_PGV)
+_OF_SIZE = SizeFactor(0.18, 0.06)
 _NAMES = ("b0", "b_ln_r", "b_ln_1_minus_r", "b_ln_1_minus_share", "b_ln_z")
 
 METHOD = Method(
@@ -56,11 +60,14 @@ METHOD = Method(
     block=TOPPLING_BLOCK,
     link=LOGLOG,
     forms={
-        "pgv": Form(("b0", "b_ln_share", "b_ln_1_minus_share"), _pgv, 1, (ABOVE_TWICE_PGV,)),
-        "pgv_pga": Form(_NAMES, _pgv_pga, 1, _BOUNDS),
-        "pgv_pga_tm": Form((*_NAMES, "b_ln_zt"), _pgv_pga_tm, 1, _BOUNDS),
+        "pgv": Form(
+            ("b0", "b_ln_share", "b_ln_1_minus_share", "b_ln_p", "b_ln_p_squared"),
+            _pgv, 0, (ABOVE_TWICE_PGV,), size_factor=_OF_SIZE,
+        ),
+        "pgv_pga": Form(_NAMES, _pgv_pga, 0, _BOUNDS, size_factor=_OF_SIZE),
+        "pgv_pga_tm": Form((*_NAMES, "b_ln_zt"), _pgv_pga_tm, 0, _BOUNDS, size_factor=_OF_SIZE),
     },
     reads="outcomes",
     meaning=OF_OUTCOME,
     fit="rbfrag.fragility.fit.outcomes:fit_outcomes",
-)
+)  # fmt: skip

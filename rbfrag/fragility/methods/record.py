@@ -1,6 +1,7 @@
 """The method ``record``: outcomes, logistic in ln(X(p)/y) and in the strength of the motion.
 
-    eta = b0 + b1 ln(X(p)/y) + b2 ln s,   s = p X(p)/(PGA g),   P = 1/(1 + exp(-eta)),  0 if y >= X
+    eta = h(p) [b0 + b1 ln(X(p)/y) + b2 ln s],   s = p X(p)/(PGA g),   h(p) = p^.30
+    P = 1/(1 + exp(-eta)), 0 where y >= X(p) or k_r >= PGA
 
 (8) of docs/theory/fragility.md.
 """
@@ -13,12 +14,14 @@ from typing import Any
 from rbfrag.fragility.methods import (
     ABOVE_SPECTRUM,
     LOGIT,
+    NOT_LIFTED,
     OF_OUTCOME,
     TOPPLING_BLOCK,
     Eta,
     Form,
     Method,
     Numbers,
+    SizeFactor,
 )
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -34,8 +37,13 @@ METHOD = Method(
     name="record",
     block=TOPPLING_BLOCK,
     link=LOGIT,
-    forms={"xp": Form(("b0", "b_ln_xp_over_y", "b_ln_s"), _eta, 0, (ABOVE_SPECTRUM,))},
+    forms={
+        "xp": Form(
+            ("b0", "b_ln_xp_over_y", "b_ln_s"), _eta, 0, (ABOVE_SPECTRUM, NOT_LIFTED),
+            size_factor=SizeFactor(0.30),
+        )
+    },
     reads="outcomes",
     meaning=OF_OUTCOME,
     fit="rbfrag.fragility.fit.outcomes:fit_outcomes",
-)
+)  # fmt: skip

@@ -115,10 +115,8 @@ def test_another_kind_of_the_same_block_is_fitted_by_the_same_methods() -> None:
     # no file knows this kind: what describes its block is enough
     source = drawn_outcomes("logistic", "pgv", TRUTH["logistic", "pgv"], events=12)
     logistic = next(m for m in methods() if m.name == "logistic")
-    toppling = fit_source(source, TERMS["pgv"], logistic, name="m", compared=False).report
-    falls = fit_source(
-        source, TERMS["pgv"], logistic, kind="falls", name="m", compared=False
-    ).report
+    toppling = fit_source(source, TERMS["pgv"], logistic, name="m").report
+    falls = fit_source(source, TERMS["pgv"], logistic, kind="falls", name="m").report
     assert falls.coefficients == toppling.coefficients
     assert (falls.kind, falls.model.row.kind) == ("falls", "falls")
     assert "falls" in falls.model.meaning

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from rbfrag.fragility.fit.clusters import cr3, effective_freedom, jackknife_steps, sandwich
+from rbfrag.fragility.fit.clusters import cr3, jackknife_steps, sandwich
 from rbfrag.fragility.fit.likelihood import (
     LINKS,
     Binomial,
@@ -140,22 +140,3 @@ def test_slopes_and_inverses_of_the_links(eta):
         assert LINKS[link.name].slope(at) == pytest.approx(slope, rel=1e-5, abs=1e-9)
         if 1e-9 < p[0] < 1 - 1e-9:
             assert LINKS[link.name].eta(p) == pytest.approx(at, rel=1e-5, abs=1e-5)
-
-
-def test_normal_steps_have_as_many_freedoms_as_earthquakes():
-    steps = np.random.default_rng(1).normal(size=(4000, 3))
-    assert 0.85 * 4000 < effective_freedom(steps) < 4000
-
-
-def test_few_earthquakes_that_decide_leave_few_freedoms():
-    random = np.random.default_rng(2)
-    steps = random.normal(size=(50, 2))
-    assert effective_freedom(steps) > 30
-    steps[:6, 1] *= 20.0
-    assert effective_freedom(steps) < 12
-    # equal steps do not scatter, and there are never more freedoms than earthquakes less one
-    assert effective_freedom(np.ones((9, 2))) == 8
-    assert effective_freedom(np.ones((3, 1))) == 2
-    one = np.zeros((40, 1))
-    one[0] = 1.0
-    assert effective_freedom(one) == 4

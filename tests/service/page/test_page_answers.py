@@ -42,6 +42,9 @@ def test_the_answer_is_the_services(open_page, ask, typed):
     low, high = re.findall(r"[<>]?\s*[\d.]+\s*%", opened.text("#interval"))[:2]
     assert agrees(low, answer["ci_low"])
     assert agrees(high, answer["ci_high"])
+    expect(page.locator("#meter .one-event")).to_be_attached()
+    if answer["event_low"] is not None and answer["probability"] > 0.0:
+        assert "In one single earthquake" in opened.text("#in-words")
     assert page.locator("#warnings li").all_text_contents() == answer["warnings"]
     inside = "within" if answer["in_domain"] else "outside"
     expect(page.locator("#domain")).to_contain_text(inside)

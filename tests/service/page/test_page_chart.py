@@ -170,3 +170,21 @@ def test_the_curve_is_the_services(open_page, ask):
         shown = 1.0 - (py - top) / height
         answer = ask("v1/predict", p2=3, kr=0.1, pgv=pgv)
         assert shown == pytest.approx(answer["probability"], abs=2e-3)
+
+
+def test_both_bands_of_the_curve_are_the_services(open_page, ask):
+    page = open_page().page
+    box = page.eval_on_selector(
+        "#curve .area",
+        "a => ['x', 'y', 'width', 'height'].map((name) => Number(a.getAttribute(name)))",
+    )
+    left, top, width, height = box
+    for kind, ends in (
+        ("confidence", ("ci_low", "ci_high")),
+        ("one-event", ("event_low", "event_high")),
+    ):
+        outline = points_of(page.get_attribute(f"#curve .{kind}", "d"))
+        for px in sorted({p[0] for p in outline if left <= p[0] <= left + width})[5::25]:
+            edges = sorted(1.0 - (py - top) / height for x, py in outline if x == px)
+            answer = ask("v1/predict", p2=3, kr=0.1, pgv=0.05 * 60.0 ** ((px - left) / width))
+            assert [edges[0], edges[-1]] == pytest.approx([answer[name] for name in ends], abs=3e-3)

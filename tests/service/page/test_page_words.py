@@ -40,20 +40,24 @@ def test_percent_agrees_with_the_probability(run):
 
 def test_words_count_what_the_numbers_say(run):
     answers = [
-        {"probability": p, "ci_low": low, "ci_high": high, "level": 0.95}
-        for p, low, high in [
-            (0.12, 0.05, 0.4),
-            (0.004, 0.001, 0.02),
-            (0.9996, 0.9, 0.99999),
-            (0, 0, 0),
+        {
+            **{"probability": p, "ci_low": low, "ci_high": high, "level": 0.95},
+            **{"event_low": least, "event_high": greatest},
+        }
+        for p, low, high, least, greatest in [
+            (0.12, 0.08, 0.17, 0.05, 0.4),
+            (0.004, 0.001, 0.02, None, None),
+            (0.9996, 0.9, 0.99999, 0.8, 1),
+            (0, 0, 0, 0, 0),
         ]
     ]
     twelve, few, most, none = run("percent.js", "inWords", [[each] for each in answers])
-    assert "Of 100" in twelve
-    assert "about 12 topple" in twelve
-    assert "Between 5 and 40" in twelve
+    assert "Of 100 such blocks about 12 topple, over all earthquakes and sites" in twelve
+    assert "as far as the data tell it, between 8 and 17." in twelve
+    assert "In one single earthquake, between 5 and 40 topple." in twelve
     assert "Of 1\u202f000" in few
     assert "about 4 topple" in few
+    assert "single earthquake" not in few
     assert "9\u202f996" in most
     assert "almost all" in most
     assert none.startswith("No earthquake motion")

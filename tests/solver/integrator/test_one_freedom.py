@@ -318,7 +318,7 @@ def test_a_fifth_model_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     response_models.models.cache_clear()
     try:
         assert set(response_models.models()) == {
-            "belt", "confined_toppling", "sliding", "slumping", "toppling",
+            "belt", "confined_toppling", "rocking", "sliding", "slumping", "toppling",
         }  # fmt: skip
         motion = GroundMotion.from_nodes([0.0, 1.0, 3.0], [0.0, 0.5, 0.0])
         block = Block.from_fractures(1.0, 2.0, 60.0)

@@ -40,7 +40,7 @@ export function showAnswer(answer) {
     ? "within the fitted range"
     : "outside the fitted range: an extrapolation";
   byId("probability").textContent = percent(answer.probability);
-  byId("interval").textContent = `${interval}, ${percent(answer.level)} confidence`;
+  byId("interval").textContent = `${interval}, ${percent(answer.level)} interval`;
   byId("in-words").textContent = inWords(answer);
   const domain = byId("domain");
   domain.textContent = range;
@@ -55,7 +55,11 @@ export function showAnswer(answer) {
   showOthers(answer.answers);
   byId("strip").textContent = `${percent(answer.probability)} (${interval})`;
   mark("known");
-  speak(`Probability of toppling ${percent(answer.probability)}, ${interval}, ${range}.`);
+  const event =
+    answer.event_low === null
+      ? ""
+      : ` In one single earthquake ${percent(answer.event_low)} to ${percent(answer.event_high)}.`;
+  speak(`Probability of toppling ${percent(answer.probability)}, ${interval}, ${range}.${event}`);
 }
 
 /**
@@ -96,7 +100,7 @@ function mark(state) {
 }
 
 /**
- * The probability and its interval on a line from 0 to 100 %.
+ * The probability, its interval and the range of one earthquake on a line from 0 to 100 %.
  * @param {any} answer
  */
 function drawMeter(answer) {
@@ -107,11 +111,18 @@ function drawMeter(answer) {
   /** @type {(name: string, kind: string) => any} */
   const one = (name, kind) => svg.selectAll(`.${kind}`).data([null]).join(name).attr("class", kind);
   one("rect", "scale").attr("x", 0).attr("y", 5).attr("width", "100%").attr("height", 8);
-  one("rect", "interval")
-    .attr("x", across(answer.ci_low))
-    .attr("y", 5)
-    .attr("width", across(Math.max(answer.ci_high - answer.ci_low, 0.004)))
-    .attr("height", 8);
+  /** @type {(kind: string, low: number, high: number) => any} */
+  const range = (kind, low, high) =>
+    one("rect", kind)
+      .attr("x", across(low))
+      .attr("y", 5)
+      .attr("width", across(Math.max(high - low, 0.004)))
+      .attr("height", 8);
+  range("one-event", answer.event_low ?? 0, answer.event_high ?? 0).attr(
+    "display",
+    answer.event_low === null ? "none" : null,
+  );
+  range("interval", answer.ci_low, answer.ci_high);
   one("circle", "value").attr("cx", across(answer.probability)).attr("cy", 9).attr("r", 6);
   const marks = [0, 0.25, 0.5, 0.75, 1];
   svg
@@ -142,6 +153,7 @@ function showOthers(answers) {
       KNOWS[/** @type {keyof typeof KNOWS} */ (each.term)] ?? each.term,
       percent(each.probability),
       `${percent(each.ci_low)} – ${percent(each.ci_high)}`,
+      each.event_low === null ? "–" : `${percent(each.event_low)} – ${percent(each.event_high)}`,
       each.in_domain ? "yes" : "no",
     ])
     .join("td")

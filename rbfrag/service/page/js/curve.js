@@ -1,4 +1,4 @@
-/** The fragility curve of the reader's block: probability and interval over the shaking. */
+/** The fragility curve of the reader's block, its interval and the range of one earthquake. */
 
 import { drawAxis, drawGrid, gridLines } from "./axes.js";
 import { MARGINS } from "./chart.js";
@@ -11,7 +11,8 @@ const SHARES = [0, 0.25, 0.5, 0.75, 1];
 
 /**
  * @typedef {{plane: import("./plane.js").Plane, xs: number[], probability: number[],
- *   ci_low: number[], ci_high: number[], in_domain: boolean[]}} Curve
+ *   ci_low: number[], ci_high: number[], event_low: (number | null)[],
+ *   event_high: (number | null)[], in_domain: boolean[]}} Curve
  */
 
 /**
@@ -23,7 +24,8 @@ export function fragilityCurve(place) {
   let curve = null;
   /** @type {{x: number, probability: number, ci_low: number, ci_high: number} | null} */
   let spot = null;
-  const name = "Fragility curve of this block with its confidence band";
+  const name =
+    "Fragility curve of this block with its interval and the range of one single earthquake";
   const sheet = sheetIn(place, name, MARGINS, () => 230, draw);
   const { svg, plot } = sheet();
   const clip = svg.append("clipPath").attr("id", "curve-clip").append("rect");
@@ -32,6 +34,7 @@ export function fragilityCurve(place) {
   const parts = {
     outside: inside.append("g"),
     grid: inside.append("g"),
+    event: inside.append("path").attr("class", "one-event"),
     band: inside.append("path").attr("class", "confidence"),
     middle: inside.append("path").attr("class", "curve"),
     bottom: plot.append("g"),
@@ -55,18 +58,21 @@ export function fragilityCurve(place) {
     drawAxis(parts.bottom, "bottom", x, labelOf(plane.across).title);
     drawAxis(parts.left, "left", y, "probability", { values: SHARES, text: percent });
     const known = (/** @type {number} */ i) => Number.isFinite(curve?.probability[i] ?? NaN);
+    const told = (/** @type {number} */ i) => Number.isFinite(curve?.event_low[i] ?? NaN);
     const across = (/** @type {any} */ _, /** @type {number} */ i) => x(xs[i]);
     const all = xs.map((_, i) => i);
     const defined = (/** @type {number} */ i) => known(i);
-    parts.band.attr(
-      "d",
+    /** @type {(where: (i: number) => boolean, low: "ci_low" | "event_low",
+     *   high: "ci_high" | "event_high") => string} */
+    const between = (where, low, high) =>
       d3
         .area()
-        .defined(defined)
+        .defined(where)
         .x(across)
-        .y0((/** @type {number} */ i) => y(curve?.ci_low[i]))
-        .y1((/** @type {number} */ i) => y(curve?.ci_high[i]))(all),
-    );
+        .y0((/** @type {number} */ i) => y(curve?.[low][i]))
+        .y1((/** @type {number} */ i) => y(curve?.[high][i]))(all);
+    parts.event.attr("d", between(told, "event_low", "event_high"));
+    parts.band.attr("d", between(defined, "ci_low", "ci_high"));
     parts.middle.attr(
       "d",
       d3

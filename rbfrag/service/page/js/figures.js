@@ -105,8 +105,10 @@ export function figures(moved, failed) {
       drawCurve({ question, answer, plane, kr, present });
       writeText(byId("chart-caption"), chartCaption(question, answer, plane));
       byId("curve-caption").textContent =
-        `Probability that this block topples over ${labelOf(plane.across).name}, with its ` +
-        `${percent(answer.level)} confidence band.`;
+        `Share of such blocks that topple over ${labelOf(plane.across).name}. Dark band: its ` +
+        `interval, as far as the data tell it.` +
+        (answer.event_low === null ? "" : " Light band: the share in one single earthquake.") +
+        ` Both ${percent(answer.level)}.`;
     },
     /**
      * Show the point where the reader has moved it, before there is an answer.

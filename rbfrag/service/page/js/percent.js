@@ -21,19 +21,25 @@ export function percent(p) {
 }
 
 /**
- * What a probability and its interval mean, in a count of motions.
- * @param {{probability: number, ci_low: number, ci_high: number, level: number}} answer
+ * What a probability, its interval and the range of one earthquake mean, in counts of blocks.
+ * @param {{probability: number, ci_low: number, ci_high: number, event_low: number | null,
+ *   event_high: number | null, level: number}} answer
  * @returns {string}
  */
 export function inWords(answer) {
-  const { probability: p, ci_low: low, ci_high: high, level } = answer;
+  const { probability: p, ci_low: low, ci_high: high, event_low, event_high, level } = answer;
   if (p === 0 && high === 0) return "No earthquake motion with this shaking topples the block.";
   const of = [100, 1000, 10000].find((n) => p * n >= 1 && (1 - p) * n >= 1) ?? 10000;
   const among = of.toLocaleString("en").replace(",", "\u202f");
   return (
-    `Of ${among} earthquake motions with this shaking, ${count(p, of)} topple the block. ` +
-    `Between ${count(low, of, true)} and ${count(high, of, true)} is what the fitted data allow ` +
-    `(${percent(level)} confidence).`
+    `Of ${among} such blocks ${count(p, of)} topple, over all earthquakes and sites with this ` +
+    `shaking; as far as the data tell it, between ${count(low, of, true)} and ` +
+    `${count(high, of, true)}.` +
+    (event_low === null || event_high === null
+      ? ""
+      : ` In one single earthquake, between ${count(event_low, of, true)} and ` +
+        `${count(event_high, of, true)} topple.`) +
+    ` (Both ranges ${percent(level)}.)`
   );
 }
 

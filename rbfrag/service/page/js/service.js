@@ -89,8 +89,8 @@ export async function askCurve(plane, model, kr, { values }) {
     model,
     level: fromField(values.level),
   });
-  const { probability, ci_low, ci_high, in_domain } = answer;
-  return { plane, xs, probability, ci_low, ci_high, in_domain };
+  const { probability, ci_low, ci_high, event_low, event_high, in_domain } = answer;
+  return { plane, xs, probability, ci_low, ci_high, event_low, event_high, in_domain };
 }
 
 /**

@@ -75,7 +75,12 @@ def leave_rest(
             sense, and is not resumed within the interval.
     """
     # a block at rest does not change its thresholds: once is enough
-    level = thresholds(rules, state)
+    return depart(record, thresholds(rules, state), place, barred)
+
+
+@inner_kernel
+def depart(record: Record, level: Thresholds, place: Place, barred: int) -> Departure:
+    """Find where motion sets in from a rest of known thresholds; see :func:`leave_rest`."""
     node, tau = place.interval, place.fraction
     while node < record.last:
         line = line_at(record, node, 0.0, 0.0)

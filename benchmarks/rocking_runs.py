@@ -1,0 +1,155 @@
+"""Rocking beside an independent integrator, on drawn blocks:  python -m benchmarks.rocking_runs
+
+The reference is that of tests/solver/rocking_reference.py (scipy's DOP853 at 1e-12 from event to
+event). Runs are grouped by the impacts up to the greater peak, or up to overturning; those whose
+outcome the flag `sensitive` marks are counted apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.page import ROOT, parser, report
+from rbfrag.bench.cases import Records, find_records
+from rbfrag.bench.tables import markdown
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.excitation import excitation
+from rbfrag.solver.respond import respond
+from rbfrag.solver.results import Outcome, Response
+from tests.solver.rocking_reference import ReferenceRocking, integrate, parallelogram
+
+PAGE = ROOT / "docs" / "theory" / "rocking.md"
+
+GROUPS = ((0, 10), (11, 30), (31, 100))
+"""Impacts up to the greater peak; runs with more are not compared."""
+
+MOST_IMPACTS = 400
+"""Impacts after which the reference stops: it takes about a millisecond for each step."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A block and what shakes it; `vertical_part` of the horizontal motion, delayed."""
+
+    motion: GroundMotion
+    alpha1_deg: float
+    alpha3_deg: float
+    r3_m: float
+    beta_deg: float
+    restitution: float | None
+    vertical: GroundMotion | None
+
+    def run(self) -> Response:
+        """Run it with rbfrag."""
+        return respond(
+            self.motion,
+            kind="rocking",
+            block=Block.from_angles(self.alpha1_deg, self.alpha3_deg, self.r3_m),
+            beta_deg=self.beta_deg,
+            restitution=self.restitution,
+            vertical=self.vertical,
+        )
+
+    def reference(self) -> ReferenceRocking:
+        """Run it with the independent integrator."""
+        drive = excitation(self.motion, self.vertical)
+        block = parallelogram(
+            self.alpha1_deg, self.alpha3_deg, self.r3_m, self.beta_deg, self.restitution
+        )
+        return integrate(drive.time_s, drive.k_h, drive.w, block, most_impacts=MOST_IMPACTS)
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One run by both; deviation of the greater peak, NaN where the block overturns."""
+
+    same: bool
+    sensitive: bool
+    impacts: int
+    deviation: float
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    chosen = parser(__doc__)
+    chosen.add_argument("--runs", type=int, default=60)
+    options = chosen.parse_args(arguments)
+    found = find_records(options.records)
+    runs = [compare(each) for each in draw(found, options.runs)]
+    cells = []
+    for low, high in GROUPS:
+        group = [run for run in runs if low <= run.impacts <= high]
+        calm = [run for run in group if not run.sensitive]
+        stays = [run.deviation for run in calm if not math.isnan(run.deviation)]
+        cells.append(
+            [
+                f"{low} to {high}", str(len(group)), str(len(group) - len(calm)),
+                f"{sum(run.same for run in calm)} of {len(calm)}", str(len(stays)),
+                f"{np.median(stays):.1g}" if stays else "", f"{max(stays):.1g}" if stays else "",
+            ]
+        )  # fmt: skip
+    left = sum(run.impacts > GROUPS[-1][1] for run in runs)
+    headers = [
+        "impacts to the peak", "runs", "sensitive", "same outcome", "stable",
+        "deviation of the peak, median", "greatest",
+    ]  # fmt: skip
+    text = f"{markdown((headers, cells))}\n\n{len(runs)} runs under {found.source}"
+    text += f"; {left} with more impacts are not compared." if left else "."
+    report("rocking-runs", text, write=options.write, page=PAGE)
+
+
+def draw(records: Records, number: int, *, seed: int = 1) -> list[Drawn]:
+    """Draw blocks that lift off, of every size and skewness, on level and dipping bases.
+
+    Args:
+        records: where the motions come from.
+        number: how many.
+        seed: the same seed draws the same blocks.
+    """
+    rng = np.random.default_rng(seed)
+    order = rng.permutation(len(records.motions))
+    drawn: list[Drawn] = []
+    for turn in range(50 * number):
+        if len(drawn) == number:
+            break
+        motion = records.motions[order[turn % order.size]]
+        beta = float(rng.choice([0.0, 0.0, 3.0, -5.0]))
+        weaker = math.degrees(math.atan(motion.pga_g * math.exp(rng.uniform(-2.0, -0.05))))
+        other = weaker * float(rng.choice([1.0, 1.0, 1.6]))
+        if not (weaker < 25.0 and motion.npts < 12_000):
+            continue
+        restitution = None if rng.random() < 0.6 else float(rng.uniform(0.7, 0.98))
+        vertical = None
+        if rng.random() < 0.3:
+            vertical = GroundMotion(0.4 * np.roll(motion.acceleration_g, 37), motion.dt_s)
+        size = float(np.exp(rng.uniform(math.log(0.25), math.log(15.0))))
+        angles = (
+            (beta - weaker, beta + other) if rng.random() < 0.5 else (beta - other, beta + weaker)
+        )
+        each = Drawn(motion, *angles, size, beta, restitution, vertical)
+        if each.run().started_s is not None:
+            drawn.append(each)
+    return drawn
+
+
+def compare(drawn: Drawn) -> Compared:
+    """Run one block by both."""
+    ours, truth = drawn.run(), drawn.reference()
+    toppled = ours.outcome is Outcome.TOPPLED
+    sense = 0 if not toppled else 1 if ours.peak_forward_rad is None else -1
+    deviation = math.nan
+    if not toppled and ours.peak_theta_rad is not None and not truth.toppled:
+        greatest = max(truth.peak.values())
+        deviation = abs(ours.peak_theta_rad - greatest) / greatest
+    # a run that the reference gave up says nothing of its greatest peak
+    decided = not truth.toppled and len(truth.impact_s) <= MOST_IMPACTS
+    impacts = truth.impacts_to_peak if decided else len(truth.impact_s)
+    return Compared(sense == truth.toppled, bool(ours.sensitive), impacts, deviation)
+
+
+if __name__ == "__main__":
+    main()

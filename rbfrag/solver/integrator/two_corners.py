@@ -1,0 +1,425 @@
+"""Kernel of a free-standing block that rocks about both corners: one run over one record.
+
+theta >= 0 is the rotation about the present corner, s = 1 for the toe and -1 for the heel, each
+with its own theta_c and p:
+
+    moving: theta'' = p² [s k_h cos(theta_c - theta) - (1 + k_v) sin(theta_c - theta)]
+    rest:   -(1 + k_v) tan(theta_c of the heel) <= k_h <= (1 + k_v) tan(theta_c of the toe)
+    impact: theta = 0 about the other corner, with a stated part of the speed
+
+The step is that of the toppling block (`rbfrag.solver.integrator.taylor`), rest that of the
+engine for one degree of freedom. Impacts are located on the polynomial of the step.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel, within
+from rbfrag.solver.integrator.events import (
+    examine_step,
+    irrecoverable,
+    keeps_direction,
+    simple_turn,
+)
+from rbfrag.solver.integrator.free_rocking import (
+    STABLE,
+    TOPPLED,
+    Corner,
+    Offset,
+    after_record,
+)
+from rbfrag.solver.integrator.one_freedom.rest import Thresholds, depart
+from rbfrag.solver.integrator.one_freedom.state import Peak, Record, higher, noted
+from rbfrag.solver.integrator.single_run import step_errors
+from rbfrag.solver.integrator.state import Place, State, StepExcitation
+from rbfrag.solver.integrator.taylor import taylor_step, turn, value
+from rbfrag.solver.results import FloatArray
+
+UNDETERMINED, JUMP = 2, 3
+
+PAST_BALANCE = 1.4
+"""Rotation beyond the balance point at which a block has overturned [rad]."""
+
+EVENT, IMPACT = -1, -2
+"""What stands for the node of an event between nodes; of what follows an impact."""
+
+
+class Rules(NamedTuple):
+    """How a run is integrated.
+
+    Args:
+        order: degree of the Taylor step: 4, 5, 6 or 8.
+        ph_max: greatest p·h of one step.
+        slowest: speed after an impact below which the block rests [rad/s].
+        most_impacts: impacts beyond which a run is given up.
+    """
+
+    order: int
+    ph_max: float
+    slowest: float
+    most_impacts: int
+
+
+class RockingRun(NamedTuple):
+    """What the kernel returns; times are NaN where nothing happened.
+
+    Args:
+        outcome: STABLE, TOPPLED, UNDETERMINED or JUMP.
+        side: on which the block overturned, 1 or -1; 0 if it did not.
+        forward: greatest rotation about the toe [rad], and its error.
+        backward: the same about the heel.
+        error: estimated error of the rotation where the run ended [rad].
+        started_s: first motion [s].
+        verdict_s: when overturning, or the throw, was certain [s].
+        impacts: impacts within the record.
+        steps: integration steps.
+        samples_moved: sample intervals in which the block moved.
+        history_length: columns of the history that are filled.
+    """
+
+    outcome: int
+    side: int
+    forward: Peak
+    backward: Peak
+    error: float
+    started_s: float
+    verdict_s: float
+    impacts: int
+    steps: int
+    samples_moved: int
+    history_length: int
+
+
+class Crossing(NamedTuple):
+    """What the rest of an interval brought.
+
+    Args:
+        state: of the block at its end.
+        off: estimated error of it.
+        peak: greatest rotation about the present corner.
+        impact_at: fraction of the interval at which the block hits its base, or -1; `state` then
+            holds the rate of the impact.
+        fallen: whether it lies beyond recovery.
+        steps: integration steps taken.
+        filled: columns of the history that are filled.
+    """
+
+    state: State
+    off: Offset
+    peak: Peak
+    impact_at: float
+    fallen: bool
+    steps: int
+    filled: int
+
+
+@within
+def carried(off: Offset, ph: float, stiffness: float, noise: float) -> Offset:
+    """Carry an error through a step and add what the step adds, in the sense that makes it grow.
+
+    The linearised equation is d(theta'/p)/dt = p D d(theta), d(theta)/dt = p d(theta'/p). The
+    signs are kept: a sum of sizes would grow by e^(p t) without end, since impacts reset nothing.
+
+    Args:
+        off: error at the start of the step.
+        ph: p times the step length.
+        stiffness: D = k_h sin(phi) + (1 + k_v) cos(phi).
+        noise: truncation and rounding of the step.
+    """
+    bend = 0.5 * ph * ph * stiffness
+    theta = off.theta + ph * off.rate + bend * off.theta
+    rate = off.rate + ph * stiffness * off.theta + bend * off.rate
+    theta += math.copysign(noise, theta)
+    rate += math.copysign(noise, rate)
+    # beyond a turn of the block an error has no size any more
+    return Offset(max(-1.0, min(theta, 1.0)), max(-1.0, min(rate, 1.0)))
+
+
+@within
+def cross_interval(
+    record: Record,
+    corner: Corner,
+    rules: Rules,
+    side: int,
+    place: Place,
+    start: tuple[State, Offset, Peak],
+    lifting: bool,
+    rows: FloatArray,
+    filled: int,
+    u: FloatArray,
+) -> Crossing:
+    """Integrate from a place to the end of its interval, or to an impact before it.
+
+    Args:
+        record: the excitation.
+        corner: the corner that the block turns about.
+        rules: how to integrate.
+        side: 1 for the toe, -1 for the heel.
+        place: where to begin.
+        start: state, its error, and the greatest rotation about this corner so far.
+        lifting: the threshold is being crossed from below: the first step holds no impact.
+        rows: history to be filled with peaks.
+        filled: how many of its columns are.
+        u: work, shape (9,).
+    """
+    (theta, rate, s, c), off, peak = start
+    i, tau = place.interval, place.fraction
+    a0, a1 = side * record.k_h[i], side * record.k_h[i + 1]
+    w0, w1 = record.w[i], record.w[i + 1]
+    order = rules.order
+    keeps = rows.shape[1] > 0
+    impact_at = -1.0
+    steps = 0
+    whole = corner.p * (record.interval_s[i] * (1.0 - tau))
+    parts = max(1, math.ceil(whole / rules.ph_max))
+    part = (1.0 - tau) / parts
+    ph = whole / parts
+    for number in range(parts):
+        at = tau + number * part
+        shaking = StepExcitation(
+            a0 + (a1 - a0) * at, (a1 - a0) * part, w0 + (w1 - w0) * at, (w1 - w0) * part
+        )
+        steps += 1
+        u_start = ph * rate
+        turned, u_end, v_end = taylor_step(order, u, u_start, ph, s, c, shaking)
+        theta_end = theta + turned
+        highest = (u[order - 2], u[order - 1], u[order])
+        _, truncation, rounding = step_errors(
+            order, ph, State(theta, rate, s, c), shaking, turned, highest
+        )
+        off = carried(off, ph, shaking.k_h * s + shaking.w * c, truncation + rounding)
+        if lifting:
+            # a threshold exceeded by less than rounding may seem to pull the block back
+            lifting = False
+            if theta_end <= 0.0 or u_end <= 0.0:
+                impact_at, rate = at + part, 0.0
+        elif theta_end <= 0.0 or (
+            not keeps_direction(u_start, u[1], u_end, v_end)
+            # a history has all peaks
+            and (
+                keeps or not simple_turn(theta, theta_end, u_start, u[1], u_end, v_end, peak.x, 0.0)
+            )
+        ):
+            inside = examine_step(theta, u, order, theta_end, u_end, v_end)
+            peak = higher(peak, inside.peak, abs(off.theta))
+            if keeps and inside.peak > 0.0:
+                top_s = record.time_s[i] + (at + part * inside.peak_at) * record.interval_s[i]
+                filled = noted(rows, filled, top_s, side * inside.peak, 0.0, EVENT)
+            if inside.impact >= 0.0:
+                impact_at = at + part * inside.impact
+                rate = value(u, order, inside.impact) / ph
+        if impact_at >= 0.0:
+            break
+        theta = theta_end
+        rate = u_end / ph
+        s, c = turn(s, c, turned)
+        if theta > corner.theta_c + PAST_BALANCE:
+            break
+    fallen = theta > corner.theta_c + PAST_BALANCE
+    return Crossing(State(theta, rate, s, c), off, peak, impact_at, fallen, steps, filled)
+
+
+@inner_kernel
+def error_after_impact(
+    off: Offset, before: Corner, after: Corner, rate: float, rate_after: float, k_h: float, w: float
+) -> Offset:
+    """Carry an error through an impact, which it moves in time.
+
+    Args:
+        off: error before it.
+        before: the corner that the block turned about.
+        after: the one that it turns about now.
+        rate: theta'/p before the impact, below 0.
+        rate_after: the same after it, above 0.
+        k_h: driving acceleration of the corner before [g].
+        w: effective gravity 1 + k_v.
+    """
+    # a block that is too high by d(theta) arrives later by this, in which it gains speed on both
+    # sides of the impact
+    late_s = -off.theta / (before.p * rate)
+    pull = before.p * before.p * (k_h * before.cos - w * before.sin)
+    pull_after = after.p * after.p * (-k_h * after.cos - w * after.sin)
+    rate_off = -before.passed_on * (before.p * off.rate + pull * late_s) - pull_after * late_s
+    return Offset(-after.p * rate_after * late_s, rate_off / after.p)
+
+
+class Landed(NamedTuple):
+    """What follows an impact.
+
+    Args:
+        side: the new corner, 1 or -1; 0 for rest.
+        state: of the block about it.
+        off: error of it.
+        speed: of the block [rad/s].
+    """
+
+    side: int
+    state: State
+    off: Offset
+    speed: float
+
+
+@inner_kernel
+def through_impact(
+    record: Record,
+    place: Place,
+    side: int,
+    corner: Corner,
+    other: Corner,
+    rules: Rules,
+    crossing: Crossing,
+) -> Landed:
+    """Return what follows an impact at a place: rest, or rotation about the other corner.
+
+    Args:
+        record: the excitation.
+        place: where in it.
+        side: the present corner, 1 or -1.
+        corner: that one.
+        other: the other one.
+        rules: how to integrate.
+        crossing: how the block came to the impact.
+    """
+    rate = crossing.state.rate
+    speed = -rate * corner.p * corner.passed_on
+    if speed < rules.slowest:
+        return Landed(0, State(0.0, 0.0, corner.sin, corner.cos), Offset(0.0, 0.0), 0.0)
+    i, tau = place.interval, place.fraction
+    k_h = side * (record.k_h[i] + (record.k_h[i + 1] - record.k_h[i]) * tau)
+    w = record.w[i] + (record.w[i + 1] - record.w[i]) * tau
+    rate_after = speed / other.p
+    off = error_after_impact(crossing.off, corner, other, rate, rate_after, k_h, w)
+    return Landed(-side, State(0.0, rate_after, other.sin, other.cos), off, speed)
+
+
+@inner_kernel
+def time_of_throw(record: Record) -> float:
+    """Return when 1 + k_v reaches zero [s]."""
+    at, w = record.last, record.w
+    thrown_s: float = record.time_s[max(at, 0)]
+    if at >= 0:  # 1 + k_v is a straight line to its zero
+        thrown_s += record.interval_s[at] * w[at] / (w[at] - w[at + 1])
+    return thrown_s
+
+
+@bare_kernel
+def run_rocking(
+    record: Record,
+    tail_max_q: FloatArray,
+    toe: Corner,
+    heel: Corner,
+    rules: Rules,
+    rows: FloatArray,
+    u: FloatArray,
+) -> RockingRun:
+    """Run one block over one record.
+
+    Args:
+        record: the excitation.
+        tail_max_q: greatest k_h/(1 + k_v) from each node on, rest after the record included.
+        toe: the corner of forward rotation.
+        heel: that of backward rotation.
+        rules: how to integrate.
+        rows: history to be filled with time, rotation (forward positive), its rate and node
+            (`EVENT` or `IMPACT` between nodes), shape (4, m); (4, 0) for none. With one, the run
+            goes on after the verdict until the block lies beyond recovery.
+        u: work, shape (9,).
+    """
+    time_s, interval_s, last = record.time_s, record.interval_s, record.last
+    # the drive forward is k_h - w tan(theta_c), backward it is -(k_h + w tan(theta_c))
+    level = Thresholds(1.0, toe.kr, 1.0, -heel.kr, True)
+    keeps = rows.shape[1] > 0
+    filled = steps = samples = impacts = 0
+    counted = -1
+    started_s, decided_s = math.nan, math.nan
+    i, tau = 0, 0.0  # interval, and position inside it
+    side = barred = 0  # present corner; sense whose start rounding has just undone
+    lifting = False
+    corner = toe
+    state, off = State(0.0, 0.0, toe.sin, toe.cos), Offset(0.0, 0.0)
+    forward, backward = Peak(0.0, 0.0), Peak(0.0, 0.0)
+
+    while i < last and impacts <= rules.most_impacts and (keeps or math.isnan(decided_s)):
+        if side == 0:
+            start = depart(record, level, Place(i, tau), barred)
+            i, tau = start.place.interval, start.place.fraction
+            if start.sense == 0 or i >= last:
+                break
+            side, lifting, barred = start.sense, start.smooth, 0
+            corner = toe if side > 0 else heel
+            state, off = State(0.0, 0.0, corner.sin, corner.cos), Offset(0.0, 0.0)
+            now_s = time_s[i] + tau * interval_s[i]
+            if math.isnan(started_s):
+                started_s = now_s
+            filled = noted(rows, filled, now_s, 0.0, 0.0, EVENT)
+        if interval_s[i] * (1.0 - tau) <= 0.0:
+            # a jump, or a start at the very end of the interval: what follows decides
+            side = 0 if state.theta == 0.0 and state.rate == 0.0 else side
+            i, tau, lifting = i + 1, 0.0, False
+            if side != 0:
+                rate = side * state.rate * corner.p
+                filled = noted(rows, filled, time_s[i], side * state.theta, rate, i)
+            continue
+        # an impact and a new start in one interval count it once
+        if i != counted:
+            counted = i
+            samples += 1
+        crossing = cross_interval(
+            record, corner, rules, side, Place(i, tau),
+            (state, off, forward if side > 0 else backward), lifting, rows, filled, u,
+        )  # fmt: skip
+        lifting = False
+        steps += crossing.steps
+        filled = crossing.filled
+        if side > 0:
+            forward = crossing.peak
+        else:
+            backward = crossing.peak
+        if crossing.impact_at >= 0.0:
+            stuck = crossing.impact_at <= tau
+            tau = min(crossing.impact_at, 1.0)
+            other = heel if side > 0 else toe
+            landed = through_impact(record, Place(i, tau), side, corner, other, rules, crossing)
+            if crossing.state.rate < 0.0:
+                impacts += 1
+                now_s = time_s[i] + tau * interval_s[i]
+                rate = side * crossing.state.rate * corner.p
+                filled = noted(rows, filled, now_s, 0.0, rate, EVENT)
+                filled = noted(rows, filled, now_s, 0.0, landed.side * landed.speed, IMPACT)
+            barred = side if stuck and landed.side == 0 else 0
+            side, state, off = landed.side, landed.state, landed.off
+            corner = corner if side == 0 else other
+            if tau >= 1.0:
+                i, tau = i + 1, 0.0
+            continue
+        state, off = crossing.state, crossing.off
+        i, tau = i + 1, 0.0
+        filled = noted(rows, filled, time_s[i], side * state.theta, side * state.rate * corner.p, i)
+        # past all recovery, whatever the rest of the record does; a history shows the fall too
+        least_q = record.tail_min_q[i] if side > 0 else -tail_max_q[i]
+        lost = irrecoverable(state.rate, state.sin, state.cos, least_q, 0.0)
+        if math.isnan(decided_s) and (lost or crossing.fallen):
+            decided_s = time_s[i]
+        if crossing.fallen:
+            break
+
+    outcome, fell, verdict_s = STABLE, 0, decided_s
+    if not math.isnan(decided_s):
+        outcome, fell = TOPPLED, side
+    elif last < record.k_h.size - 1:
+        outcome, verdict_s = JUMP, time_of_throw(record)
+    elif impacts > rules.most_impacts:
+        outcome = UNDETERMINED
+    elif side != 0:
+        free = after_record(toe, heel, side, state, off, rules.slowest)
+        outcome, fell = free.outcome, free.side
+        forward = higher(forward, free.forward.x, free.forward.error)
+        backward = higher(backward, free.backward.x, free.backward.error)
+        if outcome == TOPPLED:
+            verdict_s = time_s[last]
+    return RockingRun(
+        outcome, fell, forward, backward, abs(off.theta), started_s, verdict_s, impacts, steps,
+        samples, filled,
+    )  # fmt: skip

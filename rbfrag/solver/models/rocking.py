@@ -1,0 +1,284 @@
+"""A free-standing block that rocks about both corners of its base.
+
+    θ'' = p² [s k_h cos(θc - θ) - (1 + k_v) sin(θc - θ)],    s = 1 about the toe, -1 about the heel
+
+θc and p are those of the corner. At every impact the pivot changes to the other corner, and
+angular momentum about it leaves the speed times (I_C + r1·r3)/I of that corner (Housner 1963: 1 -
+1.5 sin² α of a rectangle), or a stated part of it. What overturns is no interval of k_r, so that
+there is no search (docs/theory/rocking.md).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from rbfrag.errors import InputError
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
+from rbfrag.solver.integrator.free_rocking import Corner
+from rbfrag.solver.integrator.two_corners import RockingRun
+from rbfrag.solver.kind import BlockOnPlanes, Kind, RunEnd, Runner, Shaking
+from rbfrag.solver.quantity import number, positive
+from rbfrag.solver.results import FloatArray, Outcome, Response, ResponseHistory
+from rbfrag.solver.rocking_run import (
+    MOST_IMPACTS,
+    FreeBlock,
+    RockingHistory,
+    corner,
+    corner_force,
+    rocking_history,
+    simulate,
+)
+from rbfrag.solver.stability.single import rectangle_r3_m
+from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless
+
+SENSITIVITY = 1e-6
+"""Change of the motion whose effect on the outcome makes it a sensitive one."""
+
+CHAOTIC = 1e-3
+"""Error over the critical angle from which on the size of a peak means nothing."""
+
+
+def free_block(site: BlockOnPlanes) -> FreeBlock:
+    """Return the block with its corners.
+
+    Args:
+        site: the block, its base, and `restitution` among its settings.
+
+    Raises:
+        InputError: a block that does not stand of itself, a restitution outside (0, 1].
+    """
+    given = site.settings.get("restitution")
+    if given is not None:
+        given = number(given, "restitution", "the ratio of speeds after and before an impact")
+        if not 0.0 < given <= 1.0:
+            raise InputError(
+                f"restitution = {given:g}: give the speed after an impact over that before it, "
+                "above 0 and up to 1"
+            )
+    if site.block is None:
+        assert site.p2 is not None
+        return _symmetric(positive(site.p2, "p2", "1/s²"), positive(site.yield_g, "kr", "g"), given)
+    return _of_shape(site.block, site.beta_rad, given)
+
+
+def _symmetric(p2: float, kr: float, given: float | None) -> FreeBlock:
+    """Return the rectangle on level ground that has these numbers."""
+    sine2 = kr * kr / (1.0 + kr * kr)
+    both = corner(kr, p2, 1.0 - 1.5 * sine2 if given is None else given)
+    half, height = rectangle_r3_m(p2) * both.sin, rectangle_r3_m(p2) * both.cos
+    return FreeBlock(both, both, 2.0 * half, (half, height), 0.0)
+
+
+def _of_shape(block: Block, beta_rad: float, given: float | None) -> FreeBlock:
+    balances = (
+        ("forward over its toe", "alpha3 - beta", math.radians(block.alpha3_deg) - beta_rad),
+        ("backward over its heel", "beta - alpha1", beta_rad - math.radians(block.alpha1_deg)),
+    )
+    for falls, name, balance in balances:
+        if balance <= 0.0:
+            raise InputError(
+                f"the block falls {falls} at rest: {name} = {math.degrees(balance):.6g} degrees is "
+                "not above zero, and no earthquake decides about it"
+            )
+    for _, name, balance in balances:
+        if balance >= 0.5 * math.pi:
+            raise InputError(
+                f"{name} = {math.degrees(balance):.6g} degrees: a block rocks about a corner whose "
+                "critical angle is below 90 degrees"
+            )
+    inertia = block.inertia_m2
+    toe, heel = block.toe, block.heel
+    about_toe = inertia + (toe[0] * toe[0] + toe[1] * toe[1])
+    about_heel = inertia + (heel[0] * heel[0] + heel[1] * heel[1])
+    # angular momentum about the corner that takes over, just before and just after the impact
+    kept = inertia + (heel[0] * toe[0] + heel[1] * toe[1])
+    return FreeBlock(
+        toe=_corner(balances[0][2], block.r3_m, about_toe, kept / about_heel, given),
+        heel=_corner(balances[1][2], block.r1_m, about_heel, kept / about_toe, given),
+        toe_m=block.base_m,
+        centroid_m=block.centroid,
+        beta_rad=beta_rad,
+    )
+
+
+def _corner(
+    balance: float, arm_m: float, inertia_m2: float, kept: float, given: float | None
+) -> Corner:
+    p2 = STANDARD_GRAVITY_M_S2 * arm_m / inertia_m2
+    return corner(math.tan(balance), p2, kept if given is None else given)
+
+
+class Rocking(Kind):
+    """The model of free-standing blocks."""
+
+    kind = "rocking"
+    mode = "topple"
+    free_standing = True
+    settings = ("restitution",)
+    numbers = ("p2", "kr")
+    no_search = (
+        "what overturns a free-standing block is no interval of k_r (up to 122 islands for one "
+        "record), so that no value is certain to be the last"
+    )
+
+    def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
+        """Return what the block does.
+
+        Raises:
+            InputError: a block that does not stand of itself, cohesion, a restitution outside
+                (0, 1].
+        """
+        block = self._block(site)
+        excited = excitation(shaking.motion, shaking.vertical, shaking.polarity)
+        refuse_endless(excited, max(block.toe.p, block.heel.p) ** 2)
+        run = simulate(excited, block)
+        outcome = OUTCOMES[run.outcome]
+        known = outcome is Outcome.STABLE
+        senses = peaks(run, outcome)
+        ratios = (run.forward.x / block.toe.theta_c, run.backward.x / block.heel.theta_c)
+        traced = rocking_history(excited, block, run.impacts)
+        sensitive = changes_with_the_motion(excited, block, outcome)
+        return Response(
+            kind=self.kind,
+            outcome=outcome,
+            peak_theta_n=max(ratios) if known else None,
+            peak_theta_rad=max(run.forward.x, run.backward.x) if known else None,
+            critical_angle_deg=math.degrees(block.toe.theta_c),
+            started_s=_time_or_none(run.started_s),
+            toppled_s=_time_or_none(run.verdict_s) if outcome is Outcome.TOPPLED else None,
+            error_estimate=error_of(run, outcome),
+            steps=run.steps,
+            samples_moved=run.samples_moved,
+            samples_total=int(np.count_nonzero(excited.interval_s)),
+            warnings=(
+                *shaking.remarks,
+                *motion_remarks(shaking.motion, shaking.vertical, excited),
+                *_warnings(block, site, run, outcome, sensitive, traced.motion),
+            ),
+            history=_posed(block, traced) if shaking.history else None,
+            critical_backward_deg=math.degrees(block.heel.theta_c),
+            peak_forward_rad=senses[0],
+            peak_backward_rad=senses[1],
+            impacts=run.impacts,
+            sensitive=sensitive,
+        )
+
+    def runner(self, site: BlockOnPlanes) -> Runner:
+        """Return a function that says how the block ends under an excitation."""
+        block = self._block(site)
+
+        def run(excited: Excitation) -> RunEnd:
+            refuse_endless(excited, max(block.toe.p, block.heel.p) ** 2)
+            end = simulate(excited, block)
+            outcome = OUTCOMES[end.outcome]
+            known = outcome is Outcome.STABLE
+            return RunEnd(
+                outcome=outcome,
+                moved=math.isfinite(end.started_s),
+                peak_rad=max(end.forward.x, end.backward.x) if known else None,
+                peak_displacement_m=None,
+                error=error_of(end, outcome),
+            )
+
+        return run
+
+    def _block(self, site: BlockOnPlanes) -> FreeBlock:
+        if site.cohesive:
+            raise InputError(
+                f"cohesion_pa does not go with {self.kind}: the block lifts off its base"
+            )
+        return free_block(site)
+
+
+def peaks(run: RockingRun, outcome: Outcome) -> tuple[float | None, float | None]:
+    """Return the greatest rotation forward and backward [rad]; None where it has none."""
+    if outcome not in (Outcome.STABLE, Outcome.TOPPLED):
+        return None, None
+    return (
+        None if run.side > 0 else run.forward.x,
+        None if run.side < 0 else run.backward.x,
+    )
+
+
+def error_of(run: RockingRun, outcome: Outcome) -> float:
+    """Return the estimated error of the greater peak [rad]; of a run without, where it ended."""
+    if outcome is not Outcome.STABLE:
+        return run.error
+    return max(run.forward, run.backward).error
+
+
+def changes_with_the_motion(excited: Excitation, block: FreeBlock, outcome: Outcome) -> bool:
+    """Return whether a change of the motion by a millionth changes the outcome."""
+    return any(
+        OUTCOMES[simulate(excited.scaled(1.0 + change), block).outcome] is not outcome
+        for change in (SENSITIVITY, -SENSITIVITY)
+    )
+
+
+def _warnings(
+    block: FreeBlock,
+    site: BlockOnPlanes,
+    run: RockingRun,
+    outcome: Outcome,
+    sensitive: bool,
+    motion: ResponseHistory,
+) -> list[str]:
+    warnings = []
+    if outcome is Outcome.UNDETERMINED:
+        warnings.append(
+            f"after {MOST_IMPACTS} impacts the block still rocks: its outcome is not determined"
+        )
+    if outcome is Outcome.JUMP:
+        warnings.append(f"at {run.verdict_s:.3f} s: {outcome.advice}")
+    if min(block.toe.passed_on, block.heel.passed_on) <= 0.0:
+        warnings.append(
+            "the block is so stocky that angular momentum leaves it no speed after an impact: "
+            "there it comes to rest"
+        )
+    if sensitive:
+        warnings.append(
+            "the outcome is sensitive: it is another one for the motion times 1 + 1e-6 or 1 - 1e-6"
+        )
+    elif error_of(run, outcome) > CHAOTIC * min(block.toe.theta_c, block.heel.theta_c):
+        warnings.append(
+            "the response is chaotic: after so many impacts the size of its peaks is not "
+            "determined by the motion as it is known"
+        )
+    tan_phi = math.tan(site.phi_rad) if site.phi_rad < 0.5 * math.pi else math.inf
+    until_s = run.verdict_s if outcome is Outcome.TOPPLED else math.inf
+    force = corner_force(block, motion, tan_phi, until_s)
+    if force.lifts_s is not None:
+        warnings.append(
+            f"at {force.lifts_s:.3f} s the corner would have to pull to stay on the base: the "
+            "block bounces there, which is not followed"
+        )
+    if force.slips_s is not None:
+        warnings.append(
+            f"at {force.slips_s:.3f} s friction does not hold the corner (it needs up to "
+            f"{math.degrees(math.atan(force.friction)):.4g} degrees): the block slips there, which "
+            "is not followed"
+        )
+    return warnings
+
+
+def _posed(block: FreeBlock, traced: RockingHistory) -> ResponseHistory:
+    """Return the history with the place of the block, clockwise about its toe or back again."""
+    theta = traced.motion.theta_rad
+    pivot = np.where(theta >= 0.0, block.toe_m, 0.0)
+    arm = block.centroid_m[0] - pivot
+    rise = block.centroid_m[1]
+    c, s = np.cos(theta), np.sin(theta)
+    centroid: FloatArray = np.stack([pivot + arm * c + rise * s, rise * c - arm * s], axis=1)
+    return replace(traced.motion, centroid_m=centroid, turned_rad=-theta, impact_s=traced.impact_s)
+
+
+def _time_or_none(time_s: float) -> float | None:
+    return time_s if math.isfinite(time_s) else None
+
+
+MODEL = Rocking()

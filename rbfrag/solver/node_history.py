@@ -1,0 +1,64 @@
+"""The motion in time that a kernel kept: nodes that it moved through, and events between them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.results import FloatArray, ResponseHistory
+
+TAIL_PERIODS = 12.0
+"""Length of the free motion shown after the record, in units of 1/p."""
+
+TAIL_INTERVALS = 400
+
+
+def with_free_motion(excited: Excitation, p: float) -> Excitation:
+    """Return the shaking and the stretch of rest after it in which free motion is shown.
+
+    Args:
+        excited: the excitation.
+        p: frequency parameter of the block [1/s].
+    """
+    return excited.with_rest_after(TAIL_PERIODS / p, TAIL_INTERVALS)
+
+
+def node_history(
+    excited: Excitation, longer: Excitation, rows: FloatArray, *, toppled: bool
+) -> ResponseHistory:
+    """Return the history of a run; the nodes of rest, which kernels skip, are put back.
+
+    Args:
+        excited: the excitation; all its nodes are shown unless the block topples.
+        longer: the same with the free motion after it, over which the run went.
+        rows: time, rotation, its rate and node of what was kept (below 0 for an event between
+            nodes), shape (4, n).
+        toppled: whether the history ends with the last of them.
+    """
+    at_node = rows[3] >= 0.0
+    theta = np.zeros(longer.time_s.size)
+    rate = np.zeros(longer.time_s.size)
+    moved = rows[3, at_node].astype(np.int64)
+    theta[moved] = rows[1, at_node]
+    rate[moved] = rows[2, at_node]
+    shown = max(excited.time_s.size, int(moved[-1]) + 1) if moved.size else excited.time_s.size
+    if toppled and moved.size:
+        shown = int(moved[-1]) + 1
+    event = rows[:3, ~at_node]
+    time_s = np.concatenate([longer.time_s[:shown], event[0]])
+    order = np.argsort(time_s, kind="stable")
+
+    def merged(at_nodes: FloatArray, at_events: FloatArray) -> FloatArray:
+        return np.concatenate([at_nodes[:shown], at_events])[order]
+
+    def between(values: FloatArray) -> FloatArray:
+        there: FloatArray = np.interp(event[0], longer.time_s, values)
+        return there
+
+    return ResponseHistory(
+        time_s=time_s[order],
+        theta_rad=merged(theta, event[1]),
+        theta_dot_rad_s=merged(rate, event[2]),
+        k_h=merged(longer.k_h, between(longer.k_h)),
+        k_v=merged(longer.w - 1.0, between(longer.w - 1.0)),
+    )

@@ -1,0 +1,234 @@
+"""The interval comes from V and the steps alone: computed again here by other means."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+from scipy.stats import norm, t
+
+from rbfrag.db.location import REFERENCE
+from rbfrag.db.model_file import ModelRow, read_models
+from rbfrag.errors import InputError
+from rbfrag.fragility.intervals import ParameterErrors, packed, quantiles_of, student_half_width
+from rbfrag.fragility.methods import SINGLE, arrays, methods
+from rbfrag.fragility.model import NO_EVENT_RANGE, FragilityModel
+from rbfrag.fragility.predict import answer_given
+from rbfrag.fragility.prediction_array import PredictionArray
+from tests.fragility.portfolio_draws import SHARED
+
+FloatArray = NDArray[np.float64]
+FORMS = [(method, term) for method in methods() for term in method.forms]
+
+
+def drawn_model(number: int, seed: int, shared: dict[str, float] | None) -> FragilityModel:
+    """A model of some form with parameters and steps at random."""
+    method, term = FORMS[number % len(FORMS)]
+    form = method.forms[term]
+    random = np.random.default_rng(seed)
+    b = np.array(form.start or random.uniform(0.5, 3.0, len(form.parameters)))
+    if form.parameters[0] == "c0":  # a straight line with its variance
+        b = np.array([0.002, 0.72, 4e-5, 3e-3, 5e-3])[: b.size]
+    g = int(random.integers(3, 60))
+    # a few earthquakes tell more than the others
+    weight = np.exp(random.normal(0.0, 1.0, (g, 1)))
+    steps = 0.02 * weight * random.normal(size=(g, b.size)) * np.abs(b)
+    covariance = (g - 1) / g * steps.T @ steps
+    criterion = {} if method.block.criterion is None else {method.block.criterion: None}
+    return FragilityModel.from_row(
+        ModelRow(
+            name="drawn",
+            kind=method.block.kind,
+            term=term,
+            method=method.name,
+            coefficients=dict(zip(form.parameters, b.tolist(), strict=True)),
+            covariance=tuple(map(tuple, covariance.tolist())),
+            leave_out_steps=tuple(map(tuple, steps.tolist())),
+            dependence=shared,
+            domain={},
+            data_fingerprint="",
+            diagnostics=criterion,
+        )
+    )
+
+
+def drawn_questions(model: FragilityModel, random: np.random.Generator, n: int) -> dict[str, Any]:
+    """Blocks and motions within what mechanics leaves to the model, or nearly."""
+    pgv = np.exp(random.uniform(-3.0, 0.5, n))
+    every = {
+        "pgv_m_s": pgv,
+        "pga_g": pgv * np.exp(random.normal(0.2, 0.4, n)),
+        "tm_s": np.exp(random.normal(-0.7, 0.4, n)),
+        "pgd_m": 0.1 * pgv * np.exp(random.normal(0.0, 0.4, n)),
+        "xp_m_s": pgv * random.uniform(0.3, 1.0, n),
+        "p2": np.exp(random.uniform(np.log(0.1), np.log(30.0), n)),
+        "ps2": np.exp(random.uniform(-1.0, 3.0, n)),
+        "displacement_m": np.exp(random.uniform(-6.0, 0.0, n)),
+    }
+    for period in ("03", "10", "20", "30"):
+        every[f"sa{period}_g"] = every["pga_g"] * np.exp(random.normal(0.0, 0.5, n))
+    every["ky"] = every["ks"] = every["pga_g"] * random.uniform(0.05, 0.95, n)
+    y = pgv * np.exp(random.uniform(-2.0, 0.6, n))
+    every["kr"] = y * np.sqrt(every["p2"]) / 9.80665
+    names = (*model.method.block.names, *model.term.inputs)
+    return {name: every[name] for name in dict.fromkeys(names)}
+
+
+def expected_ends(
+    model: FragilityModel, given: dict[str, FloatArray], level: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """P, the interval and the range of one earthquake by numpy and scipy from the stored row."""
+    ns = arrays()
+    with np.errstate(all="ignore"):
+        values = model.method.block.completed(given, model.term, ns)
+        eta, slopes, *_ = model.form.eta(model.parameters, values, ns)
+        x = np.column_stack([np.broadcast_to(each, np.shape(eta)) for each in slopes])
+        steps = np.array(model.row.leave_out_steps)
+        g = len(steps)
+        se = np.sqrt(np.einsum("ni,ij,nj->n", x, np.array(model.row.covariance), x))
+        c = (x @ steps.T) ** 2
+        nu = 2 * c.sum(1) ** 2 / ((c**2).sum(1) - c.sum(1) ** 2 / g)
+        reach = t.ppf(0.5 + 0.5 * level, np.clip(nu, 2, g - 1)) * se
+        link = model.method.link.probability
+        p, low, high = (np.asarray(link(at, ns)) for at in (eta, eta - reach, eta + reach))
+        rho = SHARED["rho_e"]
+        event = [
+            ndtr((ndtri(p) + np.sqrt(rho) * norm.ppf(q)) / np.sqrt(1 - rho))
+            for q in (0.5 - 0.5 * level, 0.5 + 0.5 * level)
+        ]
+    return p, low, high, event[0], event[1]
+
+
+COLUMNS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    number=st.integers(0, 10_000),
+    seed=st.integers(0, 10_000),
+    level=st.sampled_from([0.5, 0.9, 0.95, 0.99]),
+)
+def test_nothing_but_v_widens_an_interval(number: int, seed: int, level: float) -> None:
+    model = drawn_model(number, seed, SHARED)
+    check_intervals(model, np.random.default_rng(seed), level)
+
+
+def check_intervals(model: FragilityModel, random: np.random.Generator, level: float) -> None:
+    given = drawn_questions(model, random, 40)
+    many = answer_given(model, given, level)
+    assert isinstance(many, PredictionArray)
+    expected = expected_ends(model, given, level)
+    ruled = np.zeros(40, dtype=bool)
+    values = model.method.block.completed(given, model.term, arrays())
+    for bound in (*model.form.bounds, model.method.block.at_rest):
+        if bound.about in values and ("pga_g" in values or bound in model.form.bounds):
+            ruled |= bound.holds(values)
+    for name, column in zip(COLUMNS, expected, strict=True):
+        found = getattr(many, name)
+        np.testing.assert_allclose(
+            found, np.where(ruled, 0.0, column), rtol=1e-6, atol=1e-9, err_msg=name
+        )
+    for i in range(40):
+        one = answer_given(model, {name: float(v[i]) for name, v in given.items()}, level)
+        found = [getattr(one, name) for name in COLUMNS]
+        assert found == pytest.approx(
+            [getattr(many, name)[i] for name in COLUMNS], rel=1e-12, abs=1e-18
+        )
+
+
+def test_the_shipped_models_have_the_interval_of_v() -> None:
+    rows = [row for row in read_models(REFERENCE) if row.leave_out_steps is not None]
+    assert len(rows) >= 10
+    for row in rows:
+        steps = np.array(row.leave_out_steps)
+        g = len(steps)
+        np.testing.assert_allclose(row.covariance, (g - 1) / g * steps.T @ steps, rtol=1e-9)
+        model = FragilityModel.from_row(row)
+        random = np.random.default_rng(1)
+        given = drawn_questions(model, random, 60)
+        many = answer_given(model, given, 0.95)
+        _, low, high, *_ = expected_ends(model, given, 0.95)
+        open_ = (many.probability > 0.0) & (many.probability < 1.0)
+        assert open_.sum() > 10
+        np.testing.assert_allclose(many.ci_low[open_], low[open_], rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(many.ci_high[open_], high[open_], rtol=1e-6, atol=1e-9)
+
+
+def test_a_model_that_does_not_know_what_blocks_share_says_so() -> None:
+    model = drawn_model(0, 1, None)
+    given = drawn_questions(model, np.random.default_rng(1), 5)
+    many = answer_given(model, given, 0.95)
+    assert np.isnan(many.event_low).all()
+    assert np.isnan(many.event_high).all()
+    assert many.notes == (NO_EVENT_RANGE,)
+    one = answer_given(model, {name: float(v[0]) for name, v in given.items()}, 0.95)
+    assert one.event_low is None
+    assert one.event_high is None
+    assert NO_EVENT_RANGE in one.warnings
+    assert one.as_dict()["event_low"] is None
+
+
+@pytest.mark.parametrize("level", [0.5, 0.9, 0.95, 0.99, 0.999, 0.9999])
+def test_student_quantiles_are_those_of_scipy(level: float) -> None:
+    nu = np.linspace(2.0, 60.0, 2000)
+    expected = t.ppf(0.5 + 0.5 * level, nu)
+    quantiles = quantiles_of(level)
+    many = quantiles.student_at(1.0 / nu)
+    assert np.abs(many - expected).max() < 1e-6
+    single = [quantiles.student_at(1.0 / one) for one in nu.tolist()]
+    np.testing.assert_allclose(many, single, rtol=1e-12)
+    assert quantiles.normal == pytest.approx(norm.ppf(0.5 + 0.5 * level), rel=1e-13)
+
+
+@pytest.mark.parametrize("freedom", [2, 2.5, 3, 4.7, 9, 46, 300, 1000.5])
+@pytest.mark.parametrize("level", [0.01, 0.5, 0.9, 0.95, 0.99, 0.9999, 0.999999])
+def test_student_quantile_of_one_freedom(level: float, freedom: float) -> None:
+    assert student_half_width(level, freedom) == pytest.approx(
+        t.ppf(0.5 + level / 2, freedom), rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0, -0.1, 95, True, float("nan"), "0.95"])
+def test_levels_that_are_none(level: Any) -> None:
+    with pytest.raises(InputError, match="between 0 and 1"):
+        quantiles_of(level)
+
+
+def reach_over_error(steps: FloatArray, x: FloatArray) -> float:
+    g = len(steps)
+    covariance = (g - 1) / g * steps.T @ steps
+    errors = ParameterErrors(packed(covariance.tolist()), tuple(map(tuple, steps.tolist())))
+    quantiles = quantiles_of(0.95)
+    return float(errors.half_width(x.tolist(), quantiles, SINGLE) / np.sqrt(x @ covariance @ x))
+
+
+def test_normal_steps_have_nearly_as_many_freedoms_as_earthquakes() -> None:
+    steps = np.random.default_rng(1).normal(size=(4000, 3))
+    assert reach_over_error(steps, np.ones(3)) == pytest.approx(t.ppf(0.975, 4000), rel=1e-3)
+
+
+def test_few_earthquakes_that_decide_leave_few_freedoms() -> None:
+    random = np.random.default_rng(2)
+    steps = random.normal(size=(50, 2))
+    steps[:4, 1] *= 20.0
+    first, second = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+    assert reach_over_error(steps, first) < t.ppf(0.975, 30)
+    # of this block, not of the model
+    assert reach_over_error(steps, second) > t.ppf(0.975, 12)
+    # equal steps do not scatter, and there are never more freedoms than earthquakes less one
+    assert reach_over_error(np.ones((9, 1)), np.ones(1)) == pytest.approx(t.ppf(0.975, 8))
+    one = np.zeros((40, 1))
+    one[0] = 1.0
+    assert reach_over_error(one, np.ones(1)) == pytest.approx(t.ppf(0.975, 80 / 39), rel=1e-7)
+
+
+def test_what_is_known_without_error_has_no_width() -> None:
+    errors = ParameterErrors((0.0,), ((0.0,), (0.0,), (0.0,)))
+    assert errors.half_width([1.0], quantiles_of(0.95), SINGLE) == 0.0
+    known = ParameterErrors((4.0,), ())
+    assert known.half_width([1.0], quantiles_of(0.95), SINGLE) == pytest.approx(2 * norm.ppf(0.975))

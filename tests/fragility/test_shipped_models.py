@@ -1,0 +1,166 @@
+"""The shipped models: those of the specification, level over size, smooth and monotone."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rbfrag.db.engine import opened_database
+from rbfrag.db.location import REFERENCE
+from rbfrag.db.model_file import read_models
+from rbfrag.fragility.fit.data import FitData, FitSource, fit_data, read_source
+from rbfrag.fragility.fit.outcomes import OutcomeRows, outcome_rows, parameter_names
+from rbfrag.fragility.fit.scores import calibration, log_loss
+from rbfrag.fragility.intervals import quantiles_of
+from rbfrag.fragility.measures import TERMS
+from rbfrag.fragility.methods import arrays, method_named
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.predict import answer_given
+from rbfrag.fragility.prediction_array import PredictionArray
+
+FloatArray = NDArray[np.float64]
+
+# Section 1 of the specification: b, CR3 errors, held-out log loss in 16 folds of earthquakes. The
+# reference holds one earthquake more (48), which moves b by up to .002 and errors by up to .003.
+SPECIFIED = {
+    "bounded-pgv": (
+        (-1.120, 2.662, 2.161, 0.042, -0.266), (0.480, 0.284, 0.443, 0.088, 0.033), 0.1652,
+    ),
+    "bounded-pgv_pga": (
+        (2.509, 2.284, 4.192, 2.386, 2.783), (0.435, 0.253, 0.422, 0.356, 0.238), 0.1522,
+    ),
+    "bounded-pgv_pga_tm": (
+        (2.938, 2.282, 4.255, 2.635, 1.582, 1.253), (0.368, 0.263, 0.346, 0.383, 0.301, 0.143),
+        0.1480,
+    ),
+    "record-xp": ((3.111, 3.816, 1.064), (0.242, 0.394, 0.073), 0.0882),
+}  # fmt: skip
+
+
+@cache
+def shipped() -> dict[str, FragilityModel]:
+    return {row.name: FragilityModel.from_row(row) for row in read_models(REFERENCE)}
+
+
+@cache
+def source() -> FitSource:
+    with opened_database(REFERENCE, read_only=True) as engine, engine.connect() as connection:
+        return read_source(connection)
+
+
+@pytest.mark.parametrize("name", SPECIFIED)
+def test_coefficients_and_errors_are_those_of_the_specification(name: str) -> None:
+    b, errors, _ = SPECIFIED[name]
+    model = shipped()[name]
+    assert model.parameters == pytest.approx(b, abs=0.0025)
+    stated = model.row.diagnostics["standard_errors"]
+    assert isinstance(stated, dict)
+    assert list(stated.values()) == pytest.approx(errors, abs=0.0035)
+    assert np.sqrt(np.diag(model.row.covariance)) == pytest.approx(errors, abs=0.0035)
+    assert model.row.dependence is not None
+
+
+@cache
+def held_out(name: str) -> tuple[FitData, FloatArray]:
+    model = shipped()[name]
+    method, term = method_named(model.method.name), TERMS[model.term.name]
+    data = fit_data(source(), method, term)
+    rows: OutcomeRows = outcome_rows(data, method, term, parameter_names(method, term))
+    return data, rows.held_out(np.array(model.parameters))
+
+
+@pytest.mark.parametrize("name", SPECIFIED)
+def test_every_size_is_calibrated_on_earthquakes_left_out(name: str) -> None:
+    data, p = held_out(name)
+    judged, p2 = data.judged, data.grid("p2")
+    assert log_loss(p, judged.failed, judged.known) == pytest.approx(SPECIFIED[name][2], abs=3e-4)
+    assert 0.95 <= calibration(p, judged.failed, judged.known).slope <= 1.05
+    for size in (30.0, 10.0, 3.0, 1.0, 0.3, 0.1):
+        own = judged.known & (np.abs(p2 - size) < 1e-9 * size)
+        assert 0.90 <= calibration(p, judged.failed, own).slope <= 1.10, size
+
+
+# Dense grids: k_r, PGV (X(p)) and p² in steps of 1 %, from where the fit has its first block
+STEP = 1.01
+
+
+def grid_of(model: FragilityModel, name: str, n: int = 700) -> dict[str, FloatArray | float]:
+    """A line of questions along one value, in steps of 1 %, for each of several blocks."""
+    random = np.random.default_rng(3)
+    several = 40
+    pgv = np.exp(random.uniform(np.log(0.03), np.log(1.5), several))
+    pga = pgv / 9.80665 / np.exp(random.normal(np.log(0.1), 0.3, several))
+    p2 = np.exp(random.uniform(np.log(0.1), np.log(30.0), several))
+    every = {
+        "p2": p2,
+        "kr": pgv * np.sqrt(p2) / 9.80665 * random.uniform(0.3, 1.0, several),
+        "pgv_m_s": pgv,
+        "pga_g": pga,
+        "tm_s": 2 * np.pi * pgv / (pga * 9.80665) * np.exp(random.normal(0.0, 0.2, several)),
+        "xp_m_s": pgv * random.uniform(0.4, 0.9, several),
+        "pgd_m": 0.1 * pgv,
+    }
+    for period in ("03", "10", "20", "30"):
+        every[f"sa{period}_g"] = pga * np.exp(random.normal(-0.3, 0.3, several))
+    given = {key: every[key][:, None] for key in ("p2", "kr", *model.term.inputs)}
+    along = np.geomspace(1.0, STEP ** (n - 1), n)
+    if name == "p2":
+        given["p2"] = 0.1 * along[along <= 300.0][None, :]
+    else:
+        given[name] = given[name] * along / np.sqrt(along[-1])
+    return given
+
+
+OF_OUTCOMES = [
+    row.name for row in read_models(REFERENCE)
+    if row.kind == "toppling" and method_named(row.method).reads == "outcomes"
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OF_OUTCOMES)
+def test_p_falls_with_strength_and_rises_with_the_measure_that_is_known_alone(name: str) -> None:
+    model = shipped()[name]
+    ways = [("kr", -1.0)]
+    first = model.term.inputs[0]
+    if len(model.term.inputs) == 1 or first == "xp_m_s":
+        ways.append((first, 1.0))
+    for along, sign in ways:
+        answer = answer_given(model, grid_of(model, along), 0.95)
+        assert isinstance(answer, PredictionArray)
+        change = sign * np.diff(answer.probability, axis=1)
+        assert change.min() >= -1e-14
+        for ends in (answer.event_low, answer.event_high):
+            assert (sign * np.diff(ends, axis=1)).min() >= -1e-14
+        assert np.all(answer.ci_low <= answer.probability)
+        assert np.all(answer.probability <= answer.ci_high)
+
+
+@pytest.mark.parametrize("name", OF_OUTCOMES)
+@pytest.mark.parametrize("along", ["kr", "pgv_m_s", "xp_m_s", "p2"])
+def test_the_half_width_of_eta_has_no_steps(name: str, along: str) -> None:
+    model = shipped()[name]
+    if along not in ("kr", "p2", *model.term.inputs):
+        pytest.skip("the model does not read it")
+    values = model.method.block.completed(grid_of(model, along), model.term, arrays())
+    with np.errstate(all="ignore"):
+        found, h = model.form.unscaled(model.parameters, values, arrays())
+        slopes = [np.broadcast_to(s, found.eta.shape).ravel() for s in found.slopes]
+        reach = h * model.errors.half_width(slopes, quantiles_of(0.95), arrays()).reshape(
+            found.eta.shape
+        )
+        p = model.method.link.probability(found.eta * h, arrays())
+    # where the outcome is open, which is the domain of the statement; near the bounds of mechanics
+    # ln(1 - v) goes to infinity within a step
+    open_ = np.isfinite(reach) & (p > 0.001) & (p < 0.999)
+    for bound in model.form.bounds:
+        open_ &= ~bound.holds(values)
+    pairs = open_[:, 1:] & open_[:, :-1]
+    assert pairs.sum() > 1000
+    change = np.abs(np.diff(reach, axis=1))
+    assert change[pairs].max() <= 0.02
+    # se of V alone changes by up to 5.7 % of itself where it is least, so that no bound of 2 %
+    # of itself can hold
+    assert (change / reach[:, :-1])[pairs].max() <= 0.06
