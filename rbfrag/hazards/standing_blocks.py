@@ -141,20 +141,28 @@ def _joint_laws(n: int, blocks: ModelBlocks | None) -> dict[str, Joint]:
 
 
 def _tabled(fragility: Fragility, curves: list[HazardCurve]) -> Fragility:
-    """Return a fragility of many rows by monotone cubics between levels 2 % apart or closer.
+    """Return a fragility of many rows by monotone cubics over the levels of some curves.
 
-    Mixtures and joint probabilities are smooth, and cost too much at every node of the integral.
+    Mixtures and joint probabilities cost too much at every node of the integral.
     """
-    from scipy.interpolate import PchipInterpolator
-
     low = math.log(min(curve.levels[0] for curve in curves))
     ends = (c.levels[-1] if c.end_level is None else c.end_level for c in curves)
     high = math.log(max(ends))
+    smooth = _cubics(low, high, fragility)
+    return lambda levels: smooth(np.clip(np.log(levels), low, high))
+
+
+def _cubics(low: float, high: float, fragility: Fragility) -> Fragility:
+    """Return a function of ln x between two ends for one of x, by cubics over steps of 2 %.
+
+    Its last axis is that of the levels; probabilities of models are smooth in it.
+    """
+    from scipy.interpolate import PchipInterpolator
+
     u = np.linspace(low, high, max(_FEWEST_LEVELS, math.ceil((high - low) / _TABLE_STEP)))
     table = fragility(np.exp(u))
     table[table < 1e-100] = 0.0  # the cubics divide by differences
-    smooth = PchipInterpolator(u, table, axis=1)
-    return lambda levels: np.asarray(smooth(np.clip(np.log(levels), low, high)))
+    return cast("Fragility", PchipInterpolator(u, table, axis=-1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,16 +247,30 @@ class ModelBlocks:
         return Placement.of(np.log(p), np.log(kr * STANDARD_GRAVITY_M_S2 / p), polarity=UNKNOWN)
 
     def probabilities(self, levels: FloatArray) -> FloatArray:
-        """Return P and the ends of its interval, draws x 3 x blocks x levels."""
-        shaking = {self.shaking.name: (levels[:, None] * self.shaking.shift).reshape(1, 1, -1)}
+        """Return P and the ends of its interval, draws x 3 x blocks x levels.
+
+        Scatter of the shaking is integrated over a table of P: the model answers once at each of
+        its levels, not once for each point of the scatter.
+        """
+        shift = self.shaking.shift
+        if shift.size == 1:
+            return self._at(levels * shift)
+        u = np.log(levels)
+        smooth = _cubics(u[0] + math.log(shift[0]), u[-1] + math.log(shift[-1]), self._at)
+        points = zip(self.shaking.weight, np.log(shift), strict=True)
+        total: FloatArray = sum(w * smooth(u + by) for w, by in points)
+        return total
+
+    def _at(self, values: FloatArray) -> FloatArray:
+        """Return P and the ends of its interval at values of the model's measure."""
+        shaking = {self.shaking.name: values}
         k, m = self.p2.shape
-        rows = max(1, _AT_ONCE // (m * levels.size * self.shaking.shift.size))
+        rows = max(1, _AT_ONCE // (m * values.size))
         parts = []
         for start in range(0, k, rows):
             some = slice(start, start + rows)
             answer = self._predicted(self.p2[some, :, None], self.kr[some, :, None], shaking)
-            bands = np.stack([answer.probability, answer.ci_low, answer.ci_high], axis=1)
-            parts.append(bands.reshape(*bands.shape[:3], levels.size, -1) @ self.shaking.weight)
+            parts.append(np.stack([answer.probability, answer.ci_low, answer.ci_high], axis=1))
         return np.concatenate(parts)
 
     def share_outside(self, levels: FloatArray) -> FloatArray:
