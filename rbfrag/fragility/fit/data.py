@@ -219,6 +219,8 @@ class FitData:
         motion: number of the motion, shape (n,).
         polarity: +1 forward, -1 reverse, shape (n,).
         recording: number of the motion's recording, shape (n,); None where that is not known.
+        combination: which row of the source it is, shape (n,): the rows of a fit are sorted by its
+            intensity, so that those of two fits belong together by this alone.
         blocks: what formulas read of the blocks of the grid, shape (n, m) or (n, 1).
         failed: what they do: 1 fails, 0 does not, NaN not known, shape (n, m).
         read: which of them this fit may read, same shape.
@@ -241,6 +243,7 @@ class FitData:
     motion: NDArray[np.int64]
     polarity: FloatArray
     recording: NDArray[np.int64] | None
+    combination: NDArray[np.intp]
     blocks: dict[str, FloatArray]
     failed: FloatArray
     read: NDArray[np.bool_]
@@ -349,6 +352,7 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         motion=np.unique(table.motion_id[own], return_inverse=True)[1].astype(np.int64),
         polarity=np.where(table.polarity[own] == "forward", 1.0, -1.0),
         recording=None if source.recording is None else source.recording[own],
+        combination=own,
         blocks={name: v[chosen] for name, v in points.blocks.items()},
         failed=failed,
         read=points.read[chosen],
