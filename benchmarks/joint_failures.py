@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from benchmarks.joint_models import FOLDS, SHAPES, HeldOut, Outcomes, held_out, read_outcomes
+from benchmarks.held_out import FOLDS, MODELS, STEP, Outcomes, Study, read, studied
 from benchmarks.model_acceptance import Mark, acceptance_table
 from benchmarks.page import ROOT, parser, replaced
 from rbfrag.bench.tables import markdown
@@ -23,7 +23,7 @@ from rbfrag.db.location import REFERENCE
 from rbfrag.fragility.dependence import Dependence, event_range
 from rbfrag.fragility.fit.dependence import PairTables, estimate_dependence
 from rbfrag.fragility.fit.pair_tables import ANGLES, PairTable
-from rbfrag.fragility.joint import FailureCount, Placement
+from rbfrag.fragility.joint import FailureCount
 from rbfrag.fragility.joint_sampling import JointSampler
 
 FloatArray = NDArray[np.float64]
@@ -38,9 +38,6 @@ PUBLISHED = {
     "record": Dependence(0.082, 0.021, 0.450, 0.447, 2.7, 2.1, 0.66, 0.32),
 }
 """An earlier estimate by other code, with its rounding errors put into rho_v."""
-
-STEP = float(np.log(40.0) / 24.0)
-"""Of the grid, in ln y."""
 
 AT_EQUAL_SIZE = {
     "other site": ((0.14, 0.05, 0.03, 0.11), 0, 0),
@@ -63,17 +60,9 @@ FEWEST = 100
 CELLS = (0.02, 0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95, 0.98)
 
 
-def placement(data: Outcomes, rows: Rows) -> Placement:
-    value = data.value
-    return Placement(
-        np.log(value["p"][rows]), np.log(value["y"][rows]),
-        data.event[rows], data.site[rows], data.motion[rows], data.polarity[rows],
-    )  # fmt: skip
-
-
-def dependence_columns(data: Outcomes, model: HeldOut) -> tuple[NDArray[np.generic], ...]:
+def dependence_columns(data: Outcomes, model: Study) -> tuple[NDArray[np.generic], ...]:
     return (
-        model.probability, data.failed, data.event, data.site, data.motion, data.polarity,
+        model.own, data.failed, data.event, data.site, data.motion, data.polarity,
         data.value["p2"], data.value["y"],
     )  # fmt: skip
 
@@ -156,12 +145,12 @@ class Line:
 
 
 def line(
-    data: Outcomes, model: HeldOut, laws: Sequence[Dependence], place: str, kind: str
+    data: Outcomes, model: Study, laws: Sequence[Dependence], place: str, kind: str
 ) -> Line | None:
     """Draw portfolios of one kind and predict them."""
     generator = np.random.default_rng(len(place) + len(kind))
     low, high = RANGES[kind]
-    p = model.probability
+    p = model.own
     usable = np.flatnonzero((p > low) & (p < high))
     by_event = [usable[data.event[usable] == event] for event in np.unique(data.event[usable])]
     asked = PORTFOLIOS[kind]
@@ -170,7 +159,7 @@ def line(
         some = portfolio(data, by_event, place, generator)
         if some is None:
             continue
-        law, blocks = laws[int(data.fold[some[0]])], placement(data, some)
+        law, blocks = laws[int(data.fold[some[0]])], data.placement(some)
         own, count = p[some], float(data.failed[some].sum())
         failures = FailureCount.of(own, blocks, law)
         drawn = JointSampler(law, blocks).counts(own, SAMPLES, generator)
@@ -193,18 +182,16 @@ def line(
     )  # fmt: skip
 
 
-def cells(
-    data: Outcomes, model: HeldOut, laws: Sequence[Dependence]
-) -> dict[str, tuple[float, int]]:
+def cells(data: Outcomes, model: Study, laws: Sequence[Dependence]) -> dict[str, tuple[float, int]]:
     """Return how many shares failing, by earthquake and class of P, are in their 95 % ranges."""
     generator = np.random.default_rng(0)
-    p, found = model.probability, []
+    p, found = model.own, []
     tails = (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL)
     for event in np.unique(data.event):
         rows = np.flatnonzero((data.event == event) & (p > CELLS[0]) & (p < CELLS[-1]))
         law = laws[int(data.fold[data.event == event][0])]
         kind = np.digitize(p[rows], CELLS) - 1
-        failed = JointSampler(law, placement(data, rows)).failures(p[rows], SAMPLES // 2, generator)
+        failed = JointSampler(law, data.placement(rows)).failures(p[rows], SAMPLES // 2, generator)
         motions = np.unique(data.motion[rows]).size
         for number in np.unique(kind):
             own = kind == number
@@ -234,28 +221,27 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--published", action="store_true", help="test the earlier estimate's copula instead"
     )
     chosen = options.parse_args(arguments)
-    data = read_outcomes(chosen.db)
-    models = [held_out(shape, data) for shape in SHAPES]
-    pairs = {one.shape.name: PairTables.of(*dependence_columns(data, one)) for one in models}
+    source, data = read(chosen.db)
+    models = [studied(source, data, name) for name in MODELS]
+    pairs = {one.name: PairTables.of(*dependence_columns(data, one)) for one in models}
     laws = {
         name: [PUBLISHED[name]] * FOLDS if chosen.published else of_folds(data, tables)
         for name, tables in pairs.items()
     }
     lines = {
-        (model.shape.name, place, kind): line(data, model, laws[model.shape.name], place, kind)
+        (model.name, place, kind): line(data, model, laws[model.name], place, kind)
         for kind in RANGES
         for place in PLACES
         for model in models
     }
-    shares = {model.shape.name: cells(data, model, laws[model.shape.name]) for model in models}
+    shares = {model.name: cells(data, model, laws[model.name]) for model in models}
     tables = {
-        "models": model_table(models),
         "parameters": parameter_table(data, models),
         "equal-size": equal_size_table(pairs),
         "counts": count_table(lines),
         "any": any_table(lines),
         "cells": cell_table(shares),
-        "asked": acceptance_table(marks(lines, shares)),
+        "aims": acceptance_table(marks(lines, shares)),
     }
     page = PAGE.read_text(encoding="utf-8") if chosen.write else ""
     for name, table in tables.items():
@@ -293,22 +279,7 @@ def equal_size_table(pairs: dict[str, PairTables]) -> str:
     return markdown((["pairs", *(f"{name} (earlier)" for name in pairs)], rows))
 
 
-def model_table(models: Sequence[HeldOut]) -> str:
-    """Return coefficients and log losses beside the earlier ones."""
-    head = ["model", "b", "earlier", "CR3 errors", "earlier", "log loss", "earlier"]
-
-    def words(values: Sequence[float] | FloatArray) -> str:
-        return " ".join(f"{one:.3f}" for one in values)
-
-    return markdown((head, [
-        [one.shape.name, words(one.coefficients), words(one.shape.coefficients),
-         words(one.errors), words(one.shape.errors), f"{one.log_loss:.4f}",
-         f"{one.shape.log_loss:.4f}"]
-        for one in models
-    ]))  # fmt: skip
-
-
-def parameter_table(data: Outcomes, models: Sequence[HeldOut]) -> str:
+def parameter_table(data: Outcomes, models: Sequence[Study]) -> str:
     """Return the estimates with their errors, each over the earlier one."""
     names = [field.name for field in fields(Dependence)]
     rows = []
@@ -316,11 +287,11 @@ def parameter_table(data: Outcomes, models: Sequence[HeldOut]) -> str:
         found = estimate_dependence(*dependence_columns(data, model))
         law = found.dependence
         rows.append([
-            model.shape.name,
+            model.name,
             *(f"{getattr(law, name):.3f} ± {found.errors[name]:.3f}" for name in names),
             " ".join(f"{pairs:,}" for pairs in found.pairs),
         ])  # fmt: skip
-        asked = PUBLISHED[model.shape.name]
+        asked = PUBLISHED[model.name]
         rows.append(["earlier", *(f"{getattr(asked, name):.3f}" for name in names), ""])
     return markdown((["model", *names, "pairs"], rows))
 

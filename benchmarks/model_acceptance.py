@@ -11,7 +11,7 @@ from rbfrag.bench.tables import markdown
 
 @dataclass(frozen=True)
 class Mark:
-    """One number that was asked for.
+    """One number that is aimed at.
 
     Args:
         model: whose number it is.
@@ -30,7 +30,7 @@ class Mark:
     also: tuple[str, bool] | None = None
 
     @property
-    def asked(self) -> str:
+    def aim(self) -> str:
         """The range in words."""
         if math.isinf(self.low):
             words = f"≤ {self.high:g}"
@@ -49,5 +49,5 @@ class Mark:
 
 def acceptance_table(marks: Sequence[Mark]) -> str:
     """Return the table of the page."""
-    head = ["model", "what", "asked", "reached"]
-    return markdown((head, [[m.model, m.words, m.asked, m.cell] for m in marks]))
+    head = ["model", "what", "aim", "reached"]
+    return markdown((head, [[m.model, m.words, m.aim, m.cell] for m in marks]))

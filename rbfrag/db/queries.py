@@ -13,7 +13,7 @@ from sqlalchemy import Connection, RowMapping, Select, and_, case, func, select
 
 from rbfrag.db.location import SCHEMA_REVISION
 from rbfrag.db.motions import require_suite
-from rbfrag.db.rows import CombinationTable
+from rbfrag.db.rows import SPECTRAL_COLUMNS, CombinationTable
 from rbfrag.db.schema import (
     combination,
     earthquake,
@@ -124,6 +124,7 @@ def combination_table(
     if not doubtful_pgd:
         pgd_m[np.array([_pgd_in_doubt(row) for row in kept], dtype=np.bool_)] = np.nan
     numbers = ("p2", "search_limit", "kr_over_pga", "kr", "y_m_s", "pga_g", "pgv_m_s", "tm_s")
+    numbers += SPECTRAL_COLUMNS
     others = ("event_id", "polarity", "status", "natural_key", "block")
     return CombinationTable(
         combination_id=np.array([row["id"] for row in kept], dtype=np.int64),
@@ -230,7 +231,7 @@ def _combination_query() -> Select[Any]:
         "id", "natural_key", "motion_id", "vertical_motion_id", "polarity", "p2", "block",
         "settings", "status", "search_limit", "kr_over_pga", "kr", "y_m_s",
     )  # fmt: skip
-    of_motion = ("pga_g", "pgv_m_s", "pgd_m", "tm_s", "flags")
+    of_motion = ("pga_g", "pgv_m_s", "pgd_m", "tm_s", *SPECTRAL_COLUMNS, "flags")
     return select(
         *(combination.c[name] for name in own),
         *(motion.c[name] for name in of_motion),

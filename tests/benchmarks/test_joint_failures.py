@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.held_out import MODELS, Outcomes
 from benchmarks.joint_failures import PLACES, PUBLISHED, Line, portfolio
-from benchmarks.joint_models import SHAPES, Outcomes
 
 
 def outcomes() -> Outcomes:
@@ -14,12 +14,14 @@ def outcomes() -> Outcomes:
     random = np.random.default_rng(0)
     motion = np.repeat(np.arange(7), 60)
     return Outcomes(
+        keys=(),
         failed=random.integers(2, size=420).astype(float),
         event=(motion == 6).astype(np.intp),
         site=motion // 2,
         motion=motion,
         polarity=np.tile((-1, 1), 210),
         fold=np.zeros(420, dtype=np.intp),
+        strength=np.zeros(420, dtype=np.intp),
         value={},
     )
 
@@ -65,4 +67,4 @@ def test_what_portfolios_are_judged_by() -> None:
 
 
 def test_every_model_has_an_earlier_copula() -> None:
-    assert [shape.name for shape in SHAPES] == list(PUBLISHED)
+    assert list(MODELS) == list(PUBLISHED)
