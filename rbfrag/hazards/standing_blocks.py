@@ -238,7 +238,8 @@ class ModelBlocks:
         """What the model and the curve's meaning take for granted."""
         block = self.model.method.block
         presumed = (block.presumes,) if self.model.kind == block.kind and block.presumes else ()
-        return (*self.shaking.warnings, *presumed, *self.model.notes)
+        advice = (self.model.term.advice,) if self.model.term.advice else ()
+        return (*self.shaking.warnings, *advice, *presumed, *self.model.notes)
 
     def placement(self) -> Placement:
         """Return the blocks as those of one site with unknown azimuths."""

@@ -38,10 +38,10 @@ def curve(shell: Shell) -> str:
 def test_one_block(shell: Shell, curve: str) -> None:
     found = shell.json("survival", curve, *BLOCK, "--age", "200")
     rate = shell.json("hazard", curve, *BLOCK)["annual_rate"]
-    assert found["annual_rate_any"] == pytest.approx(rate, rel=1e-5)
+    assert found["annual_rate_any"] == pytest.approx(rate, rel=1e-4)
     assert found["probability_standing"] == pytest.approx(math.exp(-200 * rate), rel=1e-4)
-    assert found["factor_5_percent"] == pytest.approx(math.log(20) / (200 * rate), rel=1e-5)
-    assert found["factor_50_percent"] == pytest.approx(math.log(2) / (200 * rate), rel=1e-5)
+    assert found["factor_5_percent"] == pytest.approx(math.log(20) / (200 * rate), rel=1e-4)
+    assert found["factor_50_percent"] == pytest.approx(math.log(2) / (200 * rate), rel=1e-4)
     (branch,) = found["branches"]
     assert (branch["weight"], branch["weight_given_standing"]) == (None, None)
     assert (found["bounds"], found["imt"], found["kind"]) == (None, "PGV", "toppling")
