@@ -128,7 +128,7 @@ def test_measures_that_the_model_does_not_read_are_judged_too(model: FragilityMo
     assert not beside.in_domain
     assert (
         "a PGV of 0.169 m/s does not go with a PGA of 0.906 g and a Tm of 1.4 s"
-        in (beside.warnings[0])
+        in (domain_sentences(beside)[0])
     )
 
 
@@ -158,9 +158,7 @@ def test_arrays_agree_with_scalars(fitted: FragilityModel, data: FitData) -> Non
     assert 20 < answer.in_domain.sum() < n - 20
     for i in range(n):
         alone = one(fitted, **{name: float(v[i]) for name, v in columns.items()})
-        assert [answer.probability[i], answer.ci_low[i], answer.ci_high[i]] == pytest.approx(
-            [alone.probability, alone.ci_low, alone.ci_high], rel=1e-12, abs=1e-250
-        )
+        assert answer.probability[i] == pytest.approx(alone.probability, rel=1e-12, abs=1e-250)
         assert answer.in_domain[i] == alone.in_domain
         of_model = len(fitted.notes)
         assert len(alone.warnings) - of_model == len([r for r in answer.reason[i].split("; ") if r])
