@@ -10,14 +10,17 @@ from scipy.special import expit, logit
 
 from benchmarks.held_out import Outcomes, outcomes, predictions, read, studied
 from benchmarks.model_choice import (
+    Model,
     Rows,
     calibration_slope,
     class_table,
     clustered_mean,
     data_table,
     difference_table,
+    domain_table,
     log_losses,
     score,
+    study,
     table_of_shares,
 )
 from rbfrag.db.location import REFERENCE
@@ -27,7 +30,9 @@ from rbfrag.fragility.fit.data import FitSource
 @pytest.fixture(scope="module")
 def some() -> tuple[FitSource, Outcomes]:
     source, _ = read(REFERENCE)
-    source = source.only(np.isin(source.table.p2, (10.0, 0.3)) & (source.table.motion_id % 3 == 0))
+    source = source.only(
+        np.isin(source.table.p2, (10.0, 1.0, 0.3)) & (source.table.motion_id % 3 == 0)
+    )
     return source, outcomes(source)
 
 
@@ -125,3 +130,22 @@ def test_half_of_the_motions_are_counted(some: tuple[FitSource, Outcomes]) -> No
     assert f"| horizontal motions | {sum(motions)} |" in table
     assert 1 < half < len(motions) / 2
     assert f"| earthquakes that hold half of the motions | {half} |" in table
+
+
+def test_every_aim_has_a_value(some: tuple[FitSource, Outcomes]) -> None:
+    aims = study(*some, aims_alone=True)["aims"].splitlines()
+    assert len(aims) == 2 + 4 * 6
+    assert "nan" not in "".join(aims)
+
+
+def test_models_of_one_range_stand_in_one_line() -> None:
+    nothing = np.zeros(0)
+    models = {
+        name: Model(name, nothing, {}, {"z": (0.1, 2.0), "pgv_m_s": (low, 1.0)})
+        for name, low in (("a", 0.1), ("b", 0.2))
+    }
+    assert domain_table(models).splitlines()[2:] == [
+        "| `pgv_m_s` | 0.1 to 1 | a |",
+        "| `pgv_m_s` | 0.2 to 1 | b |",
+        "| `z` | 0.1 to 2 | a, b |",
+    ]
