@@ -78,8 +78,7 @@ def spectral_acceleration(
     a = acceleration_g / scale
     z = _states(a, interval_s, root)
     moving = interval_s > 0.0
-    columns = (a[:-1], a[1:], interval_s, z[:-1], z[1:])
-    steps = _Steps(*(column[moving] for column in columns))
+    steps = _Steps(a[:-1][moving], a[1:][moving], interval_s[moving], z[:-1][moving], z[1:][moving])
     greatest = max(_free_vibration(complex(z[-1]), root), float(np.max(np.abs(z.imag))))
     return scale * omega * omega / root.imag * _within(steps, root, greatest)
 
