@@ -61,7 +61,6 @@ MODELS: tuple[dict[str, Any], ...] = (
     {"method": "lognormal", "term": "pgv"},
     {"method": "wls", "term": "pgv"},
     {"method": "bounded", "term": "pgv_kr"},
-    {"method": "bounded", "term": "pgv"},
     {"method": "bounded", "term": "pga_sa03_sa10_sa30"},
     {"method": "bounded", "term": "pga_sa10"},
     {"method": "logistic", "term": "sa10"},

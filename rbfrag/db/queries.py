@@ -124,14 +124,13 @@ def combination_table(
     if not doubtful_pgd:
         pgd_m[np.array([_pgd_in_doubt(row) for row in kept], dtype=np.bool_)] = np.nan
     numbers = ("p2", "search_limit", "kr_over_pga", "kr", "y_m_s", "pga_g", "pgv_m_s", "tm_s")
-    numbers += SPECTRAL_COLUMNS
     others = ("event_id", "polarity", "status", "natural_key", "block")
     return CombinationTable(
         combination_id=np.array([row["id"] for row in kept], dtype=np.int64),
         motion_id=np.array([row["motion_id"] for row in kept], dtype=np.int64),
         event_guessed=np.array([row["guessed"] for row in kept], dtype=np.bool_),
         pgd_m=pgd_m,
-        **{name: floats(name) for name in numbers},
+        **{name: floats(name) for name in (*numbers, *SPECTRAL_COLUMNS)},
         **{name: objects(name) for name in others},
     )
 

@@ -54,7 +54,7 @@ SCORES = {
 @pytest.mark.parametrize(("method", "term"), COEFFICIENTS)
 def test_shipped_models_score_what_is_asked(method: str, term: str) -> None:
     (row,) = (row for row in read_models(REFERENCE) if row.name == f"{method}-{term}")
-    assert list(row.coefficients.values()) == pytest.approx(COEFFICIENTS[method, term], abs=0.02)
+    assert list(row.coefficients.values()) == pytest.approx(COEFFICIENTS[method, term], abs=0.025)
     scores = row.diagnostics["scores"]
     assert isinstance(scores, dict)
     log_loss, least, greatest = SCORES[term]
