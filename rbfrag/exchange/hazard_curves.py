@@ -119,12 +119,12 @@ def suited_curves(
         for name in BEST_FIRST:
             chosen = [curve for curve in curves if curve.known_as == name]
             if chosen:
-                return [_said(curve, names) for curve in chosen]
+                return [_with_choice(curve, names) for curve in chosen]
     wanted = ANSWERED if converted_period_s is None else f"SA({converted_period_s:g})"
     raise InputError(f"the file has curves of {', '.join(names)}; wanted is one of {wanted}")
 
 
-def _said(curve: HazardCurve, names: list[str]) -> HazardCurve:
+def _with_choice(curve: HazardCurve, names: list[str]) -> HazardCurve:
     text = (
         f"of {', '.join(names)} the curve of {curve.imt} is taken, the measure that tells most of "
         "toppling by itself: choose another with --imt"
