@@ -144,6 +144,15 @@ ABOVE_TWICE_PGV = Bound(
     "is not below 2 PGV, which no excursion from rest exceeds: P = 0 by mechanics, not by the "
     "model",
 )
+_STRONG_KR = 0.3
+"""k_r in k' = ln(1 + k_r/0.3): a strong block needs a PGA above k_r, also where PGA is unknown."""
+
+
+def log_strength(v: Mapping[str, Any], ns: Numbers) -> Any:
+    """Return k' = ln(1 + k_r/0.3)."""
+    return ns.log(1.0 + v["kr"] / _STRONG_KR)
+
+
 ABOVE_SPECTRUM = Bound(
     lambda v: v["y_m_s"] >= v["intensity_m_s"],
     "y_m_s",
@@ -190,9 +199,10 @@ class BlockParameters:
         values = dict(given)
         if self.adjust is not None:
             self.adjust(values, ns)
-        values["intensity_m_s"] = term.intensity_m_s(values)
         if self.size is not None:
             values["p"] = p = ns.sqrt(values[self.size])
+        values["intensity_m_s"] = term.intensity_m_s(values)
+        if self.size is not None:
             values["y_m_s"] = values[self.strength] * STANDARD_GRAVITY_M_S2 / p
         return values
 
@@ -248,6 +258,8 @@ class Form:
         bounds: what mechanics forbids.
         start: where the search for the likeliest parameters begins; empty where none is needed.
         size_factor: what eta is multiplied by; None for nothing.
+        wide: fitted to the whole grid, on which the decided blocks are that PGV tells apart, and
+            judged on the part of it that the other forms read and are judged on too.
     """
 
     parameters: tuple[str, ...]
@@ -256,6 +268,7 @@ class Form:
     bounds: tuple[Bound, ...] = ()
     start: tuple[float, ...] = ()
     size_factor: SizeFactor | None = None
+    wide: bool = False
 
     def unscaled(
         self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers
