@@ -14,16 +14,20 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import Model, predict
+from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.annual_rate import checked_years, failure_rate, normal_steps, probability_in
+from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
 from rbfrag.hazards.conversions import component as component_named
-from rbfrag.hazards.conversions import velocity_conversion
-from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.curve import ANSWERED, HazardCurve
 
 FloatArray = NDArray[np.float64]
 
-_SCATTER_POINTS = 17
+_SCATTER_POINTS = 25
+_REACH = 6.0
+"""Standard deviations of the scatter that are integrated over, to both sides."""
+_STEP = 0.1
+"""Greatest step of the measure's logarithm."""
 _CHUNK = 512
 _NOTABLE = 0.01
 
@@ -73,8 +77,8 @@ def hazard(
     p2: ArrayLike,
     kr: ArrayLike,
     *,
-    tm_s: float | None = None,
     convert: str | None = None,
+    convert_sigma: float | None = None,
     component: str | None = None,
     years: float = 50.0,
     model: Model | None = None,
@@ -87,15 +91,18 @@ def hazard(
     λ_f = ∫ P(topples | x) (-dλ), see :func:`rbfrag.hazards.annual_rate.failure_rate`. The
     ends of the interval are the integrals of the ends of the fragility's own interval; since
     these are taken at every level at once, the interval is at least as wide as one from the
-    joint distribution of the parameters.
+    joint distribution of the parameters. The model is one of the curve's own measure: what else
+    shaking of that level may be is scatter in its P.
 
     Args:
-        curve: hazard curve of PGV, of PGA (with `tm_s`), or of a spectral acceleration
-            (with `convert`).
+        curve: hazard curve of PGV, PGA or a spectral acceleration at 0.3, 1, 2 or 3 s, or of one
+            that `convert` is for.
         p2: frequency parameters p² [1/s²], scalar or shape (m,).
         kr: toppling yield acceleration coefficients, scalar or shape (m,).
-        tm_s: mean period [s] of the shaking, for a PGA curve.
-        convert: name of a published conversion from spectral acceleration to PGV.
+        convert: name of a published conversion from spectral acceleration to PGV, whose scatter
+            is integrated.
+        convert_sigma: standard deviation of ln PGV about the conversion; None for that of the
+            motions of the shipped reference.
         component: what the curve's horizontal component means: single, geometric_mean,
             rotd50 or larger; None for single, with a warning.
         years: period for the probability [a].
@@ -106,14 +113,14 @@ def hazard(
             from it: one rate, by the mean of their fragilities.
 
     Raises:
-        InputError: the curve's measure does not suffice, or a value that cannot be used.
+        InputError: no model reads the curve's measure, or a value that cannot be used.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
     p2s, krs = (np.ravel(values) for values in np.broadcast_arrays(p2, kr))
     checked_years(years)
     warnings = list(curve.warnings)
-    name, factor, fixed = _measure(curve, tm_s, convert, warnings)
+    name, factor, spread = _measure(curve, convert, convert_sigma, warnings)
     meaning = component_named("single" if component is None else component)
     if component is None:
         warnings.append(
@@ -126,17 +133,21 @@ def hazard(
             if meaning.name != "single"
             else "the curve is of a single component, as the models are"
         )
-    xi, weight = normal_steps(1 if meaning.scatter == 0.0 else _SCATTER_POINTS)
-    shift = factor / meaning.ratio * np.exp(meaning.scatter * xi)
+    scatter = math.hypot(meaning.scatter, spread)
+    steps = max(_SCATTER_POINTS, 2 * math.ceil(_REACH * scatter / _STEP) + 1)
+    xi, weight = normal_steps(1 if scatter == 0.0 else steps, _REACH)
+    shift = factor / meaning.ratio * np.exp(scatter * xi)
 
-    chosen = find_model(model, ("p2", "kr", name, *fixed), db)
+    chosen = find_model(model, ("p2", "kr", name), db)
+    if chosen.term.advice:
+        warnings.append(chosen.term.advice)
     parts = []
     for start in range(0, 0 if one_class else p2s.size, _CHUNK):
         some = slice(start, start + _CHUNK)
 
         def bands(levels: FloatArray, some: slice = some) -> FloatArray:
             """Return P and the two ends of its interval for blocks x levels, stacked."""
-            shaking = {name: (levels[:, None] * shift).reshape(1, -1), **fixed}
+            shaking = {name: (levels[:, None] * shift).reshape(1, -1)}
             answer = _predicted(p2s[some, None], krs[some, None], shaking, chosen, level)
             stacked = np.concatenate([answer.probability, answer.ci_low, answer.ci_high])
             averaged: FloatArray = stacked.reshape(-1, levels.size, shift.size) @ weight
@@ -144,7 +155,7 @@ def hazard(
 
         parts.append((p2s[some].size, failure_rate(curve, bands)))
     if one_class:
-        mean = _mean_bands(curve, p2s, krs, name, shift, fixed, chosen, level)
+        mean = _mean_bands(curve, p2s, krs, name, shift, chosen, level)
         parts.append((1, failure_rate(curve, lambda levels: mean(levels) @ weight)))
 
     def joined(name: str, row: int = 0) -> FloatArray:
@@ -157,7 +168,7 @@ def hazard(
     above, above_at_most = joined("above"), joined("above_at_most")
     _tails(curve, rate, above, above_at_most, below, warnings)
     edges = parts[0][1].edges
-    shaking = {name: factor / meaning.ratio * np.sqrt(edges[None, 1:] * edges[None, :-1]), **fixed}
+    shaking = {name: factor / meaning.ratio * np.sqrt(edges[None, 1:] * edges[None, :-1])}
     outside = ~_predicted(p2s[:, None], krs[:, None], shaking, chosen, level).in_domain
     if one_class:
         outside = outside.mean(axis=0, keepdims=True)
@@ -187,43 +198,49 @@ def hazard(
 
 
 def _measure(
-    curve: HazardCurve, tm_s: float | None, convert: str | None, warnings: list[str]
-) -> tuple[str, float, dict[str, float]]:
-    """Return predict's argument, the factor from the curve's unit, and other arguments."""
-    if convert is not None and curve.measure != "sa_g":
+    curve: HazardCurve, convert: str | None, sigma: float | None, warnings: list[str]
+) -> tuple[str, float, float]:
+    """Return predict's argument, the factor from the curve's unit, and the scatter about it."""
+    if convert is None:
+        if sigma is not None:
+            raise InputError("--convert-sigma belongs to --convert: leave it out")
+        if curve.known_as is None:
+            raise InputError(_no_model(curve))
+        return curve.known_as, 1.0, 0.0
+    if curve.measure != "sa_g":
         raise InputError(
             f"{curve.source}: --convert {convert} is for spectral accelerations; the curve is of "
             f"{curve.imt}"
         )
-    if curve.measure == "pgv_m_s":
-        if tm_s is not None:
-            warnings.append("the mean period is not used: a PGV curve answers by itself")
-        return "pgv_m_s", 1.0, {}
-    if curve.measure == "pga_g":
-        if tm_s is None:
-            raise InputError(
-                f"{curve.source}: PGA alone does not say whether a block topples: give the mean "
-                "period with --tm, or a curve of PGV"
-            )
-        warnings.append(f"the mean period {tm_s:g} s is taken to be the same at every PGA")
-        return "pga_g", 1.0, {"tm_s": tm_s}
-    if convert is None:
-        raise InputError(
-            f"{curve.source}: the models know PGV, not {curve.imt}: give a curve of PGV, or ask "
-            "for a published conversion with --convert newmark_hall_1982 (SA(1)) or "
-            "bommer_alarcon_2006 (SA(0.5))"
-        )
     used = velocity_conversion(convert)
-    if curve.period_s is None or abs(curve.period_s - used.period_s) > 1e-9:
+    if not curve.is_of(used.period_s):
         raise InputError(
             f"{curve.source}: {used.name} is for SA({used.period_s:g}), not for {curve.imt}: "
             f"choose the curve with --imt 'SA({used.period_s:g})'"
         )
+    spread = used.scatter if sigma is None else sigma
+    if not 0.0 < spread < math.inf:
+        raise InputError(
+            f"--convert-sigma = {spread:g}: give the standard deviation of ln PGV about the "
+            "conversion, above zero; no conversion is without scatter"
+        )
     warnings.append(
-        f"PGV = {used.factor:.4g} m/s per g times {curve.imt}: {used.source}; the scatter of this "
-        "conversion is not in the answer"
+        f"PGV = {used.factor:.4g} m/s per g times {curve.imt} in the median ({used.source}); "
+        f"ln PGV scatters about it by {spread:g}, which is integrated"
     )
-    return "pgv_m_s", used.factor, {}
+    if curve.known_as is not None:
+        warnings.append(
+            f"there are models of {curve.imt} itself: without --convert nothing is converted"
+        )
+    return "pgv_m_s", used.factor, spread
+
+
+def _no_model(curve: HazardCurve) -> str:
+    also = [item.name for item in CONVERSIONS.values() if curve.is_of(item.period_s)]
+    converted = f", or convert it to PGV with --convert {' or '.join(also)}" if also else ""
+    return (
+        f"{curve.source}: no model reads {curve.imt}: give a curve of one of {ANSWERED}{converted}"
+    )
 
 
 def _mean_bands(
@@ -232,7 +249,6 @@ def _mean_bands(
     kr: FloatArray,
     name: str,
     shift: FloatArray,
-    fixed: dict[str, float],
     model: FragilityModel,
     level: float,
 ) -> Callable[[FloatArray], FloatArray]:
@@ -249,7 +265,7 @@ def _mean_bands(
     total = np.zeros((3, u.size))
     for start in range(0, p2.size, _CHUNK):
         some = slice(start, start + _CHUNK)
-        shaking = {name: np.exp(u)[None, :], **fixed}
+        shaking = {name: np.exp(u)[None, :]}
         answer = _predicted(p2[some, None], kr[some, None], shaking, model, level)
         bands_of = (answer.probability, answer.ci_low, answer.ci_high)
         total += np.array([values.sum(axis=0) for values in bands_of])
@@ -266,7 +282,7 @@ def _mean_bands(
 def _predicted(
     p2: FloatArray, kr: FloatArray, shaking: dict[str, Any], model: FragilityModel, level: float
 ) -> PredictionArray:
-    answer = predict(p2, kr, **shaking, model=model, level=level)
+    answer = answer_given(model, {"p2": p2, "kr": kr, **shaking}, level)
     assert isinstance(answer, PredictionArray)
     return answer
 

@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.measures import SPECTRAL
 
 FloatArray = NDArray[np.float64]
 
 MEASURES = ("pga_g", "pgv_m_s", "sa_g")
 """What the levels of a curve may be, with the unit."""
+
+ANSWERED = ", ".join(["PGV", "PGA", *(f"SA({period:g})" for period in SPECTRAL)])
+"""The measures whose curves are answered, each by a model of that very measure."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +54,18 @@ class HazardCurve:
         if self.measure == "sa_g":
             return f"SA({self.period_s:g})"
         return self.measure.split("_")[0].upper()
+
+    @property
+    def known_as(self) -> str | None:
+        """Name of the measure in `predict`; None where no model reads it."""
+        if self.measure != "sa_g":
+            return self.measure
+        of_period = (name for period, name in SPECTRAL.items() if self.is_of(period))
+        return next(of_period, None)
+
+    def is_of(self, period_s: float) -> bool:
+        """Return whether the levels are spectral accelerations of a period [s]."""
+        return self.period_s is not None and abs(self.period_s - period_s) < 1e-9
 
     @property
     def place(self) -> str:
