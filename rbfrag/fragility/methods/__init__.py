@@ -72,9 +72,17 @@ def arrays() -> Numbers:
 
     def step_sums(errors: Any, x: Sequence[Any]) -> tuple[Any, Any]:
         # more terms than earthquakes: here the products are faster than the polynomials
-        squares = np.array(errors.steps) @ np.stack(np.broadcast_arrays(*x))
-        squares *= squares
-        return squares.sum(axis=0), np.einsum("en,en->n", squares, squares)
+        steps, columns = np.array(errors.steps), np.stack(np.broadcast_arrays(*x))
+        total, fourths = np.empty((2, columns.shape[1]))
+        # so few at a time stay near the processor, and BLAS starts no threads of its own
+        for start in range(0, columns.shape[1], 512):
+            part = slice(start, start + 512)
+            squares = steps @ columns[:, part]
+            squares *= squares
+            np.add.reduce(squares, axis=0, out=total[part])
+            squares *= squares
+            np.add.reduce(squares, axis=0, out=fourths[part])
+        return total, fourths
 
     return Numbers(
         np.log, np.exp, np.sqrt, ndtr, np.expm1, np.maximum, np.minimum, np.sin, np.cos,
@@ -169,6 +177,8 @@ class BlockParameters:
         adjust: changes the values by what is stated so, before anything reads them.
         refuses: the combinations of values that no block has.
         doubts: the combinations that make an answer doubtful.
+        presumes: what answers for its own kind take for granted of how a block stands; empty for
+            nothing.
     """
 
     names: tuple[str, ...]
@@ -181,6 +191,7 @@ class BlockParameters:
     adjust: Callable[[dict[str, Any], Numbers], None] | None = None
     refuses: tuple[Bound, ...] = ()
     doubts: tuple[Bound, ...] = ()
+    presumes: str = ""
 
     def completed(self, given: Mapping[str, Any], term: Term, ns: Numbers) -> dict[str, Any]:
         """Return the given values with what formulas read.
@@ -205,7 +216,11 @@ NOT_LIFTED = Bound(
     "is not below PGA: without vertical motion the ground cannot lift this block, P = 0 by "
     "mechanics, not by the model",
 )
-TOPPLING_BLOCK = BlockParameters(("p2", "kr"), "toppling", "kr", "p2", NOT_LIFTED)
+TOPPLING_BLOCK = BlockParameters(
+    ("p2", "kr"), "toppling", "kr", "p2", NOT_LIFTED,
+    presumes="the block is taken to be backed by a slope; one that stands free rocks about both "
+    "edges and overturns in weaker shaking",
+)  # fmt: skip
 """Blocks known by p² [1/s²] and the yield acceleration coefficient k_r."""
 
 
