@@ -43,6 +43,12 @@ def formats_dir() -> Path:
     return _folder("RBFRAG_TEST_FORMATS", "../shared/formats")
 
 
+@pytest.fixture(scope="session")
+def shaketable_dir() -> Path:
+    """Folder of tests on a shake table (docs/evidence/shake-table.md)."""
+    return _folder("RBFRAG_TEST_SHAKETABLE", "../shared/shaketable")
+
+
 @pytest.fixture(params=DIALECTS)
 def place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
     """Where a database is to be made: a path, or a schema of its own on a server."""
