@@ -233,7 +233,7 @@ def answer_with_findings(
 def _never(model: FragilityModel) -> Answer:
     """Return the answer where a single number is ruled: P = 0."""
     of_event = None if model.event_spread is None else 0.0
-    return Answer(0.0, 0.0, 0.0, of_event, of_event, None)
+    return Answer(0.0, 0.0, 0.0, of_event, of_event, None, None)
 
 
 def _not(condition: Any) -> Any:

@@ -16,7 +16,6 @@ from rbfrag.fragility.intervals import ParameterErrors, Quantiles, packed
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, TERMS, Term
 from rbfrag.fragility.methods import (
     TOPPLING_BLOCK,
-    Eta,
     Form,
     Method,
     Numbers,
@@ -53,6 +52,7 @@ class Answer(NamedTuple):
             does not know it.
         event_high: upper end of it.
         eta: argument of the link; None where nothing had to be evaluated.
+        log_sigma: logarithm of the scatter, of models that have one.
     """
 
     probability: Any
@@ -60,7 +60,8 @@ class Answer(NamedTuple):
     high: Any
     event_low: Any
     event_high: Any
-    eta: Eta | None
+    eta: Any
+    log_sigma: Any
 
 
 @dataclass(frozen=True)
@@ -258,16 +259,16 @@ class FragilityModel:
         eta = unscaled.eta * h
         link = self.method.link.probability
         middle = link(eta, ns)
-        formula = unscaled._replace(eta=eta)
+        log_sigma = unscaled.log_sigma
         if quantiles is None:
-            return Answer(middle, None, None, None, None, formula)
+            return Answer(middle, None, None, None, None, eta, log_sigma)
         reach = h * self.errors.half_width(unscaled.slopes, quantiles, ns)
         low, high = link(eta - reach, ns), link(eta + reach, ns)
         spread = self.event_spread
         if spread is None:
-            return Answer(middle, low, high, None, None, formula)
-        ends = spread.ends(ns.ndtri(middle), quantiles.normal, ns.ndtr)
-        return Answer(middle, low, high, *ends, formula)
+            return Answer(middle, low, high, None, None, eta, log_sigma)
+        event_low, event_high = spread.ends(ns.ndtri(middle), quantiles.normal, ns.ndtr)
+        return Answer(middle, low, high, event_low, event_high, eta, log_sigma)
 
 
 def _fit_line(row: ModelRow) -> str:

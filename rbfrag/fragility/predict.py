@@ -371,11 +371,11 @@ def _predict_one(
         judgement, sentences = _answer_with_diagnostics(model, given, quantiles)
         answer, values, x, _, in_domain, _ = judgement
         warnings = (*warnings, *sentences)
-    probability, low, high, event_low, event_high, eta = answer
+    probability, low, high, event_low, event_high, eta, log_sigma = answer
     median = None
     if method.median_of is not None and eta is not None:
         # the asked value, not the one that is adjusted for the base's dip
-        median = given[method.median_of] * math.exp(eta.eta * math.exp(eta.log_sigma))
+        median = given[method.median_of] * math.exp(eta * math.exp(log_sigma))
     return Prediction(
         model.row.kind,
         probability,

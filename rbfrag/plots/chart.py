@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,8 +11,15 @@ import numpy as np
 
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import BLUE, logarithmic, new_figure, plot_path, save_figure, spread_out
-from rbfrag.plots.model_lines import MORE_TERMS, HeldMeasures, failure_line, held_measures
+from rbfrag.plots.model_lines import (
+    MORE_TERMS,
+    HeldMeasures,
+    failure_line,
+    held_measures,
+    model_answers,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +35,9 @@ _LABEL_APART = 0.026
 """Least distance of labels, of the height of the sheet."""
 
 _POINTS = 300
+_NODES = 241
+"""Values along each axis at which the chart asks whether it was fitted there."""
+
 _SPAN = 1.6
 """Factor by which the sheet goes beyond the fitted range."""
 
@@ -63,7 +74,10 @@ def plot_chart(
     for probability, y in lines.items():
         axes.plot(x, y, color=BLUE, lw=1.9 if probability in _BOLD else 0.9)
     _write_beside(axes, x, lines)
-    _shade_outside(axes, held.fitted_range(model, low, high), domain.get("y_m_s"))
+    if held.words:
+        _shade_where_not_fitted(axes, model, held)
+    else:
+        _shade_outside(axes, (low, high), domain.get("y_m_s"))
     axes.set_xlabel(TERMS["pgv"].label if model.term.name in MORE_TERMS else model.term.label)
     axes.set_ylabel("toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
     axes.grid(visible=True, which="major", lw=0.6, color="#9a9a9a")
@@ -115,6 +129,16 @@ def _shade_outside(axes: Axes, across: tuple[float, float], up: tuple[float, flo
     if up is not None:
         axes.axhspan(bottom, max(float(up[0]), bottom), **shade)
         axes.axhspan(min(float(up[1]), top), top, **shade)
+
+
+def _shade_where_not_fitted(axes: Axes, model: FragilityModel, held: HeldMeasures) -> None:
+    """Shade where block and motion, with what is held, are not of the fitted ones together."""
+    x, y = (np.geomspace(*ends, _NODES) for ends in (axes.get_xlim(), axes.get_ylim()))
+    across, up = np.meshgrid(x, y)
+    kr = up * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
+    inside = model_answers(model, held.p2, kr, held.measures(model, across)).in_domain
+    outside = np.where(inside, 0.0, 1.0)
+    axes.contourf(x, y, outside, [0.5, 1.5], colors="#8a8a8a", alpha=0.25, zorder=0.5)
 
 
 def _caption(model: FragilityModel, held: HeldMeasures) -> str:

@@ -92,22 +92,6 @@ class HeldMeasures:
             measures["tm_s"] = np.full(x_m_s.shape, self.tm_s)
         return measures
 
-    def fitted_range(
-        self, model: FragilityModel, low_m_s: float, high_m_s: float
-    ) -> tuple[float, float]:
-        """Return where PGV [m/s] is fitted: in its range, and PGV/PGA in its own where PGA is held.
-
-        Args:
-            model: the model.
-            low_m_s: lower edge of the fitted intensities [m/s].
-            high_m_s: upper edge.
-        """
-        if self.pga_g is None:
-            return low_m_s, high_m_s
-        ground = self.pga_g * STANDARD_GRAVITY_M_S2
-        low, high = (float(edge) * ground for edge in model.row.domain["pgv_over_pga_s"])
-        return max(low_m_s, low), max(min(high_m_s, high), max(low_m_s, low))
-
 
 def held_measures(
     model: FragilityModel,

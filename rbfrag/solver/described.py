@@ -45,6 +45,11 @@ TAKEN_TO_TOPPLE = (
     "mode is checked"
 )
 
+NOT_BACKED = (
+    "no plane backs the block: free-standing, it rocks on both corners and fails at weaker shaking "
+    "than this model says; respond runs it as it stands (docs/theory/rocking.md)"
+)
+
 TAKEN_NOT_TO_SLIP = (
     "no friction angle is given: the corners of the free-standing rectangle are taken not to slip"
 )
@@ -205,7 +210,7 @@ def numbers_of_kind(
     Raises:
         InputError: the block is of another mode, or no earthquake decides about it.
     """
-    from rbfrag.solver.kinds import model_of_kind
+    from rbfrag.solver.kinds import model_of_kind, stands_free_of
     from rbfrag.solver.mechanism import shaken_mechanism
     from rbfrag.solver.stability.single import stability
 
@@ -215,8 +220,10 @@ def numbers_of_kind(
     described = described.without_kv()
     origin = described.origin
     topples = "kr" in model.parameters
+    backed = described.conditions.get("back_fracture", True)
+    unbacked = (NOT_BACKED,) if stands_free_of(model, backed) else ()
     if described.only_topples and topples:
-        return toppling_rectangle(described), (TAKEN_TO_TOPPLE,)
+        return toppling_rectangle(described), (TAKEN_TO_TOPPLE, *unbacked)
     block, conditions = described.on_planes()
     result = stability(block, **conditions)
     yields = f"(yield {result.yield_acceleration:.4g} g"
@@ -251,7 +258,7 @@ def numbers_of_kind(
                 f"{origin}cohesion_pa does not go with {kind}: the first slip breaks it"
             )
         values["beta_deg"] = result.beta_deg
-    return values, result.warnings
+    return values, (*result.warnings, *unbacked)
 
 
 def toppling_rectangle(described: DescribedBlock) -> dict[str, float]:

@@ -42,3 +42,15 @@ def model_of_mode(mode: ModeName, *, back_fracture: bool = True) -> Kind:
     of_mode = [model for model in models().values() if model.mode == mode]
     # False comes first: the model that fits, or the only one there is
     return min(of_mode, key=lambda model: model.free_standing == back_fracture)
+
+
+def stands_free_of(model: Kind, back_fracture: bool) -> bool:
+    """Return whether a block is asked of a model of backed blocks though nothing backs it.
+
+    Args:
+        model: the model that is asked.
+        back_fracture: whether there is a plane behind the block.
+    """
+    if back_fracture or model.free_standing or model.mode is None:
+        return False
+    return model_of_mode(model.mode, back_fracture=False).free_standing

@@ -10,8 +10,9 @@ from typing import Any
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.described import NOT_BACKED
 from rbfrag.solver.kind import BlockOnPlanes, Kind, Shaking
-from rbfrag.solver.kinds import model_of_kind, model_of_mode
+from rbfrag.solver.kinds import model_of_kind, model_of_mode, stands_free_of
 from rbfrag.solver.quantity import angle, positive
 from rbfrag.solver.results import Polarity, Response
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
@@ -175,7 +176,8 @@ def _site(
 def _remarks(judged: Stability, model: Kind) -> tuple[str, ...]:
     """Return what is known about the block that the answer of a model should say."""
     if model.mode == judged.mode:
-        return judged.warnings
+        unbacked = stands_free_of(model, judged.back_fracture)
+        return (*judged.warnings, NOT_BACKED) if unbacked else judged.warnings
     return (
         *judged.warnings,
         f"the mode of the block is {words_of_mode(judged.mode)}: by it, {model.kind} is not what "

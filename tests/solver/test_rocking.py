@@ -17,6 +17,7 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.described import DescribedBlock, numbers_of_kind
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.models.rocking import free_block
 from rbfrag.solver.respond import block_of_numbers
@@ -356,6 +357,11 @@ def test_without_a_back_plane_a_block_that_topples_rocks() -> None:
     alone = rbfrag.respond(motion, block=block, back_fracture=False, **planes)
     assert alone.kind == "rocking"
     assert alone.impacts > 0
+    backed = rbfrag.respond(motion, block=block, back_fracture=False, kind="toppling", **planes)
+    assert any("no plane backs the block" in text for text in backed.warnings)
+    assert not any("no plane backs" in text for text in alone.warnings)
+    described = DescribedBlock(block, {**planes, "back_fracture": False})
+    assert any("no plane backs" in text for text in numbers_of_kind(described, "toppling")[1])
     assert rbfrag.respond(motion, p2=3.0, kr=0.2).kind == "toppling"
     flat = Block.from_fractures(1.0, 2.0, 90.0)
     slides = rbfrag.respond(motion, block=flat, beta_deg=20.0, phi_deg=30.0, back_fracture=False)

@@ -124,10 +124,12 @@ def respond(
         _draw(response, files.plot, p2, what.get("kr"), ground.label, direction.reverse)
     if files.animate is not None and body is not None:
         from rbfrag.plots.film import film
+        from rbfrag.solver.kinds import model_of_kind
 
+        backed = not model_of_kind(response.kind).free_standing
         film(
             response, body, files.animate, beta_deg=what["beta_deg"],
-            exaggerate=files.exaggerate, back_fracture=what.get("back_fracture", True),
+            exaggerate=files.exaggerate, back_fracture=backed and what.get("back_fracture", True),
             title=ground.label,
         )  # fmt: skip
     answer = response_as_dict(response)

@@ -36,8 +36,8 @@ class Numbers(NamedTuple):
         sin: sine of an angle [rad].
         cos: its cosine.
         ndtri: its inverse.
-        fourth_powers: Σ (x·d)⁴ over the steps d of parameters that leave earthquakes out, from
-            :class:`rbfrag.fragility.intervals.ParameterErrors` and the slopes x.
+        step_sums: Σ (x·d)² and Σ (x·d)⁴ over the steps d of parameters that leave earthquakes
+            out, from :class:`rbfrag.fragility.intervals.ParameterErrors` and the slopes x.
     """
 
     log: Callable[[Any], Any]
@@ -50,7 +50,7 @@ class Numbers(NamedTuple):
     sin: Callable[[Any], Any]
     cos: Callable[[Any], Any]
     ndtri: Callable[[Any], Any]
-    fourth_powers: Callable[[Any, Sequence[Any]], Any]
+    step_sums: Callable[[Any, Sequence[Any]], tuple[Any, Any]]
 
 
 def _exp(x: float) -> float:
@@ -59,7 +59,7 @@ def _exp(x: float) -> float:
 
 SINGLE = Numbers(
     math.log, _exp, math.sqrt, normal_share, math.expm1, max, min, math.sin, math.cos,
-    normal_quantile, lambda errors, x: errors.fourth_powers(*x),
+    normal_quantile, lambda errors, x: errors.step_sums(*x),
 )  # fmt: skip
 """For single numbers."""
 
@@ -70,15 +70,15 @@ def arrays() -> Numbers:
     import numpy as np
     from scipy.special import ndtr, ndtri
 
-    def fourth_powers(errors: Any, x: Sequence[Any]) -> Any:
-        # more terms than earthquakes: here the products are faster than the polynomial
+    def step_sums(errors: Any, x: Sequence[Any]) -> tuple[Any, Any]:
+        # more terms than earthquakes: here the products are faster than the polynomials
         squares = np.array(errors.steps) @ np.stack(np.broadcast_arrays(*x))
         squares *= squares
-        return np.einsum("en,en->n", squares, squares)
+        return squares.sum(axis=0), np.einsum("en,en->n", squares, squares)
 
     return Numbers(
         np.log, np.exp, np.sqrt, ndtr, np.expm1, np.maximum, np.minimum, np.sin, np.cos,
-        ndtri, fourth_powers,
+        ndtri, step_sums,
     )  # fmt: skip
 
 
