@@ -2,10 +2,9 @@
 
     python -m benchmarks.other_kinds DATABASE [--write]
 
-reads the campaigns of a database (toppling, slumping by 2 degrees and past recovery, sliding; with
-samples, for Arias intensity), fits the models, compares them with published regressions, and writes
-the tables and the figure of docs/theory/other-kinds.md. Toppling may be in another database, such
-as the shipped one.
+reads the campaigns of a database (toppling, slumping by 2 degrees and past recovery, sliding), fits
+the models, compares them with published regressions, and writes the tables and the figure of
+docs/theory/other-kinds.md. Toppling may be in another database, such as the shipped one.
 """
 
 from __future__ import annotations
@@ -160,7 +159,7 @@ def tables(database: str, toppling: str | None) -> tuple[dict[str, str], tuple[F
     sliding, recovery = slides["pgv_pga"], slumps[None, "pgv_pga"]
     rows = []
     for fit in slides.values():
-        for variable, edges in (("k/PGA", RATIOS), ("d [m]", DISTANCES)):
+        for variable, edges in (*_ratio_classes(fit), ("d [m]", DISTANCES)):
             rows += class_lines(_name(fit), fit.result.held_out, fit.data, variable, edges)
     found["sliding-classes"] = markdown((CLASS_HEADS, rows))
     rows = [scored(_name(fit), fit.result.held_out, fit.data) for fit in slumps.values()]
@@ -170,7 +169,8 @@ def tables(database: str, toppling: str | None) -> tuple[dict[str, str], tuple[F
     found["slumping-scores"] = markdown((heads, rows))
     rows = []
     for fit in slumps.values():
-        for variable, edges in (("k/PGA", RATIOS), ("p_s² [1/s²]", SIZES), ("k_s", STRENGTHS)):
+        classes = (*_ratio_classes(fit), ("p_s² [1/s²]", SIZES), ("k_s", STRENGTHS))
+        for variable, edges in classes:
             rows += class_lines(_name(fit), fit.result.held_out, fit.data, variable, edges)
     found["slumping-classes"] = markdown((CLASS_HEADS, rows))
     cells = [
@@ -179,6 +179,11 @@ def tables(database: str, toppling: str | None) -> tuple[dict[str, str], tuple[F
     heads = ["critical values", "between blocks under one motion", "between motions"]
     found["y-scatter"] = markdown((heads, cells))
     return found, (sliding, recovery)
+
+
+def _ratio_classes(fit: Fitted) -> tuple[tuple[str, tuple[float, ...]], ...]:
+    # a model that does not read PGA cannot be level over a ratio to it
+    return (("k/PGA", RATIOS),) if "pga_g" in fit.report.model.term.inputs else ()
 
 
 def _name(fit: Fitted) -> str:

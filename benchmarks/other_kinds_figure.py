@@ -81,7 +81,8 @@ def _slumps(axes: Any, model: FragilityModel, data: FitData) -> None:
     v = data.values
     r = v["ks"] / v["pga_g"]
     z = np.sqrt(v["ps2"]) * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2)
-    excess = (1.0 - r) / r
+    c, b, d, s0 = model.parameters
+    excess = (1.0 - r) / r * v["ks"] ** d
     for chosen, colour, text in (
         (~data.observed, "#7fb2d8", "not failed before the model ends"),
         (data.observed, "#8a8a8a", "fails"),
@@ -89,7 +90,6 @@ def _slumps(axes: Any, model: FragilityModel, data: FitData) -> None:
         axes.plot(z[chosen], excess[chosen], ".", ms=1.8, color=colour, alpha=0.5, rasterized=True)
         axes.plot([], [], "o", ms=4, color=colour, label=text)
     grid = np.geomspace(float(z.min()), float(z.max()), 60)
-    c, b, s0 = model.parameters
     for side in (-1.645, 0.0, 1.645):
         axes.plot(
             grid, np.exp(c - b * np.log(grid) + side * np.exp(s0)),
@@ -101,6 +101,6 @@ def _slumps(axes: Any, model: FragilityModel, data: FitData) -> None:
     written_numbers(axes.xaxis, 1.0, 2.0, 5.0)
     written_numbers(axes.yaxis, 1.0)
     axes.set_xlabel(r"$z = p_s\,\mathrm{PGV}/(\mathrm{PGA}\,g)$")
-    axes.set_ylabel(r"$(1-r)/r$ at failure, $r=k_s/\mathrm{PGA}$")
+    axes.set_ylabel(rf"$(1-r)/r\cdot k_s^{{{d:.2f}}}$ at failure, $r=k_s/\mathrm{{PGA}}$")
     axes.set_title("slumping past recovery", fontsize=10)
     axes.legend(loc="upper right", fontsize=8, frameon=False)

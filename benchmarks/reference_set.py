@@ -16,6 +16,9 @@ import sqlite3
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from itertools import repeat
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +35,11 @@ from rbfrag.db.check.database import check_database
 from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import update_rows
 from rbfrag.db.location import REFERENCE
+from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import save_model
 from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.fit.report import FitReport
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.solver.results import NUMERICS_VERSION
 from rbfrag.version import __version__
 
@@ -55,6 +60,14 @@ MODELS: tuple[dict[str, Any], ...] = (
     {"method": "bounded", "term": "pgv"},
     {"method": "lognormal", "term": "pgv"},
     {"method": "wls", "term": "pgv"},
+    {"method": "bounded", "term": "pgv_kr"},
+    {"method": "bounded", "term": "pga_sa03_sa10_sa30"},
+    {"method": "bounded", "term": "pga_sa10"},
+    {"method": "logistic", "term": "sa10"},
+    {"method": "logistic", "term": "sa20"},
+    {"method": "logistic", "term": "sa30"},
+    {"method": "logistic", "term": "sa03"},
+    {"method": "bounded", "term": "pga"},
     {"method": "logistic", "term": "pga_tm"},
     {"method": "logistic", "term": "pgd_tm"},
     {"kind": "sliding", "term": "pgv_pga"},
@@ -95,7 +108,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     reduce(full, made)
     reports = []
     if not chosen.without_models:
-        reports = [*add_models(made, made, MODELS), *add_models(full, made, MODELS_OF_ALL)]
+        reports = add_models(made, made, MODELS, chosen.jobs)
+        reports += add_models(full, made, MODELS_OF_ALL, chosen.jobs)
     pack(made)
     examine(made)
     chosen.out.parent.mkdir(parents=True, exist_ok=True)
@@ -150,15 +164,23 @@ def pack(made: Path) -> None:
     raw.close()
 
 
-def add_models(source: Path, made: Path, models: Sequence[dict[str, Any]]) -> list[FitReport]:
+def add_models(
+    source: Path, made: Path, models: Sequence[dict[str, Any]], jobs: int | None
+) -> list[FitReport]:
     """Fit models to one database, without vertical motion, and store them in what is shipped."""
-    reports = []
-    for asked in models:
-        reports.append(fit(source, **asked))
-        with opened_database(made) as engine, engine.begin() as connection:
-            save_model(connection, reports[-1].model.row, replace=True)
-        print(f"fitted {reports[-1].name}", file=sys.stderr, flush=True)
-    return reports
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        rows = list(pool.map(fitted_row, repeat(source), models))
+    with opened_database(made) as engine, engine.begin() as connection:
+        for row in rows:
+            save_model(connection, row, replace=True)
+    return [FitReport.from_model(FragilityModel.from_row(row)) for row in rows]
+
+
+def fitted_row(source: Path, options: dict[str, Any]) -> ModelRow:
+    """Return one model, fitted in a process of its own."""
+    row = fit(source, **options).model.row
+    print(f"fitted {row.name}", file=sys.stderr, flush=True)
+    return row
 
 
 def examine(made: Path) -> None:

@@ -36,7 +36,7 @@ class Slides:
     """Blocks that slide, one row each.
 
     Args:
-        values: `ky`, `pga_g`, `pgv_m_s`, `arias_m_s`, `magnitude` (NaN where not known).
+        values: `ky`, `pga_g`, `pgv_m_s`, `arias_m_s`, `magnitude`, NaN where not known.
         displacement_m: how far they slide on a level plane [m].
         event: number of the earthquake.
     """
@@ -61,7 +61,7 @@ class Slides:
         of_row = {
             "pga_g": table.pga_g,
             "pgv_m_s": table.pgv_m_s,
-            "arias_m_s": np.array([arias_m_s[i] for i in table.motion_id.tolist()]),
+            "arias_m_s": np.array([arias_m_s.get(i, np.nan) for i in table.motion_id.tolist()]),
             "magnitude": np.array([magnitude.get(e, np.nan) for e in table.event_id.tolist()]),
         }
         columns = {name: np.broadcast_to(v[:, None], k.shape) for name, v in of_row.items()}
@@ -91,17 +91,12 @@ def larger_of_two(source: FitSource) -> FitSource:
 
 
 def arias_of_motions(connection: Connection) -> dict[int, float]:
-    """Return Arias intensity by motion [m/s], exact for straight lines between samples."""
+    """Return the Arias intensity of each motion that has one [m/s]."""
     motion = schema.motion.c
-    rows = connection.execute(select(motion.id, motion.dt_s, motion.samples))
-    return {row.id: arias_m_s(row.samples, row.dt_s) for row in rows if row.samples is not None}
-
-
-def arias_m_s(samples: bytes, dt_s: float) -> float:
-    """Return (π/2g) ∫ a² dt of samples in g, as stored [m/s]."""
-    a = np.frombuffer(samples, "<f8") * STANDARD_GRAVITY_M_S2
-    squares = (a[:-1] ** 2 + a[:-1] * a[1:] + a[1:] ** 2) / 3.0
-    return float(np.pi / (2.0 * STANDARD_GRAVITY_M_S2) * dt_s * squares.sum())
+    rows = connection.execute(
+        select(motion.id, motion.arias_m_s).where(motion.arias_m_s.is_not(None))
+    )
+    return {row.id: row.arias_m_s for row in rows}
 
 
 def magnitudes(connection: Connection) -> dict[str, float]:

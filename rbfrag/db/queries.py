@@ -13,7 +13,7 @@ from sqlalchemy import Connection, RowMapping, Select, and_, case, func, select
 
 from rbfrag.db.location import SCHEMA_REVISION
 from rbfrag.db.motions import require_suite
-from rbfrag.db.rows import CombinationTable
+from rbfrag.db.rows import SPECTRAL_COLUMNS, CombinationTable
 from rbfrag.db.schema import (
     combination,
     earthquake,
@@ -130,7 +130,7 @@ def combination_table(
         motion_id=np.array([row["motion_id"] for row in kept], dtype=np.int64),
         event_guessed=np.array([row["guessed"] for row in kept], dtype=np.bool_),
         pgd_m=pgd_m,
-        **{name: floats(name) for name in numbers},
+        **{name: floats(name) for name in (*numbers, *SPECTRAL_COLUMNS)},
         **{name: objects(name) for name in others},
     )
 
@@ -230,7 +230,7 @@ def _combination_query() -> Select[Any]:
         "id", "natural_key", "motion_id", "vertical_motion_id", "polarity", "p2", "block",
         "settings", "status", "search_limit", "kr_over_pga", "kr", "y_m_s",
     )  # fmt: skip
-    of_motion = ("pga_g", "pgv_m_s", "pgd_m", "tm_s", "flags")
+    of_motion = ("pga_g", "pgv_m_s", "pgd_m", "tm_s", *SPECTRAL_COLUMNS, "flags")
     return select(
         *(combination.c[name] for name in own),
         *(motion.c[name] for name in of_motion),

@@ -5,6 +5,7 @@ This module loads neither SQLAlchemy nor numpy, because `rbfrag predict` needs i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
@@ -92,13 +93,18 @@ class Point(NamedTuple):
     grid: int | None
 
 
+SPECTRAL_COLUMNS = ("sa03_g", "sa10_g", "sa20_g", "sa30_g")
+"""The spectral accelerations that fits read."""
+
+
 @dataclass(frozen=True)
 class CombinationTable:
     """Critical values with the intensity of their motions: columns of equal length.
 
     What the fits read. `kr_over_pga`, `kr` and `y_m_s` are NaN unless `status` is ``found``;
     `tm_s` is NaN where the mean period is not defined, `pgd_m` where the baseline of the record
-    is in doubt, unless it was asked for. `block` is JSON text, None where p² says all.
+    is in doubt, unless it was asked for; spectral accelerations where they were not computed.
+    `block` is JSON text, None where p² says all.
     """
 
     combination_id: NDArray[np.int64]
@@ -118,3 +124,12 @@ class CombinationTable:
     tm_s: NDArray[np.float64]
     natural_key: NDArray[np.object_]
     block: NDArray[np.object_]
+    sa03_g: NDArray[np.float64] = None  # type: ignore[assignment]
+    sa10_g: NDArray[np.float64] = None  # type: ignore[assignment]
+    sa20_g: NDArray[np.float64] = None  # type: ignore[assignment]
+    sa30_g: NDArray[np.float64] = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        for name in SPECTRAL_COLUMNS:
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, self.pga_g * math.nan)

@@ -435,7 +435,7 @@ fragility_model = _table(
     _row_number(),
     _column("name", Text, "name of the model"),
     _column("kind", Text, _KIND),
-    _column("term", Text, "intensity term: pgv, pga_tm, pgd_tm, pgv_pga, pgv_pga_tm, xp"),
+    _column("term", Text, "intensity term, such as pgv, pgv_pga, sa10, xp"),
     _column("method", Text, "method of the fit"),
     _column("coefficients", Text, "JSON object: value by parameter, in order"),
     _column("covariance", Text, "JSON list of lists: covariance of the parameters in that order"),

@@ -190,7 +190,7 @@ def answer_with_findings(
         at_rest, Finding(at_rest, block.strength, strength, f"is not above zero: give {wanted}")
     )
     floored = dict(given)
-    for name in (block.strength, "pga_g"):
+    for name in (block.strength, "pga_g", *SPECTRAL.values()):
         if name in floored:
             floored[name] = ns.maximum(floored[name], LEAST)
     values = block.completed(floored, term, ns)

@@ -11,7 +11,7 @@ from pathlib import Path
 from rbfrag.db.location import DEFAULT_NAME, REFERENCE, locate, reference_file
 from rbfrag.db.model_file import ModelRow, unknown_model
 from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.fragility.measures import MEASURES, SINGLE_TERMS, TERMS, terms_from
+from rbfrag.fragility.measures import MEASURES, least_inputs, terms_from
 from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, methods
 from rbfrag.fragility.model import FragilityModel
 
@@ -77,7 +77,8 @@ def find_model(
     """Return the model that answers for a block and the given measures of the motion.
 
     The more is known of the motion, the better the model: one on X(p), then PGV with PGA and Tm,
-    then PGV with PGA, then a single term. Among the stored models of the best term that the
+    then PGV with PGA, then PGV, then PGA with spectral accelerations and the single measures, in
+    the order of their skill. Among the stored models of the best term that the
     measures suffice for, the database's default answers, else the best method.
 
     Args:
@@ -155,7 +156,7 @@ def _suited_in(
 ) -> list[FragilityModel]:
     possible = terms_from(given)
     if not possible:
-        enough = ", or ".join(" and ".join(TERMS[name].inputs) for name in SINGLE_TERMS)
+        enough = ", or ".join(" and ".join(inputs) for inputs in least_inputs())
         raise InputError(f"{_measures(given)} is given: a prediction needs {enough}, or a motion")
     block_of_question = block_of(given)
     kind = block_of_question.kind if kind is None else kind

@@ -145,10 +145,13 @@ class FragilityModel:
                 "of another size: fit it again"
             )
         rho_e = None if row.dependence is None else row.dependence.get("rho_e")
+        term = TERMS[row.term]
+        if term.advice:
+            notes = (*notes, term.advice)
         event_spread = EventSpread.of(rho_e) if isinstance(rho_e, int | float) else None
         return cls(
             row=row,
-            term=TERMS[row.term],
+            term=term,
             method=method,
             form=form,
             parameters=parameters,

@@ -472,7 +472,9 @@ def _predict_motion(
     block = {name: single(name, value) for name, value in given.items()}
     answers: dict[str, Prediction] = {}
     for direction in ("forward", "reverse") if polarity == "both" else (polarity,):
-        own = {**block, **measures_of(motion, block.get("p2"), direction)}
+        # what the term X(p) does not read is of use only to a model that is named
+        known = measures_of(motion, block.get("p2"), direction, spectrum=model is not None)
+        own = {**block, **known}
         chosen = find_model(model, own, db, kind=kind, rotation_deg=rotation_deg)
         answer = answer_given(chosen, own, level)
         assert isinstance(answer, Prediction)

@@ -37,12 +37,13 @@ _HALVINGS = 500
 
 
 class _Steps(NamedTuple):
-    """Intervals: accelerations at their ends, lengths [s], and z at their starts."""
+    """Intervals: accelerations at their ends, lengths [s], and z at their ends."""
 
     start: FloatArray
     end: FloatArray
     length: FloatArray
-    state: ComplexArray
+    first: ComplexArray
+    last: ComplexArray
 
 
 def spectral_accelerations(acceleration_g: FloatArray, interval_s: FloatArray) -> dict[str, float]:
@@ -77,7 +78,7 @@ def spectral_acceleration(
     a = acceleration_g / scale
     z = _states(a, interval_s, root)
     moving = interval_s > 0.0
-    steps = _Steps(a[:-1][moving], a[1:][moving], interval_s[moving], z[:-1][moving])
+    steps = _Steps(a[:-1][moving], a[1:][moving], interval_s[moving], z[:-1][moving], z[1:][moving])
     greatest = max(_free_vibration(complex(z[-1]), root), float(np.max(np.abs(z.imag))))
     return scale * omega * omega / root.imag * _within(steps, root, greatest)
 
@@ -138,29 +139,24 @@ def _within(steps: _Steps, root: complex, greatest: float) -> float:
         greatest: the greatest |Im z| at their ends [g·s].
     """
     for _ in range(_HALVINGS):
-        last = _advanced(steps, steps.end, steps.length, root)
         x = root * steps.length
-        bend = x * x * (steps.state - steps.start / root) - steps.length * (steps.end - steps.start)
-        chord = np.maximum(np.abs(steps.state.imag), np.abs(last.imag))
+        bend = x * x * (steps.first - steps.start / root) - steps.length * (steps.end - steps.start)
+        chord = np.maximum(np.abs(steps.first.imag), np.abs(steps.last.imag))
         # the chord of C exp(λ t) itself is never further off than 2 |C|
         excess = np.abs(bend) * np.minimum(0.125, 2.0 / np.abs(x) ** 2)
         may_exceed = chord + excess > greatest * (1.0 + _CONVERGED)
-        start, end, length, state = (column[may_exceed] for column in steps)
+        start, end, length, first, last = (column[may_exceed] for column in steps)
         if not start.size:
             break
         half, middle = 0.5 * length, 0.5 * (start + end)
-        inside = _advanced(_Steps(start, end, length, state), middle, half, root)
+        decay, near, far = _weights(half, root)
+        inside = decay * first - near * start - far * middle
         greatest = max(greatest, float(np.max(np.abs(inside.imag))))
         steps = _Steps(
             np.concatenate([start, middle]),
             np.concatenate([middle, end]),
             np.concatenate([half, half]),
-            np.concatenate([state, inside]),
+            np.concatenate([first, inside]),
+            np.concatenate([inside, last]),
         )
     return greatest
-
-
-def _advanced(steps: _Steps, a: FloatArray, h: FloatArray, root: complex) -> ComplexArray:
-    """Return z a time h [s] after the start of each step, where the acceleration is a [g]."""
-    decay, near, far = _weights(h, root)
-    return decay * steps.state - near * steps.start - far * a

@@ -11,7 +11,6 @@ from benchmarks.published_slides import PUBLISHED, Published
 from benchmarks.slide_comparison import (
     Scored,
     Slides,
-    arias_m_s,
     clustered_mean,
     held_out,
     larger_of_two,
@@ -57,15 +56,6 @@ def test_stronger_blocks_slide_less_and_only_what_is_named_is_read(published: Pu
         named["pga_g"] = np.array([np.nan])
     strong = {**named, "ky": np.array([0.6])}
     assert published.median(strong)[0] < published.median(named)[0]
-
-
-def test_arias_of_a_rectangle_and_of_a_ramp() -> None:
-    g = STANDARD_GRAVITY_M_S2
-    rectangle = np.full(101, 0.2)
-    expected = np.pi / (2.0 * g) * (0.2 * g) ** 2 * 1.0
-    assert arias_m_s(rectangle.tobytes(), 0.01) == pytest.approx(expected)
-    ramp = np.array([-0.2, 0.2])
-    assert arias_m_s(ramp.tobytes(), 1.0) == pytest.approx(expected / 3.0)
 
 
 def slides_of(n: int = 3000) -> Slides:

@@ -72,7 +72,7 @@ def test_without_a_database_the_reference_answers_and_says_so(shell: Shell) -> N
     assert 0.0 < found["ci_low"] < found["probability"] < found["ci_high"] < 1.0
     assert found["in_domain"]
     more = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--pga", "0.5")
-    assert (found["term"], more["term"]) == ("pgv", "pgv_pga")
+    assert (found["term"], more["term"]) == ("pgv_kr", "pgv_pga")
 
 
 def test_file_that_is_no_database(refuses: Refuses, tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 TRUE = {
     ("sliding", "pgv_pga"): (0.3, 0.8, 3.5, -0.6, 1.0),
-    ("slumping", "pgv_pga"): (-0.2, 0.9, -0.9),
+    ("slumping", "pgv_pga"): (-0.7, 0.9, 0.4, -0.9),
     ("slumping", "pgv"): (0.3, 0.9, -0.9),
 }
 METHOD_OF = {"sliding": method_named("displacement"), "slumping": method_named("capacity")}
@@ -43,10 +43,11 @@ def drawn(kind: str, term: str, n: int = 4000, seed: int = 1) -> FitSource:
             _table(event, pga, values["pgv_m_s"], found, k, np.full(n, np.nan)),
             np.full(n, np.nan), k[:, None], np.full((n, 1), np.nan), slid[:, None],
         )  # fmt: skip
-    c, b, s0 = TRUE[kind, term]
+    c, b, *d, s0 = TRUE[kind, term]
     ks, ps2 = np.exp(rng.normal(-1.5, 0.4, n)), np.exp(rng.normal(1.0, 0.8, n))
     if term == "pgv_pga":
-        excess = np.exp(c - b * np.log(np.sqrt(ps2) * pulse) + math.exp(s0) * z)
+        line = c - b * np.log(np.sqrt(ps2) * pulse) - d[0] * np.log(ks)
+        excess = np.exp(line + math.exp(s0) * z)
         failing = ks * (1.0 + excess)
     else:
         y = ks * STANDARD_GRAVITY_M_S2 / np.sqrt(ps2)

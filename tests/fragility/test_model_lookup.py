@@ -60,8 +60,10 @@ def test_measures_that_no_stored_model_works_with(database):
     path = database("pga_tm")
     with pytest.raises(InputError, match=r"no stored .* works with pgv_m_s.*wls-pga_tm"):
         predict(3, 0.1, pgv_m_s=0.4, db=path)
-    with pytest.raises(InputError, match=r"pga_g is given: a prediction needs pgv_m_s, or pga_g"):
+    with pytest.raises(InputError, match=r"no stored .* works with pga_g; stored are wls-pga_tm"):
         predict(3, 0.1, pga_g=0.4, db=path)
+    with pytest.raises(InputError, match=r"tm_s is given: a prediction needs pgv_m_s, or sa10_g"):
+        predict(3, 0.1, tm_s=0.4, db=path)
 
 
 def test_a_database_without_models_says_how_to_make_one(database):

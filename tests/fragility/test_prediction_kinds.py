@@ -99,12 +99,12 @@ def test_a_base_that_dips_is_a_shorter_distance_on_a_level_one() -> None:
 
 def test_a_slump_is_answered_by_its_formula() -> None:
     ks, ps2, pgv, pga = 0.15, 3.0, 0.5, 0.6
-    c, b, s0 = method_named("capacity").forms["pgv_pga"].start
+    c, b, d, s0 = method_named("capacity").forms["pgv_pga"].start
     asked: dict[str, Any] = {"ks": ks, "ps2": ps2, "pgv_m_s": pgv}
     found = one(**asked, pga_g=pga, model=row_of("slumping"))
     r = ks / pga
     z = math.sqrt(ps2) * pgv / (pga * STANDARD_GRAVITY_M_S2)
-    eta = (math.log((1 - r) / r) - c + b * math.log(z)) / math.exp(s0)
+    eta = (math.log((1 - r) / r) - c + b * math.log(z) + d * math.log(ks)) / math.exp(s0)
     assert found.probability == pytest.approx(float(ndtr(eta)), rel=1e-12)
     assert found.y_m_s == pytest.approx(ks * STANDARD_GRAVITY_M_S2 / math.sqrt(ps2))
     assert (found.in_domain, found.kind, found.failure) == (
@@ -233,3 +233,22 @@ def test_an_unknown_model_or_kind_is_named(tmp_path: Any, monkeypatch: pytest.Mo
     assert one(**SLIDE, pgv_m_s=0.5).model == "sliding-pgv"
     with pytest.raises(UnknownModelError, match="no stored slumping model of a rotation of 7°"):
         predict(**SLUMP, pgv_m_s=0.5, rotation_deg=7.0)
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    ks=st.floats(0.02, 0.6),
+    ps2=st.floats(0.5, 30.0),
+    pga=st.floats(0.05, 1.5),
+    pulse=st.floats(0.02, 0.4),
+)
+def test_a_slump_fails_sooner_when_weaker_and_under_stronger_shaking(
+    ks: float, ps2: float, pga: float, pulse: float
+) -> None:
+    asked: dict[str, Any] = {"ps2": ps2, "model": row_of("slumping")}
+    pgv = pulse * pga * STANDARD_GRAVITY_M_S2
+    here = one(ks=ks, pgv_m_s=pgv, pga_g=pga, **asked).probability
+    assert one(ks=1.05 * ks, pgv_m_s=pgv, pga_g=pga, **asked).probability <= here
+    assert one(ks=ks, pgv_m_s=1.05 * pgv, pga_g=pga, **asked).probability >= here
+    assert one(ks=ks, pgv_m_s=pgv, pga_g=1.05 * pga, **asked).probability >= here
+    assert one(ks=ks, pgv_m_s=1.05 * pgv, pga_g=1.05 * pga, **asked).probability >= here

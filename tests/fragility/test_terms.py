@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.measures import TERMS, intensity_term, terms_from
+from rbfrag.fragility.measures import (
+    MEASURES,
+    SPECTRAL,
+    TERMS,
+    intensity_term,
+    least_inputs,
+    terms_from,
+)
 
 
 def test_terms_of_one_harmonic_motion_agree():
@@ -16,6 +23,8 @@ def test_terms_of_one_harmonic_motion_agree():
         "pgd_m": v * tm / (2 * math.pi),
         "tm_s": tm,
         "xp_m_s": v,
+        "p": 2 * math.pi / tm,
+        **{name: v * 2 * math.pi / period / 9.80665 for period, name in SPECTRAL.items()},
     }
     for term in TERMS.values():
         assert term.intensity_m_s(measures) == pytest.approx(v, rel=1e-14)
@@ -24,7 +33,7 @@ def test_terms_of_one_harmonic_motion_agree():
 @pytest.mark.parametrize("name", TERMS)
 def test_array_and_scalar_have_the_same_bits(name):
     random = np.random.default_rng(3)
-    names = ("pgv_m_s", "pga_g", "pgd_m", "tm_s", "xp_m_s")
+    names = ("pgv_m_s", "pga_g", "pgd_m", "tm_s", "xp_m_s", "p", *SPECTRAL.values())
     columns = {key: random.uniform(0.01, 2.0, 200) for key in names}
     together = TERMS[name].intensity_m_s(columns)
     for i in range(200):
@@ -40,14 +49,29 @@ def test_labels_name_the_unit():
 
 
 def test_terms_that_measures_suffice_for():
-    assert terms_from(["tm_s", "pga_g"]) == ("pga_tm",)
-    assert terms_from(["pgv_m_s", "pgd_m", "tm_s"]) == ("pgv", "pgd_tm")
-    assert terms_from(["pga_g"]) == ()
-    assert terms_from(["pgv_m_s", "pga_g"]) == ("pgv_pga", "pgv")
-    assert terms_from(["pgv_m_s", "pga_g", "tm_s"]) == ("pgv_pga_tm", "pgv_pga", "pgv", "pga_tm")
-    assert terms_from(["xp_m_s", "pga_g"]) == ("xp",)
+    assert terms_from(["tm_s", "pga_g"]) == ("pga_tm", "pga")
+    assert terms_from(["pgv_m_s", "pgd_m", "tm_s"]) == ("pgv_kr", "pgv", "pgd_tm")
+    assert terms_from(["tm_s"]) == ()
+    assert terms_from(["pga_g"]) == ("pga",)
+    assert terms_from(["pgv_m_s", "pga_g"]) == ("pgv_pga", "pgv_kr", "pgv", "pga")
+    everything = (
+        "xp", "pgv_pga_tm", "pgv_pga", "pgv_kr", "pgv", "pga_sa03_sa10_sa30", "pga_tm", "pga_sa10",
+        "sa10", "sa20", "sa30", "sa03", "pga", "pgd_tm",
+    )  # fmt: skip
+    assert terms_from(MEASURES) == everything
+    assert terms_from(["sa30_g", "sa03_g"]) == ("sa30", "sa03")
+    assert terms_from(["sa10_g", "pga_g"]) == ("pga_sa10", "sa10", "pga")
+    assert terms_from(["xp_m_s", "pga_g"]) == ("xp", "pga")
+
+
+def test_the_least_that_suffices():
+    found = {frozenset(inputs) for inputs in least_inputs()}
+    spectral = {frozenset([name]) for name in SPECTRAL.values()}
+    assert found == spectral | {
+        frozenset(["pgv_m_s"]), frozenset(["pga_g"]), frozenset(["pgd_m", "tm_s"])
+    }  # fmt: skip
 
 
 def test_unknown_term_lists_the_known_ones():
-    with pytest.raises(InputError, match=r"'pgx'.*pgv, pga_tm, pgd_tm"):
+    with pytest.raises(InputError, match=r"'pgx'.*pgv_kr, pgv, "):
         intensity_term("pgx")

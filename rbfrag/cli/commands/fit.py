@@ -34,7 +34,9 @@ def fit(
     *,
     term: str = option(
         "Intensity term [m/s]: pgv; pga_tm = PGA g Tm/(2 pi); pgd_tm = 2 pi PGD/Tm; "
-        "pgv_pga and pgv_pga_tm: PGV with PGA (and Tm); xp: the toppling spectrum X(p).",
+        "pgv_pga and pgv_pga_tm: PGV with PGA (and Tm); xp: the toppling spectrum X(p); pgv_kr: "
+        "PGV with the block's strength; pga; sa03, sa10, sa20, sa30: spectral acceleration at 0.3, "
+        "1, 2, 3 s; pga_sa10 and pga_sa03_sa10_sa30: PGA with these.",
         ...,
         show_default=False,
     ),

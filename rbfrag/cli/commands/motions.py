@@ -105,11 +105,12 @@ def list_motions(
         return
     print_table(
         ("id", "motion", "event", "vert.", "dt [s]", "npts", "PGA [g]", "PGV [m/s]", "PGD [m]",
-         "Tm [s]", "flags"),
+         "Tm [s]", "SA(1.0) [g]", "flags"),
         [
             (row.id, row.name, row.event_id, row.is_vertical, row.dt_s, row.npts,
              round(row.pga_g, 4), round(row.pgv_m_s, 4), round(row.pgd_m, 4),
-             None if row.tm_s is None else round(row.tm_s, 3), row.flags)
+             None if row.tm_s is None else round(row.tm_s, 3),
+             None if row.sa10_g is None else round(row.sa10_g, 4), row.flags)
             for row in rows
         ],
     )  # fmt: skip
@@ -146,6 +147,7 @@ def show(
         "npts": ground.npts,
         "duration_s": ground.duration_s,
         **asdict(ground.measures),
+        **ground.spectral_accelerations,
         "processing_applied": ground.processing_applied,
         "sha256": ground.sha256,
         "source_sha256": ground.source_sha256 or ground.sha256,

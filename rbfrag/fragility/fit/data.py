@@ -22,7 +22,7 @@ from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.censoring import censoring_weights
 from rbfrag.fragility.fit.domain import ranges_of, ratio_columns
 from rbfrag.fragility.fit.scores import Judged, critical_outcomes
-from rbfrag.fragility.measures import Term
+from rbfrag.fragility.measures import SPECTRAL, Term
 from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, Method
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -37,17 +37,18 @@ FEWEST_EVENTS = 3
 FEWEST_OBSERVED = 10
 FEW_EVENTS = 10
 
-LEAST_Y0_OVER_PGV = 0.1
-"""Weaker blocks of the stored grid are left to models that do not read PGV."""
+Y0_OVER_PGV = np.geomspace(0.1, 4.0, 25)
+"""Blocks that models are judged on, as y0/PGV; of weaker blocks of the stored grid, and of stronger
+ones, which are safe, only the fits of wide forms know."""
 
-Y0_OVER_PGV = np.geomspace(LEAST_Y0_OVER_PGV, 4.0, 25)
-"""Blocks that are judged by critical values where no outcomes are stored, as y0/PGV."""
+WIDER_STEPS = 10
+"""Blocks that the fits of wide forms read above those."""
 
 K_OVER_PGA = np.geomspace(0.02, 0.95, 25)
 """The same of blocks that the record is scaled to."""
 
-LEAST_DISPLACEMENT_M = 1e-4
-"""Displacements below this count as less than it, whether zero or not."""
+LEAST_DISPLACEMENT_M = 1e-3
+"""Displacements below this count as less than it, whether zero or not: their scatter is another."""
 
 _CENSORED = ("below_limit", "no_motion")
 
@@ -224,6 +225,7 @@ class FitData:
         blocks: what formulas read of the blocks of the grid, shape (n, m) or (n, 1).
         failed: what they do: 1 fails, 0 does not, NaN not known, shape (n, m).
         read: which of them this fit may read, same shape.
+        scored: which of these it is judged on, same shape.
         outcomes: where the outcomes come from, in words.
         domain: range of each variable that the fit covers.
         n_total: number of combinations read.
@@ -247,6 +249,7 @@ class FitData:
     blocks: dict[str, FloatArray]
     failed: FloatArray
     read: NDArray[np.bool_]
+    scored: NDArray[np.bool_]
     outcomes: str
     domain: dict[str, tuple[float, float]]
     n_total: int = 0
@@ -279,7 +282,7 @@ class FitData:
     @property
     def judged(self) -> Judged:
         """What the fit is judged on."""
-        known = np.isfinite(self.failed) & self.read
+        known = np.isfinite(self.failed) & self.scored
         if self.weights is not None:
             known &= self.weights > 0.0
         failed = np.where(known, self.failed, 0.0)
@@ -305,6 +308,7 @@ class _Points:
     outcomes: str
     ranges: dict[str, FloatArray]
     weights: FloatArray | None = None
+    scored: NDArray[np.bool_] | None = None
 
 
 def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None = None) -> FitData:
@@ -356,6 +360,7 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         blocks={name: v[chosen] for name, v in points.blocks.items()},
         failed=failed,
         read=points.read[chosen],
+        scored=points.scored[chosen] if points.scored is not None else points.read[chosen],
         outcomes=points.outcomes,
         domain=ranges_of({name: v[chosen] for name, v in points.ranges.items()}),
         n_total=int(table.p2.size),
@@ -418,7 +423,7 @@ def _refuse_thin(data: FitData, method: Method, term: Term) -> None:
 
 def _measures(source: FitSource) -> dict[str, FloatArray]:
     table = source.table
-    names = ("pgv_m_s", "pga_g", "pgd_m", "tm_s")
+    names = ("pgv_m_s", "pga_g", "pgd_m", "tm_s", *SPECTRAL.values())
     return {"xp_m_s": source.xp_m_s, **{name: getattr(table, name) for name in names}}
 
 
@@ -429,7 +434,11 @@ def _column(values: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
 def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     """Return the points of blocks of any strength k_r and some size p²."""
     table = source.table
-    given = _measures(source)
+    wide = method.forms[term.name].wide
+    if wide:
+        source = _with_safe_blocks(source)
+    p, pga_m_s2 = np.sqrt(table.p2), table.pga_g * STANDARD_GRAVITY_M_S2
+    given = {**_measures(source), "p": p}
     x = np.asarray(term.intensity_m_s(given), dtype=np.float64)
     for name in term.inputs:
         x = np.where(np.isfinite(given[name]), x, np.nan)
@@ -444,7 +453,6 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
             "the term xp needs the toppling spectrum X(p), which is stored for none of the "
             f"{x.size} combinations: run  rbfrag simulate  again, which adds it"
         )
-    p, pga_m_s2 = np.sqrt(table.p2), table.pga_g * STANDARD_GRAVITY_M_S2
     observed = table.status == "found"
     status = table.status.astype(str)
     limit = np.where(np.isin(status, _CENSORED), table.search_limit * pga_m_s2 / p, np.nan)
@@ -455,8 +463,11 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     kr = source.k_over_pga * table.pga_g[:, None]
     y0 = source.k_over_pga * (pga_m_s2 / p)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        read = y0 >= LEAST_Y0_OVER_PGV * (1.0 - 1e-9) * table.pgv_m_s[:, None]
-    read &= (y0 > 0.0) & np.isfinite(y0)
+        ratio = y0 / table.pgv_m_s[:, None]
+    some_block = (y0 > 0.0) & np.isfinite(y0)
+    scored = read = some_block & (ratio >= Y0_OVER_PGV[0] * (1.0 - 1e-9))
+    if wide:
+        scored, read = scored & (ratio <= Y0_OVER_PGV[-1] * (1.0 + 1e-9)), some_block
     failed, source_of_outcomes = source.judged_outcomes(y0, y)
     some = read.any(axis=0)
     of_outcomes = method.reads == "outcomes"
@@ -481,6 +492,27 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
         read=read[:, some],
         outcomes=source_of_outcomes,
         ranges=ranges,
+        scored=scored[:, some],
+    )
+
+
+def _with_safe_blocks(source: FitSource) -> FitSource:
+    """Return a source whose outcome grid goes on above its strongest block, with safe blocks.
+
+    No excursion from rest exceeds twice PGV, and the grid ends at four times PGV. The steps are
+    those of the grid.
+    """
+    if source.failed.shape[1] < 2:
+        return source
+    step = Y0_OVER_PGV[1] / Y0_OVER_PGV[0]
+    last = source.k_over_pga[:, -1:]
+    k = last * step ** np.arange(1, WIDER_STEPS + 1)
+    # where nothing was run nothing is added
+    safe = np.where(np.isfinite(source.failed).any(axis=1), 0.0, np.nan)
+    return replace(
+        source,
+        k_over_pga=np.hstack([source.k_over_pga, k]),
+        failed=np.hstack([source.failed, np.repeat(safe[:, None], WIDER_STEPS, axis=1)]),
     )
 
 

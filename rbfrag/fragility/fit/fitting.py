@@ -65,8 +65,7 @@ def fit(
             the current folder), or the data themselves (critical values alone carry ``wls`` and
             ``lognormal``).
         kind: what the blocks do: any kind that campaigns store.
-        term: intensity term: ``pgv``, ``pga_tm``, ``pgd_tm``, ``pgv_pga``, ``pgv_pga_tm`` or
-            ``xp``.
+        term: name of the intensity term, such as ``pgv``, ``sa10`` or ``xp``.
         method: method of fitting. Blocks known by p² and k_r: ``wls`` and ``lognormal`` (of
             critical values, for a term that is one number), ``logistic`` (of outcomes, the same
             terms), ``weibull`` and ``bounded`` (of outcomes, the terms with PGV), ``record`` and

@@ -40,8 +40,7 @@ def fit(
         db: the database: a path or URL; None for ``RBFRAG_DB`` or ``rbfrag.db`` in the current
             folder.
         kind: what the blocks do: any kind that campaigns store.
-        term: intensity term: ``pgv``, ``pga_tm``, ``pgd_tm``, ``pgv_pga``, ``pgv_pga_tm`` or
-            ``xp``.
+        term: name of the intensity term, such as ``pgv``, ``sa10`` or ``xp``.
         method: method of fitting (docs/theory/fragility.md); None for ``wls``, or the only one
             that there is for the kind.
         suite: suite of motions to fit; None for all motions.

@@ -72,9 +72,17 @@ def arrays() -> Numbers:
 
     def step_sums(errors: Any, x: Sequence[Any]) -> tuple[Any, Any]:
         # more terms than earthquakes: here the products are faster than the polynomials
-        squares = np.array(errors.steps) @ np.stack(np.broadcast_arrays(*x))
-        squares *= squares
-        return squares.sum(axis=0), np.einsum("en,en->n", squares, squares)
+        steps, columns = np.array(errors.steps), np.stack(np.broadcast_arrays(*x))
+        total, fourths = np.empty((2, columns.shape[1]))
+        # so few at a time stay near the processor, and BLAS starts no threads of its own
+        for start in range(0, columns.shape[1], 512):
+            part = slice(start, start + 512)
+            squares = steps @ columns[:, part]
+            squares *= squares
+            np.add.reduce(squares, axis=0, out=total[part])
+            squares *= squares
+            np.add.reduce(squares, axis=0, out=fourths[part])
+        return total, fourths
 
     return Numbers(
         np.log, np.exp, np.sqrt, ndtr, np.expm1, np.maximum, np.minimum, np.sin, np.cos,
@@ -136,6 +144,15 @@ ABOVE_TWICE_PGV = Bound(
     "is not below 2 PGV, which no excursion from rest exceeds: P = 0 by mechanics, not by the "
     "model",
 )
+_STRONG_KR = 0.3
+"""k_r in k' = ln(1 + k_r/0.3): a strong block needs a PGA above k_r, also where PGA is unknown."""
+
+
+def log_strength(v: Mapping[str, Any], ns: Numbers) -> Any:
+    """Return k' = ln(1 + k_r/0.3)."""
+    return ns.log(1.0 + v["kr"] / _STRONG_KR)
+
+
 ABOVE_SPECTRUM = Bound(
     lambda v: v["y_m_s"] >= v["intensity_m_s"],
     "y_m_s",
@@ -182,9 +199,10 @@ class BlockParameters:
         values = dict(given)
         if self.adjust is not None:
             self.adjust(values, ns)
-        values["intensity_m_s"] = term.intensity_m_s(values)
         if self.size is not None:
             values["p"] = p = ns.sqrt(values[self.size])
+        values["intensity_m_s"] = term.intensity_m_s(values)
+        if self.size is not None:
             values["y_m_s"] = values[self.strength] * STANDARD_GRAVITY_M_S2 / p
         return values
 
@@ -240,6 +258,8 @@ class Form:
         bounds: what mechanics forbids.
         start: where the search for the likeliest parameters begins; empty where none is needed.
         size_factor: what eta is multiplied by; None for nothing.
+        wide: fitted to the whole grid, on which the decided blocks are that PGV tells apart, and
+            judged on the part of it that the other forms read and are judged on too.
     """
 
     parameters: tuple[str, ...]
@@ -248,6 +268,7 @@ class Form:
     bounds: tuple[Bound, ...] = ()
     start: tuple[float, ...] = ()
     size_factor: SizeFactor | None = None
+    wide: bool = False
 
     def unscaled(
         self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers

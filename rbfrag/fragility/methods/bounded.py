@@ -6,14 +6,27 @@
 r = k_r/PGA, v = y/2PGV, z = p PGV/(PGA g), z_T = p T_m/2π; with PGV alone
 eta = h(p) [b0 - b1 ln v + b2 ln(1 - v) + b3 l + b4 l²] with l = ln p.
 h(p) = exp(.18 l - .06 l²). (7) of docs/theory/fragility.md.
+
+Of measures that the hazard is given in, with V_T = SA g T/2π, Q_T = ln(V_T/(PGA g)) and k' of
+:func:`rbfrag.fragility.methods.log_strength`, h(p) = p^A:
+
+    pgv_kr               A = .15   b0 + b1 l + b2 l² - b3 ln v + b4 ln(1 - v) + b5 k'
+    pga                  A = .22   b0 + b1 l + b2 l² - b3 ln r
+    pga_sa10             A = .29   the same + b4 Q_1 + b5 Q_1 l
+    pga_sa03_sa10_sa30   A = .27   the same + b4 Q_.3 + b5 Q_.3 l + ... of Q_1 and Q_3
+
+ln(1 - r) is left out where PGV is unknown: its coefficient would be negative, and P would rise
+near r = 1.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from operator import mul
 from typing import Any
 
+from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.methods import (
     ABOVE_TWICE_PGV,
     LOGLOG,
@@ -25,6 +38,7 @@ from rbfrag.fragility.methods import (
     Method,
     Numbers,
     SizeFactor,
+    log_strength,
 )
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -51,6 +65,41 @@ def _pgv_pga_tm(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     return Eta(eta + b[5] * f5, (*slopes, f5))
 
 
+def _sum(b: Sequence[float], slopes: tuple[Any, ...]) -> Eta:
+    return Eta(sum(map(mul, b, slopes)), slopes)
+
+
+def _pgv_kr(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+    ratio = v["y_m_s"] / (2.0 * v["intensity_m_s"])
+    l = ns.log(v["p"])  # noqa: E741  as in the formula
+    logs = (-ns.log(ratio), ns.log(1.0 - ratio), log_strength(v, ns))
+    return _sum(b, (1.0, l, l * l, *logs))
+
+
+def _pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers, *measures: str) -> Eta:
+    l = ns.log(v["p"])  # noqa: E741  as in the formula
+    pga = v["pga_g"]
+    slopes = [1.0, l, l * l, ns.log(pga / v["kr"])]
+    for measure in measures:
+        # V_T/(PGA g), in which g drops out
+        q = ns.log(v[measure] / pga * (_PERIOD_S[measure] / (2.0 * math.pi)))
+        slopes += [q, q * l]
+    return _sum(b, tuple(slopes))
+
+
+def _with_spectrum(*periods: str) -> Callable[[Sequence[float], Mapping[str, Any], Numbers], Eta]:
+    return lambda b, v, ns: _pga(b, v, ns, *(f"sa{period}_g" for period in periods))
+
+
+def _of_pga(a: float, *periods: str) -> Form:
+    names = [f"b_ln_q{period}{by}" for period in periods for by in ("", "_ln_p")]
+    return Form(
+        ("b0", "b_ln_p", "b_ln_p_squared", "b_ln_r", *names), _with_spectrum(*periods), 0,
+        (NOT_LIFTED,), size_factor=SizeFactor(a), wide=True,
+    )  # fmt: skip
+
+
+_PERIOD_S = {measure: period_s for period_s, measure in SPECTRAL.items()}
 _BOUNDS = (NOT_LIFTED, ABOVE_TWICE_PGV)
 _OF_SIZE = SizeFactor(0.18, 0.06)
 _NAMES = ("b0", "b_ln_r", "b_ln_1_minus_r", "b_ln_1_minus_share", "b_ln_z")
@@ -64,6 +113,13 @@ METHOD = Method(
             ("b0", "b_ln_share", "b_ln_1_minus_share", "b_ln_p", "b_ln_p_squared"),
             _pgv, 0, (ABOVE_TWICE_PGV,), size_factor=_OF_SIZE,
         ),
+        "pgv_kr": Form(
+            ("b0", "b_ln_p", "b_ln_p_squared", "b_ln_share", "b_ln_1_minus_share", "b_strength"),
+            _pgv_kr, 0, (ABOVE_TWICE_PGV,), size_factor=SizeFactor(0.15), wide=True,
+        ),
+        "pga": _of_pga(0.22),
+        "pga_sa10": _of_pga(0.29, "10"),
+        "pga_sa03_sa10_sa30": _of_pga(0.27, "03", "10", "30"),
         "pgv_pga": Form(_NAMES, _pgv_pga, 0, _BOUNDS, size_factor=_OF_SIZE),
         "pgv_pga_tm": Form((*_NAMES, "b_ln_zt"), _pgv_pga_tm, 0, _BOUNDS, size_factor=_OF_SIZE),
     },

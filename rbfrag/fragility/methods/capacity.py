@@ -2,9 +2,11 @@
 
 With r = k_s/PGA and z = p_s PGV/(PGA g), and where PGA is not known with y = k_s g/p_s:
 
-    eta = [ln((1 - r)/r) - c + b ln z]/σ,      eta = [ln PGV - c - b ln y]/σ,      ln σ = s0
+    eta = [ln((1 - r)/r) - c + b ln z + d ln k_s]/σ,    eta = [ln PGV - c - b ln y]/σ,    ln σ = s0
 
-P = Φ(eta): the PGV at which a block fails, and its PGA, scatter about a line in ln z or ln y.
+P = Φ(eta): the PGV at which a block fails, and its PGA, scatter about a line in ln z and ln k_s, or
+in ln y. With PGA known P falls with k_s where d < 1, which is all that is fitted: the slope of eta
+by ln k_s is d - 1/(1 - r) times 1/σ.
 """
 
 from __future__ import annotations
@@ -42,9 +44,10 @@ BLOCK = BlockParameters(
 def _pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     r = v["ks"] / v["pga_g"]
     z = ns.log(v["p"] * v["pgv_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
-    per = ns.exp(-b[2])
-    eta = (ns.log((1.0 - r) / r) - b[0] + b[1] * z) * per
-    return Eta(eta, (-per, z * per, -eta), b[2], (0.0, 0.0, 1.0))
+    per = ns.exp(-b[3])
+    strength = ns.log(v["ks"])
+    eta = (ns.log((1.0 - r) / r) - b[0] + b[1] * z + b[2] * strength) * per
+    return Eta(eta, (-per, z * per, strength * per, -eta), b[3], (0.0, 0.0, 0.0, 1.0))
 
 
 def _pgv(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
@@ -60,15 +63,15 @@ def _failure(_: Mapping[str, Any], rotation: float | None) -> str:
     return f"a rotation of {rotation:g} degrees or failure past recovery"
 
 
-_NAMES, _START = ("c", "b", "s0"), (0.0, 1.0, -1.0)
-
 METHOD = Method(
     name="capacity",
     block=BLOCK,
     link=NORMAL,
     forms={
-        "pgv_pga": Form(_NAMES, _pgv_pga, 0, (BLOCK.at_rest,), _START),
-        "pgv": Form(_NAMES, _pgv, 0, (), _START),
+        "pgv_pga": Form(
+            ("c", "b", "d", "s0"), _pgv_pga, 0, (BLOCK.at_rest,), (-0.5, 0.8, 0.4, -1.0)
+        ),
+        "pgv": Form(("c", "b", "s0"), _pgv, 0, (), (0.0, 1.0, -1.0)),
     },
     reads="critical",
     meaning="probability that the block slumps past recovery, or by the rotation asked for",

@@ -3,7 +3,10 @@
     eta = h(p) [b0 + b1 ln(x/y) (+ b2 ln p)],   P = 1/(1 + exp(-eta))
 
 h(p) = exp(.18 l - .06 l²), l = ln p; with X(p) h(p) = p^.30, with PGD 1. (4) of
-docs/theory/fragility.md.
+docs/theory/fragility.md. With a spectral acceleration alone, V_T = SA g T/2π and k' of
+:func:`rbfrag.fragility.methods.log_strength`,
+
+    eta = p^A [b0 + b1 l + b2 l² + b3 ln(V_T/y) + b4 ln V_T + b5 k']
 
 On the reference h lowers the held-out log loss from .1794, .1925 and .1470 to .1758, .1867 and
 .1356 (PGV, PGA·g·Tm/2π, X(p)); with 2π·PGD/Tm it would raise it from .4024 to .4060.
@@ -12,6 +15,7 @@ On the reference h lowers the held-out log loss from .1794, .1925 and .1470 to .
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from operator import mul
 from typing import Any
 
 from rbfrag.fragility.methods import (
@@ -23,6 +27,7 @@ from rbfrag.fragility.methods import (
     Method,
     Numbers,
     SizeFactor,
+    log_strength,
 )
 
 
@@ -32,6 +37,19 @@ def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
         return Eta(b[0] + b[1] * ratio, (1.0, ratio))
     log_p = ns.log(v["p"])
     return Eta(b[0] + b[1] * ratio + b[2] * log_p, (1.0, ratio, log_p))
+
+
+def _spectral(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
+    x, l = v["intensity_m_s"], ns.log(v["p"])  # noqa: E741  as in the formula
+    slopes = (1.0, l, l * l, ns.log(x / v["y_m_s"]), ns.log(x), log_strength(v, ns))
+    return Eta(sum(map(mul, b, slopes)), slopes)
+
+
+_SPECTRAL = ("b0", "b_size", "b_size_squared", "b_ln_x_over_y", "b_ln_x", "b_strength")
+
+
+def _of_period(a: float) -> Form:
+    return Form(_SPECTRAL, _spectral, 0, size_factor=SizeFactor(a), wide=True)
 
 
 def _form(size_factor: SizeFactor | None) -> Form:
@@ -49,6 +67,10 @@ METHOD = Method(
         "pga_tm": _form(_OF_SIZE),
         "pgd_tm": _form(None),
         "xp": _form(SizeFactor(0.30)),
+        "sa03": _of_period(0.16),
+        "sa10": _of_period(0.13),
+        "sa20": _of_period(-0.04),
+        "sa30": _of_period(-0.08),
     },
     reads="outcomes",
     meaning=OF_OUTCOME,
