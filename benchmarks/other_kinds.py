@@ -4,7 +4,8 @@
 
 reads the campaigns of a database (toppling, slumping by 2 degrees and past recovery, sliding), fits
 the models, compares them with published regressions, and writes the tables and the figure of
-docs/theory/other-kinds.md. Toppling may be in another database, such as the shipped one.
+docs/theory/other-kinds.md. Toppling may be in another database, such as the shipped one. What the
+blocks of one earthquake share is that of the shipped models.
 """
 
 from __future__ import annotations
@@ -25,7 +26,10 @@ from benchmarks.page import ROOT, replaced
 from benchmarks.slide_comparison import comparison
 from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
+from rbfrag.db.location import REFERENCE
+from rbfrag.db.model_file import ModelRow, read_models
 from rbfrag.db.queries import combination_table
+from rbfrag.fragility.dependence import event_range
 from rbfrag.fragility.fit.censoring import score_bounds
 from rbfrag.fragility.fit.critical import probabilities
 from rbfrag.fragility.fit.data import FitData, read_source
@@ -47,7 +51,7 @@ def fitted(
     method = method_of_kind(kind, None)
     asked = {"rotation_deg": rotation_deg}
     source = read_source(connection, method.block, kind=kind, rotation_deg=rotation_deg)
-    return fit_source(source, TERMS[term], method, kind=kind, selection=asked)
+    return fit_source(source, TERMS[term], method, kind=kind, selection=asked, shared=False)
 
 
 def as_slide(slump: FitData, sliding: Fitted, rotation_deg: float) -> FloatArray:
@@ -190,6 +194,24 @@ def _name(fit: Fitted) -> str:
     return f"`{fit.report.name}`"
 
 
+def dependence_table(models: Sequence[ModelRow]) -> str:
+    """Return what the blocks of one earthquake share, of stored models, and what that means."""
+    heads = ["model", "earthquake", "site", "component, same side", "component, opposite",
+             "one earthquake, P = 0.5"]  # fmt: skip
+    cells = []
+    for row in models:
+        if row.dependence is None:
+            continue
+        errors = row.dependence["errors"]
+        shares = [
+            f"{row.dependence[name]:.2f} ± {errors[name]:.2f}"
+            for name in ("rho_e", "rho_s", "rho_v", "rho_o")
+        ]
+        low, high = event_range(0.5, row.dependence["rho_e"], 0.95)
+        cells.append([f"`{row.name}`", *shares, f"{100 * low:.0f} to {100 * high:.0f} of 100"])
+    return markdown((heads, cells))
+
+
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("database")
@@ -197,6 +219,8 @@ def main() -> None:
     options.add_argument("--write", action="store_true", help="write page and figure")
     chosen = options.parse_args()
     found, (sliding, slumping) = tables(chosen.database, chosen.toppling)
+    kinds = ("sliding", "slumping")
+    found["dependence"] = dependence_table([m for m in read_models(REFERENCE) if m.kind in kinds])
     for name, table in found.items():
         print(name, table, sep="\n")
         if chosen.write:

@@ -32,9 +32,12 @@ def main() -> None:
 
     def answer(rows: slice) -> None:
         site_probability(
-            grid.pgv_m_s[rows], grid.pga_g[rows], p2, kr, component=component(given.component),
+            {name: values[rows] for name, values in grid.measures.items()},
+            p2,
+            kr,
+            component=component(given.component),
             db=given.database,
-        )  # fmt: skip
+        )
 
     start = time.process_time()
     grid = read_shakemap(given.grid)

@@ -16,6 +16,9 @@ from rbfrag.fragility.predict import predict as predict
 from rbfrag.hazards.answer import HazardAnswer as HazardAnswer
 from rbfrag.hazards.answer import hazard as hazard
 from rbfrag.hazards.curve import HazardCurve as HazardCurve
+from rbfrag.hazards.survival import BranchSurvival as BranchSurvival
+from rbfrag.hazards.survival import SurvivalAnswer as SurvivalAnswer
+from rbfrag.hazards.survival import survival as survival
 from rbfrag.motions.ground_motion import GroundMotion as GroundMotion
 from rbfrag.motions.recognise import read_motions as read_motions
 from rbfrag.motions.toppling_spectrum import toppling_spectrum as toppling_spectrum

@@ -234,5 +234,5 @@ _OF_POLARITY = (
 )  # fmt: skip
 """Keys that are shown of each polarity."""
 
-_LEFT_OUT = ("y_m_s", "median_displacement_m")
+_LEFT_OUT = ("y_m_s", "median_displacement_m", "unknown_share")
 """Keys that a table leaves out where they do not apply."""

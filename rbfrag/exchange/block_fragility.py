@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from os import PathLike
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,8 @@ from scipy.special import ndtr, ndtri
 from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import FragilityFunction, IntensityType
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.predict import Model, predict
+from rbfrag.fragility.measures import SPECTRAL
+from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 
 FloatArray = NDArray[np.float64]
@@ -28,6 +28,13 @@ _LOWEST, _HIGHEST, _SCANNED = 1e-5, 1e3, 4001
 _STRAIGHT = 1e-9
 _CHUNK = 256
 
+_TYPES = {
+    "pgv_m_s": IntensityType("pgv_m_s", 0.01),
+    "pga_g": IntensityType("pga_g", 1.0),
+    **{name: IntensityType("sa_g", 1.0, period) for period, name in SPECTRAL.items()},
+}
+"""What the levels of a function measure, by the measure's name in `predict`."""
+
 
 def block_functions(
     names: list[str],
@@ -36,7 +43,6 @@ def block_functions(
     measure: str,
     *,
     one_class: bool = False,
-    tm_s: float | None = None,
     levels: int = 80,
     model: Model | None = None,
     db: str | PathLike[str] | None = None,
@@ -51,9 +57,9 @@ def block_functions(
         names: identifiers of the blocks.
         p2: frequency parameters [1/s²], shape (m,).
         kr: toppling yield acceleration coefficients, shape (m,).
-        measure: ``pgv_m_s``, or ``pga_g`` with `tm_s`.
+        measure: ``pgv_m_s``, ``pga_g``, ``sa03_g``, ``sa10_g``, ``sa20_g`` or ``sa30_g``, which
+            a model reads alone.
         one_class: the blocks stand for one class: one function, their mean, of one name.
-        tm_s: mean period [s], for PGA.
         levels: number of levels of a discrete function.
         model: as in :func:`rbfrag.predict`.
         db: as in :func:`rbfrag.predict`.
@@ -67,7 +73,7 @@ def block_functions(
         DatabaseError: the database cannot be read.
     """
     x = np.geomspace(_LOWEST, _HIGHEST, _SCANNED)
-    kind, about, parts = _probabilities(x, p2, kr, measure, tm_s, levels, model, db)
+    kind, about, parts = _probabilities(x, p2, kr, measure, levels, model, db)
     if one_class:
         total = np.zeros_like(x)
         for part in parts:
@@ -85,7 +91,6 @@ def _probabilities(
     p2: FloatArray,
     kr: FloatArray,
     measure: str,
-    tm_s: float | None,
     levels: int,
     model: Model | None,
     db: str | PathLike[str] | None,
@@ -93,26 +98,19 @@ def _probabilities(
     """Return the meaning of the levels, the model, and probabilities, some blocks at a time."""
     if levels < 10:
         raise InputError(f"levels = {levels}: a discrete fragility needs at least 10")
-    if measure not in ("pgv_m_s", "pga_g"):
-        raise InputError(f"measure = {measure!r}: use pgv_m_s or pga_g")
-    if measure == "pga_g" and tm_s is None:
-        raise InputError(
-            "PGA alone does not say whether a block topples: give the mean period with --tm, or "
-            "export PGV"
-        )
-    fixed = {} if tm_s is None or measure != "pga_g" else {"tm_s": tm_s}
-    chosen = find_model(model, ("p2", "kr", measure, *fixed), db)
+    if measure not in _TYPES:
+        raise InputError(f"measure = {measure!r}: use one of {', '.join(_TYPES)}")
+    chosen = find_model(model, ("p2", "kr", measure), db)
 
     def rows() -> Iterator[FloatArray]:
         for start in range(0, p2.size, _CHUNK):
             some = slice(start, start + _CHUNK)
-            shaking: dict[str, Any] = {measure: x[None, :], **fixed}
-            prediction = predict(p2[some, None], kr[some, None], **shaking, model=chosen)
+            given = {"p2": p2[some, None], "kr": kr[some, None], measure: x[None, :]}
+            prediction = answer_given(chosen, given, 0.95, interval=False)
             assert isinstance(prediction, PredictionArray)
             yield prediction.probability
 
-    kind = IntensityType(measure, 0.01 if measure == "pgv_m_s" else 1.0)
-    return kind, (chosen.name, chosen.term.name, chosen.row.method), rows()
+    return _TYPES[measure], (chosen.name, chosen.term.name, chosen.row.method), rows()
 
 
 def _function(

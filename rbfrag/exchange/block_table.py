@@ -34,6 +34,9 @@ SUFFIXES = (".csv", ".parquet")
 NUMBERS = ("p2_1_s2", "kr")
 """Columns of a block that topples."""
 
+SIGMAS = ("p2_sigma", "kr_sigma")
+"""Columns of the standard deviations of ln p² and ln k_r of such a block; an empty cell is 0."""
+
 RECTANGLE = ("height_m", "width_m", "dip_deg")
 """Columns of a rectangle, which are read where those are not all there; the dip may be missing."""
 
@@ -162,7 +165,8 @@ def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
 
     Args:
         path: file with ``p2_1_s2`` [1/s²] and ``kr``, or ``height_m`` and ``width_m`` (and
-            ``dip_deg``), and ``block_id``, ``weight``, ``lon`` and ``lat`` [deg] if it has them.
+            ``dip_deg``), and ``block_id``, ``p2_sigma``, ``kr_sigma``, ``weight``, ``lon`` and
+            ``lat`` [deg] if it has them.
 
     Returns:
         Columns of one length; ``block_id`` are texts, numbers from 1 on where there are none.
@@ -189,6 +193,9 @@ def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
             raise InputError(
                 f"{block} at lon = {row['lon']:g}, lat = {row['lat']:g} lies off the map"
             )
+        for name in SIGMAS:
+            if name in row and not 0.0 <= row[name] < math.inf:
+                raise InputError(f"{block} has {name} = {row[name]:g}: give 0 or more")
         if "weight" in row and not row["weight"] >= 0.0:
             raise InputError(f"{block} has a weight below zero")
     if "weight" in columns and not columns["weight"].sum() > 0.0:
@@ -224,7 +231,10 @@ def _numbers(path: str | os.PathLike[str], name: str, values: list[Any]) -> NDAr
 
 def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     columns = read_columns(
-        path, (), optional=(*NUMBERS, *RECTANGLE, "lon", "lat", "weight"), texts=("block_id",)
+        path,
+        (),
+        optional=(*NUMBERS, *SIGMAS, *RECTANGLE, "lon", "lat", "weight"),
+        texts=("block_id",),
     )
     if is_of_rectangles(columns):
         columns |= rectangle_columns(columns)
@@ -234,6 +244,8 @@ def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
                 f"{path}: there is no column {name}: a table of blocks has p2_1_s2 and kr, or "
                 "height_m and width_m"
             )
+    for name in {*SIGMAS} & {*columns}:
+        columns[name] = np.nan_to_num(columns[name], nan=0.0, posinf=math.inf)
     if ("lon" in columns) != ("lat" in columns):
         raise InputError(f"{path}: lon and lat go together: give both columns, or neither")
     if "block_id" not in columns:

@@ -10,6 +10,7 @@ import json
 import os
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import openquake_type
 from rbfrag.files import source_text
 from rbfrag.hazards.answer import HazardAnswer
-from rbfrag.hazards.curve import HazardCurve, hazard_curve, rates_from_probabilities
+from rbfrag.hazards.curve import ANSWERED, HazardCurve, hazard_curve, rates_from_probabilities
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 
@@ -65,8 +66,12 @@ def hazard_curves_in(
 
 
 def _of_imt(curves: list[HazardCurve], imt: str, source: str) -> list[HazardCurve]:
-    wanted = imt.replace(" ", "").upper()
-    selected = [curve for curve in curves if curve.imt.upper() == wanted]
+    kind = openquake_type(imt, "--imt")
+    selected = [
+        curve
+        for curve in curves
+        if curve.measure == kind.measure and (kind.period_s is None or curve.is_of(kind.period_s))
+    ]
     if not selected:
         have = ", ".join(dict.fromkeys(curve.imt for curve in curves))
         raise InputError(f"{source}: there is no curve of {imt}; there are {have}")
@@ -86,35 +91,45 @@ def _of_site(curves: list[HazardCurve], site: str, source: str) -> list[HazardCu
     )
 
 
-def suited_curves(
-    curves: list[HazardCurve], *, with_mean_period: bool, converted_period_s: float | None
-) -> list[HazardCurve]:
-    """Return the curves that a fragility can be integrated over, of one measure.
+BEST_FIRST = ("pgv_m_s", "sa10_g", "sa20_g", "sa30_g", "sa03_g", "pga_g")
+"""Measures by falling skill of the models that read them alone (docs/theory/model-choice.md)."""
 
-    PGV if there is such a curve; else PGA if the mean period is known; else the spectral
-    acceleration that a conversion to PGV has been asked for.
+
+def suited_curves(
+    curves: list[HazardCurve], *, converted_period_s: float | None = None
+) -> list[HazardCurve]:
+    """Return the curves of one measure, that of which a model alone knows most.
 
     Args:
         curves: curves of a file, one or more measures.
-        with_mean_period: whether the mean period is known.
-        converted_period_s: period of the spectral acceleration to be converted, or None.
+        converted_period_s: period of the spectral acceleration that a conversion to PGV has been
+            asked for, or None.
+
+    Raises:
+        InputError: curves of several measures, none of which a model reads.
     """
-    measures = list(dict.fromkeys((curve.measure, curve.period_s) for curve in curves))
-    if len(measures) == 1:
+    names = list(dict.fromkeys(curve.imt for curve in curves))
+    if len(names) == 1:
         return curves
-    wanted: list[tuple[str, float | None]] = [("pgv_m_s", None)]
     if converted_period_s is not None:
-        wanted = [("sa_g", converted_period_s)]
-    elif with_mean_period:
-        wanted.append(("pga_g", None))
-    for choice in wanted:
-        if choice in measures:
-            return [curve for curve in curves if (curve.measure, curve.period_s) == choice]
-    have = ", ".join(dict.fromkeys(curve.imt for curve in curves))
-    raise InputError(
-        f"the file has curves of {have}: choose one with --imt; PGA needs --tm, a spectral "
-        "acceleration --convert"
+        chosen = [curve for curve in curves if curve.is_of(converted_period_s)]
+        if chosen:
+            return chosen
+    else:
+        for name in BEST_FIRST:
+            chosen = [curve for curve in curves if curve.known_as == name]
+            if chosen:
+                return [_with_choice(curve, names) for curve in chosen]
+    wanted = ANSWERED if converted_period_s is None else f"SA({converted_period_s:g})"
+    raise InputError(f"the file has curves of {', '.join(names)}; wanted is one of {wanted}")
+
+
+def _with_choice(curve: HazardCurve, names: list[str]) -> HazardCurve:
+    text = (
+        f"of {', '.join(names)} the curve of {curve.imt} is taken, the measure that tells most of "
+        "toppling by itself: choose another with --imt"
     )
+    return replace(curve, warnings=(*curve.warnings, text))
 
 
 _SPECTRAL = re.compile(r"([0-9.]+) Second Spectral Acceleration", re.IGNORECASE)
@@ -160,7 +175,7 @@ def _meaning(name: str, where: str) -> tuple[str, float, float | None]:
         return "sa_g", 1.0, float(match.group(1))
     raise InputError(
         f"{where}: the measure is not known: Peak Ground Acceleration, Peak Ground Velocity and "
-        "'T Second Spectral Acceleration' are"
+        f"'T Second Spectral Acceleration' are; answered are {ANSWERED}"
     )
 
 
@@ -199,6 +214,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     if not years > 0.0:
         raise InputError(f"{source}, line 1: investigation_time = {years:g}: give years above zero")
     kind = openquake_type(_stated("imt", head, source), f"{source}, line 1")
+    statistic = _stated("kind", head, source, "")
     if len(rows) < 2:
         raise InputError(f"{source}: ends after line 1, before the names of the columns")
     names = [name.strip() for name in rows[1]]
@@ -241,6 +257,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
                 site=place_of.get("custom_site_id", place_of.get("site_id", "")),
                 lon=_coordinate(place_of, "lon", 180.0, where),
                 lat=_coordinate(place_of, "lat", 90.0, where),
+                statistic=statistic,
             )
         )
     if not curves:
@@ -248,9 +265,11 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     return curves
 
 
-def _stated(name: str, head: str, source: str) -> str:
+def _stated(name: str, head: str, source: str, default: str | None = None) -> str:
     match = re.search(rf"\b{name}\s*=\s*(?:'([^']*)'|\"+([^\"]*)\"+|([^,\s]+))", head)
     if match is None:
+        if default is not None:
+            return default
         raise InputError(f"{source}, line 1: {name} is not stated")
     return next(group for group in match.groups() if group is not None)
 
@@ -282,7 +301,8 @@ _POE = re.compile(r"poe_([0-9.]+)_years?")
 
 HEADER_HELP = (
     "the first line names both columns with their unit: pga_g, pga_m_s2, pgv_m_s, pgv_cm_s or "
-    "sa(PERIOD)_g, and annual_rate or poe_YEARS_years, such as  pgv_m_s,annual_rate"
+    f"sa(PERIOD)_g, and annual_rate or poe_YEARS_years, such as  pgv_m_s,annual_rate; answered are "
+    f"{ANSWERED}"
 )
 
 

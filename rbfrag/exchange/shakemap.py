@@ -18,15 +18,32 @@ FloatArray = NDArray[np.float64]
 MOST_NODES = 20_000_000
 """Larger grids are refused."""
 
-_FIELDS: Mapping[str, tuple[str, Mapping[str, float], str]] = {
-    "PGA": ("pga_g", {"pctg": 0.01, "%g": 0.01, "g": 1.0}, "pctg"),
-    "PGV": ("pgv_m_s", {"cms": 0.01, "cm/s": 0.01, "m/s": 1.0}, "cms"),
-    "STDPGA": ("std_ln_pga", {"ln(pctg)": 1.0, "ln(%g)": 1.0, "ln(g)": 1.0}, "ln(pctg)"),
-    "STDPGV": ("std_ln_pgv", {"ln(cms)": 1.0, "ln(cm/s)": 1.0, "ln(m/s)": 1.0}, "ln(cms)"),
-}
-"""What is read of a grid: our name, units with their factors, and the unit of a blank one."""
+_G = {"pctg": 0.01, "%g": 0.01, "g": 1.0}
+_V = {"cms": 0.01, "cm/s": 0.01, "m/s": 1.0}
 
-_MOST = {"pga_g": 10.0, "pgv_m_s": 20.0, "std_ln_pga": 5.0, "std_ln_pgv": 5.0}
+_MEASURES: Mapping[str, tuple[str, Mapping[str, float]]] = {
+    "PGV": ("pgv_m_s", _V),
+    "PGA": ("pga_g", _G),
+    "PSA03": ("sa03_g", _G),
+    "PSA10": ("sa10_g", _G),
+    "PSA20": ("sa20_g", _G),
+    "PSA30": ("sa30_g", _G),
+}
+"""Measures that are read of a grid: our name, and its units with their factors; a blank unit is the
+first of them."""
+
+_STD = "std_ln_"
+_FIELDS: Mapping[str, tuple[str, Mapping[str, float]]] = {
+    **_MEASURES,
+    # the standard deviation of a logarithm does not depend on the unit inside
+    **{
+        f"STD{title}": (_STD + name, {f"ln({unit})": 1.0 for unit in units})
+        for title, (name, units) in _MEASURES.items()
+    },
+}
+
+_MOST = {"pgv_m_s": 20.0, **dict.fromkeys(("pga_g", "sa03_g", "sa10_g", "sa20_g", "sa30_g"), 10.0)}
+_MOST_STD = 5.0
 
 
 @dataclass(frozen=True)
@@ -49,7 +66,7 @@ class GridReading:
 
     Args:
         source: path of the file.
-        needed: fields that must be there beside LON and LAT.
+        needed: fields of which one must be there beside LON and LAT.
     """
 
     source: str
@@ -83,12 +100,12 @@ class GridReading:
             self.places[title] = (int(index) - 1, attributes.get("units", "").strip(), line)
         elif name == "grid_data":
             self.in_data, self.data_line = True, line
-            for wanted in ("LON", "LAT", *self.needed):
-                if wanted not in self.places:
+            for wanted in (("LON",), ("LAT",), self.needed):
+                if not set(wanted) & set(self.places):
                     have = ", ".join(self.places) or "none"
                     raise InputError(
-                        f"{self.source}, line {line}: there is no field {wanted}; the fields are "
-                        f"{have}"
+                        f"{self.source}, line {line}: there is no field {' or '.join(wanted)}; the "
+                        f"fields are {have}"
                     )
 
     def text(self, part: str) -> None:
@@ -189,8 +206,9 @@ class GridReading:
 
     def _field(self, table: FloatArray, title: str, warnings: list[str]) -> FloatArray:
         place, unit, line = self.places[title]
-        name, units, usual = _FIELDS[title]
+        name, units = _FIELDS[title]
         if not unit:
+            usual = next(iter(units))
             warnings.append(f"{self.source}, line {line}: {title} has no unit: taken as {usual}")
             unit = usual
         if unit not in units:
@@ -206,7 +224,7 @@ class GridReading:
                 f"{self.source}, node {node + 1} of grid_data: {title} = {table[node, place]:g}: "
                 "a finite number, not below zero, is wanted"
             )
-        if values.max() > _MOST[name]:
+        if values.max() > _MOST.get(name, _MOST_STD):
             warnings.append(
                 f"{self.source}: {title} reaches {table[:, place].max():g} {unit}: is that its "
                 "unit?"
@@ -241,10 +259,9 @@ class ShakeMapGrid:
         event: the earthquake.
         lon: longitudes [deg], shape (n,).
         lat: latitudes [deg], shape (n,).
-        pgv_m_s: peak ground velocity [m/s], shape (n,).
-        pga_g: peak ground acceleration [g], shape (n,).
-        std_ln_pgv: standard deviation of ln PGV, shape (n,), or None.
-        std_ln_pga: standard deviation of ln PGA, shape (n,), or None.
+        measures: what the map holds of PGV [m/s], PGA and spectral accelerations [g] by their
+            names in `predict`, each of shape (n,).
+        std_ln: standard deviations of their logarithms by the same names, as far as they are there.
         columns: declared number of nodes in a row.
         rows: declared number of rows.
         warnings: what was noticed on reading.
@@ -253,10 +270,8 @@ class ShakeMapGrid:
     event: ShakeMapEvent
     lon: FloatArray
     lat: FloatArray
-    pgv_m_s: FloatArray
-    pga_g: FloatArray
-    std_ln_pgv: FloatArray | None
-    std_ln_pga: FloatArray | None
+    measures: dict[str, FloatArray]
+    std_ln: dict[str, FloatArray]
     columns: int
     rows: int
     warnings: tuple[str, ...] = ()
@@ -280,23 +295,22 @@ def read_shakemap(
 
     Args:
         path: grid.xml.
-        uncertainty: uncertainty.xml of the same map: standard deviations of ln PGA and ln PGV.
+        uncertainty: uncertainty.xml of the same map: standard deviations of the measures'
+            logarithms.
         allow_partial: read a grid with fewer or more nodes than it declares, with a warning.
 
     Raises:
         InputError: not such a file, or numbers that cannot be used; the message names the line.
     """
-    event, fields, columns, rows, warnings = GridReading(str(path), ("PGA", "PGV")).read(
+    event, fields, columns, rows, warnings = GridReading(str(path), tuple(_MEASURES)).read(
         allow_partial
     )
     grid = ShakeMapGrid(
         event=event,
         lon=fields["lon"],
         lat=fields["lat"],
-        pgv_m_s=fields["pgv_m_s"],
-        pga_g=fields["pga_g"],
-        std_ln_pgv=fields.get("std_ln_pgv"),
-        std_ln_pga=fields.get("std_ln_pga"),
+        measures={name: fields[name] for name, _ in _MEASURES.values() if name in fields},
+        std_ln=_deviations(fields),
         columns=columns,
         rows=rows,
         warnings=tuple(warnings),
@@ -304,10 +318,16 @@ def read_shakemap(
     return grid if uncertainty is None else _with_uncertainty(grid, uncertainty, allow_partial)
 
 
+def _deviations(fields: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    return {n.removeprefix(_STD): values for n, values in fields.items() if n.startswith(_STD)}
+
+
 def _with_uncertainty(
     grid: ShakeMapGrid, path: str | os.PathLike[str], allow_partial: bool
 ) -> ShakeMapGrid:
-    event, fields, _, _, warnings = GridReading(str(path), ("STDPGV",)).read(allow_partial)
+    event, fields, _, _, warnings = GridReading(
+        str(path), tuple(f"STD{title}" for title in _MEASURES)
+    ).read(allow_partial)
     if event.event_id and grid.event.event_id and event.event_id != grid.event.event_id:
         raise InputError(
             f"{path}: is of event {event.event_id!r}, the grid of {grid.event.event_id!r}: name "
@@ -322,18 +342,17 @@ def _with_uncertainty(
         )
     return replace(
         grid,
-        std_ln_pgv=fields["std_ln_pgv"],
-        std_ln_pga=fields.get("std_ln_pga", grid.std_ln_pga),
+        std_ln={**grid.std_ln, **_deviations(fields)},
         warnings=(*grid.warnings, *warnings),
     )
 
 
 def at_places(
     grid: ShakeMapGrid, lon: FloatArray, lat: FloatArray
-) -> tuple[dict[str, FloatArray | None], NDArray[np.bool_]]:
-    """Return the fields of a grid at places, and which places lie on the map.
+) -> tuple[dict[str, FloatArray], dict[str, FloatArray], NDArray[np.bool_]]:
+    """Return measures and deviations of a grid at places, and which places lie on the map.
 
-    Bilinear between the four nodes around a place, in the logarithm of PGV and PGA; off the map
+    Bilinear between the four nodes around a place, in the logarithm of the measures; off the map
     NaN.
 
     Args:
@@ -359,18 +378,13 @@ def at_places(
         raise InputError("the nodes of the grid do not run west to east and north to south")
     on_map = (lon >= x[0]) & (lon <= x[-1]) & (lat <= y[0]) & (lat >= y[-1])
 
-    def between(values: FloatArray | None, logarithmic: bool) -> FloatArray | None:
-        if values is None:
-            return None
-        table = np.log(np.maximum(values, 1e-300)) if logarithmic else values
-        bilinear = RegularGridInterpolator((y, x), table.reshape(shape), bounds_error=False)
-        values_there: FloatArray = bilinear(np.column_stack([lat, lon]))
-        return np.exp(values_there) if logarithmic else values_there
+    def between(values: FloatArray) -> FloatArray:
+        bilinear = RegularGridInterpolator((y, x), values.reshape(shape), bounds_error=False)
+        there: FloatArray = bilinear(np.column_stack([lat, lon]))
+        return there
 
-    fields = {
-        "pgv_m_s": between(grid.pgv_m_s, True),
-        "pga_g": between(grid.pga_g, True),
-        "std_ln_pgv": between(grid.std_ln_pgv, False),
-        "std_ln_pga": between(grid.std_ln_pga, False),
+    measures = {
+        name: np.exp(between(np.log(np.maximum(values, 1e-300))))
+        for name, values in grid.measures.items()
     }
-    return fields, on_map
+    return measures, {name: between(values) for name, values in grid.std_ln.items()}, on_map

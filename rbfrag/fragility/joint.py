@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,7 +32,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _NEAR_ONE = 0.99
 _PANELS = (0.0, *(0.25**k for k in range(5, -1, -1)))
 _FARTHEST = 38.0
-_LEAST_RHO = 1e-9
+_LEAST_RHO, _MOST_RHO = 1e-9, 1.0 - 1e-12
 _PAIRS_AT_ONCE = 2**18
 
 
@@ -218,17 +219,46 @@ def count_moments(
         weights: weight or loss of each block, shape (n,); None for 1.
     """
     p, w = checked(probability, blocks, weights)
-    variance = float(np.sum(w * w * p * (1.0 - p)))
+    mean, variance = _moments(p, w, blocks, dependence)
+    return float(mean), float(variance)
+
+
+def any_failure(probability: ArrayLike, blocks: Placement, dependence: Dependence) -> FloatArray:
+    """Return the probability that at least one block fails, for many sets of P at once.
+
+    That of the beta-binomial law of `FailureCount`.
+
+    Args:
+        probability: P of each block, shape (..., n).
+        blocks: where they stand.
+        dependence: the copula.
+
+    Returns:
+        Probabilities of shape (...).
+    """
+    p = np.asarray(probability, dtype=np.float64)
+    _, w = checked(np.zeros(p.shape[-1:]), blocks, None)
+    mean, variance = _moments(p, w, blocks, dependence)
+    return _probability_any(blocks.size, mean, variance, p.max(axis=-1, initial=0.0))
+
+
+def _moments(
+    p: FloatArray, w: FloatArray, blocks: Placement, law: Dependence
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean and variance of the weighted number of failures of P of shape (..., n)."""
+    variance = np.asarray((w * w * p * (1.0 - p)).sum(axis=-1))
     for number in np.unique(blocks.earthquake):
         some = blocks.earthquake == number
-        variance += 2.0 * _shared_variance(p[some], w[some], blocks.only(some), dependence)
-    return float(w @ p), variance
+        shared = _shared_variance(p[..., some], w[some], blocks.only(some), law)
+        variance = np.asarray(variance + 2.0 * shared)
+    return np.asarray(p @ w), variance
 
 
-def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Dependence) -> float:
-    """Return the sum of covariances over all pairs of blocks of one earthquake."""
-    a, total, n = ndtri(p), 0.0, blocks.size
-    rows = max(1, _PAIRS_AT_ONCE // max(n, 1))
+def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Dependence) -> Any:
+    """Return the sum of covariances over all pairs of blocks of one earthquake, shape (...)."""
+    a, n = ndtri(p), blocks.size
+    total: Any = 0.0
+    rows = max(1, _PAIRS_AT_ONCE // max(p.size, 1))
     for start in range(0, n, rows):
         i, j = np.nonzero(np.arange(start, min(start + rows, n))[:, None] < np.arange(n))
         i += start
@@ -237,17 +267,44 @@ def _shared_variance(p: FloatArray, w: FloatArray, blocks: Placement, law: Depen
         component = site & (blocks.component[i] == blocks.component[j])
         sign = (blocks.polarity[i] * blocks.polarity[j]).astype(np.float64)
         either = site & (sign == UNKNOWN)
-        excess = joint_excess(a[i], a[j], law.of_pairs(d_l, d_y, site, component & ~either, sign))
+        r = law.of_pairs(d_l, d_y, site, component & ~either, sign)
+        excess = joint_excess(a[..., i], a[..., j], r)
         if either.any():  # another component in half of the cases, else the same or opposite side
             here = np.ones(int(either.sum()), dtype=np.bool_)
-            a_i, a_j, apart = a[i[either]], a[j[either]], (d_l[either], d_y[either])
+            a_i, a_j, apart = a[..., i[either]], a[..., j[either]], (d_l[either], d_y[either])
             own = [
                 joint_excess(a_i, a_j, law.of_pairs(*apart, here, here, np.full(here.size, side)))
                 for side in (-1.0, 1.0)
             ]
-            excess[either] = 0.5 * excess[either] + 0.25 * (own[0] + own[1])
-        total += float((w[i] * w[j]) @ excess)
+            excess[..., either] = 0.5 * excess[..., either] + 0.25 * (own[0] + own[1])
+        total = total + excess @ (w[i] * w[j])
     return total
+
+
+def _probability_any(n: int, mean: Any, variance: Any, least: Any) -> FloatArray:
+    """Return the probability that any of n blocks fails, of the law of `FailureCount`.
+
+    Args:
+        n: number of blocks.
+        mean: expected number of failures, any shape.
+        variance: its variance, same shape.
+        least: greatest P of one block, same shape.
+    """
+    mean, variance = (np.asarray(values, dtype=np.float64) for values in (mean, variance))
+    share = mean / max(n, 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        alone = n * share * (1.0 - share)
+        rho = np.minimum(1.0, (variance / alone - 1.0) / max(n - 1.0, 1.0))
+        more = 1.0 / rho - 1.0
+        alpha, beta = share * more, (1.0 - share) * more
+        p = 1.0 - variance / mean  # of the binomial law, of n' = mean/p blocks, not whole
+        binomial = np.where(p > 0.0, (1.0 - p) ** (mean / p), (1.0 - share) ** n)
+        none = np.where(
+            rho > _LEAST_RHO, np.exp(betaln(alpha, beta + n) - betaln(alpha, beta)), binomial
+        )
+    none = np.where(rho >= _MOST_RHO, 1.0 - share, none)
+    any_of_them = np.minimum(np.clip(1.0 - none, least, mean), 1.0)
+    return np.asarray(np.where((share > 0.0) & (share < 1.0), any_of_them, share))
 
 
 def checked(
@@ -309,18 +366,7 @@ class FailureCount:
     @property
     def probability_any(self) -> float:
         """Probability that at least one fails, between the greatest P and the sum of all."""
-        share, rho = self.mean / max(self.n, 1), self.overdispersion
-        if not 0.0 < share < 1.0:
-            return share
-        if rho >= 1.0:
-            none = 1.0 - share
-        elif rho > _LEAST_RHO:
-            alpha, beta = share * (1.0 / rho - 1.0), (1.0 - share) * (1.0 / rho - 1.0)
-            none = float(np.exp(betaln(alpha, beta + self.n) - betaln(alpha, beta)))
-        else:
-            n, p = self._binomial()
-            none = (1.0 - p) ** n
-        return min(max(1.0 - none, self.least_any), self.mean, 1.0)
+        return float(_probability_any(self.n, self.mean, self.variance, self.least_any))
 
     def quantile(self, q: ArrayLike) -> IntArray:
         """Return the smallest number that is not exceeded with probability q, same shape as q."""

@@ -22,6 +22,7 @@ from rbfrag.fragility.methods import (
     method_named,
     method_names,
 )
+from rbfrag.fragility.unknown_outcomes import UnknownOutcomes
 
 LEAST = 1e-290
 """Velocities, accelerations and strengths are taken for at least this, for logarithms."""
@@ -79,6 +80,7 @@ class FragilityModel:
         vertical: whether it was fitted with vertical motion.
         notes: what every answer says of the model, such as where it comes from.
         spread: how the fitted points scatter; None where the row does not say it.
+        unknown: how many outcomes that it was fitted to are not known; None where all are.
     """
 
     row: ModelRow
@@ -91,6 +93,7 @@ class FragilityModel:
     vertical: bool
     notes: tuple[str, ...] = ()
     spread: Spread | None = None
+    unknown: UnknownOutcomes | None = None
     ranges: dict[tuple[str, ...], tuple[Range, ...]] = field(
         default_factory=dict, compare=False, repr=False
     )
@@ -160,6 +163,7 @@ class FragilityModel:
             vertical=row.diagnostics.get("vertical", "without") != "without",
             notes=notes if event_spread is not None else (*notes, NO_EVENT_RANGE),
             spread=stored_spread(row.name, row.diagnostics),
+            unknown=UnknownOutcomes.stored(row.diagnostics, method.block.strength, row.name),
         )
 
     @property

@@ -18,6 +18,7 @@ from rbfrag.fragility.lookup import find_model, suited_models
 from rbfrag.fragility.measures import SPECTRAL, STATED
 from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.unknown_outcomes import NOTABLE_SHARE, in_words
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -58,6 +59,9 @@ class Prediction:
             short pulses where Tm is not known.
         median_displacement_m: the displacement that is exceeded with P = 1/2 [m]; None where the
             kind has none and where the block does not move.
+        unknown_share: of the outcomes that the model was fitted to, of like strength and shaking,
+            the share that is not known because blocks left their model before they failed; None
+            where all are known.
     """
 
     kind: str
@@ -77,6 +81,7 @@ class Prediction:
     warnings: tuple[str, ...] = ()
     pgv_over_pga_s: float | None = None
     median_displacement_m: float | None = None
+    unknown_share: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
@@ -376,6 +381,11 @@ def _predict_one(
     if method.median_of is not None and eta is not None:
         # the asked value, not the one that is adjusted for the base's dip
         median = given[method.median_of] * math.exp(eta * math.exp(log_sigma))
+    share = None
+    if model.unknown is not None:
+        share = model.unknown.share(values)
+        if share >= NOTABLE_SHARE:
+            warnings = (*warnings, in_words(share))
     return Prediction(
         model.row.kind,
         probability,
@@ -394,6 +404,7 @@ def _predict_one(
         warnings,
         values.get("pgv_over_pga_s"),
         median,
+        share,
     )
 
 
@@ -494,7 +505,8 @@ def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
     means: dict[str, Any] = {
         name: mean(name)
         for name in (
-            "probability", "ci_low", "ci_high", "event_low", "event_high", "intensity_m_s"
+            "probability", "ci_low", "ci_high", "event_low", "event_high", "intensity_m_s",
+            "unknown_share",
         )
     }  # fmt: skip
     return MotionPrediction(

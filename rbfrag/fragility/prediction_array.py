@@ -17,6 +17,7 @@ from rbfrag.fragility.checks import Finding, answer_with_findings
 from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.methods import Numbers, arrays
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.unknown_outcomes import IN_GENERAL, NOTABLE_SHARE
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T")
@@ -63,6 +64,8 @@ class PredictionArray:
         term: its intensity term.
         method: how it was fitted.
         notes: sentences about the model that hold for every element.
+        unknown_share: of the outcomes that the model was fitted to, of like strength and shaking,
+            the share that is not known; None where all are known.
     """
 
     kind: str
@@ -80,6 +83,7 @@ class PredictionArray:
     term: str
     method: str
     notes: tuple[str, ...] = ()
+    unknown_share: FloatArray | None = None
 
     @cached_property
     def reason(self) -> NDArray[np.object_]:
@@ -99,6 +103,7 @@ class _Columns:
     y: FloatArray
     x: FloatArray
     in_domain: NDArray[np.bool_]
+    unknown: FloatArray | None = None
 
 
 def predict_many(
@@ -126,7 +131,10 @@ def predict_many(
     size = int(np.prod(shape))
     ns = arrays()
     p, low, high, event_low, event_high, y, x = np.empty((7, size))
-    out = _Columns(p, low, high, event_low, event_high, y, x, np.ones(size, dtype=np.bool_))
+    unknown = None if model.unknown is None else np.empty(size)
+    out = _Columns(
+        p, low, high, event_low, event_high, y, x, np.ones(size, dtype=np.bool_), unknown
+    )
     reach = quantiles if interval else None
     if not interval:
         out.low[:] = out.high[:] = np.nan
@@ -167,6 +175,7 @@ def predict_many(
         term=model.term.name,
         method=model.method.name,
         notes=model.notes,
+        unknown_share=None if unknown is None else unknown.reshape(shape),
     )
 
 
@@ -205,6 +214,9 @@ def _answer_part(
         clear &= np.logical_not(holds)
     if model.spread is not None:
         clear &= model.spread.holds(values, ns)
+    if model.unknown is not None and out.unknown is not None:
+        out.unknown[part] = share = model.unknown.array(values)
+        clear &= np.logical_not(share >= NOTABLE_SHARE)
     answer = model.answer(values, quantiles, ns)
     for column, value in zip(_answered(out), answer, strict=False):
         if value is not None:
@@ -260,6 +272,8 @@ def _answer_with_diagnostics(
     for column, value in ((out.y, y), (out.x, judgement.intensity_m_s)):
         column[places] = np.where(judgement.missing, np.nan, value)
     out.in_domain[places] = judgement.in_domain
+    if out.unknown is not None:
+        sentences.add(out.unknown[places] >= NOTABLE_SHARE, IN_GENERAL)
     return sentences.texts()
 
 

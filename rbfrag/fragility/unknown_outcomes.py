@@ -21,10 +21,13 @@ if TYPE_CHECKING:
 NOTABLE_SHARE = 0.05
 """From this share on an answer says it in words."""
 
-SENTENCE = (
+_SENTENCE = (
     "of the outcomes that the model was fitted to, of like strength and shaking, are not known: "
     "those blocks leave the model before they fail"
 )
+
+IN_GENERAL = f"a share (unknown_share) {_SENTENCE}"
+"""The sentence about many elements, whose shares stand in their own array."""
 
 
 @dataclass(frozen=True)
@@ -117,4 +120,4 @@ class UnknownOutcomes:
 
 def in_words(share: float) -> str:
     """Return the sentence about a share."""
-    return f"{100.0 * share:.0f} % {SENTENCE}"
+    return f"{100.0 * share:.0f} % {_SENTENCE}"

@@ -11,21 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import Model, predict
+from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.hazards.annual_rate import checked_years, failure_rate, normal_steps, probability_in
-from rbfrag.hazards.conversions import component as component_named
-from rbfrag.hazards.conversions import velocity_conversion
+from rbfrag.hazards.annual_rate import checked_years, failure_rate, probability_in
 from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.shaking import NOTABLE, Shaking, warn_of_ends
 
 FloatArray = NDArray[np.float64]
 
-_SCATTER_POINTS = 17
 _CHUNK = 512
-_NOTABLE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +69,8 @@ def hazard(
     p2: ArrayLike,
     kr: ArrayLike,
     *,
-    tm_s: float | None = None,
     convert: str | None = None,
+    convert_sigma: float | None = None,
     component: str | None = None,
     years: float = 50.0,
     model: Model | None = None,
@@ -87,15 +83,18 @@ def hazard(
     λ_f = ∫ P(topples | x) (-dλ), see :func:`rbfrag.hazards.annual_rate.failure_rate`. The
     ends of the interval are the integrals of the ends of the fragility's own interval; since
     these are taken at every level at once, the interval is at least as wide as one from the
-    joint distribution of the parameters.
+    joint distribution of the parameters. The model is one of the curve's own measure: what else
+    shaking of that level may be is scatter in its P.
 
     Args:
-        curve: hazard curve of PGV, of PGA (with `tm_s`), or of a spectral acceleration
-            (with `convert`).
+        curve: hazard curve of PGV, PGA or a spectral acceleration at 0.3, 1, 2 or 3 s, or of one
+            that `convert` is for.
         p2: frequency parameters p² [1/s²], scalar or shape (m,).
         kr: toppling yield acceleration coefficients, scalar or shape (m,).
-        tm_s: mean period [s] of the shaking, for a PGA curve.
-        convert: name of a published conversion from spectral acceleration to PGV.
+        convert: name of a published conversion from spectral acceleration to PGV, whose scatter
+            is integrated.
+        convert_sigma: standard deviation of ln PGV about the conversion; None for that of the
+            motions of the shipped reference.
         component: what the curve's horizontal component means: single, geometric_mean,
             rotd50 or larger; None for single, with a warning.
         years: period for the probability [a].
@@ -106,37 +105,25 @@ def hazard(
             from it: one rate, by the mean of their fragilities.
 
     Raises:
-        InputError: the curve's measure does not suffice, or a value that cannot be used.
+        InputError: no model reads the curve's measure, or a value that cannot be used.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
     p2s, krs = (np.ravel(values) for values in np.broadcast_arrays(p2, kr))
     checked_years(years)
-    warnings = list(curve.warnings)
-    name, factor, fixed = _measure(curve, tm_s, convert, warnings)
-    meaning = component_named("single" if component is None else component)
-    if component is None:
-        warnings.append(
-            "the curve's horizontal component is taken as a single one, which the models are "
-            "fitted on; hazard products often mean rotd50 or the geometric mean: say which"
-        )
-    else:
-        warnings.append(
-            f"the curve is of {meaning.title}; Beyer and Bommer (2006) relate it to one component"
-            if meaning.name != "single"
-            else "the curve is of a single component, as the models are"
-        )
-    xi, weight = normal_steps(1 if meaning.scatter == 0.0 else _SCATTER_POINTS)
-    shift = factor / meaning.ratio * np.exp(meaning.scatter * xi)
-
-    chosen = find_model(model, ("p2", "kr", name, *fixed), db)
+    reading = Shaking.of(curve, convert=convert, convert_sigma=convert_sigma, component=component)
+    name, shift, weight = reading.name, reading.shift, reading.weight
+    warnings = list(reading.warnings)
+    chosen = find_model(model, ("p2", "kr", name), db)
+    if chosen.term.advice:
+        warnings.append(chosen.term.advice)
     parts = []
     for start in range(0, 0 if one_class else p2s.size, _CHUNK):
         some = slice(start, start + _CHUNK)
 
         def bands(levels: FloatArray, some: slice = some) -> FloatArray:
             """Return P and the two ends of its interval for blocks x levels, stacked."""
-            shaking = {name: (levels[:, None] * shift).reshape(1, -1), **fixed}
+            shaking = {name: (levels[:, None] * shift).reshape(1, -1)}
             answer = _predicted(p2s[some, None], krs[some, None], shaking, chosen, level)
             stacked = np.concatenate([answer.probability, answer.ci_low, answer.ci_high])
             averaged: FloatArray = stacked.reshape(-1, levels.size, shift.size) @ weight
@@ -144,7 +131,7 @@ def hazard(
 
         parts.append((p2s[some].size, failure_rate(curve, bands)))
     if one_class:
-        mean = _mean_bands(curve, p2s, krs, name, shift, fixed, chosen, level)
+        mean = _mean_bands(curve, p2s, krs, name, shift, chosen, level)
         parts.append((1, failure_rate(curve, lambda levels: mean(levels) @ weight)))
 
     def joined(name: str, row: int = 0) -> FloatArray:
@@ -155,14 +142,14 @@ def hazard(
     rate, low, high = (joined("annual_rate", row) for row in range(3))
     contribution, below = joined("contribution"), joined("below")
     above, above_at_most = joined("above"), joined("above_at_most")
-    _tails(curve, rate, above, above_at_most, below, warnings)
+    warn_of_ends(curve, rate, above, above_at_most, below, warnings)
     edges = parts[0][1].edges
-    shaking = {name: factor / meaning.ratio * np.sqrt(edges[None, 1:] * edges[None, :-1]), **fixed}
+    shaking = {name: reading.median * np.sqrt(edges[None, 1:] * edges[None, :-1])}
     outside = ~_predicted(p2s[:, None], krs[:, None], shaking, chosen, level).in_domain
     if one_class:
         outside = outside.mean(axis=0, keepdims=True)
     part = (outside * contribution).sum(axis=1) / np.maximum(rate, np.finfo(np.float64).tiny)
-    if (part > _NOTABLE).any():
+    if (part > NOTABLE).any():
         warnings.append(
             f"up to {100.0 * float(part.max()):.3g} % of the rate comes from blocks and shaking "
             "outside the ranges that the model was fitted on"
@@ -186,53 +173,12 @@ def hazard(
     )
 
 
-def _measure(
-    curve: HazardCurve, tm_s: float | None, convert: str | None, warnings: list[str]
-) -> tuple[str, float, dict[str, float]]:
-    """Return predict's argument, the factor from the curve's unit, and other arguments."""
-    if convert is not None and curve.measure != "sa_g":
-        raise InputError(
-            f"{curve.source}: --convert {convert} is for spectral accelerations; the curve is of "
-            f"{curve.imt}"
-        )
-    if curve.measure == "pgv_m_s":
-        if tm_s is not None:
-            warnings.append("the mean period is not used: a PGV curve answers by itself")
-        return "pgv_m_s", 1.0, {}
-    if curve.measure == "pga_g":
-        if tm_s is None:
-            raise InputError(
-                f"{curve.source}: PGA alone does not say whether a block topples: give the mean "
-                "period with --tm, or a curve of PGV"
-            )
-        warnings.append(f"the mean period {tm_s:g} s is taken to be the same at every PGA")
-        return "pga_g", 1.0, {"tm_s": tm_s}
-    if convert is None:
-        raise InputError(
-            f"{curve.source}: the models know PGV, not {curve.imt}: give a curve of PGV, or ask "
-            "for a published conversion with --convert newmark_hall_1982 (SA(1)) or "
-            "bommer_alarcon_2006 (SA(0.5))"
-        )
-    used = velocity_conversion(convert)
-    if curve.period_s is None or abs(curve.period_s - used.period_s) > 1e-9:
-        raise InputError(
-            f"{curve.source}: {used.name} is for SA({used.period_s:g}), not for {curve.imt}: "
-            f"choose the curve with --imt 'SA({used.period_s:g})'"
-        )
-    warnings.append(
-        f"PGV = {used.factor:.4g} m/s per g times {curve.imt}: {used.source}; the scatter of this "
-        "conversion is not in the answer"
-    )
-    return "pgv_m_s", used.factor, {}
-
-
 def _mean_bands(
     curve: HazardCurve,
     p2: FloatArray,
     kr: FloatArray,
     name: str,
     shift: FloatArray,
-    fixed: dict[str, float],
     model: FragilityModel,
     level: float,
 ) -> Callable[[FloatArray], FloatArray]:
@@ -249,7 +195,7 @@ def _mean_bands(
     total = np.zeros((3, u.size))
     for start in range(0, p2.size, _CHUNK):
         some = slice(start, start + _CHUNK)
-        shaking = {name: np.exp(u)[None, :], **fixed}
+        shaking = {name: np.exp(u)[None, :]}
         answer = _predicted(p2[some, None], kr[some, None], shaking, model, level)
         bands_of = (answer.probability, answer.ci_low, answer.ci_high)
         total += np.array([values.sum(axis=0) for values in bands_of])
@@ -266,29 +212,6 @@ def _mean_bands(
 def _predicted(
     p2: FloatArray, kr: FloatArray, shaking: dict[str, Any], model: FragilityModel, level: float
 ) -> PredictionArray:
-    answer = predict(p2, kr, **shaking, model=model, level=level)
+    answer = answer_given(model, {"p2": p2, "kr": kr, **shaking}, level)
     assert isinstance(answer, PredictionArray)
     return answer
-
-
-def _tails(
-    curve: HazardCurve,
-    rate: FloatArray,
-    above: FloatArray,
-    above_at_most: FloatArray,
-    below: FloatArray,
-    warnings: list[str],
-) -> None:
-    unit = curve.measure.replace("sa_g", curve.imt + " in g")
-    open_above = above_at_most - above > _NOTABLE * rate
-    if open_above.any():
-        worst = float((above_at_most - above)[open_above].max())
-        warnings.append(
-            f"the curve ends at {unit} = {curve.levels[-1]:g}: stronger shaking may add up to "
-            f"{worst:.3g} failures a year to the answer"
-        )
-    if (below > _NOTABLE).any():
-        warnings.append(
-            f"the curve begins at {unit} = {curve.levels[0]:g}, where the probability of failure "
-            f"is already {float(below.max()):.3g}: weaker shaking is not counted"
-        )

@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.measures import SPECTRAL
 
 FloatArray = NDArray[np.float64]
 
 MEASURES = ("pga_g", "pgv_m_s", "sa_g")
 """What the levels of a curve may be, with the unit."""
+
+ANSWERED = ", ".join(["PGV", "PGA", *(f"SA({period:g})" for period in SPECTRAL)])
+"""The measures whose curves are answered, each by a model of that very measure."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +35,8 @@ class HazardCurve:
         lat: latitude of the site [deg], or None.
         source: where the curve comes from, for messages.
         warnings: what was noticed on reading it.
+        statistic: what of a logic tree the curve is, as OpenQuake names it: mean, quantile-0.84,
+            rlz-001; empty where that is not stated.
     """
 
     measure: str
@@ -43,6 +49,7 @@ class HazardCurve:
     lat: float | None = None
     source: str = "hazard curve"
     warnings: tuple[str, ...] = ()
+    statistic: str = ""
 
     @property
     def imt(self) -> str:
@@ -50,6 +57,18 @@ class HazardCurve:
         if self.measure == "sa_g":
             return f"SA({self.period_s:g})"
         return self.measure.split("_")[0].upper()
+
+    @property
+    def known_as(self) -> str | None:
+        """Name of the measure in `predict`; None where no model reads it."""
+        if self.measure != "sa_g":
+            return self.measure
+        of_period = (name for period, name in SPECTRAL.items() if self.is_of(period))
+        return next(of_period, None)
+
+    def is_of(self, period_s: float) -> bool:
+        """Return whether the levels are spectral accelerations of a period [s]."""
+        return self.period_s is not None and abs(self.period_s - period_s) < 1e-9
 
     @property
     def place(self) -> str:
@@ -87,6 +106,7 @@ def hazard_curve(
     site: str = "",
     lon: float | None = None,
     lat: float | None = None,
+    statistic: str = "",
 ) -> HazardCurve:
     """Return a checked hazard curve; levels that say nothing are left out with a warning.
 
@@ -102,6 +122,7 @@ def hazard_curve(
         site: name of the site.
         lon: longitude [deg].
         lat: latitude [deg].
+        statistic: what of a logic tree the curve is.
 
     Raises:
         InputError: levels or rates that make no hazard curve, with the offending value.
@@ -146,6 +167,7 @@ def hazard_curve(
         lat=lat,
         source=source,
         warnings=tuple(warnings),
+        statistic=statistic,
     )
 
 

@@ -18,6 +18,11 @@ _NAMES = {
 }
 
 
+def measure_title(curve: HazardCurve) -> str:
+    """Return what the levels of a curve are, with their unit."""
+    return _NAMES.get(curve.measure, f"spectral acceleration, {curve.imt} [g]")
+
+
 def plot_contribution(curve: HazardCurve, answer: HazardAnswer, path: str | PathLike[str]) -> Path:
     """Draw a hazard curve and, below it, where the failures of the first block come from.
 
@@ -46,7 +51,7 @@ def plot_contribution(curve: HazardCurve, answer: HazardAnswer, path: str | Path
         color="#2b6cac", edgecolor="white", linewidth=0.3,
     )  # fmt: skip
     bottom.set_ylabel("share of the rate\n[% per decade of shaking]")
-    bottom.set_xlabel(_NAMES.get(curve.measure, f"spectral acceleration, {curve.imt} [g]"))
+    bottom.set_xlabel(measure_title(curve))
     seen = percent > _SHOWN * max(float(percent.max()), np.finfo(float).tiny)
     if seen.any():
         left, right = answer.edges[:-1][seen][0], answer.edges[1:][seen][-1]

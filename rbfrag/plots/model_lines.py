@@ -12,6 +12,7 @@ from scipy.optimize.elementwise import find_root
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
+from rbfrag.fragility.measures import STATED
 from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import answer_given
@@ -235,11 +236,12 @@ def predicted_strengths(
     Returns:
         Shape (n,); NaN where what the model reads is not known.
     """
-    columns = {name: getattr(table, name) for name in ("p2", "pgv_m_s", "pga_g", "tm_s", "pgd_m")}
+    columns = {name: getattr(table, name) for name in ("p2", *STATED)}
     columns["xp_m_s"] = xp_m_s
     given = {name: columns[name] for name in ("p2", *model.term.inputs)}
     with np.errstate(divide="ignore", invalid="ignore"):
-        x = np.asarray(model.term.intensity_m_s(given), dtype=np.float64)
+        p = np.sqrt(table.p2)
+        x = np.asarray(model.term.intensity_m_s({**given, "p": p}), dtype=np.float64)
     known = np.isfinite(x) & (x > 0.0)
     for name in model.term.inputs:
         known &= np.isfinite(given[name])

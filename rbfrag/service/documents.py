@@ -68,6 +68,7 @@ class PredictAnswer(_Document):
     warnings: list[str]
     pgv_over_pga_s: float | None
     median_displacement_m: float | None
+    unknown_share: float | None
     answers: list[ModelAnswer]
 
 

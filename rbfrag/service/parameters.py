@@ -321,10 +321,12 @@ class HazardQuery(TopplingBlock):
     """Intensity measure of the curve: PGV, PGA, SA(1.0)."""
     site: Text | None = None
     """Site of the file: its number from 1 on, or its name."""
-    tm: Annotated[Positive | None, TM] = None
     convert: Text | None = None
     """Published conversion of a spectral acceleration to PGV: newmark_hall_1982 (SA(1)) or
-    bommer_alarcon_2006 (SA(0.5))."""
+    bommer_alarcon_2006 (SA(0.5)); its scatter is integrated."""
+    convert_sigma: Positive | None = None
+    """Standard deviation of ln PGV about the conversion. Default: that of the reference's
+    motions."""
     component: Text | None = None
     """What the curve's horizontal component means: single, geometric_mean, rotd50 or larger."""
     model: Annotated[Text | None, MODEL] = None

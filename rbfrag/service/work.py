@@ -147,11 +147,12 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     convert = None if query.convert is None else velocity_conversion(query.convert)
     curves = suited_curves(
         curves,
-        with_mean_period=query.tm is not None,
         converted_period_s=None if convert is None else convert.period_s,
     )
-    chosen = query.model_dump(include={"years", "level", "convert", "component", "model"})
-    rates = [answer(curve, p2, kr, tm_s=query.tm, **chosen, db=db) for curve in curves]
+    chosen = query.model_dump(
+        include={"years", "level", "convert", "convert_sigma", "component", "model"}
+    )
+    rates = [answer(curve, p2, kr, **chosen, db=db) for curve in curves]
     return json_text(as_dict(curves, [None], rates, remarks))
 
 

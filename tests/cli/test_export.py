@@ -15,6 +15,7 @@ from rbfrag.exchange.nrml import read_nrml
 from rbfrag.exchange.pelicun_table import read_pelicun
 from tests.cli.conftest import Shell
 from tests.fragility.conftest import model_row
+from tests.hazards.conftest import measure_row
 
 BLOCKS = "block_id,p2_1_s2,kr\nA7,3,0.1\nB2,10,0.3\n"
 
@@ -23,7 +24,8 @@ BLOCKS = "block_id,p2_1_s2,kr\nA7,3,0.1\nB2,10,0.3\n"
 def database(shell: Shell) -> None:
     with opened_database("rbfrag.db", create=True) as engine, engine.begin() as connection:
         save_model(connection, model_row())
-        save_model(connection, model_row("pga_tm"))
+        save_model(connection, measure_row("pga"))
+        save_model(connection, measure_row("sa10"))
 
 
 @pytest.mark.usefixtures("database")
@@ -41,13 +43,27 @@ def test_nrml_of_several_blocks(shell: Shell) -> None:
 @pytest.mark.usefixtures("database")
 def test_pelicun_of_one_block_in_pga(shell: Shell) -> None:
     told = shell.json(
-        "export", "pelicun", "--p2", "3", "--kr", "0.1", "--imt", "PGA", "--tm", "0.5",
+        "export", "pelicun", "--p2", "3", "--kr", "0.1", "--imt", "PGA",
         "--levels", "300", "--name", "boulder", "--out", "a.csv",
     )  # fmt: skip
     (found,) = read_pelicun("a.csv").functions
     assert (found.name, found.kind.measure) == ("boulder", "pga_g")
     x = np.linspace(0.4, 1.8, 50)
-    expected = rbfrag.predict(3.0, 0.1, pga_g=x, tm_s=0.5).probability
+    expected = rbfrag.predict(3.0, 0.1, pga_g=x).probability
+    assert np.abs(found.at(x) - expected).max() < 1.2 * told["largest_grid_error"] + 1e-5
+
+
+@pytest.mark.usefixtures("database")
+def test_nrml_of_a_spectral_acceleration(shell: Shell) -> None:
+    for imt in ("SA(1.0)", "SA(1)"):
+        told = shell.json(
+            "export", "nrml", "--p2", "3", "--kr", "0.1", "--imt", imt, "--out", "a.xml"
+        )
+        assert told["term"] == "sa10"
+    (found,) = read_nrml("a.xml")
+    assert (found.kind.measure, found.kind.period_s) == ("sa_g", 1.0)
+    x = np.linspace(0.2, 2.0, 50)
+    expected = rbfrag.predict(3.0, 0.1, sa_g={1.0: x}).probability
     assert np.abs(found.at(x) - expected).max() < 1.2 * told["largest_grid_error"] + 1e-5
 
 
@@ -59,7 +75,7 @@ def test_an_exported_curve_is_drawn_beside_its_origin(
     shell("export", "nrml", *block, "--name", "boulder", "--out", "a.xml")
     shell("plot", "curve", *block, "--beside", "a.xml", "--out", "a.svg")
     assert "boulder, toppled" in Path("a.svg").read_text()
-    shell("export", "pelicun", *block, "--imt", "PGA", "--tm", "0.5", "--out", "a.csv")
+    shell("export", "pelicun", *block, "--imt", "PGA", "--out", "a.csv")
     message = refuses("plot", "curve", *block, "--beside", "a.csv", "--out", "b.svg")
     assert "no fragility over pgv_m_s; there are PGA" in message
 
@@ -101,8 +117,9 @@ def test_a_rock_mass_is_the_mean_of_its_toppling_blocks(shell: Shell) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--p2", "3", "--kr", "0.1", "--imt", "PGA"), "mean period with --tm"),
-        (("--p2", "3", "--kr", "0.1", "--imt", "SA(1)"), "--imt SA(1)"),
+        (("--p2", "3", "--kr", "0.1", "--imt", "SA(2)"), "stored toppling model works with sa20_g"),
+        (("--p2", "3", "--kr", "0.1", "--imt", "SA(0.5)"), "PGV, PGA, SA(0.3), SA(1), SA(2)"),
+        (("--p2", "3", "--kr", "0.1", "--imt", "PGD"), "intensity measure 'PGD' is not known"),
         (("--p2", "3", "--kr", "0.1", "--levels", "2"), "at least 10"),
         (
             ("--p2", "3", "--kr", "0.1", "--blocks", "b.csv"),

@@ -102,8 +102,17 @@ def test_plot(shell: Shell, curve: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
-        ("pga_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (), "give the mean period with --tm"),
-        ("sa(1)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (), "published conversion"),
+        ("sa(0.5)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
+         "no model reads SA(0.5): give a curve of one of PGV, PGA, SA(0.3), SA(1), SA(2), SA(3), or"
+         " convert it to PGV with --convert bommer_alarcon_2006"),
+        ("sa(0.75)_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
+         "no model reads SA(0.75): give a curve of one of PGV, PGA, SA(0.3), SA(1), SA(2), SA(3)"),
+        ("pga_g,annual_rate\n0.1,0.01\n0.5,0.001\n", (),
+         "no stored toppling model works with pga_g"),
+        ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n", ("--convert-sigma", "0.5"),
+         "--convert-sigma belongs to --convert"),
+        ("sa(1)_g,annual_rate\n0.1,0.01\n0.5,0.001\n",
+         ("--convert", "newmark_hall_1982", "--convert-sigma", "0"), "no conversion is without"),
         ("sa(2)_g,annual_rate\n0.1,0.01\n0.5,0.001\n",
          ("--convert", "newmark_hall_1982"), "is for SA(1), not for SA(2)"),
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.5,0.001\n",

@@ -38,7 +38,7 @@ def test_one_block_at_every_node(shell: Shell, grid: Path) -> None:
     expected = rbfrag.predict(3.0, 0.1, pgv_m_s=0.6, pga_g=0.4).probability
     assert features[0]["properties"]["probability"] == pytest.approx(expected, rel=1e-12)
     assert told["largest_probability"] == pytest.approx(expected, rel=1e-12)
-    assert any("uncertainty of PGV is not given" in text for text in told["warnings"])
+    assert any("uncertainty of pgv_m_s is not given" in text for text in told["warnings"])
 
 
 def test_blocks_at_their_places(shell: Shell, grid: Path) -> None:

@@ -42,14 +42,20 @@ def test_usgs_nshm(formats_dir: Path) -> None:
     pga = curves[0]
     assert pga.levels[0] == pytest.approx(0.0025, rel=1e-12)
     assert pga.annual_rate[0] == 0.7542958319493401
-    (one,) = read_hazard_curves(path, imt="SA(1.0)".replace(".0", ""))
-    assert one.period_s == 1.0
+    for imt in ("SA(1.0)", "SA(1)", "sa( 1.00 )"):
+        (one,) = read_hazard_curves(path, imt=imt)
+        assert (one.period_s, one.known_as) == (1.0, "sa10_g")
     with pytest.raises(InputError, match="no curve of PGV; there are PGA, SA"):
         read_hazard_curves(path, imt="PGV")
-    with pytest.raises(InputError, match="choose one with --imt"):
-        suited_curves(curves, with_mean_period=False, converted_period_s=None)
-    assert suited_curves(curves, with_mean_period=True, converted_period_s=None) == [pga]
-    assert suited_curves(curves, with_mean_period=False, converted_period_s=1.0)[0].imt == "SA(1)"
+    (best,) = suited_curves(curves)
+    assert best.imt == "SA(1)"
+    assert "the curve of SA(1) is taken" in best.warnings[-1]
+    assert suited_curves([pga]) == [pga]
+    assert suited_curves(curves, converted_period_s=0.5)[0].imt == "SA(0.5)"
+    with pytest.raises(InputError, match=r"SA\(0.1\), SA\(0.5\); wanted is one of PGV, PGA, SA"):
+        suited_curves([each for each in curves if each.imt in ("SA(0.1)", "SA(0.5)")])
+    with pytest.raises(InputError, match=r"wanted is one of SA\(0.25\)"):
+        suited_curves(curves[:2], converted_period_s=0.25)
 
 
 def test_units_and_investigation_time(tmp_path: Path) -> None:
@@ -89,6 +95,7 @@ def test_two_columns(tmp_path: Path, header: str, row: str, level: float, rate: 
         ("pgv_m_s,poe_50_years\n0.1,1.5\n", "line 2: 1.5 is no probability"),
         ("pgv_m_s,annual_rate,x\n", "line 1: 3 columns, not two"),
         (OPENQUAKE.replace("imt='PGV'", "imt='CAV'"), "line 1: intensity measure 'CAV'"),
+        ("pgd_m,annual_rate\n0.1,0.01\n", r"'pgd_m' is not known.*PGV, PGA, SA\(0.3\), SA\(1\)"),
         (OPENQUAKE.replace("50.0", "x"), "line 1: 'x' is not a number"),
         (OPENQUAKE.replace("kind='mean', investigation_time=50.0", "investigation_time=-1"),
          "investigation_time = -1"),

@@ -47,19 +47,21 @@ def test_version_3(formats_dir: Path) -> None:
     assert (found.event.magnitude, found.event.depth_km, found.event.lat) == (6.9, 18.0, 37.04)
     # first row of the file: -125.3800 39.4340 0.52 1.57, percent of g and cm/s
     assert (found.lon[0], found.lat[0]) == (-125.38, 39.434)
-    assert found.pga_g[0] == pytest.approx(0.0052)
-    assert found.pgv_m_s[0] == pytest.approx(0.0157)
-    assert found.std_ln_pga is not None
-    assert found.std_ln_pga[0] == 0.49
-    assert found.std_ln_pgv is None
+    assert found.measures["pga_g"][0] == pytest.approx(0.0052)
+    assert found.measures["pgv_m_s"][0] == pytest.approx(0.0157)
+    assert found.std_ln["pga_g"][0] == 0.49
+    assert list(found.std_ln) == ["pga_g"]
+    # PSA03 1.63, PSA10 2.7, PSA30 0.7 percent of g
+    sa = [found.measures[name][0] for name in ("sa03_g", "sa10_g", "sa30_g")]
+    assert sa == pytest.approx([0.0163, 0.027, 0.007])
     assert found.warnings == ()
 
 
 def test_blank_units_are_those_of_the_manual(formats_dir: Path) -> None:
     found = read_shakemap(formats_dir / "shakemap_v3_loma_prieta_grid_cut_blank_units.xml")
-    assert found.pga_g[0] == pytest.approx(0.18)
-    assert found.pgv_m_s[0] == pytest.approx(0.1323)
-    assert sum("has no unit" in text for text in found.warnings) == 3
+    assert found.measures["pga_g"][0] == pytest.approx(0.18)
+    assert found.measures["pgv_m_s"][0] == pytest.approx(0.1323)
+    assert sum("has no unit" in text for text in found.warnings) == 6
 
 
 def test_version_4_has_another_order_and_lies_about_its_size(formats_dir: Path) -> None:
@@ -67,8 +69,8 @@ def test_version_4_has_another_order_and_lies_about_its_size(formats_dir: Path) 
     with pytest.raises(InputError, match=r"10 nodes, .* 741 x 575 = 426075: with --allow-partial"):
         read_shakemap(path)
     found = read_shakemap(path, allow_partial=True)
-    assert found.pga_g[0] == pytest.approx(0.006399)
-    assert found.pgv_m_s[0] == pytest.approx(0.01023)
+    assert found.measures["pga_g"][0] == pytest.approx(0.006399)
+    assert found.measures["pgv_m_s"][0] == pytest.approx(0.01023)
     assert not found.is_whole
     assert "read as it is" in found.warnings[0]
 
@@ -77,10 +79,8 @@ def test_uncertainty_of_the_same_map(tmp_path: Path, grid_file: Path) -> None:
     other = tmp_path / "uncertainty.xml"
     other.write_text(UNCERTAINTY)
     found = read_shakemap(grid_file, uncertainty=other)
-    assert found.std_ln_pgv is not None
-    assert found.std_ln_pga is not None
-    assert found.std_ln_pgv.tolist() == [0.5, 0.6, 0.7, 0.5, 0.6, 0.7]
-    assert found.std_ln_pga.tolist() == [0.4, 0.5, 0.6, 0.4, 0.5, 0.6]
+    assert found.std_ln["pgv_m_s"].tolist() == [0.5, 0.6, 0.7, 0.5, 0.6, 0.7]
+    assert found.std_ln["pga_g"].tolist() == [0.4, 0.5, 0.6, 0.4, 0.5, 0.6]
     other.write_text(UNCERTAINTY.replace("e1", "e2"))
     with pytest.raises(InputError, match="of event 'e2', the grid of 'e1'"):
         read_shakemap(grid_file, uncertainty=other)
@@ -90,11 +90,11 @@ def test_uncertainty_of_the_same_map(tmp_path: Path, grid_file: Path) -> None:
 
 
 def test_between_the_nodes(grid_file: Path) -> None:
-    fields, on_map = at_places(
+    fields, deviations, on_map = at_places(
         read_shakemap(grid_file), np.array([20.25, 21.0, 22.0]), np.array([40.3, 41.0, 40.5])
     )
     assert on_map.tolist() == [True, True, False]
-    assert fields["pgv_m_s"] is not None
+    assert deviations == {}
     # halfway between 10 and 20 cm/s in the logarithm
     assert fields["pgv_m_s"][0] == pytest.approx(0.1 * np.sqrt(2.0))
     assert fields["pgv_m_s"][1] == pytest.approx(0.4)
@@ -114,7 +114,7 @@ def test_between_the_nodes(grid_file: Path) -> None:
         ("20.5 40.0 20 10", "20.5 40.0 nan 10", "node 5 of grid_data: PGV = nan"),
         ("20.5 40.0", "200.5 40.0", "node 5 of grid_data: LON = 200.5 lies off the map"),
         ('units="cm/s"', 'units="knots"', "PGV in 'knots' is not known"),
-        ('name="PGV"', 'name="MMI"', "there is no field PGV; the fields are LON, LAT, MMI, PGA"),
+        ('name="LAT"', 'name="MMI"', "there is no field LAT; the fields are LON, MMI, PGV, PGA"),
         ('index="4"', 'index="5"', "indices up to 5 but there are 4"),
         ('index="4"', 'index="x"', "index 'x' is not a number"),
         ('name="PGA"', 'name="PGV"', "field PGV is there twice"),
@@ -138,9 +138,30 @@ def test_numbers_cut_by_the_parser_are_put_together(tmp_path: Path) -> None:
     path.write_text(f"{head}<grid_data>\n{rows}\n</grid_data>{rest.split('</grid_data>')[1]}")
     found = read_shakemap(path)
     assert found.lon.size == n
-    assert found.pgv_m_s.tolist() == [0.01 * (10 + i % 7) for i in range(n)]
+    assert found.measures["pgv_m_s"].tolist() == [0.01 * (10 + i % 7) for i in range(n)]
 
 
 def test_suspicious_units_are_doubted(grid_file: Path) -> None:
     grid_file.write_text(GRID.replace('units="cm/s"', 'units="m/s"'))
     assert any("is that its unit?" in text for text in read_shakemap(grid_file).warnings)
+
+
+def test_a_grid_without_pgv(grid_file: Path) -> None:
+    grid_file.write_text(GRID.replace('name="PGV" units="cm/s"', 'name="PSA10" units="pctg"'))
+    found = read_shakemap(grid_file)
+    assert list(found.measures) == ["pga_g", "sa10_g"]
+    assert found.measures["sa10_g"].tolist() == pytest.approx([0.1, 0.2, 0.4, 0.1, 0.2, 0.4])
+    nothing = GRID.replace('"PGV"', '"MMI"').replace('"PGA"', '"SVEL"')
+    grid_file.write_text(nothing)
+    with pytest.raises(InputError, match="no field PGV or PGA or PSA03 or PSA10 or PSA20 or PSA30"):
+        read_shakemap(grid_file)
+
+
+def test_deviations_of_spectral_accelerations(tmp_path: Path, grid_file: Path) -> None:
+    other = tmp_path / "uncertainty.xml"
+    for unit in ("ln(g)", "ln(pctg)"):
+        other.write_text(
+            UNCERTAINTY.replace('"STDPGV" units="ln(cm/s)"', f'"STDPSA10" units="{unit}"')
+        )
+        found = read_shakemap(grid_file, uncertainty=other)
+        assert found.std_ln["sa10_g"].tolist() == [0.5, 0.6, 0.7, 0.5, 0.6, 0.7]

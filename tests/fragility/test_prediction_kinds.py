@@ -252,3 +252,46 @@ def test_a_slump_fails_sooner_when_weaker_and_under_stronger_shaking(
     assert one(ks=ks, pgv_m_s=1.05 * pgv, pga_g=pga, **asked).probability >= here
     assert one(ks=ks, pgv_m_s=pgv, pga_g=1.05 * pga, **asked).probability >= here
     assert one(ks=ks, pgv_m_s=1.05 * pgv, pga_g=1.05 * pga, **asked).probability >= here
+
+
+UNKNOWN = {
+    "variable": "k_over_pga",
+    "edges": [0.2],
+    "first": math.log(0.1),
+    "step": math.log(2.0),
+    "shares": [[0.41, 0.2, 0.0], [0.8, 0.6, 0.1]],
+}
+
+
+def test_an_answer_says_how_many_outcomes_are_not_known() -> None:
+    diagnostics = {"rotation_deg": None, "unknown_outcomes": UNKNOWN}
+    model = row_of("slumping", diagnostics=diagnostics)
+    strong = one(ks=0.1, ps2=3.0, pgv_m_s=0.9, pga_g=1.0, model=model)
+    assert strong.unknown_share == pytest.approx(0.41)
+    assert any(text.startswith("41 % of the outcomes") for text in strong.warnings)
+    weak = one(ks=0.1, ps2=3.0, pgv_m_s=0.2, pga_g=0.26, model=model)
+    assert weak.unknown_share == pytest.approx(0.0, abs=0.05)
+    assert not any("not known: those blocks" in text for text in weak.warnings)
+    many = predict(
+        ks=[0.1, 0.1, 0.3, -0.1, 0.1], ps2=3.0, pgv_m_s=[0.9, 0.2, 0.9, 0.9, 0.0],
+        pga_g=[1.0, 0.26, 1.0, 1.0, 0.0], model=model,
+    )  # fmt: skip
+    assert isinstance(many, PredictionArray)
+    assert many.unknown_share is not None
+    expected = [strong.unknown_share, weak.unknown_share]
+    assert many.unknown_share[:2] == pytest.approx(expected, rel=1e-12)
+    assert many.unknown_share[2] == pytest.approx(0.6 - 0.5 * math.log2(1.5))
+    assert np.isnan(many.unknown_share[3])
+    assert [("not known: those" in text) for text in many.reason] == [
+        True,
+        False,
+        True,
+        False,
+        False,
+    ]
+    still = one(ks=0.1, ps2=3.0, pgv_m_s=0.0, pga_g=0.0, model=model)
+    assert (still.unknown_share, many.unknown_share[4]) == (0.0, 0.0)
+    assert one(**SLIDE, pgv_m_s=0.5, pga_g=0.5, model=row_of("sliding")).unknown_share is None
+    moved = one(ks=0.1, ps2=3.0, motion=shaking(), model=model)
+    alone = one(ks=0.1, ps2=3.0, motion=shaking(), polarity="forward", model=model)
+    assert moved.unknown_share == alone.unknown_share

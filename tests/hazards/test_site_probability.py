@@ -9,21 +9,25 @@ import pytest
 from numpy.typing import NDArray
 
 from rbfrag.fragility.dependence import EventSpread, event_range
+from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
+from rbfrag.fragility.predict import answer_given, predict
 from rbfrag.hazards import site_probability as site_module
 from rbfrag.hazards.conversions import component
+from rbfrag.hazards.correlations import correlation, correlations
 from rbfrag.hazards.site_probability import site_probability
+from tests.hazards.conftest import measure_row
 
 FloatArray = NDArray[np.float64]
 
 PGV = np.array([0.0, 0.3, 0.7, 1.2])
 PGA = np.array([0.0, 0.3, 0.5, 0.9])
+SHAKING = {"pgv_m_s": PGV, "pga_g": PGA}
 
 
 def test_certain_shaking_is_plain_prediction(model: FragilityModel) -> None:
     p2, kr = np.array([3.0, 10.0]), np.array([0.1, 0.2])
-    found = site_probability(PGV, PGA, p2, kr, component=component("single"), model=model,
+    found = site_probability(SHAKING, p2, kr, component=component("single"), model=model,
                              weight=np.array([3.0, 1.0]))  # fmt: skip
     each = predict(p2[None, :], kr[None, :], pgv_m_s=PGV[:, None], model=model).probability
     assert found.probability == pytest.approx(each @ [0.75, 0.25], rel=1e-14)
@@ -33,13 +37,13 @@ def test_certain_shaking_is_plain_prediction(model: FragilityModel) -> None:
 def test_the_range_of_one_earthquake_is_taken_at_p(model: FragilityModel) -> None:
     known = replace(model, event_spread=EventSpread.of(0.2))
     found = site_probability(
-        PGV, PGA, np.array([3.0]), np.array([0.1]), component=component("rotd50"), model=known
+        SHAKING, np.array([3.0]), np.array([0.1]), component=component("rotd50"), model=known
     )
     ends = [event_range(float(p), 0.2) for p in found.probability]
     assert found.event_low == pytest.approx([low for low, _ in ends], rel=1e-9)
     assert found.event_high == pytest.approx([high for _, high in ends], rel=1e-9)
     nothing = site_probability(
-        PGV, PGA, np.array([3.0]), np.array([0.1]), component=component("rotd50"),
+        SHAKING, np.array([3.0]), np.array([0.1]), component=component("rotd50"),
         model=replace(model, event_spread=None),
     )  # fmt: skip
     assert np.isnan([nothing.event_low, nothing.event_high]).all()
@@ -48,7 +52,7 @@ def test_the_range_of_one_earthquake_is_taken_at_p(model: FragilityModel) -> Non
 def test_own_blocks(model: FragilityModel) -> None:
     p2, kr = np.full(4, 3.0), np.array([0.05, 0.08, 0.1, 0.15])
     found = site_probability(
-        PGV, PGA, p2, kr, component=component("single"), model=model, own_block=True
+        SHAKING, p2, kr, component=component("single"), model=model, own_block=True
     )
     assert found.probability == pytest.approx(predict(p2, kr, pgv_m_s=PGV, model=model).probability)
 
@@ -58,7 +62,8 @@ def test_only_sites_where_nothing_can_fail_are_left_out(
 ) -> None:
     def answer() -> FloatArray:
         return site_probability(
-            np.geomspace(0.01, 1.0, 40), np.full(40, 0.5), np.array([3.0, 1.0]),
+            {"pgv_m_s": np.geomspace(0.01, 1.0, 40), "pga_g": np.full(40, 0.5)},
+            np.array([3.0, 1.0]),
             np.array([0.1, 0.05]), component=component("larger"), model=model,
         ).probability  # fmt: skip
 
@@ -78,8 +83,8 @@ def test_uncertain_shaking_is_the_mean(model: FragilityModel, name: str) -> None
     random = np.random.default_rng(5)
     pgv, std = np.array([0.5, 0.7]), np.array([0.3, 0.5])
     found = site_probability(
-        pgv, np.array([0.4, 0.5]), np.array([3.0]), np.array([0.1]), component=meaning,
-        std_ln_pgv=std, std_ln_pga=np.array([0.4, 0.4]), model=model,
+        {"pgv_m_s": pgv, "pga_g": np.array([0.4, 0.5])}, np.array([3.0]), np.array([0.1]),
+        component=meaning, std_ln={"pgv_m_s": std, "pga_g": np.array([0.4, 0.4])}, model=model,
     )  # fmt: skip
     draws = random.standard_normal((2, 200_000)) * np.hypot(std, meaning.scatter)[:, None]
     shaken = (pgv / meaning.ratio)[:, None] * np.exp(draws)
@@ -87,3 +92,82 @@ def test_uncertain_shaking_is_the_mean(model: FragilityModel, name: str) -> None
     assert found.probability == pytest.approx(sampled, abs=0.004)
     assert (found.ci_low < found.probability).all()
     assert (found.probability < found.ci_high).all()
+
+
+def measured(*names: str) -> dict[str, FloatArray]:
+    values = {"pga_g": [0.5, 0.7], "sa03_g": [0.9, 1.1], "sa10_g": [0.5, 0.6], "sa30_g": [0.1, 0.2]}
+    return {name: np.array(values[name]) for name in names}
+
+
+ALL = ("pga_g", "sa03_g", "sa10_g", "sa30_g")
+
+
+@pytest.mark.parametrize(
+    ("names", "term"),
+    [
+        (ALL, "pga_sa03_sa10_sa30"),
+        (("pga_g", "sa10_g"), "pga_sa10"),
+        (("pga_g", "sa03_g", "sa10_g"), "pga_sa10"),
+        (("sa10_g",), "sa10"),
+        (("pga_g",), "pga"),
+    ],
+)
+def test_without_pgv_the_best_of_what_is_there_answers(
+    measures_db: str, names: tuple[str, ...], term: str
+) -> None:
+    shaking = measured(*names)
+    found = site_probability(
+        shaking, np.array([3.0]), np.array([0.1]), component=component("single"), db=measures_db
+    )
+    assert found.term == term
+    chosen = FragilityModel.from_row(measure_row(term))
+    own = {name: shaking[name] for name in chosen.term.inputs}
+    expected = answer_given(chosen, {"p2": 3.0, "kr": 0.1, **own}, 0.95)
+    assert found.probability == pytest.approx(expected.probability, rel=1e-12)
+    assert found.integrated == ()
+
+
+@pytest.mark.parametrize("names", [ALL, ("pga_g", "sa10_g"), ("sa10_g",)])
+def test_uncertain_spectral_accelerations_are_the_mean(
+    measures_db: str, names: tuple[str, ...]
+) -> None:
+    # against plain sampling of the measures' logarithms with the published correlations
+    shaking, meaning = measured(*names), component("larger")
+    std = {name: np.full(2, 0.5 + 0.05 * i) for i, name in enumerate(names)}
+    found = site_probability(
+        shaking, np.array([3.0]), np.array([0.1]), component=meaning, std_ln=std, db=measures_db
+    )
+    assert set(found.integrated) == set(names)
+    random = np.random.default_rng(2)
+    deviations = np.array([std[name][0] for name in names])
+    covariance = correlations(names) * np.outer(deviations, deviations) + meaning.scatter**2
+    drawn = random.multivariate_normal(np.zeros(len(names)), covariance, 200_000)
+    sampled = {
+        name: shaking[name][:, None] / meaning.ratio * np.exp(drawn[:, i])
+        for i, name in enumerate(names)
+    }
+    chosen = find_model(None, ("p2", "kr", *names), measures_db)
+    expected = answer_given(chosen, {"p2": 3.0, "kr": 0.1, **sampled}, 0.95).probability
+    assert found.probability == pytest.approx(expected.mean(axis=1), abs=0.004)
+
+
+def test_values_without_all_deviations_are_certain(measures_db: str) -> None:
+    shaking, single = measured(*ALL), component("single")
+    block = (np.array([3.0]), np.array([0.1]))
+    certain = site_probability(shaking, *block, component=single, db=measures_db)
+    part = site_probability(
+        shaking, *block, component=single, db=measures_db, std_ln={"pga_g": np.array([0.5, 0.5])}
+    )
+    assert part.integrated == ()
+    assert part.probability.tolist() == certain.probability.tolist()
+
+
+def test_correlations_of_the_residuals() -> None:
+    # Baker and Jayaram (2008), figure 5 and equation 9
+    assert correlation("sa03_g", "sa10_g") == pytest.approx(0.574, abs=0.001)
+    assert correlation("sa30_g", "sa10_g") == pytest.approx(0.609, abs=0.001)
+    assert correlation("pga_g", "sa10_g") == pytest.approx(0.519, abs=0.001)
+    assert correlation("pgv_m_s", "pga_g") == 0.733
+    matrix = correlations(ALL)
+    assert (matrix == matrix.T).all()
+    assert (np.linalg.eigvalsh(matrix) > 0.0).all()

@@ -26,8 +26,7 @@ class FunctionOptions(BlocksOptions):
     """The blocks, one function each, and what a function is of."""
 
     name: str = option("Identifier of the one block or of the rock mass.", "block")
-    imt: str = option("Measure of the function: PGV, or PGA with --tm.", "PGV")
-    tm: options.Tm = None
+    imt: str = option("Measure of the function: PGV, PGA, or SA at 0.3, 1, 2 or 3 s.", "PGV")
     levels: int = option("Number of levels of a function that is not lognormal.", 80)
     model: options.Model = None
     db: options.Db = None
@@ -35,14 +34,18 @@ class FunctionOptions(BlocksOptions):
     def functions(self) -> tuple[list[Any], tuple[str, ...], list[str]]:
         """Return the functions, name, term and method of their model, and warnings."""
         from rbfrag.exchange.block_fragility import block_functions
+        from rbfrag.exchange.fragility_function import openquake_type
+        from rbfrag.fragility.measures import SPECTRAL
+        from rbfrag.hazards.curve import ANSWERED
 
-        measures = {"PGV": "pgv_m_s", "PGA": "pga_g"}
-        if self.imt.upper() not in measures:
-            raise InputError(f"--imt {self.imt}: use PGV, or PGA with --tm")
+        kind = openquake_type(self.imt, "--imt")
+        measure = kind.measure if kind.period_s is None else SPECTRAL.get(kind.period_s)
+        if measure is None:
+            raise InputError(f"--imt {self.imt}: use one of {ANSWERED}")
         table, is_class, remarks = self.toppling_blocks(name=self.name)
         functions, about = block_functions(
             [self.name] if is_class else list(table["block_id"]), table["p2_1_s2"], table["kr"],
-            measures[self.imt.upper()], one_class=is_class, tm_s=self.tm, levels=self.levels,
+            measure, one_class=is_class, levels=self.levels,
             model=self.model, db=self.db,
         )  # fmt: skip
         return functions, about, list(remarks)
@@ -57,7 +60,7 @@ def nrml(out: Out, blocks: FunctionOptions, json: options.Json = False) -> None:
 
     target = output_path(out, (".xml",), "NRML file")
     functions, about, warnings = blocks.functions()
-    write_text(nrml_text(functions, description=_sentence(about, blocks.tm)), target)
+    write_text(nrml_text(functions, description=_sentence(about)), target)
     _tell(str(target), functions, about, warnings, json)
 
 
@@ -76,9 +79,8 @@ def pelicun(out: Out, blocks: FunctionOptions, json: options.Json = False) -> No
     _tell(str(target), functions, about, warnings, json)
 
 
-def _sentence(about: tuple[str, ...], tm: float | None) -> str:
-    period = "" if tm is None else f", mean period {tm:g} s"
-    return f"Toppling of rock blocks, model {about[0]} ({about[2]} on {about[1]}){period}"
+def _sentence(about: tuple[str, ...]) -> str:
+    return f"Toppling of rock blocks, model {about[0]} ({about[2]} on {about[1]})"
 
 
 def _tell(

@@ -20,10 +20,13 @@ class CurveOptions:
 
     imt: str | None = option("Intensity measure of the curve: PGV, PGA, 'SA(1.0)'.")
     site: str | None = option("Site of the file: its number from 1 on, or its name.")
-    tm: options.Tm = None
     convert: str | None = option(
         "Published conversion of a spectral acceleration to PGV: newmark_hall_1982 "
-        "(SA(1)) or bommer_alarcon_2006 (SA(0.5))."
+        "(SA(1)) or bommer_alarcon_2006 (SA(0.5)); its scatter is integrated."
+    )
+    convert_sigma: float | None = option(
+        "Standard deviation of ln PGV about the conversion. Default: that of the reference's "
+        "motions."
     )
     component: str | None = option(
         "What the curve's horizontal component means: single, geometric_mean, rotd50 or larger."
@@ -51,8 +54,9 @@ def hazard(
     """Print the annual rate at which a block topples.
 
     The fragility is integrated over the hazard curve, and the probability in a period of years
-    follows. A PGA curve needs --tm, a spectral acceleration --convert. The block is backed by a
-    slope; a free-standing one fails at weaker shaking.
+    follows. Curves of PGV, PGA and SA at 0.3, 1, 2 and 3 s are answered, each by a model of that
+    very measure; another needs --convert. The block is backed by a slope; a free-standing one
+    fails at weaker shaking.
     """
     from rbfrag.exchange.block_table import write_block_table
     from rbfrag.exchange.hazard_curves import read_hazard_curves, suited_curves
@@ -65,7 +69,6 @@ def hazard(
     names = list(table["block_id"])
     curves = suited_curves(
         read_hazard_curves(curve, imt=meaning.imt, site=meaning.site),
-        with_mean_period=meaning.tm is not None,
         converted_period_s=None
         if meaning.convert is None
         else velocity_conversion(meaning.convert).period_s,
@@ -76,9 +79,9 @@ def hazard(
         )
     answers = [
         answer(
-            one, table["p2_1_s2"], table["kr"], tm_s=meaning.tm, convert=meaning.convert,
-            component=meaning.component, years=years, model=answering.model,
-            level=answering.level, db=answering.db, one_class=is_class,
+            one, table["p2_1_s2"], table["kr"], convert=meaning.convert,
+            convert_sigma=meaning.convert_sigma, component=meaning.component, years=years,
+            model=answering.model, level=answering.level, db=answering.db, one_class=is_class,
         )
         for one in curves
     ]  # fmt: skip

@@ -46,8 +46,9 @@ def shakemap(
     """Write the probability that blocks topple across a ShakeMap.
 
     One block, a table without lon and lat, or a rock mass stands at every node; a table with lon
-    and lat [deg] is answered block by block. PGV and PGA of the map are used together where a
-    model knows both. Blocks are backed by a slope; free-standing ones fail at weaker shaking.
+    and lat [deg] is answered block by block. The best model that the map's measures suffice for
+    answers: PGV and PGA, or, without PGV, PGA with spectral accelerations. Blocks are backed by a
+    slope; free-standing ones fail at weaker shaking.
     """
     import numpy as np
 
@@ -67,26 +68,15 @@ def shakemap(
     own = "lon" in class_blocks
     if own:
         lon, lat = class_blocks["lon"], class_blocks["lat"]
-        fields, on_map = at_places(shaken, lon, lat)
+        measures, std_ln, on_map = at_places(shaken, lon, lat)
         if not on_map.all():
             warnings.append(
                 f"{int((~on_map).sum())} of {on_map.size} blocks lie off the map and have no answer"
             )
     else:
         lon, lat = shaken.lon, shaken.lat
-        fields = {
-            "pgv_m_s": shaken.pgv_m_s,
-            "pga_g": shaken.pga_g,
-            "std_ln_pgv": shaken.std_ln_pgv,
-            "std_ln_pga": shaken.std_ln_pga,
-        }
+        measures, std_ln = shaken.measures, shaken.std_ln
         on_map = np.ones(lon.size, dtype=bool)
-    if fields["std_ln_pgv"] is None:
-        warnings.append(
-            "the map's uncertainty of PGV is not given: its values are taken as certain; name "
-            "uncertainty.xml with --uncertainty"
-        )
-        fields["std_ln_pga"] = None
     if not on_map.any():
         raise InputError(f"{grid}: none of the blocks lies on the map")
     warnings.append(
@@ -95,18 +85,24 @@ def shakemap(
         if component.name != "single"
         else "the map is taken to be of one component"
     )
-    picked = {name: None if values is None else values[on_map] for name, values in fields.items()}
-    pgv, pga = picked["pgv_m_s"], picked["pga_g"]
-    assert pgv is not None
-    assert pga is not None
     answer = site_probability(
-        pgv, pga,
+        {name: values[on_map] for name, values in measures.items()},
         class_blocks["p2_1_s2"][on_map] if own else class_blocks["p2_1_s2"],
         class_blocks["kr"][on_map] if own else class_blocks["kr"],
         component=component, weight=None if own else class_blocks.get("weight"), own_block=own,
-        std_ln_pgv=picked["std_ln_pgv"], std_ln_pga=picked["std_ln_pga"],
+        std_ln={name: values[on_map] for name, values in std_ln.items()},
         model=answering.model, level=answering.level, db=answering.db,
     )  # fmt: skip
+    if answer.advice:
+        warnings.append(answer.advice)
+    if "pgv_m_s" not in measures:
+        read = " and ".join(name.partition("_")[0].upper() for name in answer.measures)
+        warnings.append(f"the map has no PGV, which tells most: a model of {read} answers")
+    if not answer.integrated:
+        warnings.append(
+            f"the map's uncertainty of {' and '.join(answer.measures)} is not given: its values "
+            "are taken as certain; name uncertainty.xml with --uncertainty"
+        )
 
     def placed(values: Any, empty: Any = np.nan) -> Any:
         whole = np.full(on_map.size, empty)
@@ -119,8 +115,11 @@ def shakemap(
     columns |= {
         "lon": lon,
         "lat": lat,
-        "pgv_m_s": fields["pgv_m_s"],
-        "pga_g": fields["pga_g"],
+        **{
+            name: values
+            for name, values in measures.items()
+            if name in ("pgv_m_s", "pga_g", *answer.measures)
+        },
         "probability": placed(answer.probability),
         "ci_low": placed(answer.ci_low),
         "ci_high": placed(answer.ci_high),
@@ -144,7 +143,8 @@ def shakemap(
         "term": answer.term,
         "method": answer.method,
         "level": answering.level,
-        "uncertainty_integrated": fields["std_ln_pgv"] is not None,
+        "measures": " ".join(answer.measures),
+        "uncertainty_integrated": bool(answer.integrated),
     }
     _write(columns, {**document, "warnings": warnings}, target)
     if plot is not None:

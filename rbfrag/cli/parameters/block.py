@@ -133,23 +133,19 @@ class BlockOptions(ShapeOptions, NumberOptions):
 
 
 @dataclass(frozen=True, kw_only=True)
-class BlocksOptions(BlockOptions):
-    """One block, or many."""
+class TableOptions(BlockOptions):
+    """One block, or a table of them."""
 
     blocks: str | None = option(
         "Table of blocks (.csv, .parquet, .geojson) with p2_1_s2 [1/s²] and kr, or "
         "height_m and width_m [m] (and dip_deg); one answer a row.",
         metavar="FILE",
     )
-    rockmass: str | None = option(
-        "Rock mass file (.toml, .csv): the mean over its stable toppling blocks.", metavar="FILE"
-    )
 
-    def toppling_blocks(self, *, n: int | None = None, name: str | None = None) -> TopplingBlocks:
+    def toppling_blocks(self, *, name: str | None = None) -> TopplingBlocks:
         """Return the blocks that the options describe.
 
         Args:
-            n: number of realisations of the rock mass; None for what its file says.
             name: identifier of a single block.
         """
         import numpy as np
@@ -158,8 +154,6 @@ class BlocksOptions(BlockOptions):
             from rbfrag.exchange.block_table import waiting_blocks
 
             return TopplingBlocks(waiting_blocks(self.blocks), False, ())
-        if self.rockmass is not None:
-            return _of_rock_mass(self.rockmass, n)
         from rbfrag.solver.quantity import positive
 
         p2, kr, remarks = self.toppling()
@@ -169,6 +163,26 @@ class BlocksOptions(BlockOptions):
             "kr": np.array([positive(kr, "kr", "g")]),
         }
         return TopplingBlocks(columns, False, remarks)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlocksOptions(TableOptions):
+    """One block, or many."""
+
+    rockmass: str | None = option(
+        "Rock mass file (.toml, .csv): the mean over its stable toppling blocks.", metavar="FILE"
+    )
+
+    def toppling_blocks(self, *, name: str | None = None, n: int | None = None) -> TopplingBlocks:
+        """Return the blocks that the options describe.
+
+        Args:
+            name: identifier of a single block.
+            n: number of realisations of the rock mass; None for what its file says.
+        """
+        if self.rockmass is not None:
+            return _of_rock_mass(self.rockmass, n)
+        return super().toppling_blocks(name=name)
 
 
 class TopplingBlocks(NamedTuple):

@@ -177,6 +177,8 @@ class BlockParameters:
         adjust: changes the values by what is stated so, before anything reads them.
         refuses: the combinations of values that no block has.
         doubts: the combinations that make an answer doubtful.
+        presumes: what answers for its own kind take for granted of how a block stands; empty for
+            nothing.
     """
 
     names: tuple[str, ...]
@@ -189,6 +191,7 @@ class BlockParameters:
     adjust: Callable[[dict[str, Any], Numbers], None] | None = None
     refuses: tuple[Bound, ...] = ()
     doubts: tuple[Bound, ...] = ()
+    presumes: str = ""
 
     def completed(self, given: Mapping[str, Any], term: Term, ns: Numbers) -> dict[str, Any]:
         """Return the given values with what formulas read.
@@ -213,7 +216,11 @@ NOT_LIFTED = Bound(
     "is not below PGA: without vertical motion the ground cannot lift this block, P = 0 by "
     "mechanics, not by the model",
 )
-TOPPLING_BLOCK = BlockParameters(("p2", "kr"), "toppling", "kr", "p2", NOT_LIFTED)
+TOPPLING_BLOCK = BlockParameters(
+    ("p2", "kr"), "toppling", "kr", "p2", NOT_LIFTED,
+    presumes="the block is taken to be backed by a slope; one that stands free rocks about both "
+    "edges and overturns in weaker shaking",
+)  # fmt: skip
 """Blocks known by p² [1/s²] and the yield acceleration coefficient k_r."""
 
 

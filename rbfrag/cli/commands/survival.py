@@ -1,0 +1,165 @@
+"""`rbfrag survival`: what standing blocks say of a seismic hazard."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from rbfrag.cli.commands.hazard import CurveOptions
+from rbfrag.cli.output import cell, check_files, print_json, print_table, print_warnings
+from rbfrag.cli.parameters import options
+from rbfrag.cli.parameters.block import TableOptions
+from rbfrag.cli.parameters.stack import argument, option, stacked
+from rbfrag.errors import InputError
+
+if TYPE_CHECKING:
+    from rbfrag.hazards.curve import HazardCurve
+    from rbfrag.hazards.survival import SurvivalAnswer
+
+EXAMPLE = (
+    "Example:  rbfrag survival pgv-curve.csv --p2 18 --kr 0.25 --age 10000 --age-sd 2000 "
+    "--kr-sigma 0.1 --component rotd50"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Uncertainty:
+    """How well the blocks and their age are known."""
+
+    age: float = option(
+        "How long the blocks have stood in this position [years], the mean.", default=...
+    )
+    age_sd: float = option("Standard deviation of the age [years]; the age is lognormal.", 0.0)
+    p2_sigma: float = option(
+        "Standard deviation of ln p² of each block; a column p2_sigma of a table goes before.", 0.0
+    )
+    kr_sigma: float = option(
+        "Standard deviation of ln k_r of each block; a column kr_sigma of a table goes before.",
+        0.0,
+    )
+    draws: int = option("Number of draws where several uncertain blocks are given.", 128)
+    seed: int = option("Seed of these draws.", 0)
+
+
+@stacked
+def survival(
+    *,
+    curves: list[str] = argument(
+        "Hazard curves of one site and one measure: OpenQuake CSV (mean, quantiles, branches), "
+        "USGS NSHM JSON, or CSV of two columns whose header names their units.",
+        metavar="CURVE...",
+    ),
+    blocks: TableOptions,
+    known: Uncertainty,
+    meaning: CurveOptions,
+    answering: options.Answering,
+    weights: str | None = option(
+        "Weights of the branches: 0.5,0.3,0.2 in the order of the curves, or OpenQuake's file of "
+        "realizations."
+    ),
+    kind: str | None = option(
+        "Kind of failure that the model is of. Default: toppling, backed by a slope."
+    ),
+    plot: str | None = option(
+        "Draw the curves, survival over the factor on their rates, and weights (.png, .pdf, .svg)."
+    ),
+    json: options.Json = False,
+) -> None:
+    """Print how likely standing blocks are under a seismic hazard.
+
+    Several blocks of --blocks stand at one site. The factors are those on all rates of the hazard
+    at which the blocks stand with 5 % and 50 %. With --weights the branches of a logic tree are
+    weighted again by what the standing blocks say of each.
+    """
+    from rbfrag.exchange.branch_weights import stated_weights
+    from rbfrag.hazards.survival import survival as answered
+
+    check_files(plot=plot)
+    table, _, remarks = blocks.toppling_blocks()
+    read = [_one_curve(path, meaning) for path in curves]
+    answer = answered(
+        read, table["p2_1_s2"], table["kr"], age_years=known.age, age_sd_years=known.age_sd,
+        weights=None if weights is None else stated_weights(weights, read),
+        p2_sigma=table.get("p2_sigma", known.p2_sigma),
+        kr_sigma=table.get("kr_sigma", known.kr_sigma), kind=kind, convert=meaning.convert,
+        convert_sigma=meaning.convert_sigma, component=meaning.component, model=answering.model,
+        level=answering.level, draws=known.draws, seed=known.seed, db=answering.db,
+    )  # fmt: skip
+    answer = replace(answer, warnings=(*remarks, *answer.warnings))
+    if plot is not None:
+        from rbfrag.plots.survival import plot_survival
+
+        plot_survival(read, answer, plot)
+    if json:
+        print_json(answer.as_dict())
+        return
+    _print(answer)
+
+
+def _one_curve(path: str, meaning: CurveOptions) -> HazardCurve:
+    from rbfrag.exchange.hazard_curves import read_hazard_curves, suited_curves
+    from rbfrag.hazards.conversions import velocity_conversion
+
+    period = None if meaning.convert is None else velocity_conversion(meaning.convert).period_s
+    suited = suited_curves(
+        read_hazard_curves(path, imt=meaning.imt, site=meaning.site), converted_period_s=period
+    )
+    if len(suited) > 1:
+        raise InputError(
+            f"{path} has {len(suited)} sites, and the blocks stand at one: choose it with --site"
+        )
+    return suited[0]
+
+
+def _print(answer: SurvivalAnswer) -> None:
+    """Print a sentence, the numbers with their intervals, and a table of several curves."""
+    who = "the block stands" if answer.blocks == 1 else f"all {answer.blocks} blocks stand"
+    sd = f" (standard deviation {answer.age_sd_years:g})" if answer.age_sd_years else ""
+    rate = answer.annual_rate_any
+    often = "never fails" if rate == 0.0 else f"fails once in {1.0 / rate:.4g} years on average"
+    print(
+        f"{_condition(answer)}, {who} for {answer.age_years:g} years{sd} with a "
+        f"probability of {answer.probability_standing:.3g}; "
+        f"{'it' if answer.blocks == 1 else 'one of them'} {often}."
+    )
+    print(_verdict(answer))
+    print()
+    ends = {
+        "probability_standing": (answer.ci_low, answer.ci_high),
+        "factor_5_percent": answer.factor_5_percent_ci,
+        "factor_50_percent": answer.factor_50_percent_ci,
+    }
+    print_table(
+        ("", "value", "ci_low", "ci_high"),
+        [(name, getattr(answer, name), *both) for name, both in ends.items()],
+    )
+    for name, bound in (answer.bounds or {}).items():
+        values = ", ".join(f"{key} {cell(value)}" for key, value in bound.items())
+        print(f"{name.replace('_', ' ')}: {values}")
+    if len(answer.branches) > 1:
+        print()
+        columns = list(answer.branches[0].as_dict())
+        print_table(columns, [list(one.as_dict().values()) for one in answer.branches])
+    print_warnings(answer.warnings)
+
+
+def _verdict(answer: SurvivalAnswer) -> str:
+    five: Any = answer.factor_5_percent
+    if five is None:
+        return "No factor on its rates makes that improbable: the blocks say nothing against it."
+    if five < 1.0:
+        return (
+            f"That is less than 5 %: it would be 5 % if all rates of the hazard were multiplied by "
+            f"{five:.3g}."
+        )
+    return (
+        f"Standing does not contradict it: all rates of the hazard would have to be {five:.3g} "
+        "times as high to leave 5 %."
+    )
+
+
+def _condition(answer: SurvivalAnswer) -> str:
+    if len(answer.branches) == 1:
+        return "If the hazard is right"
+    weighted = answer.branches[0].name != answer.hazard
+    return f"Over {answer.hazard}" if weighted else f"If the hazard of {answer.hazard} is right"

@@ -1,0 +1,155 @@
+"""What the levels of a hazard curve are to a model: its measure, a factor, and a scatter."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.hazards.annual_rate import normal_steps
+from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
+from rbfrag.hazards.conversions import component as component_named
+from rbfrag.hazards.curve import ANSWERED, HazardCurve
+
+FloatArray = NDArray[np.float64]
+
+_SCATTER_POINTS = 25
+_REACH = 6.0
+"""Standard deviations of the scatter that are integrated over, to both sides."""
+_STEP = 0.1
+"""Greatest step of the measure's logarithm."""
+
+NOTABLE = 0.01
+"""Part of a rate, or probability, from which on a warning tells of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shaking:
+    """How a model reads a level of a curve: as the measure at level · shift, with weights.
+
+    Args:
+        name: what `predict` calls the measure.
+        shift: factors, shape (s,).
+        weight: their weights, which sum to 1, shape (s,).
+        median: the factor without scatter.
+        warnings: what was assumed.
+    """
+
+    name: str
+    shift: FloatArray
+    weight: FloatArray
+    median: float
+    warnings: tuple[str, ...]
+
+    @classmethod
+    def of(
+        cls,
+        curve: HazardCurve,
+        *,
+        convert: str | None = None,
+        convert_sigma: float | None = None,
+        component: str | None = None,
+    ) -> Shaking:
+        """Return what a curve's levels are; arguments as for :func:`rbfrag.hazard`."""
+        warnings = list(curve.warnings)
+        name, factor, spread = _measure(curve, convert, convert_sigma, warnings)
+        meaning = component_named("single" if component is None else component)
+        if component is None:
+            warnings.append(
+                "the curve's horizontal component is taken as a single one, which the models are "
+                "fitted on; hazard products often mean rotd50 or the geometric mean: say which"
+            )
+        else:
+            warnings.append(
+                f"the curve is of {meaning.title}; Beyer and Bommer (2006) relate it to one "
+                "component"
+                if meaning.name != "single"
+                else "the curve is of a single component, as the models are"
+            )
+        scatter = math.hypot(meaning.scatter, spread)
+        steps = max(_SCATTER_POINTS, 2 * math.ceil(_REACH * scatter / _STEP) + 1)
+        xi, weight = normal_steps(1 if scatter == 0.0 else steps, _REACH)
+        median = factor / meaning.ratio
+        return cls(name, median * np.exp(scatter * xi), weight, median, tuple(warnings))
+
+
+def _measure(
+    curve: HazardCurve, convert: str | None, sigma: float | None, warnings: list[str]
+) -> tuple[str, float, float]:
+    """Return predict's argument, the factor from the curve's unit, and the scatter about it."""
+    if convert is None:
+        if sigma is not None:
+            raise InputError("--convert-sigma belongs to --convert: leave it out")
+        if curve.known_as is None:
+            raise InputError(_no_model(curve))
+        return curve.known_as, 1.0, 0.0
+    if curve.measure != "sa_g":
+        raise InputError(
+            f"{curve.source}: --convert {convert} is for spectral accelerations; the curve is of "
+            f"{curve.imt}"
+        )
+    used = velocity_conversion(convert)
+    if not curve.is_of(used.period_s):
+        raise InputError(
+            f"{curve.source}: {used.name} is for SA({used.period_s:g}), not for {curve.imt}: "
+            f"choose the curve with --imt 'SA({used.period_s:g})'"
+        )
+    spread = used.scatter if sigma is None else sigma
+    if not 0.0 < spread < math.inf:
+        raise InputError(
+            f"--convert-sigma = {spread:g}: give the standard deviation of ln PGV about the "
+            "conversion, above zero; no conversion is without scatter"
+        )
+    warnings.append(
+        f"PGV = {used.factor:.4g} m/s per g times {curve.imt} in the median ({used.source}); "
+        f"ln PGV scatters about it by {spread:g}, which is integrated"
+    )
+    if curve.known_as is not None:
+        warnings.append(
+            f"there are models of {curve.imt} itself: without --convert nothing is converted"
+        )
+    return "pgv_m_s", used.factor, spread
+
+
+def _no_model(curve: HazardCurve) -> str:
+    also = [item.name for item in CONVERSIONS.values() if curve.is_of(item.period_s)]
+    converted = f", or convert it to PGV with --convert {' or '.join(also)}" if also else ""
+    return (
+        f"{curve.source}: no model reads {curve.imt}: give a curve of one of {ANSWERED}{converted}"
+    )
+
+
+def warn_of_ends(
+    curve: HazardCurve,
+    rate: FloatArray,
+    above: FloatArray,
+    above_at_most: FloatArray,
+    below: FloatArray,
+    warnings: list[str],
+) -> None:
+    """Add warnings where shaking beyond the ends of a curve may matter.
+
+    Args:
+        curve: the curve.
+        rate: rates of failure [1/a], shape (m,).
+        above: part from beyond the last level, at least [1/a], shape (m,).
+        above_at_most: the same at most.
+        below: probability of failure at the first level, shape (m,).
+        warnings: where they are added.
+    """
+    unit = curve.measure.replace("sa_g", curve.imt + " in g")
+    open_above = above_at_most - above > NOTABLE * rate
+    if open_above.any():
+        worst = float((above_at_most - above)[open_above].max())
+        warnings.append(
+            f"the curve ends at {unit} = {curve.levels[-1]:g}: stronger shaking may add up to "
+            f"{worst:.3g} failures a year to the answer"
+        )
+    if (below > NOTABLE).any():
+        warnings.append(
+            f"the curve begins at {unit} = {curve.levels[0]:g}, where the probability of failure "
+            f"is already {float(below.max()):.3g}: weaker shaking is not counted"
+        )

@@ -1,0 +1,380 @@
+"""Standing blocks as evidence about hazard: `survival`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.predict import Model
+from rbfrag.hazards.annual_rate import Fragility
+from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.shaking import NOTABLE, Shaking
+from rbfrag.hazards.standing import Age, Standing, weights_given_standing
+from rbfrag.hazards.standing_blocks import (
+    DEPENDENT,
+    INDEPENDENT,
+    AnyRate,
+    ModelBlocks,
+    StandingBlocks,
+)
+
+FloatArray = NDArray[np.float64]
+
+DRAWS = 128
+"""Draws of the blocks' parameters where several uncertain blocks are given."""
+
+_ADDS_UP = 2e-3
+"""How far weights may add up to something else than 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class BranchSurvival:
+    """What one hazard curve says of the blocks.
+
+    Args:
+        name: the branch or statistic that the curve is of, or where it comes from.
+        weight: its weight before; None for a curve that is no branch.
+        weight_given_standing: its weight after all blocks have stood.
+        annual_rate_any: rate at which any block fails [1/a], the mean over uncertain blocks.
+        probability_standing: probability that all blocks stand after the age.
+        factor_5_percent: factor on the hazard rates at which that is 5 %; None where none is.
+        factor_50_percent: the same for 50 %.
+        standing: survival for any factor.
+    """
+
+    name: str
+    weight: float | None
+    weight_given_standing: float | None
+    annual_rate_any: float
+    probability_standing: float
+    factor_5_percent: float | None
+    factor_50_percent: float | None
+    standing: Standing = field(repr=False)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the numbers under the keys of the JSON contract."""
+        return {name: value for name, value in vars(self).items() if name != "standing"}
+
+
+@dataclass(frozen=True, eq=False)
+class SurvivalAnswer:
+    """What blocks that stand say of seismic hazard.
+
+    Args:
+        probability_standing: probability that all blocks stand after the age, if the hazard is
+            right: over the branches with their weights, or of the first curve without weights.
+        ci_low: lower end of its interval from the uncertain parameters of the model.
+        ci_high: upper end of it.
+        factor_5_percent: factor on the hazard rates at which all stand with 5 %; None where no
+            factor makes that so improbable.
+        factor_5_percent_ci: both ends of its interval.
+        factor_50_percent: the same for 50 %.
+        factor_50_percent_ci: both ends of its interval.
+        annual_rate_any: rate at which any block fails [1/a].
+        age_years: mean age [a].
+        age_sd_years: standard deviation of the age [a].
+        blocks: number of blocks.
+        hazard: the curve or the branches that these numbers are of.
+        joint_law: how the blocks of one earthquake fail together.
+        bounds: for several blocks, the same three numbers if they fail independently and if they
+            fail all or none; None for one block.
+        branches: every curve's own answer, with weights.
+        kind: how the blocks fail.
+        model: name of the model that answered; None for a fragility of the caller's.
+        term: its intensity term.
+        method: how it was fitted.
+        imt: measure of the curves.
+        site: site of the curves, or empty.
+        level: confidence level of the interval.
+        warnings: what to know about the answer.
+        standing: survival for any factor.
+    """
+
+    probability_standing: float
+    ci_low: float
+    ci_high: float
+    factor_5_percent: float | None
+    factor_5_percent_ci: tuple[float | None, float | None]
+    factor_50_percent: float | None
+    factor_50_percent_ci: tuple[float | None, float | None]
+    annual_rate_any: float
+    age_years: float
+    age_sd_years: float
+    blocks: int
+    hazard: str
+    joint_law: str
+    bounds: Mapping[str, Mapping[str, float | None]] | None
+    branches: tuple[BranchSurvival, ...]
+    kind: str | None
+    model: str | None
+    term: str | None
+    method: str | None
+    imt: str
+    site: str
+    level: float
+    warnings: tuple[str, ...]
+    standing: Standing = field(repr=False)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract."""
+        return {
+            **{name: value for name, value in vars(self).items() if name != "standing"},
+            "factor_5_percent_ci": list(self.factor_5_percent_ci),
+            "factor_50_percent_ci": list(self.factor_50_percent_ci),
+            "branches": [branch.as_dict() for branch in self.branches],
+            "site": self.site or None,
+            "warnings": list(self.warnings),
+        }
+
+
+def survival(
+    curves: HazardCurve | Sequence[HazardCurve],
+    p2: ArrayLike | None = None,
+    kr: ArrayLike | None = None,
+    *,
+    age_years: float,
+    age_sd_years: float = 0.0,
+    weights: Sequence[float | None] | None = None,
+    p2_sigma: ArrayLike = 0.0,
+    kr_sigma: ArrayLike = 0.0,
+    kind: str | None = None,
+    fragility: Fragility | None = None,
+    convert: str | None = None,
+    convert_sigma: float | None = None,
+    component: str | None = None,
+    model: Model | None = None,
+    level: float = 0.95,
+    draws: int = DRAWS,
+    seed: int = 0,
+    db: str | PathLike[str] | None = None,
+) -> SurvivalAnswer:
+    """Return how likely blocks of one site are to stand after an age, if a hazard is right.
+
+    S(f) = E[exp(-f T ∫ P(any fails | x) (-dλ))] over the age T and the blocks' own parameters,
+    which are the same in all earthquakes; earthquakes come as a Poisson process. The factors are
+    those f on all hazard rates at which S is 5 % and 50 %: a hazard whose rates lie above the
+    first is at odds with blocks that stand. Weights of branches are updated by Bayes' rule.
+
+    What several blocks do in one earthquake follows the copula that is stored with the model,
+    their azimuths unknown; without one they are taken to fail all or none, which says least
+    against the hazard, and both bounds are given.
+
+    Args:
+        curves: hazard curves of one site and one measure: a mean, quantiles, branches.
+        p2: frequency parameters p² [1/s²] of the blocks, medians, scalar or shape (m,).
+        kr: toppling yield acceleration coefficients, medians, scalar or shape (m,).
+        age_years: how long the blocks have stood in this position [a], the mean of a lognormal
+            law (:class:`rbfrag.hazards.standing.Age`).
+        age_sd_years: its standard deviation [a].
+        weights: weight of each curve as a branch of a logic tree, None for one that is no branch;
+            they sum to 1.
+        p2_sigma: standard deviations of ln p², independent of block to block, as `p2`.
+        kr_sigma: the same of ln k_r.
+        kind: how the blocks fail; None for toppling, backed by a slope.
+        fragility: instead of blocks, a function from levels of the curves' measure, shape (n,), to
+            probabilities of failure, shape (n,) or one row for each block, (m, n).
+        convert: as in :func:`rbfrag.hazard`, like `convert_sigma`, `component` and `model`.
+        convert_sigma: see there.
+        component: see there.
+        model: see there.
+        level: confidence level of the interval.
+        draws: number of draws where several uncertain blocks are given; one block is integrated
+            by quadrature.
+        seed: seed of these draws.
+        db: as in :func:`rbfrag.predict`.
+
+    Raises:
+        InputError: curves of several measures or sites, weights that do not add up to 1, or a
+            value that cannot be used.
+        UnknownModelError: no model of that name.
+        DatabaseError: the database cannot be read.
+    """
+    each = [curves] if isinstance(curves, HazardCurve) else list(curves)
+    _refuse_unlike(each)
+    weight = _checked_weights(weights, len(each))
+    age = Age.of(age_years, age_sd_years)
+    known: ModelBlocks | None = None
+    if fragility is None:
+        shaking = Shaking.of(
+            each[0], convert=convert, convert_sigma=convert_sigma, component=component
+        )
+        known = ModelBlocks.of(
+            p2, kr, p2_sigma=p2_sigma, kr_sigma=kr_sigma, draws=draws, seed=seed, kind=kind,
+            model=model, level=level, db=db, shaking=shaking,
+        )  # fmt: skip
+        blocks = StandingBlocks.of_blocks(known, each)
+    elif p2 is None and kr is None:
+        blocks = StandingBlocks.of_fragility(fragility, each[0].levels)
+    else:
+        raise InputError("fragility says all of the blocks: leave p2 and kr out")
+    rates = [blocks.rate(curve) for curve in each]
+    result = _Survival(rates, blocks.weight, age, weight)
+    bands = rates[0].annual_rate.shape[2]
+    middle, least, most = (result.whole(band=band % bands) for band in (0, 2, 1))
+    places = {
+        name: blocks.laws.index(name) for name in (INDEPENDENT, DEPENDENT) if blocks.count > 1
+    }
+    return SurvivalAnswer(
+        **_numbers(middle),
+        ci_low=least.probability,
+        ci_high=most.probability,
+        factor_5_percent_ci=(least.factor(0.05), most.factor(0.05)),
+        factor_50_percent_ci=(least.factor(0.5), most.factor(0.5)),
+        annual_rate_any=result.annual_rate,
+        age_years=float(age_years),
+        age_sd_years=float(age_sd_years),
+        blocks=blocks.count,
+        hazard=_name(each[0]) if weight is None else "the weighted branches",
+        joint_law=blocks.laws[0],
+        bounds={name.replace(" ", "_"): _numbers(result.whole(law)) for name, law in places.items()}
+        or None,
+        branches=result.branches(each),
+        kind=None if known is None else known.model.kind,
+        model=None if known is None else known.model.name,
+        term=None if known is None else known.model.term.name,
+        method=None if known is None else known.model.row.method,
+        imt=each[0].imt,
+        site=each[0].place,
+        level=level,
+        warnings=tuple(dict.fromkeys(_warnings(each, rates, blocks))),
+        standing=middle,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Survival:
+    """Survival under some curves.
+
+    Args:
+        rates: how often any block fails under each.
+        draw_weight: weights of the draws of the blocks, shape (k,).
+        age: how long they have stood.
+        weight: weight of each curve, NaN for one that is no branch; None where none is.
+    """
+
+    rates: list[AnyRate]
+    draw_weight: FloatArray
+    age: Age
+    weight: FloatArray | None
+
+    def parts(self, law: int = 0, band: int = 0) -> list[Standing]:
+        """Return the survival under each curve, by a law of joint failure and an end of P."""
+        return [
+            Standing.of(rate.annual_rate[law, :, band], self.draw_weight, self.age)
+            for rate in self.rates
+        ]
+
+    def whole(self, law: int = 0, band: int = 0) -> Standing:
+        """Return the survival over all branches, or under the first curve without weights."""
+        parts = self.parts(law, band)
+        return (
+            parts[0] if self.weight is None else Standing.mixed(parts, np.nan_to_num(self.weight))
+        )
+
+    @property
+    def annual_rate(self) -> float:
+        """The rate that goes with it [1/a]."""
+        rates = [rate.mean for rate in self.rates]
+        return rates[0] if self.weight is None else float(np.nan_to_num(self.weight) @ rates)
+
+    def branches(self, curves: list[HazardCurve]) -> tuple[BranchSurvival, ...]:
+        """Return every curve's own answer."""
+        parts, n = self.parts(), len(curves)
+        before: list[float | None] = [None] * n
+        after: list[float | None] = [None] * n
+        if self.weight is not None:
+            given = weights_given_standing(parts, np.nan_to_num(self.weight))
+            for i in np.flatnonzero(~np.isnan(self.weight)).tolist():
+                before[i], after[i] = float(self.weight[i]), float(given[i])
+        return tuple(
+            BranchSurvival(
+                name=_name(curve),
+                weight=before[i],
+                weight_given_standing=after[i],
+                annual_rate_any=self.rates[i].mean,
+                **_numbers(parts[i]),
+                standing=parts[i],
+            )
+            for i, curve in enumerate(curves)
+        )
+
+
+def _warnings(
+    curves: list[HazardCurve], rates: list[AnyRate], blocks: StandingBlocks
+) -> Iterator[str]:
+    for curve in curves:
+        yield from curve.warnings
+        if curve.statistic.startswith("quantile"):
+            yield (
+                f"{curve.statistic} is the hazard of no single model, and survival under it no "
+                "quantile of survival: branches with their weights say more"
+            )
+    if blocks.of_model is not None:
+        yield from blocks.of_model.warnings
+    for rate in rates:
+        yield from rate.warnings
+    outside = max(rate.outside for rate in rates)
+    if outside > NOTABLE:
+        yield (
+            f"up to {100.0 * outside:.3g} % of the rate comes from blocks and shaking outside the "
+            "ranges that the model was fitted on"
+        )
+    if blocks.laws[0] == DEPENDENT:
+        yield (
+            "what the blocks share in one earthquake is not known here: they are taken to fail all "
+            "or none, which says least against the hazard; bounds also has the independent case"
+        )
+
+
+def _name(curve: HazardCurve) -> str:
+    return curve.statistic or curve.source
+
+
+def _numbers(standing: Standing) -> dict[str, Any]:
+    return {
+        "probability_standing": standing.probability,
+        "factor_5_percent": standing.factor(0.05),
+        "factor_50_percent": standing.factor(0.5),
+    }
+
+
+def _refuse_unlike(curves: list[HazardCurve]) -> None:
+    if not curves:
+        raise InputError("there is no hazard curve: give one or more")
+    measures = list(dict.fromkeys(curve.imt for curve in curves))
+    if len(measures) > 1:
+        raise InputError(
+            f"the curves are of {', '.join(measures)}: give curves of one measure, or choose it "
+            "with --imt"
+        )
+    places = list(dict.fromkeys(curve.place for curve in curves if curve.place))
+    if len(places) > 1:
+        raise InputError(
+            f"the curves are of {len(places)} sites ({places[0]}; {places[1]}; …): the blocks "
+            "stand at one: choose it with --site"
+        )
+
+
+def _checked_weights(weights: Sequence[float | None] | None, n: int) -> FloatArray | None:
+    """Return weights that sum to 1, NaN for curves without; None where none is given."""
+    if weights is None or all(one is None for one in weights):
+        return None
+    if len(weights) != n:
+        raise InputError(f"{len(weights)} weights for {n} curves: give one for each")
+    values = np.array([math.nan if one is None else one for one in weights], dtype=np.float64)
+    given = values[~np.isnan(values)]
+    if not ((given >= 0.0) & (given <= 1.0)).all():
+        raise InputError(f"weights {', '.join(f'{one:g}' for one in given)}: each is from 0 to 1")
+    if abs(given.sum() - 1.0) > _ADDS_UP:
+        raise InputError(
+            f"the weights of {given.size} branches add up to {given.sum():.6g}, not 1: give the "
+            "curves and weights of all branches"
+        )
+    return np.asarray(values / given.sum())

@@ -1,0 +1,131 @@
+"""Figure of what standing blocks say of a hazard: curves, survival over the factor, weights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.standing import Standing
+from rbfrag.hazards.survival import BranchSurvival, SurvivalAnswer
+from rbfrag.plots.canvas import (
+    BLUE,
+    RED,
+    legend_below,
+    light_grid,
+    new_figure,
+    open_corner,
+    plot_path,
+    save_figure,
+    written_numbers,
+)
+from rbfrag.plots.hazard import measure_title
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_COLOURS = (BLUE, "#d98c1f", "#4c8f4c", "#8c2d4f", "#2c9fad", "#7a6fae", "#6b6b6b", "#b59a2e")
+_LINES = ("-", "--", "-.", ":")
+_FACTORS = np.geomspace(1e-4, 1e4, 401)
+_LEAST_RATE = 1e-7
+
+
+def plot_survival(
+    curves: Sequence[HazardCurve], answer: SurvivalAnswer, path: str | PathLike[str]
+) -> Path:
+    """Draw hazard curves, the survival of the blocks over a factor on their rates, and weights.
+
+    Args:
+        curves: the hazard curves.
+        answer: what the blocks say of them.
+        path: file to write: .png, .pdf or .svg.
+    """
+    plot_path(path)
+    weighted = [one for one in answer.branches if one.weight is not None]
+    figure = new_figure(11.0 if weighted else 9.0, 4.6)
+    ratios = (1.0, 1.0, 0.7) if weighted else (1.0, 1.0)
+    panels = figure.subplots(1, len(ratios), width_ratios=ratios)
+    _draw_curves(panels[0], curves, answer)
+    _draw_survival(panels[1], answer)
+    if weighted:
+        _draw_weights(panels[2], weighted)
+    for axes in panels:
+        open_corner(axes)
+    light_grid(*panels[:2])
+    who = "The block stands" if answer.blocks == 1 else f"All {answer.blocks} blocks stand"
+    figure.suptitle(
+        f"{who} after {answer.age_years:g} years with P = {answer.probability_standing:.3g} "
+        f"({100 * answer.level:g} % interval {answer.ci_low:.2g} to {answer.ci_high:.2g})",
+        fontsize=11,
+    )
+    legend_below(figure, 4)
+    return save_figure(figure, path)
+
+
+def _style(i: int) -> dict[str, str]:
+    n = len(_COLOURS)
+    return {"color": _COLOURS[i % n], "linestyle": _LINES[i // n % len(_LINES)]}
+
+
+def _short(name: str) -> str:
+    """Return a name without the folders of a file."""
+    return name.rpartition("/")[2]
+
+
+def _draw_curves(axes: Axes, curves: Sequence[HazardCurve], answer: SurvivalAnswer) -> None:
+    for i, (curve, branch) in enumerate(zip(curves, answer.branches, strict=True)):
+        label = _short(branch.name)
+        axes.loglog(curve.levels, curve.annual_rate, label=label, lw=1.5, **_style(i))
+    highest = max(float(curve.annual_rate.max()) for curve in curves)
+    lowest = min(float(curve.annual_rate.min()) for curve in curves)
+    axes.set_ylim(max(lowest, _LEAST_RATE), 2.0 * highest)
+    axes.set_xlabel(measure_title(curves[0]))
+    axes.set_ylabel("exceedances a year, λ [1/a]")
+    axes.set_title("hazard curves", fontsize=10)
+
+
+def _draw_survival(axes: Axes, answer: SurvivalAnswer) -> None:
+    for i, branch in enumerate(answer.branches):
+        axes.semilogx(_FACTORS, _percent(branch.standing), lw=1.3, **_style(i))
+    if len(answer.branches) > 1:
+        axes.semilogx(
+            _FACTORS, _percent(answer.standing), color="black", lw=2.2, label=answer.hazard
+        )
+    axes.axvline(1.0, color="#333333", lw=0.8)
+    for percent, factor in ((5.0, answer.factor_5_percent), (50.0, answer.factor_50_percent)):
+        axes.axhline(percent, color="#888888", lw=0.7, ls=":")
+        if factor is not None:
+            axes.plot([factor], [percent], "o", color=RED, ms=6, zorder=3)
+            axes.annotate(
+                f"{factor:.3g}", (factor, percent), xytext=(6, 5), textcoords="offset points",
+                color=RED, fontsize=9,
+            )  # fmt: skip
+    axes.set_ylim(0.0, 100.0)
+    written_numbers(axes.xaxis, 1.0)
+    near = [one for one in (answer.factor_5_percent, answer.factor_50_percent) if one is not None]
+    axes.set_xlim(max(min([0.1, *near]) / 3.0, 0.001), min(max([3.0, *near]) * 3.0, 1000.0))
+    axes.set_xlabel("factor on all hazard rates")
+    axes.set_ylabel("probability of standing [%]")
+    axes.set_title("survival", fontsize=10)
+
+
+def _percent(standing: Standing) -> NDArray[np.float64]:
+    logs = [standing.log_probability(factor) for factor in _FACTORS.tolist()]
+    return np.asarray(100.0 * np.exp(logs))
+
+
+def _draw_weights(axes: Axes, branches: Sequence[BranchSurvival]) -> None:
+    at = np.arange(len(branches))
+    before = [100.0 * (one.weight or 0.0) for one in branches]
+    after = [100.0 * (one.weight_given_standing or 0.0) for one in branches]
+    axes.barh(at - 0.2, before, 0.38, color="#bbbbbb", label="weight before")
+    axes.barh(at + 0.2, after, 0.38, color=RED, label="weight given standing")
+    axes.set_yticks(at, [_short(one.name) for one in branches])
+    axes.invert_yaxis()
+    axes.set_xlabel("weight [%]")
+    axes.set_title("branches", fontsize=10)

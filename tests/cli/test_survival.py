@@ -1,0 +1,155 @@
+"""`rbfrag survival` as people and scripts call it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rbfrag.db.engine import opened_database
+from rbfrag.db.models import save_model
+from tests.cli.conftest import Shell
+from tests.fragility.conftest import model_row
+
+BLOCK = ("--p2", "3", "--kr", "0.1", "--component", "single")
+TREE = "openquake_classical_logic_tree/three_realizations"
+
+
+def written(path: str, times: float = 1.0) -> str:
+    x = np.geomspace(0.01, 10.0, 20)
+    lines = [
+        f"{a!r},{b!r}" for a, b in zip(x.tolist(), (times * 1e-3 * x**-2).tolist(), strict=True)
+    ]
+    Path(path).write_text("\n".join(["pgv_m_s,annual_rate", *lines]))
+    return path
+
+
+@pytest.fixture
+def curve(shell: Shell) -> str:
+    """A power law of PGV in the current folder, with a database of one model beside it."""
+    with opened_database("rbfrag.db", create=True) as engine, engine.begin() as connection:
+        save_model(connection, model_row())
+    return written("curve.csv")
+
+
+def test_one_block(shell: Shell, curve: str) -> None:
+    found = shell.json("survival", curve, *BLOCK, "--age", "200")
+    rate = shell.json("hazard", curve, *BLOCK)["annual_rate"]
+    assert found["annual_rate_any"] == pytest.approx(rate, rel=1e-4)
+    assert found["probability_standing"] == pytest.approx(math.exp(-200 * rate), rel=1e-4)
+    assert found["factor_5_percent"] == pytest.approx(math.log(20) / (200 * rate), rel=1e-4)
+    assert found["factor_50_percent"] == pytest.approx(math.log(2) / (200 * rate), rel=1e-4)
+    (branch,) = found["branches"]
+    assert (branch["weight"], branch["weight_given_standing"]) == (None, None)
+    assert (found["bounds"], found["imt"], found["kind"]) == (None, "PGV", "toppling")
+    assert any("backed by a slope" in text for text in found["warnings"])
+
+
+def test_a_sentence_goes_before_the_numbers(shell: Shell, curve: str) -> None:
+    first, second, *_ = shell("survival", curve, *BLOCK, "--age", "5000").stdout.splitlines()
+    assert first.startswith("If the hazard is right, the block stands for 5000 years with")
+    assert "if all rates of the hazard were multiplied by" in second
+    calm = shell("survival", curve, *BLOCK, "--age", "50").stdout
+    assert "Standing does not contradict it" in calm
+    safe = ("--p2", "3", "--kr", "500", "--component", "single")
+    assert (
+        "the blocks say nothing against it" in shell("survival", curve, *safe, "--age", "9").stdout
+    )
+
+
+def test_a_table_has_its_own_sigmas(shell: Shell, curve: str) -> None:
+    Path("one.csv").write_text("block_id,p2_1_s2,kr,kr_sigma,p2_sigma\nA7,3,0.1,0.2,\n")
+    asked = ("--component", "single", "--age", "200")
+    table = shell.json("survival", curve, "--blocks", "one.csv", "--kr-sigma", "0.7", *asked)
+    alone = shell.json("survival", curve, *BLOCK, "--kr-sigma", "0.2", "--age", "200")
+    assert table["probability_standing"] == alone["probability_standing"]
+    Path("two.csv").write_text("p2_1_s2,kr\n3,0.1\n3,0.1\n")
+    both = shell.json("survival", curve, "--blocks", "two.csv", *asked)
+    assert both["blocks"] == 2
+    assert set(both["bounds"]) == {"independent", "fully_dependent"}
+    printed = shell("survival", curve, "--blocks", "two.csv", *asked)
+    assert "all 2 blocks stand" in printed.stdout
+    assert "fully dependent: probability_standing" in printed.stdout
+
+
+def test_weights_in_the_order_of_the_curves(shell: Shell, curve: str) -> None:
+    other = written("other.csv", 3.0)
+    asked = (curve, other, *BLOCK, "--age", "300")
+    found = shell.json("survival", *asked, "--weights", "0.4,0.6")
+    first, second = found["branches"]
+    whole = 0.4 * first["probability_standing"] + 0.6 * second["probability_standing"]
+    assert found["probability_standing"] == pytest.approx(whole, rel=1e-9)
+    assert first["weight_given_standing"] == pytest.approx(
+        0.4 * first["probability_standing"] / whole, rel=1e-9
+    )
+    assert shell.json("survival", *asked)["probability_standing"] == first["probability_standing"]
+    assert shell("survival", *asked, "--weights", "0.4,0.6").stdout.startswith("Over the weighted")
+
+
+def test_branches_of_openquake(shell: Shell, curve: str, formats_dir: Path) -> None:
+    tree = formats_dir / TREE
+    files = [tree / f"hazard_curve-{name}-PGV_7.csv" for name in ("mean", "rlz-000", "rlz-001")]
+    files += [tree / "hazard_curve-rlz-002-PGV_7.csv", tree / "quantile_curve-0.84-PGV_7.csv"]
+    asked = ("--site", "SLIDE-A", *BLOCK, "--age", "3000")
+    weights = ("--weights", tree / "realizations_7.csv")
+    found = shell.json("survival", *files, *asked, *weights, "--plot", "tree.svg")
+    assert [one["name"] for one in found["branches"]] == [
+        "mean", "rlz-000", "rlz-001", "rlz-002", "quantile-0.84"
+    ]  # fmt: skip
+    before = [one["weight"] for one in found["branches"]]
+    assert before[1:4] == pytest.approx([0.5, 0.3, 0.2], abs=1e-6)
+    assert (before[0], before[4], found["site"]) == (None, None, "SLIDE-A")
+    after = [one["weight_given_standing"] for one in found["branches"][1:4]]
+    assert sum(after) == pytest.approx(1.0, rel=1e-12)
+    rates = [one["annual_rate_any"] for one in found["branches"][1:4]]
+    calmest = int(np.argmin(rates))
+    assert after[calmest] > before[1 + calmest]
+    drawn = Path("tree.svg").read_text()
+    for word in ("quantile-0.84", "weight given standing", "factor on all hazard rates"):
+        assert word in drawn
+
+
+def test_refusals_of_a_logic_tree(
+    refuses: Callable[..., str], curve: str, formats_dir: Path
+) -> None:
+    tree = formats_dir / TREE
+    branch, weights = tree / "hazard_curve-rlz-000-PGV_7.csv", tree / "realizations_7.csv"
+    asked = (*BLOCK, "--age", "3000")
+    at = ("--site", "SLIDE-A")
+    assert "choose it with --site" in refuses("survival", branch, *asked)
+    assert "add up to 0.5, not 1" in refuses("survival", branch, *at, *asked, "--weights", weights)
+    assert "none of the curves is one" in refuses("survival", curve, *asked, "--weights", weights)
+    Path("few.csv").write_text("rlz_id,branch_path,weight\n1,A~B,1.0\n")
+    message = refuses("survival", branch, *at, *asked, "--weights", "few.csv")
+    assert "there is no rlz_id 0" in message
+    Path("none.csv").write_text("rlz_id,weight\n0,half\n")
+    message = refuses("survival", branch, *at, *asked, "--weights", "none.csv")
+    assert "is no realization" in message
+    other = tree / "hazard_curve-mean-PGA_7.csv"
+    assert "curves are of PGV, PGA" in refuses("survival", branch, other, *at, *asked)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--age", "0"), "age = 0 years"),
+        (("--age", "100", "--age-sd=-1"), "standard deviation of the age"),
+        (("--age", "100", "--kr-sigma=-1"), "kr_sigma = -1"),
+        (("--age", "100", "--weights", "0.5,0.5"), "2 weights for 1 curves"),
+        (("--age", "100", "--kind", "rolling"), "rolling"),
+        (("--age", "100", "--plot", "plot.xls"), ".png"),
+    ],
+)
+def test_refusals(
+    refuses: Callable[..., str], curve: str, options: tuple[str, ...], words: str
+) -> None:
+    assert words in refuses("survival", curve, *BLOCK, *options)
+
+
+def test_a_sigma_below_zero_is_refused_by_name(refuses: Callable[..., str], curve: str) -> None:
+    Path("one.csv").write_text("block_id,p2_1_s2,kr,kr_sigma\nA7,3,0.1,-0.2\n")
+    message = refuses("survival", curve, "--blocks", "one.csv", "--age", "100")
+    assert "block A7 has kr_sigma = -0.2" in message

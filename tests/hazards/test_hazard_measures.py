@@ -1,0 +1,139 @@
+"""Annual rates by the measure that the hazard is given in."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.predict import Prediction, answer_given
+from rbfrag.hazards.answer import hazard
+from rbfrag.hazards.conversions import CONVERSIONS
+from rbfrag.hazards.curve import HazardCurve, hazard_curve
+from tests.hazards.conftest import measure_row
+
+K, B = 1e-4, 2.0
+
+CURVES: dict[str, tuple[str, float | None, str]] = {
+    "pgv_kr": ("pgv_m_s", None, "pgv_m_s"),
+    "pga": ("pga_g", None, "pga_g"),
+    "sa03": ("sa_g", 0.3, "sa03_g"),
+    "sa10": ("sa_g", 1.0, "sa10_g"),
+    "sa20": ("sa_g", 2.0, "sa20_g"),
+    "sa30": ("sa_g", 3.0, "sa30_g"),
+}
+
+
+def power_law(measure: str, period_s: float | None, reach: float = 1e5) -> HazardCurve:
+    x = np.geomspace(1.0 / reach, reach, 60)
+    return hazard_curve(measure, x, K * x**-B, period_s=period_s)
+
+
+def probability(model: Any, measure: str, level: float) -> float:
+    found = find_model(model, ("p2", "kr", measure))
+    answer = answer_given(found, {"p2": 3.0, "kr": 0.1, measure: level}, 0.95)
+    assert isinstance(answer, Prediction)
+    return answer.probability
+
+
+@pytest.mark.parametrize("term", CURVES)
+def test_each_measure_is_answered_by_its_own_model(measures_db: str, term: str) -> None:
+    measure, period, name = CURVES[term]
+    found = hazard(power_law(measure, period), 3.0, 0.1, component="single", db=measures_db)
+    assert (found.term, found.measure) == (term, measure)
+    row = measure_row(term)
+    # λ_f = ∫ P K B x^-B d(ln x), past the lowest level at which the block may fail
+    total, edges = 0.0, np.linspace(math.log(1e-5), math.log(1e5), 41)
+    for low, high in pairwise(edges.tolist()):
+        total += quad(
+            lambda u: probability(row, name, math.exp(u)) * K * B * math.exp(-B * u),
+            low, high, epsabs=1e-13, epsrel=1e-9, limit=200,
+        )[0]  # fmt: skip
+    assert found.annual_rate[0] == pytest.approx(total, rel=1e-5)
+    assert found.ci_low[0] < found.annual_rate[0] < found.ci_high[0]
+
+
+def test_a_logistic_fragility_on_a_power_law(measures_db: str) -> None:
+    # P = 1/(1 + (m/x)^s):  λ_f = K m^-B (π B/s)/sin(π B/s)
+    row = measure_row("sa10")
+    scores = []
+    for level in (0.2, 0.8):
+        p = probability(row, "sa10_g", level)
+        scores.append(math.log(p / (1.0 - p)))
+    s = (scores[1] - scores[0]) / math.log(4.0)
+    median = 0.2 * math.exp(-scores[0] / s)
+    found = hazard(power_law("sa_g", 1.0), 3.0, 0.1, component="single", db=measures_db)
+    expected = K * median**-B * (math.pi * B / s) / math.sin(math.pi * B / s)
+    assert found.annual_rate[0] == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("sigma", [None, 0.2, 0.7])
+@pytest.mark.parametrize("name", CONVERSIONS)
+def test_the_scatter_of_a_conversion_is_integrated(
+    measures_db: str, name: str, sigma: float | None
+) -> None:
+    used = CONVERSIONS[name]
+    of_pgv = hazard(power_law("pgv_m_s", None), 3.0, 0.1, component="single", db=measures_db)
+    found = hazard(
+        power_law("sa_g", used.period_s), 3.0, 0.1, convert=name, convert_sigma=sigma,
+        component="single", db=measures_db,
+    )  # fmt: skip
+    spread = used.scatter if sigma is None else sigma
+    # PGV = factor x exp(spread ξ): the rates of PGV are those of x times factor^B exp(B² spread²/2)
+    expected = of_pgv.annual_rate[0] * used.factor**B * math.exp(0.5 * (B * spread) ** 2)
+    assert found.annual_rate[0] == pytest.approx(expected, rel=2e-3)
+    assert found.term == "pgv_kr"
+    assert any(f"scatters about it by {spread:g}" in text for text in found.warnings)
+
+
+def test_one_class_of_blocks(measures_db: str) -> None:
+    curve = power_law("pga_g", None)
+    each = hazard(curve, [3.0, 10.0], [0.1, 0.2], component="rotd50", db=measures_db)
+    one = hazard(curve, [3.0, 10.0], [0.1, 0.2], component="rotd50", one_class=True, db=measures_db)
+    assert one.annual_rate[0] == pytest.approx(each.annual_rate.mean(), rel=1e-4)
+
+
+def test_a_measure_that_knows_little_is_said(measures_db: str) -> None:
+    asked: dict[str, Any] = {"component": "single", "db": measures_db}
+    told = hazard(power_law("pga_g", None), 3.0, 0.1, **asked).warnings
+    assert any("PGA alone says little" in text for text in told)
+    quiet = hazard(power_law("sa_g", 1.0), 3.0, 0.1, **asked).warnings
+    assert not any("says little" in text for text in quiet)
+
+
+@pytest.mark.parametrize("period", [0.1, 0.5, 0.75, 1.5, 5.0])
+def test_no_other_period_is_answered(measures_db: str, period: float) -> None:
+    listed = r"one of PGV, PGA, SA\(0.3\), SA\(1\), SA\(2\), SA\(3\)"
+    with pytest.raises(InputError, match=rf"no model reads SA\({period:g}\): .*{listed}") as told:
+        hazard(power_law("sa_g", period), 3.0, 0.1, db=measures_db)
+    assert ("bommer_alarcon_2006" in str(told.value)) is (period == 0.5)
+
+
+@pytest.mark.parametrize("model", ["bounded-pga_sa10", "bounded-pgv_kr"])
+def test_a_model_that_reads_more_is_refused(measures_db: str, model: str) -> None:
+    with pytest.raises(InputError, match="needs"):
+        hazard(power_law("pga_g", None), 3.0, 0.1, model=model, db=measures_db)
+
+
+@pytest.mark.parametrize(
+    ("measure", "period", "options", "words"),
+    [
+        ("pga_g", None, {"convert": "newmark_hall_1982"}, "is for spectral accelerations"),
+        ("sa_g", 2.0, {"convert": "newmark_hall_1982"}, r"is for SA\(1\), not for SA\(2\)"),
+        ("sa_g", 1.0, {"convert": "x"}, "'x' is not known"),
+        ("sa_g", 1.0, {"convert_sigma": 0.3}, "belongs to --convert"),
+        ("sa_g", 1.0, {"convert": "newmark_hall_1982", "convert_sigma": 0.0}, "above zero"),
+        ("sa_g", 1.0, {"convert": "newmark_hall_1982", "convert_sigma": math.nan}, "above zero"),
+    ],
+)
+def test_conversions_that_make_no_sense_are_refused(
+    measures_db: str, measure: str, period: float | None, options: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        hazard(power_law(measure, period), 3.0, 0.1, db=measures_db, **options)
