@@ -2,7 +2,7 @@
 
 Estimates the copula of failures from predictions of held-out earthquakes, and tests it on
 portfolios of blocks in earthquakes that neither the probabilities nor the copula were fitted to.
-The reference that is shipped has all that is read. Five minutes of processor time. With --write
+The reference that is shipped has all that is read. Six minutes of processor time. With --write
 the tables of docs/theory/joint-failures.md are replaced.
 """
 

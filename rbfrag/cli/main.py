@@ -25,7 +25,7 @@ COMMANDS = {
     "spectrum": "Compute the toppling spectrum X(p): what a motion can topple.",
     "simulate": "Store critical values and outcomes of every motion and block.",
     "fit": "Fit a fragility model to stored critical values or outcomes.",
-    "predict": "Print the probability that a block fails, with its interval.",
+    "predict": "Print the probability that a block fails.",
     "hazard": "Print the annual rate at which a block topples.",
     "survival": "Print how likely standing blocks are under a seismic hazard.",
     "shakemap": "Write the probability that blocks topple across a ShakeMap.",
