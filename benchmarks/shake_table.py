@@ -239,7 +239,7 @@ def predictors(trials: Trials, runs: Outcomes, blocks: Candidates) -> dict[str, 
     }
 
 
-def score_table(scores: list[Mapping[str, Score]]) -> str:
+def score_table(scores: Sequence[Mapping[str, Score]]) -> str:
     """Return the scores of both specimens, and the source's own model."""
     head = ["predictor"]
     for name in SPECIMENS:
@@ -263,7 +263,7 @@ def interval(values: FloatArray, base: Labels) -> str:
 
 
 def difference_table(
-    predicted: list[Mapping[str, FloatArray]], failed: FloatArray, base: Labels
+    predicted: Sequence[Mapping[str, FloatArray]], failed: FloatArray, base: Labels
 ) -> str:
     """Return the share's log loss and Brier score less those of each other predictor."""
     head = [f"{SHARE} less"]
@@ -281,7 +281,7 @@ def difference_table(
     return markdown((head, cells))
 
 
-def target_table(scores: list[Mapping[str, Score]]) -> tuple[str, bool]:
+def target_table(scores: Sequence[Mapping[str, Score]]) -> tuple[str, bool]:
     """Return what is asked of the share, and whether all of it is reached."""
     head = ["specimen", "log loss", "asked", "Brier", "asked", "below PGV, PGA"]
     cells, reached = [], True
@@ -331,7 +331,7 @@ def study(trials: Trials, runs: Outcomes) -> tuple[str, bool]:
     base, fold = trials.base, folds(trials.base, SEED)
     blocks = distributions(overturned(runs.free))
     all_predictors = predictors(trials, runs, blocks)
-    predicted: list[Mapping[str, FloatArray]] = [
+    predicted = [
         {name: held_out(one, failed, fold) for name, one in all_predictors.items()}
         for failed in trials.overturned
     ]

@@ -213,4 +213,4 @@ def free_block(forward_kr: float, backward_kr: float, e: float) -> FreeBlock:
 
 def overturned(codes: Codes) -> FloatArray:
     """Return 1 where a block overturns, 0 elsewhere."""
-    return (codes == TOPPLED).astype(np.float64)
+    return np.asarray(codes == TOPPLED, dtype=np.float64)
