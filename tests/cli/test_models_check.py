@@ -60,7 +60,7 @@ def test_a_value_that_is_gone_is_counted(shell: Shell, database: Path) -> None:
 
 
 def test_a_model_that_cannot_be_read_is_told(shell: Shell, database: Path) -> None:
-    change(database, "UPDATE fragility_model SET method = 'guess' WHERE name = 'weibull-pgv'")
+    change(database, "UPDATE fragility_model SET method = 'guess' WHERE name = 'bounded-pgv'")
     told = shell("models", "check", expect=1).stdout
     assert "unreadable" in told
     assert "'guess', which this rbfrag does not know" in " ".join(told.split())

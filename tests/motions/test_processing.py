@@ -101,7 +101,7 @@ def test_taper_is_a_cosine_at_both_ends() -> None:
         (GroundMotion(np.ones(50), 5.0), {}, "corner of 0.1 Hz"),
         (GroundMotion(np.ones(50), 1e-7), {}, "200000000 samples"),
         (GroundMotion(np.ones(50), 1e-320), {}, "inf samples"),
-        (GroundMotion(np.full(50, 1e200), 0.01), {}, "check the unit"),
+        (GroundMotion(np.full(50, 1e200), 0.01), {}, "check units"),
         (GroundMotion(np.ones(50), 0.01), {"taper_s": 1.0}, "taper of 1 s"),
         (GroundMotion(np.ones(3), 0.01), {"padding_s": 0.0}, "too few"),
         (GroundMotion.from_nodes([0.0, 1.0], [0.0, 1.0]), {}, "equally spaced"),
