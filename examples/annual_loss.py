@@ -1,4 +1,4 @@
-"""Mean annual loss of a road under rock faces, with its interval.
+"""Mean annual loss of a road under rock faces, and how probable it is that any rock falls.
 
     python examples/annual_loss.py [DATABASE]
 
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,38 +21,79 @@ import rbfrag
 HERE = Path(__file__).parent
 
 
-def annual_loss(segments: pd.DataFrame, db: str | None) -> pd.DataFrame:
-    """Return segments with falls and loss a year, and the ends of their 95 % intervals."""
-    parts = []
+class Site(NamedTuple):
+    """How often an earthquake brings down any block of a site [1/a], and the bounds of that."""
+
+    name: str
+    rate_any: float | None
+    fully_dependent: float
+    independent: float
+
+
+def annual_loss(segments: pd.DataFrame, db: str | None) -> tuple[pd.DataFrame, list[Site]]:
+    """Return segments with falls and loss a year and the ends of their 95 % intervals, and sites.
+
+    Every block of a site is a row of its own: an earthquake that shakes one shakes all of them.
+    """
+    parts, sites = [], []
     for curve_file, some in segments.groupby("curve", sort=False):
         (curve,) = rbfrag.read_hazard_curves(HERE / str(curve_file))
-        found = rbfrag.hazard(curve, some["p2_1_s2"], some["kr"], component="geometric_mean", db=db)
+        each = some.loc[some.index.repeat(some["blocks"])]
+        found = rbfrag.hazard(curve, each["p2_1_s2"], each["kr"], component="geometric_mean", db=db)
         for text in found.warnings:
             print(f"{curve_file}: {text}", file=sys.stderr)
-        parts.append(
-            some.assign(
-                falls_per_year=some["blocks"] * found.annual_rate,
-                falls_low=some["blocks"] * found.ci_low,
-                falls_high=some["blocks"] * found.ci_high,
-            )
+        rates = pd.DataFrame(
+            {"per_year": found.annual_rate, "low": found.ci_low, "high": found.ci_high},
+            index=each.index,
         )
+        falls = rates.groupby(level=0).sum().add_prefix("falls_")
+        parts.append(some.join(falls))
+        assert found.joint is not None
+        bounds = found.joint.bounds
+        ends = [bounds[law]["annual_rate_any"] for law in ("fully_dependent", "independent")]
+        sites.append(Site(str(curve_file), found.annual_rate_any, ends[0], ends[1]))
     table = pd.concat(parts)
     for end in ("per_year", "low", "high"):
         table[f"loss_{end}_eur"] = table[f"falls_{end}"] * table["cost_per_block_eur"]
-    return table
+    return table, sites
+
+
+def in_50_years(annual_rate: float) -> str:
+    """Return the probability of at least one earthquake of a rate in 50 years, in percent."""
+    return f"{-100.0 * np.expm1(-50.0 * annual_rate):.2g} %"
+
+
+def print_falls(falls_per_year: float, sites: list[Site]) -> None:
+    """Print how probable it is that any block falls.
+
+    The two curves do not tell whether one earthquake shakes both sites. The rate for the road is
+    the greater one's if the same earthquakes do, and the sum if no earthquake shakes both.
+    """
+    print(f"falls expected in 50 years, several in one earthquake: {50.0 * falls_per_year:.2g}")
+    print("probability in 50 years that")
+    for site in sites:
+        shown = in_50_years(site.rate_any) if site.rate_any is not None else "not known"
+        least, most = in_50_years(site.fully_dependent), in_50_years(site.independent)
+        print(f"  any block of {site.name} falls: {shown} ({least} if all fall together, {most} "
+              "if independently)")  # fmt: skip
+    low = [site.fully_dependent if site.rate_any is None else site.rate_any for site in sites]
+    high = [site.independent if site.rate_any is None else site.rate_any for site in sites]
+    print(f"  any block of the road falls: {in_50_years(max(low))} to {in_50_years(sum(high))}")
+    print(
+        f"not {in_50_years(falls_per_year)}: that takes every block to have earthquakes of its own"
+    )
 
 
 def main() -> None:
     """Print the table and the sums."""
-    table = annual_loss(pd.read_csv(HERE / "segments.csv"), *(sys.argv[1:] or [None]))
+    table, sites = annual_loss(pd.read_csv(HERE / "segments.csv"), *(sys.argv[1:] or [None]))
     shown = ["segment", "blocks", "falls_per_year", "loss_per_year_eur", "loss_low_eur",
              "loss_high_eur"]  # fmt: skip
     print(table[shown].to_string(index=False, float_format=lambda value: f"{value:.4g}"))
     # the parameters of the model are common to all segments, so the ends add up
     loss, low, high = (table[f"loss_{end}_eur"].sum() for end in ("per_year", "low", "high"))
     print(f"\nmean annual loss {loss:.0f} EUR (95 % interval {low:.0f} to {high:.0f})")
-    falls = table["falls_per_year"].sum()
-    print(f"probability of a fall on the road in 50 years {100 * -np.expm1(-50 * falls):.2g} %")
+    print_falls(float(table["falls_per_year"].sum()), sites)
 
 
 if __name__ == "__main__":

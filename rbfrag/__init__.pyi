@@ -16,6 +16,7 @@ from rbfrag.fragility.predict import predict as predict
 from rbfrag.hazards.answer import HazardAnswer as HazardAnswer
 from rbfrag.hazards.answer import hazard as hazard
 from rbfrag.hazards.curve import HazardCurve as HazardCurve
+from rbfrag.hazards.joint_rate import JointRate as JointRate
 from rbfrag.hazards.survival import BranchSurvival as BranchSurvival
 from rbfrag.hazards.survival import SurvivalAnswer as SurvivalAnswer
 from rbfrag.hazards.survival import survival as survival

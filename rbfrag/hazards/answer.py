@@ -17,7 +17,9 @@ from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.annual_rate import checked_years, failure_rate, probability_in
 from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.joint_rate import JointRate
 from rbfrag.hazards.shaking import NOTABLE, Shaking, warn_of_ends
+from rbfrag.hazards.standing_blocks import ModelBlocks
 
 FloatArray = NDArray[np.float64]
 
@@ -44,6 +46,7 @@ class HazardAnswer:
         above: part from beyond the last level, at least [1/a], shape (m,).
         above_at_most: the same at most.
         measure: measure of `edges`: ``pga_g``, ``pgv_m_s`` or ``sa_g``.
+        joint: earthquakes with at least one failure among several blocks; None for one block.
         warnings: what to know about the answer.
     """
 
@@ -61,7 +64,21 @@ class HazardAnswer:
     above: FloatArray
     above_at_most: FloatArray
     measure: str
+    joint: JointRate | None
     warnings: tuple[str, ...]
+
+    @property
+    def annual_rate_any(self) -> float | None:
+        """Annual rate of earthquakes with at least one failure [1/a].
+
+        None for several blocks whose dependence is not known: `joint` has its bounds.
+        """
+        return float(self.annual_rate[0]) if self.joint is None else self.joint.annual_rate_any
+
+    @property
+    def expected_failures_per_year(self) -> float:
+        """Mean number of failures a year of all blocks [1/a], the sum of their rates."""
+        return float(self.annual_rate.sum())
 
 
 def hazard(
@@ -85,6 +102,9 @@ def hazard(
     these are taken at every level at once, the interval is at least as wide as one from the
     joint distribution of the parameters. The model is one of the curve's own measure: what else
     shaking of that level may be is scatter in its P.
+
+    Several blocks stand at one site and share its earthquakes: their rates add up to the failures
+    expected a year, and `joint` has the rate of earthquakes in which any of them fails.
 
     Args:
         curve: hazard curve of PGV, PGA or a spectral acceleration at 0.3, 1, 2 or 3 s, or of one
@@ -154,6 +174,11 @@ def hazard(
             f"up to {100.0 * float(part.max()):.3g} % of the rate comes from blocks and shaking "
             "outside the ranges that the model was fitted on"
         )
+    joint = None
+    if p2s.size > 1 and not one_class:
+        blocks = ModelBlocks.certain(p2s, krs, shaking=reading, model=chosen, level=level)
+        joint = JointRate.of(blocks, curve, years)
+        warnings.extend(joint.warnings)
     return HazardAnswer(
         annual_rate=rate,
         ci_low=low,
@@ -169,6 +194,7 @@ def hazard(
         above=above,
         above_at_most=above_at_most,
         measure=curve.measure,
+        joint=joint,
         warnings=tuple(warnings),
     )
 

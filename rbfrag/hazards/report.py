@@ -17,7 +17,8 @@ def as_dict(
 ) -> dict[str, Any]:
     """Return the answer under the keys of the JSON contract.
 
-    One block at one site is an object with its contributions; several are a list in it.
+    One block at one site is an object with its contributions; at several sites a list in it.
+    Several blocks are a list in it beside what they do in common, at several sites a list of that.
     """
     rows = [
         {
@@ -40,6 +41,10 @@ def as_dict(
         "imt": curves[0].imt,
     }
     warnings = [*remarks, *dict.fromkeys(word for each in answers for word in each.warnings)]
+    if answers[0].joint is not None:
+        sites = [_of_site(curve, one) for curve, one in zip(curves, answers, strict=True)]
+        common = sites[0] if len(sites) == 1 else {"sites": sites}
+        return {**common, **shared, "blocks": rows, "warnings": warnings}
     if len(rows) > 1:
         return {**shared, "answers": rows, "warnings": warnings}
     del rows[0]["block_id"]
@@ -52,3 +57,13 @@ def as_dict(
         )
     ]  # fmt: skip
     return {**rows[0], **shared, "contributions": contributions, "warnings": warnings}
+
+
+def _of_site(curve: HazardCurve, answer: HazardAnswer) -> dict[str, Any]:
+    """Return what several blocks of one site do in common."""
+    assert answer.joint is not None
+    return {
+        "site": curve.place or None,
+        **answer.joint.as_dict(),
+        "expected_failures_per_year": answer.expected_failures_per_year,
+    }

@@ -33,6 +33,8 @@ DEPENDENT = "fully dependent"
 
 _SIGMA_POINTS, _SIGMA_REACH = 15, 5.0
 _TABLE_STEP = 0.02
+COARSE_STEP = 0.04
+"""Step of ln x of a table of joint probabilities where its cost counts; rates are good to 0.1 %."""
 _FEWEST_LEVELS = 64
 _AT_ONCE = 400_000
 
@@ -68,12 +70,31 @@ class StandingBlocks:
         return cls(count, np.ones(1), tuple(laws), any_fails)
 
     @classmethod
-    def of_blocks(cls, blocks: ModelBlocks, curves: list[HazardCurve]) -> StandingBlocks:
-        """Return blocks that a model answers for, tabled over the levels of some curves."""
+    def of_blocks(
+        cls, blocks: ModelBlocks, curves: list[HazardCurve], step: float = _TABLE_STEP
+    ) -> StandingBlocks:
+        """Return blocks that a model answers for, tabled in steps of ln x over some curves."""
         count = blocks.p2.shape[1]
         laws = _joint_laws(count, blocks)
-        any_fails = _tabled(lambda x: _by_law(laws, blocks.probabilities(x)), curves)
+        any_fails = _tabled(lambda x: _by_law(laws, blocks.probabilities(x)), curves, step)
         return cls(count, blocks.weight, tuple(laws), any_fails, blocks)
+
+    @classmethod
+    def of_parts(cls, parts: list[ModelBlocks], curves: list[HazardCurve]) -> StandingBlocks:
+        """Return many blocks whose parameters are known, in parts, by the bounds alone."""
+
+        def any_fails(levels: FloatArray) -> FloatArray:
+            greatest, none = np.zeros((3, levels.size)), np.ones((3, levels.size))
+            for part in parts:
+                p = part.probabilities(levels)[0]
+                greatest = np.maximum(greatest, p.max(axis=1))
+                none *= (1.0 - p).prod(axis=1)
+            return np.concatenate([greatest, 1.0 - none])
+
+        count = sum(part.p2.shape[1] for part in parts)
+        return cls(
+            count, np.ones(1), (DEPENDENT, INDEPENDENT), _tabled(any_fails, curves, COARSE_STEP)
+        )
 
     def rate(self, curve: HazardCurve) -> AnyRate:
         """Return how often any of them fails under a curve."""
@@ -140,7 +161,7 @@ def _joint_laws(n: int, blocks: ModelBlocks | None) -> dict[str, Joint]:
     return {COPULA: lambda p: any_failure(np.moveaxis(p, 2, -1), where, known), **bounds}
 
 
-def _tabled(fragility: Fragility, curves: list[HazardCurve]) -> Fragility:
+def _tabled(fragility: Fragility, curves: list[HazardCurve], step: float) -> Fragility:
     """Return a fragility of many rows by monotone cubics over the levels of some curves.
 
     Mixtures and joint probabilities cost too much at every node of the integral.
@@ -148,18 +169,18 @@ def _tabled(fragility: Fragility, curves: list[HazardCurve]) -> Fragility:
     low = math.log(min(curve.levels[0] for curve in curves))
     ends = (c.levels[-1] if c.end_level is None else c.end_level for c in curves)
     high = math.log(max(ends))
-    smooth = _cubics(low, high, fragility)
+    smooth = _cubics(low, high, fragility, step)
     return lambda levels: smooth(np.clip(np.log(levels), low, high))
 
 
-def _cubics(low: float, high: float, fragility: Fragility) -> Fragility:
-    """Return a function of ln x between two ends for one of x, by cubics over steps of 2 %.
+def _cubics(low: float, high: float, fragility: Fragility, step: float = _TABLE_STEP) -> Fragility:
+    """Return a function of ln x between two ends for one of x, by cubics over equal steps.
 
     Its last axis is that of the levels; probabilities of models are smooth in it.
     """
     from scipy.interpolate import PchipInterpolator
 
-    u = np.linspace(low, high, max(_FEWEST_LEVELS, math.ceil((high - low) / _TABLE_STEP)))
+    u = np.linspace(low, high, max(_FEWEST_LEVELS, math.ceil((high - low) / step)))
     table = fragility(np.exp(u))
     table[table < 1e-100] = 0.0  # the cubics divide by differences
     return cast("Fragility", PchipInterpolator(u, table, axis=-1))
@@ -223,6 +244,30 @@ class ModelBlocks:
         drawn = [m * np.exp(s * part) for m, s, part in zip(medians, values[2:], z, strict=True)]
         chosen = find_model(model, ("p2", "kr", shaking.name), db, kind=kind)
         return cls(drawn[0], drawn[1], weight, medians, shaking, chosen, level)
+
+    @classmethod
+    def certain(
+        cls,
+        p2: FloatArray,
+        kr: FloatArray,
+        *,
+        shaking: Shaking,
+        model: FragilityModel,
+        level: float,
+    ) -> ModelBlocks:
+        """Return blocks whose parameters are known, shape (m,) each."""
+        return cls(p2[None], kr[None], np.ones(1), (p2, kr), shaking, model, level)
+
+    def parts(self, size: int) -> list[ModelBlocks]:
+        """Return the same blocks, so many at once, where their parameters are known."""
+        p2, kr = self.medians
+        return [
+            ModelBlocks.certain(
+                p2[i : i + size], kr[i : i + size], shaking=self.shaking, model=self.model,
+                level=self.level,
+            )
+            for i in range(0, p2.size, size)
+        ]  # fmt: skip
 
     @property
     def dependence(self) -> Dependence | None:

@@ -175,7 +175,7 @@ def test_tables_of_rectangles(shell: Shell, files: Path) -> None:
     assert (float(rows[3][column]), rows[3][-1].strip('"')) == (1.0, "unstable")
     table.write_text("height_m,width_m,dip_deg\n2,0.5,3\n2,0.5,0\n")
     asked = ("--component", "single")
-    found = shell.json("hazard", "curve.csv", "--blocks", table, *asked)["answers"]
+    found = shell.json("hazard", "curve.csv", "--blocks", table, *asked)["blocks"]
     alone = shell.json("hazard", "curve.csv", *SIDES, *asked)
     assert found[1]["annual_rate"] == pytest.approx(alone["annual_rate"], rel=1e-12)
     points = [

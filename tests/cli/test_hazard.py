@@ -65,8 +65,22 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     assert [row["block_id"] for row in rows] == ["A7", "B2"]
     alone = shell.json("hazard", curve, "--p2", "3", "--kr", "0.1")
     assert float(rows[0]["annual_rate"]) == pytest.approx(alone["annual_rate"], rel=1e-8)
-    answers = shell.json("hazard", curve, "--blocks", "blocks.csv")["answers"]
-    assert answers[1]["block_id"] == "B2"
+    found = shell.json("hazard", curve, "--blocks", "blocks.csv", "--years", "100")
+    assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
+    assert set(found) == {
+        "site", "annual_rate_any", "annual_rate_any_ci", "probability_any", "joint_law", "bounds",
+        "expected_failures_per_year", "years", "level", "model", "term", "method", "imt", "blocks",
+        "warnings",
+    }  # fmt: skip
+    each = [row["annual_rate"] for row in found["blocks"]]
+    assert found["expected_failures_per_year"] == pytest.approx(sum(each), rel=1e-12)
+    assert max(each) < found["annual_rate_any"] < sum(each)
+    # a Poisson process of earthquakes
+    assert found["probability_any"] == pytest.approx(1 - np.exp(-100 * found["annual_rate_any"]))
+    assert any("blocks are taken as those of one site" in text for text in found["warnings"])
+    printed = shell("hazard", curve, "--blocks", "blocks.csv", "--years", "100").stdout
+    assert f"once in {1 / found['annual_rate_any']:.4g} years on average" in printed
+    assert f"{found['expected_failures_per_year']:.4g} failures a year are expected" in printed
 
 
 def test_a_rock_mass_is_one_class(shell: Shell, curve: Path) -> None:
@@ -84,7 +98,7 @@ def test_a_rock_mass_is_one_class(shell: Shell, curve: Path) -> None:
         writer = csv.writer(file)
         writer.writerow(["block_id", "p2_1_s2", "kr"])
         writer.writerows([r["block_id"], r["p2_1_s2"], r["kr"]] for r in rows)
-    each = shell.json("hazard", curve, "--blocks", "each.csv", "--component", "rotd50")["answers"]
+    each = shell.json("hazard", curve, "--blocks", "each.csv", "--component", "rotd50")["blocks"]
     # the mean of the rates is the rate of the mean fragility
     for key in ("annual_rate", "ci_low", "ci_high"):
         mean = np.mean([answer[key] for answer in each])

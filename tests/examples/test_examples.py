@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import sqlite3
 import subprocess
 import sys
 from pathlib import Path
@@ -58,6 +59,38 @@ def test_annual_loss(database: Path) -> None:
     assert 0 < low < loss < high
     rows = [line for line in printed.splitlines() if line.lstrip().startswith("km ")]
     assert len(rows) == 4
+
+
+def percent(text: str) -> list[float]:
+    return [float(value) for value in re.findall(r"([0-9.e+-]+) %", text)]
+
+
+def test_any_fall_on_the_road(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)  # no database here: the reference answers
+    monkeypatch.delenv("RBFRAG_DB", raising=False)
+    lines = run("annual_loss.py").splitlines()
+    low, high = percent(next(line for line in lines if "any block of the road falls" in line))
+    # an earthquake brings down many of the 53 blocks; their rates do not add up to it
+    assert 1.4 <= low < high <= 4.3
+    sites = [percent(line) for line in lines if ".csv falls:" in line]
+    assert len(sites) == 2
+    for known, together, apart in sites:
+        assert together < known < apart
+    assert (low, high) == pytest.approx((sites[0][0], sites[0][0] + sites[1][0]), abs=0.11)
+    (wrong,) = percent(next(line for line in lines if line.startswith("not ")))
+    assert wrong > 4 * high
+
+
+def test_the_road_without_an_estimate_of_what_blocks_share(database: Path, tmp_path: Path) -> None:
+    unknown = tmp_path / "unknown.db"
+    unknown.write_bytes(database.read_bytes())
+    with sqlite3.connect(unknown) as connection:
+        connection.execute("UPDATE fragility_model SET dependence = NULL")
+    connection.close()
+    printed = run("annual_loss.py", unknown)
+    assert printed.count("falls: not known (") == 2
+    low, high = percent(printed.split("any block of the road falls:")[1].splitlines()[0])
+    assert 0.0 < low < high
 
 
 def test_refit_with_pandas(database: Path) -> None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.output import check_files, print_json, print_pairs, print_table, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
+
+if TYPE_CHECKING:
+    from rbfrag.hazards.answer import HazardAnswer
+    from rbfrag.hazards.curve import HazardCurve
 
 EXAMPLE = "Example:  rbfrag hazard pgv-curve.csv --p2 3 --kr 0.1 --component rotd50 --years 50"
 
@@ -54,8 +58,10 @@ def hazard(
     """Print the annual rate at which a block topples.
 
     The fragility is integrated over the hazard curve, and the probability in a period of years
-    follows. Curves of PGV, PGA and SA at 0.3, 1, 2 and 3 s are answered, each by a model of that
-    very measure; another needs --convert. The block is backed by a slope; a free-standing one
+    follows. Several blocks of --blocks stand at one site: beside their rates it gives how often an
+    earthquake fails at least one of them, by what the model knows of blocks that share the shaking.
+    Curves of PGV, PGA and SA at 0.3, 1, 2 and 3 s are answered, each by a model of that very
+    measure; another needs --convert. The block is backed by a slope; a free-standing one
     fails at weaker shaking.
     """
     from rbfrag.exchange.block_table import write_block_table
@@ -98,8 +104,14 @@ def hazard(
         print_json(document)
         return
     warnings = document.pop("warnings")
-    if "answers" in document:
-        rows = document.pop("answers")
+    rows = document.pop("blocks", None) or document.pop("answers", None)
+    if rows is not None:
+        for one, curve_of in zip(answers, curves, strict=True):
+            if one.joint is not None:
+                print(_in_common(one, curve_of))
+        document.pop("sites", None)
+        for law, bound in document.pop("bounds", {}).items():
+            document |= {f"{name}_{law}": value for name, value in bound.items()}
         print_pairs(document)
         print()
         print_table(list(rows[0]), [list(row.values()) for row in rows])
@@ -111,6 +123,31 @@ def hazard(
             print()
             print_table(["from", "to", "share_%"], _shares(answers[0], curves[0]))
     print_warnings(warnings)
+
+
+def _in_common(answer: HazardAnswer, curve: HazardCurve) -> str:
+    """Return what several blocks of one site do, in two sentences."""
+    assert answer.joint is not None
+    where = f"{curve.place}: " if curve.place else ""
+    expected = (
+        f"{answer.expected_failures_per_year:.4g} failures a year are expected of all "
+        f"{answer.annual_rate.size} blocks, several of them in one earthquake."
+    )
+    rate, chance = answer.joint.annual_rate_any, answer.joint.probability_any
+    if rate is not None and chance is not None:
+        often = f"once in {1.0 / rate:.4g} years on average" if rate > 0.0 else "never"
+        return (
+            f"{where}at least one of the blocks fails in an earthquake {often}, with a probability "
+            f"of {100.0 * chance:.3g} % in {answer.years:g} years. {expected}"
+        )
+    least, most = (
+        100.0 * answer.joint.bounds[name]["probability_any"]
+        for name in ("fully_dependent", "independent")
+    )
+    return (
+        f"{where}at least one of the blocks fails in {answer.years:g} years with a probability of "
+        f"{least:.3g} % under full dependence and {most:.3g} % if independent. {expected}"
+    )
 
 
 def _shares(answer: Any, curve: Any) -> list[list[object]]:
