@@ -117,11 +117,11 @@ def rocking_history(excited: Excitation, block: FreeBlock, impacts: int) -> Rock
     Args:
         excited: the excitation.
         block: the block.
-        impacts: impacts within the record, for which room is made.
+        impacts: number of impacts within the record, which decides the size of the arrays.
     """
     longer = with_free_motion(excited, block.slowest_p)
     # a node and a turn in each interval, four events an impact; the free motion has far fewer than
-    # the room that is left for it, and what does not fit is not drawn
+    # the array that is left for it, and what does not fit is not drawn
     rows = np.empty((4, 3 * longer.time_s.size + 5 * impacts + 50_000))
     run = simulate(longer, block, rows=rows)
     kept = rows[:, : run.history_length]
