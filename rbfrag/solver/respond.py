@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rbfrag.errors import InputError
@@ -14,13 +14,14 @@ from rbfrag.solver.described import NOT_BACKED
 from rbfrag.solver.kind import BlockOnPlanes, Kind, Shaking
 from rbfrag.solver.kinds import model_of_kind, model_of_mode, stands_free_of
 from rbfrag.solver.quantity import angle, positive
-from rbfrag.solver.results import Polarity, Response
+from rbfrag.solver.results import BlockState, Polarity, Response
+from rbfrag.solver.sequence import STARTS_ANEW, Motions, respond_in_sequence
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
 from rbfrag.solver.stability.single import Stability, stability
 
 
 def respond(
-    motion: GroundMotion,
+    motion: GroundMotion | Sequence[GroundMotion],
     *,
     p2: float | None = None,
     kr: float | None = None,
@@ -32,15 +33,17 @@ def respond(
     back_fracture: bool = True,
     cohesion_pa: float = 0.0,
     density_kg_m3: float | None = None,
-    vertical: GroundMotion | None = None,
+    vertical: GroundMotion | Sequence[GroundMotion | None] | None = None,
     polarity: Polarity = "forward",
     kind: str | None = None,
+    gap_s: float | None = None,
+    start: BlockState | None = None,
     two_way: bool = False,
     horizontal: bool = False,
     restitution: float | None = None,
     history: bool = False,
 ) -> Response:
-    """Return what a block does under a ground motion.
+    """Return what a block does under a ground motion, or under several one after another.
 
     The block is given in one of three ways: `p2` and `kr` (it topples, or rocks on level ground if
     `kind` says so), `ky` (it slides), or `block` with `beta_deg` and `phi_deg`, whose failure mode
@@ -48,7 +51,8 @@ def respond(
     user states; a kind refuses those of another.
 
     Args:
-        motion: horizontal ground motion.
+        motion: horizontal ground motion, or a list of them: of slides and slumps each finds the
+            block where the one before has left it.
         p2: frequency parameter p² of a toppling or rocking block [1/s²], > 0.
         kr: its rocking acceleration coefficient k_r = tan(critical angle), > 0.
         ky: yield acceleration coefficient tan(φ - β) of a block that slides, whatever its
@@ -62,10 +66,15 @@ def respond(
             both corners.
         cohesion_pa: cohesion of the base [Pa]; only a block that topples may have any.
         density_kg_m3: density of the rock [kg/m³], needed with a cohesion.
-        vertical: vertical motion of the same recording, upward positive.
+        vertical: vertical motion of the same recording, upward positive; of a list of motions, a
+            list of as many, None where there is none.
         polarity: ``forward`` (positive samples drive forward motion) or ``reverse``.
         kind: ``toppling``, ``rocking``, ``sliding``, ``slumping`` or ``confined_toppling``; None
             for the model of the failure mode.
+        gap_s: of a list of motions, rest between the end of one and the beginning of the next [s];
+            None for as long as the block takes to come to rest.
+        start: the state of the block before the motion, as an earlier answer has it; None for its
+            first place.
         two_way: sliding up the base too, where the ground drives the block that way.
         horizontal: sliding without the factor cos(φ - β)/cos φ, as Newmark's horizontal block.
         restitution: rocking: speed after an impact over that before it, above 0 and up to 1;
@@ -75,13 +84,16 @@ def respond(
     Raises:
         InputError: a value outside its range, a block given in no way or in two, a block that
             fails at rest or that nothing moves, an unknown kind or polarity, an option of
-            another model, components that cannot be brought together.
+            another model, components that cannot be brought together, a start of a block that
+            carries none.
     """
     settings = {
         "two_way": two_way or None,
         "horizontal": horizontal or None,
         "restitution": restitution,
     }
+    shaken = _Shaken(motion, vertical, polarity, history, gap_s, start)
+    answer = shaken.answer
     free_standing = kind is not None and model_of_kind(kind).free_standing
     conditions = {
         "beta_deg": beta_deg,
@@ -114,8 +126,7 @@ def respond(
         if phi_deg is None:
             site = replace(site, phi_rad=0.5 * math.pi)
         remarks = _remarks(judged, model)
-        return model.respond(site, Shaking(motion, vertical, polarity, history, remarks))
-    shaking = Shaking(motion, vertical, polarity, history)
+        return answer(model, site, remarks)
     if ky is not None:
         if p2 is not None or kr is not None:
             raise InputError("ky belongs to sliding, p2 and kr to toppling: give one or the other")
@@ -123,7 +134,7 @@ def respond(
             raise InputError(f"{extra[0]} does not go with ky: it follows from ky and beta_deg")
         model = _by_numbers(kind, "slide", ("ky",))
         site = _sliding_site(ky, beta_deg or 0.0, _known(model, settings))
-        return model.respond(site, shaking)
+        return answer(model, site)
     if p2 is None or kr is None:
         missing = "p2" if p2 is None else "kr"
         raise InputError(
@@ -132,7 +143,43 @@ def respond(
     if given:
         raise InputError(f"{given[0]} does not go with p2 and kr, which say all about the block")
     model = _by_numbers(kind, "topple", ("p2", "kr"))
-    return model.respond(block_of_numbers(p2, kr, _known(model, settings)), shaking)
+    return answer(model, block_of_numbers(p2, kr, _known(model, settings)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Shaken:
+    """What shakes the block, as :func:`respond` was asked."""
+
+    motion: GroundMotion | Sequence[GroundMotion]
+    vertical: GroundMotion | Sequence[GroundMotion | None] | None
+    polarity: Polarity
+    history: bool
+    gap_s: float | None
+    start: BlockState | None
+
+    def answer(self, model: Kind, site: BlockOnPlanes, remarks: tuple[str, ...] = ()) -> Response:
+        """Return what a model answers."""
+        if self.start is not None and not model.carries_state:
+            raise InputError(f"start does not go with {model.kind}: {STARTS_ANEW}")
+
+        def run(
+            motion: GroundMotion, vertical: GroundMotion | None, start: BlockState | None
+        ) -> Response:
+            shaking = Shaking(motion, vertical, self.polarity, self.history, remarks, start)
+            return model.respond(site, shaking)
+
+        if isinstance(self.motion, GroundMotion):
+            if self.gap_s is not None:
+                raise InputError("gap_s goes with a list of motions: it is the rest between them")
+            if not (self.vertical is None or isinstance(self.vertical, GroundMotion)):
+                raise InputError("vertical is a list: one motion has one vertical motion")
+            return run(self.motion, self.vertical, self.start)
+        if isinstance(self.vertical, GroundMotion):
+            raise InputError("vertical is one motion: of a list of motions it is a list, too")
+        motions = Motions(tuple(self.motion), tuple(self.vertical or ()), self.gap_s)
+        return respond_in_sequence(
+            run, motions, carries_state=model.carries_state, start=self.start
+        )
 
 
 def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> BlockOnPlanes:
