@@ -57,8 +57,17 @@ _rows_before: dict[int, tuple[ModelRow, FragilityModel]] = {}
 _MOST_ROWS = 64
 
 
-def block_of(given: Collection[str]) -> BlockParameters:
-    """Return what a question describes its block by; toppling where it says nothing of one."""
+def block_of(given: Collection[str], kind: str | None = None) -> BlockParameters:
+    """Return what a question describes its block by; toppling where it says nothing of one.
+
+    Args:
+        given: names of what it gives.
+        kind: how the block is asked to fail, if the question says so.
+    """
+    if kind is not None:
+        for method in methods():
+            if method.block.kind == kind:
+                return method.block
     if "p2" in given:
         return TOPPLING_BLOCK
     blocks = {method.block for method in methods()}
@@ -205,7 +214,8 @@ def _check_block(
     """
     described = [name for name in given if name not in MEASURES]
     missing = [name for name in block.names if name not in given]
-    others = [name for name in described if name not in block.names and name not in block.options]
+    own = {*block.names, *block.options, *block.sigmas}
+    others = [name for name in described if name not in own]
     if not described or not (missing or others):
         return
     if others and len(missing) == len(block.names):
