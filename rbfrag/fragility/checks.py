@@ -38,6 +38,7 @@ _DESCRIPTIONS = {
         "without an earthquake)",
     ),
     "displacement_m": ("m", "the displacement that is too far in m, above 0"),
+    "restitution": ("", "the speed after an impact over that before it, above 0 and up to 1"),
     **{
         f"{name}_sigma": ("", f"the standard deviation of ln {name}, 0 or more")
         for name in ("p2", "ps2", "kr", "ky", "ks")

@@ -58,21 +58,23 @@ _MOST_ROWS = 64
 
 
 def block_of(given: Collection[str], kind: str | None = None) -> BlockParameters:
-    """Return what a question describes its block by; toppling where it says nothing of one.
+    """Return what a question describes its block by; toppling where that does not tell.
 
     Args:
         given: names of what it gives.
         kind: how the block is asked to fail, if the question says so.
     """
-    if kind is not None:
-        for method in methods():
-            if method.block.kind == kind:
-                return method.block
-    if "p2" in given:
-        return TOPPLING_BLOCK
-    blocks = {method.block for method in methods()}
-    named = [block for block in blocks if set(given) & {*block.names, *block.options}]
-    return named[0] if named else TOPPLING_BLOCK
+    described = {name for name in given if name not in MEASURES}
+    if kind is None and described <= {*TOPPLING_BLOCK.names, *TOPPLING_BLOCK.sigmas}:
+        return TOPPLING_BLOCK  # without loading the methods
+    blocks = dict.fromkeys((TOPPLING_BLOCK, *(method.block for method in methods())))
+
+    def read(block: BlockParameters) -> int:
+        return len({*block.names, *block.options}.intersection(given))
+
+    of_kind = [block for block in blocks if block.kind == kind and read(block)]
+    # the first of those that read most of what is said
+    return max(of_kind or blocks, key=read)
 
 
 def find_model(

@@ -254,7 +254,9 @@ class FragilityModel:
         if ranges is None:
             block = self.method.block
             ranges = self.ranges[key] = tuple(
-                self._clear_range(name) for name in key if name not in block.options
+                self._clear_range(name)
+                for name in key
+                if name in self.row.domain or name not in block.options
             )
         return ranges
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, Protocol
 
 import numpy as np
@@ -162,7 +162,8 @@ class UncertainModel(FragilityModel):
     @classmethod
     def over(cls, model: FragilityModel, possible: Possible) -> UncertainModel:
         """Return a model that answers for all that a block may be."""
-        return cls(**vars(model), possible=possible)
+        own = {each.name: getattr(model, each.name) for each in fields(FragilityModel)}
+        return cls(**own, possible=possible)
 
     @property
     def uncertain(self) -> bool:
