@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -37,7 +38,7 @@ from rbfrag.solver.results import FloatArray, ModeChange, Outcome
 STEP_S = 2e-4
 """Step [s]; a run of twice the step beside it tells the error."""
 
-SHORTEST_S = 0.01
+SHORTEST_S = 0.02
 """Time for which a block must do something for it to count as a change of what it does [s]."""
 
 ON_ITS_BACK_EDGE = (
@@ -93,8 +94,9 @@ class FreeMotion:
         error_rad: difference of the rotation from a run of twice the step [rad].
         error_m: the same of the displacement [m].
         steps: steps of both runs.
-        changes: what the block did.
-        history: the motion in time.
+        block: the block.
+        contact: the contact whose displacement is told, from the centroid [m].
+        rows: what the kernel kept of the motion.
     """
 
     outcome: Outcome
@@ -109,8 +111,19 @@ class FreeMotion:
     error_rad: float
     error_m: float
     steps: int
-    changes: tuple[ModeChange, ...]
-    history: FreeHistory
+    block: Block
+    contact: tuple[float, float]
+    rows: FloatArray
+
+    @cached_property
+    def history(self) -> FreeHistory:
+        """The motion in time."""
+        return _history(self.block, self.rows, self.contact)
+
+    @cached_property
+    def changes(self) -> tuple[ModeChange, ...]:
+        """What the block did."""
+        return _changes(self.block, self.rows)
 
 
 def free_motion(
@@ -135,15 +148,12 @@ def free_motion(
     contact = block.toe if at_toe else block.heel
     coarse, coarse_rows = _run(site, excited, release, 2.0 * STEP_S, stop_at_landing)
     fine, rows = _run(site, excited, release, STEP_S, stop_at_landing)
-    history = _history(block, rows, contact)
-    other = _history(block, coarse_rows, contact)
     slips, slips_coarse = (
-        each.slip_m if each.slip_m.size else np.array([release.pose.displacement_m])
-        for each in (history, other)
+        _extremes(release.pose.displacement_m, _slips(block, each, contact))
+        for each in (rows, coarse_rows)
     )
     turns, turns_coarse = (
-        each.turned_rad if each.turned_rad.size else np.array([release.pose.turned_rad])
-        for each in (history, other)
+        _extremes(release.pose.turned_rad, each[3]) for each in (rows, coarse_rows)
     )
     outcome, sentence = _ending(fine)
     if (fine.stop in (BACKWARD, FORWARD)) != (coarse.stop in (BACKWARD, FORWARD)):
@@ -155,14 +165,15 @@ def free_motion(
         pose=_pose(block, fine.motion, contact),
         started_s=None if math.isnan(fine.moved_s) else fine.moved_s,
         landed_s=None if math.isnan(fine.landed_s) else fine.landed_s,
-        backward_rad=max(0.0, release.pose.turned_rad, float(turns.max())),
-        forward_rad=max(0.0, -release.pose.turned_rad, float(-turns.min())),
-        slip_m=max(release.pose.displacement_m, float(slips.max())),
-        error_rad=abs(float(np.abs(turns).max() - np.abs(turns_coarse).max())),
-        error_m=abs(float(slips.max() - slips_coarse.max())),
+        backward_rad=max(0.0, turns[1]),
+        forward_rad=max(0.0, -turns[0]),
+        slip_m=slips[1],
+        error_rad=max(abs(a - b) for a, b in zip(turns, turns_coarse, strict=True)),
+        error_m=abs(slips[1] - slips_coarse[1]),
         steps=fine.steps + coarse.steps,
-        changes=_changes(block, rows),
-        history=history,
+        block=block,
+        contact=contact,
+        rows=rows,
     )
 
 
@@ -244,17 +255,30 @@ def _pose(block: Block, at: Motion, contact: tuple[float, float]) -> Pose:
     return Pose(at.turned, (at.x, at.y), here[0] - start)
 
 
+def _extremes(start: float, values: FloatArray) -> tuple[float, float]:
+    return (
+        float(values.min(initial=start)),
+        float(values.max(initial=start)),
+    )
+
+
+def _slips(block: Block, rows: FloatArray, contact: tuple[float, float]) -> FloatArray:
+    """Return how far a contact has slipped along the base [m]."""
+    x, turned = rows[1], rows[3]
+    start = contact[0] - block.heel[0]
+    slips: FloatArray = x + contact[0] * np.cos(turned) - contact[1] * np.sin(turned) - start
+    return slips
+
+
 def _history(block: Block, rows: FloatArray, contact: tuple[float, float]) -> FreeHistory:
     time_s, x, y, turned, vx, _, spin, _ = rows
-    c, s = np.cos(turned), np.sin(turned)
-    start = contact[0] - block.heel[0]
     return FreeHistory(
         time_s=time_s.copy(),
         turned_rad=turned.copy(),
         spin_rad_s=spin.copy(),
         centroid_m=np.stack([x, y], axis=1),
-        slip_m=x + contact[0] * c - contact[1] * s - start,
-        slip_m_s=vx - spin * (contact[0] * s + contact[1] * c),
+        slip_m=_slips(block, rows, contact),
+        slip_m_s=vx - spin * (contact[0] * np.sin(turned) + contact[1] * np.cos(turned)),
     )
 
 
@@ -273,9 +297,8 @@ def _ending(run: FreeRun) -> tuple[Outcome, str]:
 
 
 SLIDES = "slides on its base"
-TIPS_BACK = "tips back about its heel"
 SLUMPS = "slumps against its back plane"
-TIPS_FORWARD = "tips forward about its heel"
+ON_HEEL = "tips about its heel"
 CLIMBS = "is driven back against its back plane"
 ROCKS = "rocks about its toe"
 CONFINED = "topples against its back plane"
@@ -310,7 +333,7 @@ def _named(base: int, back: int, heel: int, toe: int, spin: float) -> str:
     if base & heel:
         if back:
             return SLUMPS if spin > 0.0 else CLIMBS
-        return TIPS_BACK if spin > 0.0 else TIPS_FORWARD
+        return ON_HEEL
     if base:
         return CONFINED if back else ROCKS
     return ON_BACK if back else OFF

@@ -334,7 +334,7 @@ def _history(whole: WholeRun, excited: Excitation) -> ResponseHistory:
                 there.slip_m_s,
                 there.centroid_m,
                 np.full_like(there.time_s, np.nan),
-            )  # fmt: skip
+            )
         )
     kept = _Kept(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     time_s = kept.time_s

@@ -6,7 +6,13 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.cli.output import print_json, print_pairs, print_warnings, say_when_compiling
+from rbfrag.cli.output import (
+    print_json,
+    print_pairs,
+    print_table,
+    print_warnings,
+    say_when_compiling,
+)
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import WAYS, BlockOptions
 from rbfrag.cli.parameters.motion import find_shaking
@@ -17,6 +23,12 @@ from rbfrag.solver.described import TAKEN_NOT_TO_SLIP, TAKEN_TO_TOPPLE, toppling
 if TYPE_CHECKING:
     from rbfrag.solver.block.geometry import Block
     from rbfrag.solver.results import Response
+
+_PART = (
+    "motion", "begins_s", "outcome", "peak_theta_rad", "final_theta_rad", "displacement_m",
+    "started_s", "stopped_s",
+)  # fmt: skip
+"""What is told of each motion of several; all of it with --json."""
 
 EXAMPLE = "Example:  rbfrag respond record.AT2 --p2 3 --kr 0.1 --plot response.png"
 
@@ -44,6 +56,27 @@ class Rocking:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Directions(options.Direction):
+    """How several motions act on the block."""
+
+    vertical: list[str] | None = option(  # type: ignore[assignment]
+        "Vertical accelerogram of the same recording, upward positive; of several motions one for "
+        "each, in their order.",
+        metavar="MOTION",
+    )
+
+    def each(self, count: int) -> list[options.Direction]:
+        """Return the direction of each of so many motions."""
+        texts: list[str | None] = [None] * count if self.vertical is None else [*self.vertical]
+        if len(texts) != count:
+            raise InputError(
+                f"{count} motions and {len(texts)} times --vertical: give one for each motion, or "
+                "none at all"
+            )
+        return [options.Direction(vertical=text, reverse=self.reverse) for text in texts]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Files:
     """What is written."""
 
@@ -52,7 +85,7 @@ class Files:
         "Draw the acceleration against the strength that is left, and the motion of the "
         "block (.png, .pdf, .svg)."
     )
-    animate: str | None = option(
+    film: str | None = option(
         "Film the block on its planes (.gif, .mp4 where ffmpeg is installed, .html); it "
         "must be given by its shape."
     )
@@ -64,11 +97,11 @@ class Files:
 @stacked
 def respond(
     *,
-    motion: options.Motion,
+    motions: options.Motions,
     block: BlockOptions,
     sliding: Sliding,
     rocking: Rocking,
-    direction: options.Direction,
+    direction: Directions,
     files: Files,
     reading: options.Reading,
     ky: float | None = option(
@@ -79,10 +112,16 @@ def respond(
         "Response model: toppling, rocking, sliding, slumping or confined_toppling. Default: "
         "that of the block's failure mode; of a block that topples with --no-back, rocking."
     ),
+    gap: float | None = option(
+        "Rest between two motions [s]. Default: as long as the block takes to come to rest."
+    ),
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Run one block under one accelerogram.
+    """Run one block under one accelerogram, or under several one after another.
+
+    A block that slides or slumps meets each motion where the one before has left it; one that
+    topples or rocks starts again from rest.
 
     The block is --p2 and --kr (toppling, or with --kind rocking a free-standing one on level
     ground), --ky (sliding), or its shape, from which the failure mode and with it the model follow;
@@ -92,25 +131,33 @@ def respond(
     from rbfrag.solver.respond import respond as run
 
     body, what, remarks = _body(block, ky, kind)
-    if files.animate is not None:
+    if files.film is not None:
         if body is None:
             raise InputError(
-                "--animate needs the shape of the block and its --phi, unless it stands free"
+                "--film needs the shape of the block and its --phi, unless it stands free"
             )
         from rbfrag.plots.film import film_path
 
-        film_path(files.animate)
-    ground, upward, about = find_shaking(motion, direction, db=db, reading=reading)
+        film_path(files.film)
+    found = [
+        find_shaking(each, one, db=db, reading=reading)
+        for each, one in zip(motions, direction.each(len(motions)), strict=True)
+    ]
+    about = [text for *_, texts in found for text in texts]
+    grounds, upwards = [each for each, *_ in found], [each for _, each, _ in found]
+    title = ",\nthen ".join(ground.label for ground in grounds)
+    several = len(grounds) > 1
     say_when_compiling()
     try:
         response = run(
-            ground,
-            vertical=upward,
+            grounds if several else grounds[0],
+            vertical=upwards if several else upwards[0],
             polarity=direction.polarity,
+            gap_s=gap,
             two_way=sliding.two_way,
             horizontal=sliding.horizontal,
             restitution=rocking.restitution,
-            history=any((files.csv, files.plot, files.animate)),
+            history=any((files.csv, files.plot, files.film)),
             **what,
         )
     except InputError as error:
@@ -121,16 +168,16 @@ def respond(
         write_history(response, files.csv)
     if files.plot is not None:
         p2 = what.get("p2") if body is None else body.p2
-        _draw(response, files.plot, p2, what.get("kr"), ground.label, direction.reverse)
-    if files.animate is not None and body is not None:
+        _draw(response, files.plot, p2, what.get("kr"), title, direction.reverse)
+    if files.film is not None and body is not None:
         from rbfrag.plots.film import film
         from rbfrag.solver.kinds import model_of_kind
 
         backed = not model_of_kind(response.kind).free_standing
         film(
-            response, body, files.animate, beta_deg=what["beta_deg"],
+            response, body, files.film, beta_deg=what["beta_deg"],
             exaggerate=files.exaggerate, back_fracture=backed and what.get("back_fracture", True),
-            title=ground.label,
+            title=title,
         )  # fmt: skip
     answer = response_as_dict(response)
     if json:
@@ -138,7 +185,11 @@ def respond(
         return
     answer.pop("warnings")
     changes = answer.pop("mode_changes")
+    parts = answer.pop("parts", [])
     print_pairs({name: value for name, value in answer.items() if value is not None})
+    if parts:
+        print()
+        print_table(_PART, [[part[name] for name in _PART] for part in parts])
     for change in changes:
         print(f"from {change['time_s']:.6g} s on the block {change['motion']}")
     print(response.outcome.advice)

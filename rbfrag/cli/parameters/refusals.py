@@ -117,7 +117,7 @@ NEEDS = (
         f"give --motion, or {_MEASURE.removeprefix('give ')}",
         ("rockmass",),
     ),
-    Need(("--exaggerate",), ("--animate",), "--animate", "it is a factor on what the film shows"),
+    Need(("--exaggerate",), ("--film",), "--film", "it is a factor on what the film shows"),
     Need(("--up", "--contact-mm"), ("--mesh",), "--mesh", "it is about the pose of a mesh"),
     Need(
         ("--out",), ("--mesh",), "--mesh", "only a mesh makes a table, of its azimuths", ("block",)

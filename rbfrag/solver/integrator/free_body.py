@@ -36,7 +36,7 @@ FREE_MOST_S = 60.0
 SWEEPS_MAX = 400
 """Gauss-Seidel sweeps of one step."""
 
-CONVERGED = 1e-12
+CONVERGED = 1e-10
 """Change of velocity in a sweep, over g h, at which the impulses are found."""
 
 STILL = 1e-8
