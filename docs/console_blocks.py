@@ -85,8 +85,11 @@ class Session:
 
     def agrees(self, answer: str) -> bool:
         """Return whether the page prints this answer, but for what it leaves out."""
-        parts = self.printed.strip().split(f"\n{_LEFT_OUT}\n")
-        return re.fullmatch(r"\n(?:.*\n)??".join(map(re.escape, parts)), answer, re.S) is not None
+        lines = self.printed.strip().splitlines()
+        pattern = "".join(
+            r"(?:.*\n)*?" if line == _LEFT_OUT else re.escape(f"{line}\n") for line in lines
+        )
+        return re.fullmatch(pattern, f"{answer}\n") is not None
 
 
 def sessions(page: str) -> Iterator[Session]:

@@ -39,5 +39,6 @@ def test_what_a_page_leaves_out_is_all_that_may_differ() -> None:
     page = CONSOLE.Session("a page", "rbfrag x", "one\n...\nfour\n")
     assert page.agrees("one\ntwo\nthree\nfour")
     assert page.agrees("one\nfour")
+    assert CONSOLE.Session("a page", "rbfrag x", "one\n...\n").agrees("one\ntwo")
     assert not page.agrees("one\ntwo\nfour\nfive")
     assert not page.agrees("oneandfour")
