@@ -174,6 +174,7 @@ class BlockParameters:
         criterion: name of the criterion of failure that a model is fitted for, if there are
             several.
         options: names of what else a question may state.
+        stored: names of what combinations say of their block beside its size, for `adjust`.
         adjust: changes the values by what is stated so, before anything reads them.
         refuses: the combinations of values that no block has.
         doubts: the combinations that make an answer doubtful.
@@ -188,6 +189,7 @@ class BlockParameters:
     at_rest: Bound
     criterion: str | None = None
     options: tuple[str, ...] = ()
+    stored: tuple[str, ...] = ()
     adjust: Callable[[dict[str, Any], Numbers], None] | None = None
     refuses: tuple[Bound, ...] = ()
     doubts: tuple[Bound, ...] = ()
