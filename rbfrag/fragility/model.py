@@ -6,11 +6,11 @@ import math
 import shlex
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from rbfrag.db.model_file import MODEL_FORM, ModelRow
 from rbfrag.errors import InputError, ModelError
-from rbfrag.fragility.dependence import EventSpread
+from rbfrag.fragility.dependence import Dependence, EventSpread
 from rbfrag.fragility.domain import Ratio, Spread, ratios_of, stored_spread
 from rbfrag.fragility.intervals import ParameterErrors, Quantiles, packed
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, TERMS, Term
@@ -165,6 +165,15 @@ class FragilityModel:
             spread=stored_spread(row.name, row.diagnostics),
             unknown=UnknownOutcomes.stored(row.diagnostics, method.block.strength, row.name),
         )
+
+    @property
+    def dependence(self) -> Dependence | None:
+        """The copula of blocks of one earthquake that is stored with the model, if there is one."""
+        stored = self.row.dependence
+        names = Dependence.__dataclass_fields__
+        if stored is None or not set(names) <= set(stored):
+            return None
+        return Dependence(**{name: float(cast("float", stored[name])) for name in names})
 
     @property
     def name(self) -> str:
