@@ -23,7 +23,7 @@ from rbfrag.db.merge.databases import merge_databases
 from rbfrag.db.motions import add_motion, load_motion
 from rbfrag.db.queries import combination_table, outcome_grid
 from rbfrag.db.rows import EarthquakeInfo
-from rbfrag.errors import FitError, InputError
+from rbfrag.errors import FitError, InputError, MergeConflictError
 from rbfrag.exchange.database_tables import read_table
 from rbfrag.fragility.fit.fitting import fit
 from rbfrag.motions.ground_motion import GroundMotion
@@ -198,10 +198,11 @@ def test_merging_keeps_what_is_sensitive(database: Path, tmp_path: Path) -> None
         changed = {"outcome": "stable", "theta_n": 0.5, "sensitive": True}
         update_rows(connection, schema.simulation, first, changed)
         update_rows(connection, schema.simulation, last, {"theta_n": 0.3})
-    assert merge_databases(twin, db=database).as_dict()["conflicts"] == []
+    assert merge_databases(twin, db=database).added == {}
     with opened_database(twin) as engine, engine.begin() as connection:
         update_rows(connection, schema.simulation, first, {"sensitive": False})
-    assert len(merge_databases(twin, db=database).as_dict()["conflicts"]) == 1
+    with pytest.raises(MergeConflictError, match="the outcome at kr/PGA"):
+        merge_databases(twin, db=database)
 
 
 def test_a_campaign_is_fitted_and_its_model_knows_restitution(tmp_path: Path) -> None:
