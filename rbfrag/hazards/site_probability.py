@@ -16,7 +16,7 @@ from rbfrag.fragility.joint import event_ranges
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.hazards.annual_rate import normal_steps
+from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import Component
 from rbfrag.hazards.correlations import correlations
 

@@ -17,7 +17,8 @@ from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.hazards.annual_rate import Fragility, failure_rate, normal_steps
+from rbfrag.fragility.uncertain import normal_steps
+from rbfrag.hazards.annual_rate import Fragility, failure_rate
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.shaking import Shaking, warn_of_ends
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
