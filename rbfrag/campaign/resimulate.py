@@ -283,12 +283,12 @@ def _map_differences(stored: StoredCombination, critical: CriticalResult) -> Ite
 def _described(end: End | None) -> object:
     if end is None:
         return "none"
-    said: list[object] = [end.outcome, end.theta_n]
+    parts: list[object] = [end.outcome, end.theta_n]
     if end.displacement_m is not None:
-        said.append(f"{end.displacement_m!r} m")
+        parts.append(f"{end.displacement_m!r} m")
     if end.sensitive is not None:
-        said.append("sensitive" if end.sensitive else "not sensitive")
-    return tuple(said)
+        parts.append("sensitive" if end.sensitive else "not sensitive")
+    return tuple(parts)
 
 
 def _close(then: float | None, now: float | None) -> bool:
