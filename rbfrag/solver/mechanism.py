@@ -203,7 +203,7 @@ class WholeRun:
 FALLS_ON_ITS_BASE = (
     "at {:.3f} s, and perhaps later, the block falls on its whole base: rigid contact takes the "
     "speed of such an impact and does not decide how far it pushes the block, so that the "
-    "displacement may be some per cent off"
+    "displacement may be a tenth off"
 )
 
 

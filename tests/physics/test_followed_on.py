@@ -80,13 +80,13 @@ def test_a_slide_that_tips_back_and_slumps(name: str) -> None:
     history = answer.history
     assert history is not None
     for part in (0.02, 0.98):
-        least = part * _first_rest(answer)
+        least = part * first_rest_rad(answer)
         ours = first_time(history.time_s, history.theta_rad > least)
         theirs = first_time(free.time_s, free.turned_rad > least)
         assert ours == pytest.approx(theirs, abs=0.01)
 
 
-def _first_rest(answer: Response) -> float:
+def first_rest_rad(answer: Response) -> float:
     """Return the rotation at which the block first leans."""
     history = answer.history
     assert history is not None
