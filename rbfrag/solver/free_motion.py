@@ -32,6 +32,7 @@ from rbfrag.solver.integrator.free_body import (
     work_of,
 )
 from rbfrag.solver.integrator.one_freedom.equation import Pose
+from rbfrag.solver.integrator.one_freedom.state import record_of
 from rbfrag.solver.kind import BlockOnPlanes
 from rbfrag.solver.results import FloatArray, ModeChange, Outcome
 
@@ -210,13 +211,13 @@ def _run(
     )
     (x, y), (vx, vy) = release.pose.centroid_m, release.velocity_m_s
     start = Motion(x, y, release.pose.turned_rad, vx, vy, release.spin_rad_s)
+    record = record_of(excited)
     size = 4 * excited.time_s.size + 200_000
-    last = min(excited.k_h.size, excited.jump_node) - 1
     while True:
         rows = np.empty((ROWS, size))
         run = run_free(
-            excited.time_s, excited.k_h, excited.w, last, corners, frame, release.time_s, start,
-            step_s, at_landing, work_of(corners), rows,
+            record, corners, frame, release.time_s, start, step_s, at_landing, work_of(corners),
+            rows,
         )  # fmt: skip
         if run.filled < size:
             return run, rows[:, : run.filled]
@@ -311,7 +312,7 @@ def _changes(block: Block, rows: FloatArray) -> tuple[ModeChange, ...]:
     n = len(block.outline)
     heel, toe = (block.outline.index(corner) for corner in (block.heel, block.toe))
     changes: list[ModeChange] = []
-    since, doing, said = 0.0, "", ""
+    since, doing, last = 0.0, "", ""
     for now, vx, vy, spin, bits in zip(rows[0], rows[4], rows[5], rows[6], rows[7], strict=True):
         touch = int(bits) & ~LANDS
         if vx == 0.0 and vy == 0.0 and spin == 0.0:
@@ -320,9 +321,9 @@ def _changes(block: Block, rows: FloatArray) -> tuple[ModeChange, ...]:
         name = _named(base, back, 1 << heel, 1 << toe, spin)
         if name != doing:
             since, doing = float(now), name
-        if doing != said and now - since >= SHORTEST_S:
+        if doing != last and now - since >= SHORTEST_S:
             changes.append(ModeChange(since, doing))
-            said = doing
+            last = doing
     return tuple(changes)
 
 
@@ -373,12 +374,12 @@ def touching(site: BlockOnPlanes, pose: Pose) -> tuple[str, ...]:
     corners = _corners(site, block)
     n = len(block.outline)
     names = {block.heel: "heel", block.toe: "toe", block.back: "upper back corner"}
-    found = []
+    contacts = []
     for i in range(corners.arm_x.size):
         arm = block.outline[i % n]
         x, y = _corner(pose.centroid_m, pose.turned_rad, arm)
         away = x * corners.normal_x[i] + y * corners.normal_y[i] - corners.off_m[i]
         if away <= _TOUCHES * block.r3_m:
             plane = "base" if i < n else "back plane"
-            found.append(f"{names.get(arm, 'another corner')} on the {plane}")
-    return tuple(found)
+            contacts.append(f"{names.get(arm, 'another corner')} on the {plane}")
+    return tuple(contacts)

@@ -177,8 +177,8 @@ class WholeRun:
             return known
         if self.run is not None and self.run.ending:
             known = known[:-1]
-        said = [FALLS_ON_ITS_BASE.format(self.free.landed_s)] if self.free.landed_s else []
-        return (*known, *said, *([self.free.sentence] if self.free.sentence else []))
+        impact = [FALLS_ON_ITS_BASE.format(self.free.landed_s)] if self.free.landed_s else []
+        return (*known, *impact, *([self.free.sentence] if self.free.sentence else []))
 
     @property
     def state(self) -> BlockState | None:

@@ -185,12 +185,12 @@ def respond(
         from rbfrag.plots.film import film_path
 
         film_path(files.film)
-    found = [
+    read = [
         find_shaking(each, one, db=db, reading=reading)
         for each, one in zip(motions, direction.each(len(motions)), strict=True)
     ]
-    about = [text for *_, texts in found for text in texts]
-    grounds, upwards = [each for each, *_ in found], [each for _, each, _ in found]
+    about = [text for *_, texts in read for text in texts]
+    grounds, upwards = [each for each, *_ in read], [each for _, each, _ in read]
     title = ",\nthen ".join(ground.label for ground in grounds)
     several = len(grounds) > 1
     say_when_compiling()

@@ -18,6 +18,7 @@ import numpy as np
 
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel
+from rbfrag.solver.integrator.one_freedom.state import Record
 from rbfrag.solver.results import FloatArray
 
 AT_REST, BACKWARD, FORWARD, THROWN, ENDLESS, LANDED = range(6)
@@ -39,7 +40,7 @@ SWEEPS_MAX = 400
 CONVERGED = 1e-10
 """Change of velocity in a sweep, over g h, at which the impulses are found."""
 
-STILL = 1e-8
+STANDSTILL = 1e-8
 """Velocity over g h below which a block is at rest."""
 
 
@@ -216,23 +217,20 @@ def rests(
 ) -> bool:
     """Whether a block at rest stays so under two accelerations [g]."""
     after, _ = one_step(corners, frame, at, h, a, w, work)
-    return is_still(after, frame, h)
+    return at_standstill(after, frame, h)
 
 
 @inner_kernel
-def is_still(at: Motion, frame: Frame, h: float) -> bool:
+def at_standstill(at: Motion, frame: Frame, h: float) -> bool:
     """Whether the velocities are nought but for rounding."""
-    least = STILL * STANDARD_GRAVITY_M_S2 * h
+    least = STANDSTILL * STANDARD_GRAVITY_M_S2 * h
     turning = abs(at.spin) * math.sqrt(frame.inertia_m2)
     return abs(at.vx) <= least and abs(at.vy) <= least and turning <= least
 
 
 @bare_kernel
 def run_free(
-    time_s: FloatArray,
-    k_h: FloatArray,
-    w: FloatArray,
-    last: int,
+    record: Record,
     corners: Corners,
     frame: Frame,
     start_s: float,
@@ -245,10 +243,7 @@ def run_free(
     """Run a block from a time of the record until nothing moves it any more.
 
     Args:
-        time_s: nodes [s], shape (n,); a time may repeat.
-        k_h: driving acceleration [g], shape (n,).
-        w: 1 + k_v, shape (n,).
-        last: last node with 1 + k_v > 0.
+        record: the excitation; a time may repeat.
         corners: pairs of corner and plane.
         frame: the block on its slope.
         start_s: where in the record the run begins [s].
@@ -258,12 +253,13 @@ def run_free(
         work: shape (9, m).
         history: shape (8, k) for what is kept; (8, 0) for nothing.
     """
+    time_s, k_h, w, last = record.time_s, record.k_h, record.w, record.last
     node = 0
     while node < last and time_s[node + 1] <= start_s:
         node += 1
     now, steps, filled = start_s, 0, 0
     stopped_s, moved_s, landed_s = start_s, math.nan, math.nan
-    still = is_still(at, frame, h)
+    resting = at_standstill(at, frame, h)
     end_s = time_s[-1]
     every = 0
     while True:
@@ -282,7 +278,7 @@ def run_free(
             if length <= 0.0 or now >= time_s[node + 1]:
                 node += 1
                 continue
-        if still:
+        if resting:
             part = (now - begin) / length
             if rests(corners, frame, at, h, a0 + part * (a1 - a0), w0 + part * (w1 - w0), work):
                 if free:
@@ -301,10 +297,10 @@ def run_free(
             )
             steps += 1
             every += 1
-            was = still
-            still = is_still(at, frame, size)
+            was = resting
+            resting = at_standstill(at, frame, size)
             now = first + (n + 1) * size
-            if still:
+            if resting:
                 at = Motion(at.x, at.y, at.turned, 0.0, 0.0, 0.0)
                 if not was:
                     stopped_s = now
@@ -312,7 +308,7 @@ def run_free(
                 moved_s = now - size
             if touch & LANDS and math.isnan(landed_s):
                 landed_s = now
-            if filled < history.shape[1] and (every >= KEEP or still != was or n == parts - 1):
+            if filled < history.shape[1] and (every >= KEEP or resting != was or n == parts - 1):
                 history[0, filled] = now
                 history[1, filled], history[2, filled], history[3, filled] = at.x, at.y, at.turned
                 history[4, filled], history[5, filled], history[6, filled] = at.vx, at.vy, at.spin

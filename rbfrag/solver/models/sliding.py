@@ -129,11 +129,11 @@ def _leans(site: BlockOnPlanes) -> bool:
 def _tips_back(site: BlockOnPlanes) -> Equation:
     """Return the equation of the start of a rotation backward about the heel."""
     assert site.block is not None
-    behind = math.radians(site.block.alpha1_deg) - site.beta_rad
+    past_heel = math.radians(site.block.alpha1_deg) - site.beta_rad
     return Equation(
         inertia=constant(1.0),
-        driving=constant(math.cos(behind)),
-        resistance=constant(math.sin(behind)),
+        driving=constant(math.cos(past_heel)),
+        resistance=constant(math.sin(past_heel)),
     )
 
 
