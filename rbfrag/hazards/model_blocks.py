@@ -25,8 +25,8 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]
 
-TABLE_STEP = 0.02
-"""Greatest step of ln x between the nodes of a table of P."""
+TABLE_STEP, SMOOTH_STEP = 0.01, 0.02
+"""Greatest step of ln x between the nodes of a table of P, as it is and smoothed by scatter."""
 
 FEWEST_NODES = 65
 
@@ -192,7 +192,7 @@ class ModelBlocks:
         low = math.log(min(float(curve.levels[0]) for curve in curves))
         shift = np.log(self.shaking.shift)
         apart = float(shift[1] - shift[0]) if shift.size > 1 else 0.0
-        each = max(1, math.ceil(apart / TABLE_STEP))
+        each = max(1, math.ceil(apart / SMOOTH_STEP))
         step = apart / each if apart > 0.0 else TABLE_STEP
         size = max(FEWEST_NODES, math.ceil((math.log(max(ends)) - low) / step) + 1)
         size += 1 - size % 2  # so that every second node is a table too
