@@ -1,9 +1,11 @@
 """Readers under damage:  python -m benchmarks.fuzz_readers --inputs 100000
 
-Every input is a file of one of the formats after one to four random edits: bytes flipped, pieces
-put in or over, spans and lines dropped, doubled or swapped, numbers changed, ends cut off. A
-reader must refuse it in one sentence that names the file and a line of it, or return motions that
-are fit for use: finite samples, a positive interval, measures and flags that can be computed.
+Every input is a file of one of the formats of accelerograms, or of another reader of the list in
+`benchmarks/readers.py`, after one to four random edits: bytes flipped, pieces put in or over, spans
+and lines dropped, doubled or swapped, numbers changed, ends cut off. A reader must refuse it in one
+printable sentence of less than 500 characters that names the file and a line of it, or read it;
+motions must then be fit for use: finite samples, a positive interval, measures and flags that can
+be computed.
 Anything else is a failure and is printed with its number, from which it can be made again.
 """
 
@@ -24,7 +26,8 @@ from random import Random
 import numpy as np
 
 from benchmarks.damage import damaged
-from rbfrag.errors import InputError, RbfragError
+from benchmarks.readers import READERS, Reader
+from rbfrag.errors import MOST_CHARACTERS, InputError, RbfragError
 from rbfrag.motions.formats import rbfrag_csv
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.metadata import read_metadata
@@ -44,6 +47,8 @@ LARGEST_REAL_BYTES = 400_000
 
 FEW_SAMPLES = 1000
 """Motions up to this size are filtered as well."""
+
+OTHERS: dict[str, Reader] = {reader.name: reader for reader in READERS}
 
 NEEDS: dict[str, tuple[str, float | None]] = {
     **dict.fromkeys(STATE_NO_UNIT, ("g", None)),
@@ -87,6 +92,7 @@ def bases(records: Path | None) -> dict[str, list[bytes]]:
     if records is not None:
         for name, files in real_files(records).items():
             found[f"real: {name}"] = files
+    found |= {reader.name: list(reader.sound()) for reader in READERS}
     return found
 
 
@@ -104,25 +110,39 @@ def real_files(records: Path) -> dict[str, list[bytes]]:
     return {name: files for name, files in chosen.items() if files}
 
 
-def failure(name: str, path: Path, content: bytes, random: Random, tally: Tally) -> str:
-    """Return what is wrong with what a reader made of a file; empty when nothing is."""
+def read_record(name: str, path: Path, random: Random, tally: Tally) -> str:
+    """Return what is wrong with the motions of an accelerogram's file; empty when nothing is."""
     # mostly what the format needs, so that most inputs get past it
     units, dt_s = NEEDS.get(name, (None, None))
     if random.random() < 0.1:
         units, dt_s = random.choice(("g", "m/s2", None)), random.choice((None, 0.005, 1e-300))
     allow_partial = random.random() < 0.5
+    motions = read_motions(path, units=units, dt_s=dt_s, allow_partial=allow_partial)
+    tally.partial += any(motion.is_partial for motion in motions)
+    return next(filter(None, map(unfit, motions)), "" if motions else "no motion")
+
+
+def failure(name: str, folder: Path, content: bytes, random: Random, tally: Tally) -> str:
+    """Return what is wrong with what a reader made of a file; empty when nothing is."""
+    reader = OTHERS.get(name)
+    suffix = reader.suffix if reader else ""
+    path = folder / (suffix if suffix and not suffix.startswith(".") else f"record{suffix}")
     path.write_bytes(content)
     started = time.process_time()
     try:
-        motions = read_motions(path, units=units, dt_s=dt_s, allow_partial=allow_partial)
-        wrong = next(filter(None, map(unfit, motions)), "" if motions else "no motion")
-        tally.partial += any(motion.is_partial for motion in motions)
+        wrong = ""
+        if reader is None:
+            wrong = read_record(name, path, random, tally)
+        else:
+            reader.read(path)
     except RbfragError as error:
         tally.refused += 1
         tally.reasons[type(error).__name__] += 1
         wrong = unclear(error, path, content)
     except Exception as error:  # noqa: BLE001  # whatever else is raised is what is looked for
         wrong = f"{type(error).__name__}: {str(error)[:200]}"
+    finally:
+        path.unlink()  # an index beside the next file would count
     took = time.process_time() - started
     tally.slowest_s = max(tally.slowest_s, took)
     if took > SLOW_S:
@@ -159,10 +179,11 @@ def unclear(error: RbfragError, path: Path, content: bytes) -> str:
     """Return what a message lacks; empty for a clear one."""
     text, line = str(error), getattr(error, "line", None)
     last = content.replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
-    if str(path) not in text:
+    # a record may be refused for the index beside it
+    if str(path.parent) not in text:
         return f"the message names no file: {text[:200]}"
-    if "\n" in text or len(text) > 1000:
-        return f"the message is not one sentence: {text[:200]!r}"
+    if not text.isprintable() or len(text) > MOST_CHARACTERS:
+        return f"the message is not one printable sentence: {text[:200]!r}"
     if line is not None and not 1 <= line <= last:
         return f"the message names line {line} of {last}: {text[:200]}"
     return ""
@@ -182,13 +203,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.simplefilter("error")
     numbers = range(chosen.inputs) if chosen.only is None else [chosen.only]
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "record"
         for number in numbers:
             random = Random(f"{chosen.seed} {number}")
             name = names[number % len(names)]
             content = damaged(random.choice(found[name]), random)
             tallies[name].inputs += 1
-            wrong = failure(name, path, content, random, tallies[name])
+            wrong = failure(name, Path(folder), content, random, tallies[name])
             if wrong:
                 failures += 1
                 print(f"input {number} ({name}): {wrong}", file=sys.stderr)

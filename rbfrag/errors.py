@@ -19,7 +19,9 @@
     └── WorkFailedError             part of the work failed; what finished is kept (exit 1)
 
 A message says what was wrong with the offending value, where (file and line), and
-what to do next. It is one paragraph meant for a person, without a traceback.
+what to do next. It is one paragraph of less than 500 characters meant for a person, without a
+traceback; what a file or a caller put into it is shortened, and control characters are shown as
+Python escapes them, so that no input can steer a terminal.
 """
 
 from __future__ import annotations
@@ -28,13 +30,37 @@ import re
 from os import PathLike, fspath
 from typing import ClassVar
 
+MOST_CHARACTERS = 499
+"""A longer message loses its middle: what was wrong stands first, what to do last."""
+
+LONGEST_NAME = 200
+"""Characters; what is longer names nothing, and no figure or table has room for it."""
+
 _LONG_WORD = re.compile(r"(\S{60})\S{140,}")
+_BLANKS = re.compile(r"[ \t]*[\r\n\t]\s*")
+# control characters, line separators, and marks that turn the direction of writing around
+_UNPRINTABLE = re.compile(
+    "[\x00-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
+)
+
+
+def one_paragraph(message: str) -> str:
+    """Return a message fit for a terminal: one paragraph, printable, at most 499 characters."""
+    text = _BLANKS.sub(" ", message.strip())
+    text = _UNPRINTABLE.sub(lambda match: ascii(match[0])[1:-1], text)
+    if len(text) > MOST_CHARACTERS:
+        tail = MOST_CHARACTERS // 3
+        text = f"{text[: MOST_CHARACTERS - tail - 3]} … {text[-tail:]}"
+    return text
 
 
 class RbfragError(Exception):
     """Base of all errors raised on purpose; the message is meant for a person."""
 
     exit_status: ClassVar[int] = 2
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(one_paragraph(message))
 
 
 class InputError(RbfragError, ValueError):
@@ -142,3 +168,21 @@ class WorkFailedError(RbfragError):
     """Part of the work failed; what finished is kept."""
 
     exit_status: ClassVar[int] = 1
+
+
+def checked_name(name: str, what: str) -> str:
+    """Return a name of a model, suite, earthquake, station or block that can be stored and shown.
+
+    Args:
+        name: the name; it may be empty.
+        what: what it names, for the message: "the suite".
+
+    Raises:
+        InputError: it is longer than 200 characters.
+    """
+    if len(name) > LONGEST_NAME:
+        raise InputError(
+            f"{what} has a name of {len(name)} characters, {name[:40]!r}…: give it at most "
+            f"{LONGEST_NAME}"
+        )
+    return name

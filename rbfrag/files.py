@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import json
 import os
+import re
 import secrets
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from rbfrag.errors import InputError
 
 MOST_BYTES = 1 << 28
 """Larger texts are refused: no curve, model or description is 256 MB long."""
+
+_DOTTED = re.compile(r"(?:^|[\[{,])[^.,=\n\[\]{}#]*(?:\.[^.,=\n\[\]{}#]*){20}", re.MULTILINE)
+"""A key of more than 20 parts; the parser's time grows with the square of their number."""
 
 
 @contextmanager
@@ -40,7 +49,7 @@ def reading(source: Path, what: str) -> Iterator[None]:
 
 
 def source_text(path: str | os.PathLike[str], what: str, most_bytes: int = MOST_BYTES) -> str:
-    """Return the whole text of a file.
+    """Return the whole text of a file, with newlines as ``\\n``.
 
     Args:
         path: the file.
@@ -56,9 +65,82 @@ def source_text(path: str | os.PathLike[str], what: str, most_bytes: int = MOST_
         if size > most_bytes:
             raise InputError(f"{source} has {size} bytes: larger than {what} can be")
         text = source.read_bytes().decode("utf-8-sig")
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
     if not text.strip():
         raise InputError(f"{source} is empty: name a file with {what}")
     return text
+
+
+def csv_rows(text: str, where: object = "") -> Iterator[tuple[int, list[str]]]:
+    """Yield the rows of CSV, the empty ones too, each with the number of its last line.
+
+    Args:
+        text: the CSV, with newlines as :func:`source_text` leaves them.
+        where: what messages name before the line, such as the file; empty for nothing.
+
+    Raises:
+        InputError: it is no CSV, by a cell that does not end or is too long; with its line.
+    """
+    reader = csv.reader(io.StringIO(text))
+    try:
+        for row in reader:
+            yield reader.line_num, row
+    except csv.Error as error:
+        place = f"{where}, line" if where else "line"
+        raise InputError(f"{place} {reader.line_num}: not a CSV file: {error}") from None
+
+
+def toml_document(text: str) -> dict[str, Any]:
+    """Return what TOML says.
+
+    Raises:
+        InputError: it is not TOML, nested too deeply, or holds a key or number out of all bounds.
+    """
+    if _DOTTED.search(text):
+        raise InputError("not valid TOML for us: a key of more than 20 parts")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise InputError("not valid TOML for us: tables or arrays nested too deeply") from None
+    # beside its own error, the parser passes on that of an integer of thousands of digits
+    except ValueError as error:
+        raise InputError(f"not valid TOML: {error}") from None
+
+
+def json_document(text: str) -> Any:
+    """Return what JSON says.
+
+    Raises:
+        InputError: it is not JSON, nested too deeply, or has a key twice in one object.
+    """
+    try:
+        return json.loads(text, object_pairs_hook=_object)
+    except RecursionError:
+        raise InputError("not JSON for us: objects or arrays nested too deeply") from None
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(f"not JSON: {error}") from None
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    document = dict(pairs)
+    if len(document) < len(pairs):
+        names = [name for name, _ in pairs]
+        double = next(name for name in document if names.count(name) > 1)
+        raise InputError(f"the key {double[:40]!r} is there twice in one JSON object: keep one")
+    return document
+
+
+def is_number(value: object) -> bool:
+    """Return whether a value of a document is a number that a float can hold."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        float(value)
+    except OverflowError:
+        return False
+    return True
 
 
 def output_path(path: str | os.PathLike[str], suffixes: tuple[str, ...], what: str) -> Path:

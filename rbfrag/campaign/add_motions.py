@@ -15,7 +15,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import add_motion, motion_row, same_source
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.vertical_pairs import recordings_of_mixed_dt
-from rbfrag.errors import InputError, MotionFileError
+from rbfrag.errors import InputError, MotionFileError, checked_name
 from rbfrag.motions.direction import upward
 from rbfrag.motions.formats.delimited_text import INDEX
 from rbfrag.motions.metadata import read_metadata
@@ -135,6 +135,7 @@ def add_motions(
     """
     if suite is not None and not suite.strip():
         raise InputError("--suite: the name is empty; give one or leave it out")
+    checked_name(suite or "", "the suite")
     stated = None if metadata is None else read_metadata(metadata)
     files = list(_files(paths, leave_out=metadata))
     run = _Run(suite, None if raw else high_pass)

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from rbfrag.errors import RbfragError
+from rbfrag.errors import RbfragError, one_paragraph
 from rbfrag.version import __version__
 
 COMMANDS = {
@@ -38,6 +38,10 @@ COMMANDS = {
     "demo": "Run the whole chain from records to a prediction.",
 }
 """The modules of `rbfrag/cli/commands`, and the first line of each one's help."""
+
+
+_UsageError: Any = typer.BadParameter.__base__
+"""What typer raises for a wrong command line; where it stands depends on typer's version."""
 
 
 class _Commands(TyperGroup):
@@ -71,6 +75,9 @@ class _Commands(TyperGroup):
         except RbfragError as error:
             print(f"rbfrag: {error}", file=sys.stderr)
             raise typer.Exit(error.exit_status) from None
+        except _UsageError as error:
+            error.message = one_paragraph(error.message)
+            raise
 
 
 app = typer.Typer(

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from rbfrag.db.sqlite_file import check_sqlite_database, connect_sqlite, explained_sqlite_error
-from rbfrag.errors import DatabaseError, InputError
+from rbfrag.errors import DatabaseError, InputError, checked_name
 
 MODEL_FORM = 2
 """The form of the predictors that this rbfrag fits and answers with."""
@@ -91,6 +91,7 @@ def encode_model(row: ModelRow) -> dict[str, Any]:
     """
     if not row.name.strip():
         raise InputError("the name of a model must not be empty")
+    checked_name(row.name, "the model")
     if not row.name.isprintable():
         raise InputError(f"the name of a model must be printable text, not {row.name!r}")
     n = len(row.coefficients)
@@ -208,6 +209,8 @@ def read_models(path: str | PathLike[str]) -> list[ModelRow]:
         check_sqlite_database(connection, file)
         try:
             rows = [decode_model(row) for row in connection.execute(_SELECT)]
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             raise explained_sqlite_error(error, file) from error
+        except DatabaseError as error:
+            raise DatabaseError(f"{file}: {error}") from error
     return sorted(rows, key=lambda model: model.name)

@@ -84,7 +84,7 @@ def connect_sqlite(
                 raise
             _refuse_unreadable_log(path)
             return _connect(path, "mode=ro&immutable=1", True, busy_timeout_s, check_same_thread)
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:
         raise explained_sqlite_error(error, path) from error
 
 
@@ -136,7 +136,7 @@ def check_sqlite_database(connection: sqlite3.Connection, path: Path) -> None:
             if tables
             else None
         )
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:
         raise explained_sqlite_error(error, path) from error
     if row is None:
         raise NotADatabaseError(
@@ -145,8 +145,15 @@ def check_sqlite_database(connection: sqlite3.Connection, path: Path) -> None:
     check_revision(row[0], str(path))
 
 
-def explained_sqlite_error(error: sqlite3.Error, path: Path | str) -> DatabaseError:
-    """Return the rbfrag error that explains what SQLite ran into."""
+def explained_sqlite_error(
+    error: sqlite3.Error | UnicodeDecodeError, path: Path | str
+) -> DatabaseError:
+    """Return the rbfrag error that explains what SQLite ran into, or text that is none."""
+    if isinstance(error, UnicodeDecodeError):
+        return DatabaseError(
+            f"{path} is damaged (a text in it is not UTF-8): run  rbfrag db check  and restore it "
+            "from a copy"
+        )
     code = _primary_code(error)
     if code in (_BUSY, _LOCKED):
         return DatabaseBusyError(

@@ -116,13 +116,21 @@ def parquet_parts(
     arrow, parquet = pyarrow()
     try:
         file = stack.enter_context(parquet.ParquetFile(origin))
-    except arrow.ArrowException as error:
+    except (arrow.ArrowException, UnicodeError) as error:
         raise InputError(f"{origin}: not a Parquet file: {error}") from None
     header = list(file.schema_arrow.names)
 
+    def batches() -> Iterator[Any]:
+        try:
+            yield from file.iter_batches(batch_size=ROWS)
+        except (arrow.ArrowException, OSError, UnicodeError) as error:
+            raise InputError(
+                f"{origin}: the Parquet file is damaged: {error}; write it again"
+            ) from None
+
     def parts() -> Parts:
         first = 1
-        for group in file.iter_batches(batch_size=ROWS):
+        for group in batches():
             part: dict[str, Any] = {}
             for name, column in zip(header, group.columns, strict=True):
                 if name in numeric:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, checked_name
 from rbfrag.exchange.batch_table import (
     arrow_array,
     cells_of,
@@ -24,7 +24,7 @@ from rbfrag.exchange.batch_table import (
 )
 from rbfrag.exchange.points import SUFFIXES as GEOJSON
 from rbfrag.exchange.points import read_points
-from rbfrag.files import output_path, reading, written_whole
+from rbfrag.files import is_number, output_path, reading, written_whole
 from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.described import rectangle_numbers
 
@@ -131,7 +131,10 @@ def read_columns(
             for first, part in parts:
                 for name, arrays in collected.items():
                     if name in texts:
-                        cells = [str(cell).strip() for cell in cells_of(part[name])]
+                        cells = [
+                            checked_name(str(cell).strip(), f"{source}: a cell of {name}")
+                            for cell in cells_of(part[name])
+                        ]
                         arrays.append(np.array(cells, dtype=object))
                     else:
                         arrays.append(numbers(source, name, part[name], first))
@@ -213,7 +216,11 @@ def _points(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
         "lon": np.array([lon for lon, _, _ in points]),
         "lat": np.array([lat for _, lat, _ in points]),
         "block_id": np.array(
-            [str(p.get("block_id", i + 1)) for i, (_, _, p) in enumerate(points)], dtype=object
+            [
+                checked_name(str(p.get("block_id", i + 1)), f"{path}: a block")
+                for i, (_, _, p) in enumerate(points)
+            ],
+            dtype=object,
         ),
     }
     properties = [p for _, _, p in points]
@@ -228,7 +235,7 @@ def _points(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
 
 def _numbers(path: str | os.PathLike[str], name: str, values: list[Any]) -> NDArray[np.float64]:
     for i, value in enumerate(values):
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        if not is_number(value):
             raise InputError(f"{path}, features[{i}]: {name} = {value!r} is not a number")
     return np.array(values, dtype=np.float64)
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import re
 from collections.abc import Sequence
 
 from rbfrag.errors import InputError
-from rbfrag.files import source_text
+from rbfrag.files import csv_rows, source_text
 from rbfrag.hazards.curve import HazardCurve
 
 COLUMNS = ("rlz_id", "weight")
@@ -31,16 +30,16 @@ def realization_weights(
     """
     text = source_text(path, "the realizations of a logic tree")
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    rows = list(csv.DictReader(lines))
+    header, *rows = [cells for _, cells in csv_rows("\n".join(lines), path)] or [[]]
     weights: dict[int, float] = {}
-    for row in rows:
+    for cells in rows:
+        row = dict(zip(header, cells, strict=False))
         try:
-            number, weight = (row[name] for name in COLUMNS)
-            weights[int(number)] = float(weight)
-        except (KeyError, TypeError, ValueError):
+            weights[int(row["rlz_id"])] = float(row["weight"])
+        except (KeyError, ValueError):
             raise InputError(
-                f"{path}: {','.join(str(cell) for cell in row.values())!r} is no realization: the "
-                "columns rlz_id and weight hold numbers"
+                f"{path}: {','.join(cells)[:80]!r} is no realization: the columns rlz_id and "
+                "weight hold numbers"
             ) from None
     branches = [_REALIZATION.fullmatch(curve.statistic) for curve in curves]
     if not any(branches):

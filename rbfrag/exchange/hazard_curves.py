@@ -5,8 +5,6 @@ The files: OpenQuake CSV, USGS NSHM JSON, or two columns.
 
 from __future__ import annotations
 
-import csv
-import json
 import os
 import re
 from collections.abc import Mapping, Sequence
@@ -18,7 +16,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import openquake_type
-from rbfrag.files import source_text
+from rbfrag.files import csv_rows, is_number, json_document, source_text
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import ANSWERED, HazardCurve, hazard_curve, rates_from_probabilities
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -147,9 +145,9 @@ def nshm_curves(text: str, source: str) -> list[HazardCurve]:
     cm/s for the peak ground velocity), and ``ys``, annual rates of exceedance.
     """
     try:
-        document = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{source}: not JSON: {error}") from None
+        document = json_document(text)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
     if not isinstance(document, dict) or not document:
         raise InputError(f"{source}: a JSON object with one member a measure is wanted")
     return [_curve(name, member, f"{source}, {name!r}") for name, member in document.items()]
@@ -183,7 +181,7 @@ def _numbers(value: Any, key: str, where: str) -> np.ndarray[Any, np.dtype[np.fl
     if not isinstance(value, list) or not value:
         raise InputError(f"{where}: {key} is not a list of numbers")
     for i, item in enumerate(value):
-        if isinstance(item, bool) or not isinstance(item, int | float):
+        if not is_number(item):
             raise InputError(f"{where}: {key}[{i}] = {item!r} is not a number")
     return np.array(value, dtype=np.float64)
 
@@ -208,7 +206,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
     Raises:
         InputError: a header or a row that does not say what it should, with its line.
     """
-    rows = list(csv.reader(text.splitlines()))
+    rows = [cells for _, cells in csv_rows(text, source)]
     head = ",".join(rows[0])
     years = _number(_stated("investigation_time", head, source), f"{source}, line 1")
     if not years > 0.0:
@@ -315,7 +313,7 @@ def table_curves(text: str, source: str) -> list[HazardCurve]:
     """
     rows = [
         (number, [cell.strip() for cell in row])
-        for number, row in enumerate(csv.reader(text.splitlines()), start=1)
+        for number, row in csv_rows(text, source)
         if row and not row[0].lstrip().startswith("#")
     ]
     if not rows:

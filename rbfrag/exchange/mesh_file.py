@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import logging
 import os
+import warnings
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -52,22 +53,34 @@ def block_from_mesh(
         MissingExtraError: trimesh is not installed.
     """
     source = Path(path)
-    mesh, middle, notes = _closed_surface(source)
+    try:
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
+            mesh, middle, notes = _closed_surface(source)
+    except (ValueError, OverflowError, IndexError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(
+            f"{source}: not the mesh of a block ({str(error)[:120]}): export it again"
+        ) from None
     volume = float(mesh.volume)
     mass = MassProperties(
         volume_m3=volume,
         centre_m=np.asarray(mesh.center_mass, dtype=np.float64) + middle,
         inertia_m2=np.asarray(mesh.moment_inertia, dtype=np.float64) / volume + 0.0,  # no -0
     )
-    return mesh_block(
-        source.stem,
-        np.asarray(mesh.vertices, dtype=np.float64) + middle,
-        mass,
-        up=up,
-        contact_mm=contact_mm,
-        density_kg_m3=density_kg_m3,
-        warnings=notes,
-    )
+    try:
+        return mesh_block(
+            source.stem,
+            np.asarray(mesh.vertices, dtype=np.float64) + middle,
+            mass,
+            up=up,
+            contact_mm=contact_mm,
+            density_kg_m3=density_kg_m3,
+            warnings=notes,
+        )
+    except InputError as error:
+        raise InputError(f"{source}: {str(error).removeprefix(f'{source.stem}: ')}") from None
 
 
 def _closed_surface(source: Path) -> tuple[Trimesh, NDArray[np.float64], list[str]]:

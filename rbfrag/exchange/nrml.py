@@ -118,6 +118,8 @@ def _function(
             raise InputError(
                 f"{where}: mean = {mean:g} and stddev = {sd:g}: both must be above zero"
             )
+        if not sd / mean < 1e100:
+            raise InputError(f"{where}: stddev = {sd:g} is out of all bounds with mean {mean:g}")
         spread = 1.0 + (sd / mean) ** 2
         median, beta = kind.factor * mean / math.sqrt(spread), math.sqrt(math.log(spread))
         return lognormal_function(name, state, kind, median, beta, where, lowest)

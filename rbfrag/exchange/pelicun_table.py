@@ -12,14 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, checked_name
 from rbfrag.exchange.fragility_function import (
     FragilityFunction,
     IntensityType,
     discrete_function,
     lognormal_function,
 )
-from rbfrag.files import source_text
+from rbfrag.files import csv_rows, source_text
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 _DEMANDS = {"pga_g": ("Peak Ground Acceleration", "g"), "pgv_m_s": ("Peak Ground Velocity", "mps")}
@@ -93,20 +93,20 @@ def read_pelicun(path: str | os.PathLike[str]) -> PelicunTable:
         InputError: not such a table, or a row whose numbers make no function, with its line.
     """
     text = source_text(path, "a pelicun fragility table")
-    reader = csv.reader(io.StringIO(text))
-    header = [name.strip() for name in next(reader, [])]
+    rows = csv_rows(text, path)
+    header = [name.strip() for name in next(rows)[1]]
     for name in ("ID", "Demand-Type", "Demand-Unit", "LS1-Family", "LS1-Theta_0"):
         if name not in header:
             raise InputError(f"{path}, line 1: there is no column {name}: not a pelicun table")
     functions: list[FragilityFunction] = []
     skipped, incomplete = 0, []
-    for cells in reader:
+    for line, cells in rows:
         if not cells:
             continue
-        line = reader.line_num
         if len(cells) != len(header):
             raise InputError(f"{path}, line {line}: {len(cells)} cells under {len(header)} columns")
         row = {name: cell.strip() for name, cell in zip(header, cells, strict=True)}
+        checked_name(row["ID"], f"{path}, line {line}: the fragility")
         states = [
             name.removesuffix("-Family")
             for name in header

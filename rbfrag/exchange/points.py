@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, MissingExtraError
-from rbfrag.files import source_text, written_whole
+from rbfrag.files import is_number, json_document, source_text, written_whole
 
 SUFFIXES = (".geojson", ".json")
 """File types of GeoJSON."""
@@ -23,12 +23,11 @@ _ROWS = 1 << 13
 
 def read_points(path: str | os.PathLike[str]) -> list[tuple[float, float, dict[str, Any]]]:
     """Return longitude, latitude and properties of every point of a FeatureCollection."""
+    text = source_text(path, "GeoJSON")
     try:
-        document = json.loads(source_text(path, "GeoJSON"))
-    except (ValueError, RecursionError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{path}: not JSON: {error}") from None
+        document = json_document(text)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     features = document.get("features") if isinstance(document, dict) else None
     if not isinstance(features, list) or document.get("type") != "FeatureCollection":
         raise InputError(f"{path}: not a GeoJSON FeatureCollection")
@@ -39,11 +38,7 @@ def read_points(path: str | os.PathLike[str]) -> list[tuple[float, float, dict[s
         if not isinstance(geometry, dict) or geometry.get("type") != "Point":
             raise InputError(f"{where}: the geometry is no Point")
         place = geometry.get("coordinates")
-        if (
-            not isinstance(place, list)
-            or len(place) < 2
-            or any(isinstance(c, bool) or not isinstance(c, int | float) for c in place[:2])
-        ):
+        if not isinstance(place, list) or len(place) < 2 or not all(map(is_number, place[:2])):
             raise InputError(f"{where}: coordinates are no [longitude, latitude]")
         lon, lat = float(place[0]), float(place[1])
         if not (abs(lon) <= 180.0 and abs(lat) <= 90.0):

@@ -37,6 +37,7 @@ _DESCRIPTIONS = {
         "without an earthquake)",
     ),
     "displacement_m": ("m", "the displacement that is too far in m, above 0"),
+    "restitution": ("", "the speed after an impact over that before it, above 0 and up to 1"),
     "beta_deg": ("°", "the dip of the base in degrees, out of the slope positive"),
     "leaves_g": ("g", "the acceleration in g at which the block leaves its back plane"),
     "pgv_m_s": ("m/s", "the peak ground velocity in m/s, 0 or more"),

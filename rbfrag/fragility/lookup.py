@@ -58,12 +58,10 @@ _MOST_ROWS = 64
 
 
 def block_of(given: Collection[str]) -> BlockParameters:
-    """Return what a question describes its block by; toppling where it says nothing of one."""
-    if "p2" in given:
-        return TOPPLING_BLOCK
-    blocks = {method.block for method in methods()}
-    named = [block for block in blocks if set(given) & {*block.names, *block.options}]
-    return named[0] if named else TOPPLING_BLOCK
+    """Return what a question describes its block by; toppling where that does not tell."""
+    blocks = dict.fromkeys((TOPPLING_BLOCK, *(method.block for method in methods())))
+    # the first of those that read most of what is said
+    return max(blocks, key=lambda block: len({*block.names, *block.options}.intersection(given)))
 
 
 def find_model(

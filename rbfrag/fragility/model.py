@@ -241,7 +241,9 @@ class FragilityModel:
         ranges = self.ranges.get(key)
         if ranges is None:
             ranges = self.ranges[key] = tuple(
-                self._clear_range(name) for name in key if name not in self.method.block.options
+                self._clear_range(name)
+                for name in key
+                if name in self.row.domain or name not in self.method.block.options
             )
         return ranges
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rbfrag.errors import InputError, MotionFileError
+from rbfrag.errors import InputError, MotionFileError, checked_name
 from rbfrag.motions.text.file import read_text
 from rbfrag.motions.units import acceleration_unit
 
@@ -19,6 +19,9 @@ COLUMNS = (
     "magnitude", "processing", "earthquake", "year", "station", "component", "dt_s",
 )  # fmt: skip
 """The columns that are read; only ``file`` must be there, and others are ignored."""
+
+NAMES = ("event_id", "companion_group", "earthquake", "station", "component")
+"""Columns of names, whose length is bounded."""
 
 _TRUTH = {
     "1": True, "yes": True, "true": True,
@@ -167,6 +170,12 @@ def _header(table: Path, cells: list[str], line: int) -> list[str]:
 def _row(table: Path, stated: Mapping[str, str], line: int) -> TraceMetadata:
     def text(name: str) -> str:
         return stated.get(name, "")
+
+    for name in NAMES:
+        try:
+            checked_name(text(name), f"the {name}")
+        except InputError as error:
+            raise MotionFileError(table, str(error), line=line) from None
 
     def number(name: str, ok: Callable[[float], bool], rule: str) -> float | None:
         if not text(name):

@@ -28,14 +28,12 @@ with a ``value`` and no distribution.
 
 from __future__ import annotations
 
-import csv
 import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
 from rbfrag.errors import InputError
-from rbfrag.files import source_text
+from rbfrag.files import csv_rows, source_text, toml_document
 from rbfrag.rockmasses.joint_sets import RockMass
 
 COLUMNS = (
@@ -75,12 +73,7 @@ def rock_mass_of_toml(text: str) -> RockMass:
     Raises:
         InputError: it is not TOML, or describes no rock mass; the message names the key.
     """
-    try:
-        document = tomllib.loads(text)
-    # Beside its own error, the parser passes on those of absurd numbers and nesting.
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"not valid TOML: {error}") from None
-    return rock_mass_of_tables(document)
+    return rock_mass_of_tables(toml_document(text))
 
 
 def rock_mass_of_csv(text: str) -> RockMass:
@@ -89,10 +82,7 @@ def rock_mass_of_csv(text: str) -> RockMass:
     Raises:
         InputError: it is not CSV, or describes no rock mass; the message names the line or key.
     """
-    try:
-        return RockMass.of(_from_csv(text))
-    except csv.Error as error:
-        raise InputError(f"not a CSV file: {error}") from None
+    return RockMass.of(_from_csv(text))
 
 
 def rock_mass_of_tables(document: Mapping[str, object]) -> RockMass:
@@ -115,7 +105,7 @@ def rock_mass_of_tables(document: Mapping[str, object]) -> RockMass:
 def _from_csv(text: str) -> dict[str, object]:
     description: dict[str, object] = {}
     header: list[str] = []
-    for line, cells in enumerate(csv.reader(text.splitlines()), start=1):
+    for line, cells in csv_rows(text):
         row = [cell.strip() for cell in cells]
         if not any(row) or row[0].startswith("#"):
             continue

@@ -165,8 +165,8 @@ class Kind:
         mode: failure mode of its blocks; None where no geometry chooses it.
         free_standing: whether its blocks have no plane behind them.
         settings: options of `rbfrag.respond` that it understands.
-        numbers: what describes its block in `rbfrag.respond` without a shape, beside `parameters`.
-        parameters: what describes its block in predictions; () where no fragility is fitted.
+        parameters: what describes its block in predictions, and in `rbfrag.respond` without a
+            shape; () where no fragility is fitted.
         searchable: whether it has a critical value.
         search_needs: the option without which there is no search.
         search_options: options of `rbfrag.critical` that it understands.
@@ -179,7 +179,6 @@ class Kind:
     mode: ModeName | None = None
     free_standing: bool = False
     settings: tuple[str, ...] = ()
-    numbers: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()
     searchable: bool = False
     search_needs: str = ""

@@ -212,7 +212,7 @@ def _by_numbers(kind: str | None, mode: ModeName, numbers: tuple[str, ...]) -> K
     if kind is None:
         return model_of_mode(mode)
     model = model_of_kind(kind)
-    if not set(numbers) <= {*model.numbers, *model.parameters}:
+    if not set(numbers) <= {*model.parameters}:
         raise InputError(
             f"{kind} needs the shape of the block: give a block with beta_deg and phi_deg instead "
             f"of {' and '.join(numbers)}, which mean {model_of_mode(mode).kind}"

@@ -53,3 +53,15 @@ def test_a_curve_runs_over_what_is_named(shell: Shell, refuses: Refuses, tmp_pat
     assert "PGV = 0.6 m/s" in text
     assert "runs over pgv, pga, pgd, sa03" in refuses("plot", "curve", *block, "--over", "cav")
     assert "pgv_m_s is what the curve runs over" in refuses("plot", "curve", *block, "--pgv", "0.6")
+
+
+def test_yield_over_rotation(shell: Shell, refuses: Refuses, tmp_path: Path) -> None:
+    block = ("--alpha1", "45", "--alpha3", "65", "--r3", "1", "--beta", "0", "--phi", "35")
+    answer = shell.json("plot", "rotation", *block, "--out", "r.png", "--back-follows", "0,1")
+    assert (tmp_path / "r.png").stat().st_size > 5000
+    stays, turns = answer["lines"]
+    assert stays["least_g"] == stays["end_g"] < 0.49
+    assert turns["least_g"] == pytest.approx(0.597, abs=1e-3)
+    assert "from 0 to 1" in refuses(
+        "plot", "rotation", *block, "--out", "r.png", "--back-follows", "2"
+    )

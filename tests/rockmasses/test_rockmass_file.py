@@ -100,7 +100,7 @@ def test_toml_refusals(tmp_path: Path, old: str, new: str, words: str) -> None:
         ("seed,,7", "seed,,7,8", "line 4: seed: without a distribution only a value counts"),
         ("seed,,7", "realisations,,7", "line 4: realisations is stated twice"),
         ("seed,,7", "seed,,,,,,,,,,,7", "line 4: 12 cells under 10 columns"),
-        ("41 44.5", "4" * 200_000, "not a CSV file"),
+        ("41 44.5", "4" * 200_000, "line 8: not a CSV file"),
         ("41 44.5", "41 x", "line 8: back.dip_deg: values = 'x' is not a number"),
         ("back.dip_deg,", "back.dip,", "unknown key back.dip"),
         ("block.back_fracture,,false", "block.back_fracture,,0", "block.back_fracture = 0"),

@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
-from rbfrag.cli.output import print_warnings, say_when_compiling
+from rbfrag.cli.output import print_json, print_table, print_warnings, say_when_compiling
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlockOptions, NoBack
+from rbfrag.cli.parameters.block import WAYS, BlockOptions, NoBack, ShapeOptions
 from rbfrag.cli.parameters.motion import find_motion, find_shaking
 from rbfrag.cli.parameters.stack import command_group, option, stacked
+from rbfrag.errors import InputError
 
 app = command_group(
     "Draw models, data, spectra, responses and failure modes.",
@@ -134,7 +135,6 @@ def plot_curve(
     One band is the interval of P as far as the data tell it, the other the share of such blocks
     that may fail in one single earthquake. The other measures are held at the values given.
     """
-    from rbfrag.errors import InputError
     from rbfrag.fragility.lookup import find_model
     from rbfrag.fragility.measures import MEASURES
     from rbfrag.plots.curve import plot_curve as draw
@@ -314,3 +314,41 @@ def plot_modes(
     )
     print(out)
     print_warnings(shown.warnings)
+
+
+@app.command(
+    "rotation",
+    epilog="Example:  rbfrag plot rotation --alpha1 45 --alpha3 65 --r3 1 --beta 0 --phi 35 "
+    "--out rotation.png",
+)
+@stacked
+def plot_rotation(
+    *,
+    out: Out,
+    shape: ShapeOptions,
+    back_follows: str = option(
+        "Shares of the block's rotation by which the back plane turns with it, from 0 to 1.",
+        "0,0.5,1",
+    ),
+    json: options.Json = False,
+) -> None:
+    """Draw the yield of a slump or a confined topple over its rotation, and print its least.
+
+    The rock behind a block may give way with it: its back plane then turns by a share of the
+    block's rotation.
+    """
+    from rbfrag.cli.parameters.values import number_list
+    from rbfrag.plots.rotation import plot_rotation as draw
+
+    described = shape.described()
+    if described is None:
+        raise InputError(f"no block: describe it by {WAYS}")
+    block, conditions = described.without_kv().on_planes()
+    if not conditions.pop("back_fracture", True):
+        raise InputError("--no-back: without a plane behind it no block turns against it")
+    lines = draw(block, out, shares=number_list(back_follows, "--back-follows"), **conditions)
+    if json:
+        print_json({"plot": out, "lines": [line._asdict() for line in lines]})
+        return
+    print_table(lines[0]._fields, lines)
+    print(out)

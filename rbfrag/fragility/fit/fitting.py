@@ -132,7 +132,9 @@ def methods_of_kind(kind: str) -> tuple[Method, ...]:
     from rbfrag.solver.kinds import model_of_kind
 
     names = model_of_kind(kind).parameters
-    suited = tuple(method for method in methods() if names and method.block.names == names)
+    reading = [method for method in methods() if names and method.block.names == names]
+    # of a kind without methods of its own, all that read what describes its block
+    suited = tuple(each for each in reading if each.block.kind == kind) or tuple(reading)
     if not suited:
         raise InputError(f"there is no fragility model of kind {kind}: no method reads its block")
     return suited

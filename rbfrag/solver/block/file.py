@@ -18,16 +18,14 @@ values stand in comment lines above it, such as ``# gamma_deg = 90``.
 
 from __future__ import annotations
 
-import csv
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from rbfrag.errors import InputError
-from rbfrag.files import source_text
+from rbfrag.files import csv_rows, source_text, toml_document
 from rbfrag.solver.block.geometry import Block
 
 ANGLES = ("alpha1_deg", "alpha3_deg", "r3_m")
@@ -116,15 +114,15 @@ def _block(stated: dict[str, Any]) -> Block:
 
 def _from_toml(source: Path, text: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{source}: not valid TOML: {error}") from None
+        return toml_document(text)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
 
 
 def _from_csv(source: Path, text: str) -> dict[str, Any]:
     stated: dict[str, Any] = {"vertices_m": []}
     header: list[str] | None = None
-    for line, cells in enumerate(csv.reader(text.splitlines()), start=1):
+    for line, cells in csv_rows(text, source):
         row = [cell.strip() for cell in cells]
         where = f"{source}, line {line}"
         if not any(row):

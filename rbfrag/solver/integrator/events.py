@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.solver.integrator.compiled import inner_kernel, within
+from rbfrag.solver.integrator.compiled import fused_kernel, inner_kernel, within
 from rbfrag.solver.integrator.taylor import (
     OF_ACCELERATION,
     OF_RATE,
@@ -19,6 +19,12 @@ from rbfrag.solver.integrator.taylor import (
 )
 
 FloatArray = NDArray[np.float64]
+
+REFINEMENTS = 8
+"""Steps of Newton for a landing; two are nearly always enough."""
+
+LEFT_BY_NEWTON = 1e-17
+"""Error of a landing that is no longer corrected, over the time to it."""
 
 
 class Inside(NamedTuple):
@@ -158,3 +164,109 @@ def examine_step(
         left = right
         theta_left = theta_right
     return Inside(-1.0, peak, peak_at, lowest)
+
+
+@fused_kernel
+def landing(theta: float, u: FloatArray, order: int) -> tuple[float, float]:
+    """Return where a concave or a falling arc of a step comes down to theta = 0, and U there.
+
+    Newton's method from the root of the first terms of the series, which at the steps of a record
+    are nearly all of it: two evaluations are enough, where a search between bounds takes six.
+
+    Args:
+        theta: rotation at the start, which is no landing where this is 0.
+        u: coefficients of U.
+        order: their degree.
+
+    Returns:
+        Fraction of the step, or -1 where the method fails; U.
+    """
+    u0, u1, u2 = u[0], u[1], u[2]
+    if theta == 0.0:
+        # U0 + U1 tau/2 + U2 tau²/3 = 0, in the form that loses nothing where U2 is small
+        root = math.sqrt(max(0.25 * u1 * u1 - (4.0 / 3.0) * u0 * u2, 0.0))
+        tau = 2.0 * u0 / (root - 0.5 * u1)
+    else:
+        # theta + U0 tau + U1 tau²/2 = 0, and two steps of Newton with the next term
+        root = math.sqrt(max(u0 * u0 - 2.0 * theta * u1, 0.0))
+        tau = 2.0 * theta / (root - u0) if u0 <= 0.0 else (u0 + root) / -u1
+        for _ in range(2):
+            height = theta + tau * (u0 + tau * (0.5 * u1 + tau * ((1.0 / 3.0) * u2)))
+            tau -= height / (u0 + tau * (u1 + tau * u2))
+    # written so that a NaN is a failure, too
+    if not 0.0 < tau < 2.0:
+        tau = 1.0
+    bend = abs(u1) + 2.0 * abs(u2)
+    for _ in range(REFINEMENTS):
+        turned, rate, slope = u[order] / (order + 1), u[order], 0.0
+        for k in range(order - 1, -1, -1):
+            turned = turned * tau + u[k] / (k + 1)
+            slope = slope * tau + rate
+            rate = rate * tau + u[k]
+        if not rate < 0.0:
+            break
+        step = -(theta + tau * turned) / rate
+        tau += step
+        if not 0.0 < tau < 2.0:
+            break
+        # a step of Newton leaves step² theta''/(2 theta') of the error
+        if bend * (step * step) <= LEFT_BY_NEWTON * tau * -rate:
+            return min(tau, 1.0), rate + slope * step
+    return -1.0, 0.0
+
+
+class Descent(NamedTuple):
+    """What happens inside one step of a block that keeps its speed at an impact.
+
+    Args:
+        impact: fraction of the step at which theta returns to 0, or -1.
+        rate: U there.
+        peak: greatest maximum of theta before that, -1 where there is none that counts.
+        peak_at: fraction of the step at which it is.
+    """
+
+    impact: float
+    rate: float
+    peak: float
+    peak_at: float
+
+
+@inner_kernel
+def examine_descent(
+    theta: float,
+    u: FloatArray,
+    order: int,
+    theta_end: float,
+    u_end: float,
+    v_end: float,
+    highest: float,
+) -> Descent:
+    """Find what :func:`examine_step` finds, and how fast the block is at the impact.
+
+    The arcs between the impacts of a rocking block are mostly concave over the whole step: they
+    have one peak, which seldom is the greatest, and land once.
+
+    Args:
+        theta: rotation at the start.
+        u: coefficients of U.
+        order: their degree.
+        theta_end: rotation at the end.
+        u_end: U at the end.
+        v_end: its derivative there.
+        highest: a maximum of theta counts above this one only; below zero to have all.
+    """
+    u_start, v_start = u[0], u[1]
+    rounds = (u_start > 0.0) & (v_start < 0.0) & (v_end < 0.0)
+    falls = (theta > 0.0) & (u_start < 0.0) & keeps_direction(u_start, v_start, u_end, v_end)
+    if theta_end <= 0.0 and (rounds or falls):
+        at, rate = landing(theta, u, order)
+        if at >= 0.0:
+            peak, peak_at = -1.0, -1.0
+            # a concave arc is below its tangents
+            if rounds and min(theta + u_start, theta_end - u_end) > highest:
+                peak_at = bracketed_root(OF_RATE, theta, u, order, 0.0, 1.0)
+                peak = rotation(theta, u, order, peak_at)
+            return Descent(at, rate, peak, peak_at)
+    inside = examine_step(theta, u, order, theta_end, u_end, v_end)
+    rate = value(u, order, inside.impact) if inside.impact >= 0.0 else 0.0
+    return Descent(inside.impact, rate, inside.peak, inside.peak_at)

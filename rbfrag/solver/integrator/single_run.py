@@ -269,9 +269,10 @@ def cross_interval(
     steps = 0
     # a step holds the truncation at rounding only up to ph_max (see `taylor.PH_MAX`)
     whole = block.p * (nodes.interval_s[i] * (1.0 - tau))
-    parts = max(1, math.ceil(whole / block.ph_max))
-    part = (1.0 - tau) / parts
-    ph = whole / parts
+    parts, part, ph = 1, 1.0 - tau, whole
+    if whole > block.ph_max:  # a division takes as long as a tenth of a step
+        parts = math.ceil(whole / block.ph_max)
+        part, ph = part / parts, ph / parts
     for number in range(parts):
         at = tau + number * part
         shaking = excitation_over(nodes.k_h, nodes.w, i, at, part)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel, within
 from rbfrag.solver.integrator.events import (
-    examine_step,
+    examine_descent,
     irrecoverable,
     keeps_direction,
     simple_turn,
@@ -34,7 +34,7 @@ from rbfrag.solver.integrator.one_freedom.rest import Thresholds, depart
 from rbfrag.solver.integrator.one_freedom.state import Peak, Record, higher, noted
 from rbfrag.solver.integrator.single_run import step_errors
 from rbfrag.solver.integrator.state import Place, State, StepExcitation
-from rbfrag.solver.integrator.taylor import taylor_step, turn, value
+from rbfrag.solver.integrator.taylor import taylor_step, turn
 from rbfrag.solver.results import FloatArray
 
 UNDETERMINED, JUMP = 2, 3
@@ -173,9 +173,10 @@ def cross_interval(
     impact_at = -1.0
     steps = 0
     whole = corner.p * (record.interval_s[i] * (1.0 - tau))
-    parts = max(1, math.ceil(whole / rules.ph_max))
-    part = (1.0 - tau) / parts
-    ph = whole / parts
+    parts, part, ph = 1, 1.0 - tau, whole
+    if whole > rules.ph_max:  # a division takes as long as a tenth of a step
+        parts = math.ceil(whole / rules.ph_max)
+        part, ph = part / parts, ph / parts
     for number in range(parts):
         at = tau + number * part
         shaking = StepExcitation(
@@ -202,14 +203,15 @@ def cross_interval(
                 keeps or not simple_turn(theta, theta_end, u_start, u[1], u_end, v_end, peak.x, 0.0)
             )
         ):
-            inside = examine_step(theta, u, order, theta_end, u_end, v_end)
+            least = -1.0 if keeps else peak.x
+            inside = examine_descent(theta, u, order, theta_end, u_end, v_end, least)
             peak = higher(peak, inside.peak, abs(off.theta))
             if keeps and inside.peak > 0.0:
                 top_s = record.time_s[i] + (at + part * inside.peak_at) * record.interval_s[i]
                 filled = noted(rows, filled, top_s, side * inside.peak, 0.0, EVENT)
             if inside.impact >= 0.0:
                 impact_at = at + part * inside.impact
-                rate = value(u, order, inside.impact) / ph
+                rate = inside.rate / ph
         if impact_at >= 0.0:
             break
         theta = theta_end

@@ -120,7 +120,7 @@ class Rocking(Kind):
     mode = "topple"
     free_standing = True
     settings = ("restitution",)
-    numbers = ("p2", "kr")
+    parameters = ("p2", "kr")
     no_search = (
         "what overturns a free-standing block is no interval of k_r (up to 122 islands for one "
         "record), so that no value is certain to be the last"

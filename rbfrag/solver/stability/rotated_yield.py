@@ -2,13 +2,17 @@
 
 Lengths and γ keep their values at rest; only the arms turn. In terms of the block angles: a
 slump has α + θ, a topple α - θ, but γ must not be computed anew from them.
+
+Where the rock behind the block gives way with it, the back plane turns by a share of the block's
+rotation in the block's sense (Gibson's dissertation, Fig. 3.20b): γ - share θ behind a slump, which
+makes the plane flatter, γ + share θ above a confined topple, which makes it overhang more.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, overload
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise, tan_deg
@@ -16,6 +20,7 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.block.polygon import Point
 from rbfrag.solver.quantity import angle, friction_angle, number, vertical_g
 from rbfrag.solver.stability.modes import (
+    ModeName,
     confined_topple,
     on_its_branch,
     slump,
@@ -63,7 +68,7 @@ def kr_after_rotation(
     tb = tan_deg(angle(beta_deg, "beta_deg", -90.0, 90.0), SCALAR)
     weight = 1.0 + vertical_g(kv)
 
-    def formula(cosine: Any, sine: Any, functions: Elementwise[Any]) -> Any:
+    def formula(_turn: Any, cosine: Any, sine: Any, functions: Elementwise[Any]) -> Any:
         toe_x, toe_y = _turned(block.arms.toe, cosine, -sine)
         return yield_coefficient(toe_x, -toe_y, tb, weight, functions)
 
@@ -81,6 +86,7 @@ def ks_after_rotation(
     phi_deg: float,
     phi_back_deg: float | None = ...,
     kv: float = ...,
+    back_follows: float = ...,
 ) -> float: ...
 
 
@@ -93,6 +99,7 @@ def ks_after_rotation(
     phi_deg: float,
     phi_back_deg: float | None = ...,
     kv: float = ...,
+    back_follows: float = ...,
 ) -> FloatArray: ...
 
 
@@ -104,6 +111,7 @@ def ks_after_rotation(
     phi_deg: float,
     phi_back_deg: float | None = None,
     kv: float = 0.0,
+    back_follows: float = 0.0,
 ) -> float | FloatArray:
     """Return k_s(θ) of a slump that has turned backward (eqs. 3.24, 3.25 with turned arms).
 
@@ -115,6 +123,7 @@ def ks_after_rotation(
         phi_deg: friction angle of the base [deg].
         phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
         kv: vertical acceleration of the ground, up positive [g].
+        back_follows: share of the rotation by which the back plane turns, from 0 to 1.
 
     Returns:
         The yield [g]; -inf where nothing holds the block.
@@ -123,16 +132,18 @@ def ks_after_rotation(
         InputError: a value outside its range, or a block that does not slump.
     """
     tb, mu1, mu2, weight = _surroundings(beta_deg, phi_deg, phi_back_deg, kv)
+    share = _share(back_follows)
     if block.tan_alpha1 < mu1:
         raise InputError(
             f"alpha1 = {block.alpha1_deg:.6g} degrees is below phi_deg = {phi_deg:.6g}: the block "
             "does not slump, so that it has no k_s"
         )
 
-    def formula(cosine: Any, sine: Any, functions: Elementwise[Any]) -> Any:
+    def formula(turn: Any, cosine: Any, sine: Any, functions: Elementwise[Any]) -> Any:
         heel = _turned(block.arms.heel, cosine, sine)
         back = _turned(block.arms.back, cosine, sine)
-        x, y, r_base, _ = slump(*heel, *back, block.cot_gamma, mu1, mu2)
+        cot = _cot_of_back(block, -share * turn, functions)
+        x, y, r_base, _ = slump(*heel, *back, cot, mu1, mu2)
         k = yield_coefficient(x, y, tb, weight, functions)
         return functions.where(r_base <= 0.0, -math.inf, k)
 
@@ -150,6 +161,7 @@ def kct_after_rotation(
     phi_deg: float,
     phi_back_deg: float | None = ...,
     kv: float = ...,
+    back_follows: float = ...,
 ) -> float: ...
 
 
@@ -162,6 +174,7 @@ def kct_after_rotation(
     phi_deg: float,
     phi_back_deg: float | None = ...,
     kv: float = ...,
+    back_follows: float = ...,
 ) -> FloatArray: ...
 
 
@@ -173,17 +186,19 @@ def kct_after_rotation(
     phi_deg: float,
     phi_back_deg: float | None = None,
     kv: float = 0.0,
+    back_follows: float = 0.0,
 ) -> float | FloatArray:
     """Return k_ct(θ) of a confined topple that has turned forward (eqs. 3.28, 3.29 corrected).
 
     Args:
         block: the block, with γ above 90° and α3 of at most phi_deg.
-        theta_deg: forward rotation, from 0 to γ - 90, where the base edge stands normal to
-            the back plane and the block topples freely [deg]; scalar or array.
+        theta_deg: forward rotation, from 0 to :func:`confined_limit_deg`, which is γ - 90 for a
+            back plane that stays [deg]; scalar or array.
         beta_deg: dip of the base [deg].
         phi_deg: friction angle of the base [deg].
         phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
         kv: vertical acceleration of the ground, up positive [g].
+        back_follows: share of the rotation by which the back plane turns, from 0 to 1.
 
     Returns:
         The yield [g]; +inf where the block is wedged.
@@ -193,7 +208,7 @@ def kct_after_rotation(
     """
     tb, mu1, mu2, weight = _surroundings(beta_deg, phi_deg, phi_back_deg, kv)
     ky = yield_coefficient(mu1, 1.0, tb, weight, SCALAR)
-    wedged = wedges(block.cot_gamma, mu1, mu2)
+    share = _share(back_follows)
     if not block.confines or block.tan_alpha3 > mu1:
         raise InputError(
             f"alpha3 = {block.alpha3_deg:.6g}, gamma = {block.gamma_deg:.6g} and phi_deg = "
@@ -201,17 +216,97 @@ def kct_after_rotation(
             "gamma above 90 and alpha3 not above phi_deg), so that it has no k_ct"
         )
 
-    def formula(cosine: Any, sine: Any, functions: Elementwise[Any]) -> Any:
+    def formula(turn: Any, cosine: Any, sine: Any, functions: Elementwise[Any]) -> Any:
         toe = _turned(block.arms.toe, cosine, -sine)
         low = _turned(block.arms.lowest_on_back, cosine, -sine)
-        x, y, r_base, _ = confined_topple(*toe, *low, block.cot_gamma, mu1, mu2)
+        cot = _cot_of_back(block, share * turn, functions)
+        x, y, r_base, _ = confined_topple(*toe, *low, cot, mu1, mu2)
         k = yield_coefficient(x, y, tb, weight, functions)
-        k = on_its_branch(k, ky, wedged, functions)
+        k = on_its_branch(k, ky, wedges(cot, mu1, mu2), functions)
         return functions.where(r_base <= 0.0, math.inf, k)
 
-    why = "the base edge stands normal to the back plane"
-    k: float | FloatArray = _over(theta_deg, formula, block.gamma_deg - 90.0, why)
+    limit_deg = confined_limit_deg(block, back_follows=share)
+    on_its_face = limit_deg == 180.0 - block.gamma_deg
+    why = "the front face meets the base" if on_its_face else _FREE
+    k: float | FloatArray = _over(theta_deg, formula, limit_deg, why)
     return k
+
+
+class RotatedYield(NamedTuple):
+    """How the yield of a mode changes as the block turns against its back plane.
+
+    Args:
+        yield_g: function of the block and θ [deg] like :func:`ks_after_rotation`.
+        limit_deg: the greatest θ, by block and `back_follows` [deg].
+        end: what happens there.
+    """
+
+    yield_g: Callable[..., Any]
+    limit_deg: Callable[..., float]
+    end: str
+
+
+_FREE = "the base edge stands normal to the back plane"
+
+
+def confined_limit_deg(block: Block, *, back_follows: float = 0.0) -> float:
+    """Return the rotation up to which a confined topple is confined [deg].
+
+    There the base edge stands normal to the back plane, θ = (γ - 90°)/(1 - share), and the block
+    topples freely; or its front face meets the base, at 180° - γ, if that is first.
+
+    Args:
+        block: the block, with γ above 90°.
+        back_follows: share of the rotation by which the back plane turns, from 0 to 1.
+    """
+    free, face = block.gamma_deg - 90.0, 180.0 - block.gamma_deg
+    stays = 1.0 - _share(back_follows)
+    if stays == 1.0:
+        return free
+    return min(free / stays, face) if stays > 0.0 else face
+
+
+def slump_limit_deg(block: Block, *, back_follows: float = 0.0) -> float:
+    """Return γ [deg], the rotation that lays the back edge of a slump on its base.
+
+    Args:
+        block: the block.
+        back_follows: share of the rotation by which the back plane turns, from 0 to 1, which does
+            not change it.
+    """
+    _share(back_follows)
+    return block.gamma_deg
+
+
+BY_MODE: Mapping[ModeName, RotatedYield] = {
+    "slump": RotatedYield(ks_after_rotation, slump_limit_deg, "its back edge lies on the base"),
+    "confined_topple": RotatedYield(
+        kct_after_rotation, confined_limit_deg, "it is free of its back plane, or on its face"
+    ),
+}
+"""The modes in which a block turns against its back plane."""
+
+
+def _share(back_follows: float) -> float:
+    what = "a share of the block's rotation from 0 to 1"
+    share = number(back_follows, "back_follows", what)
+    if not 0.0 <= share <= 1.0:
+        raise InputError(f"back_follows = {share:g} is out of range: give {what}")
+    return share
+
+
+_FLAT = 1e-15
+"""Least sine of the angle of a back plane: the formulas take its cotangent."""
+
+
+def _cot_of_back(block: Block, turn: Any, functions: Elementwise[Any]) -> Any:
+    """Return cot(γ + turn) [turn in rad], of the angle at rest where nothing turns."""
+    cot = block.cot_gamma
+    # sine and cosine of γ + turn, over sin γ
+    cosine, sine = _wave(turn)
+    along, across = cot * cosine - sine, cosine + cot * sine
+    turned = along / functions.where(across < _FLAT, _FLAT, across)
+    return functions.where(turn == 0.0, cot, turned)
 
 
 def _surroundings(
@@ -231,6 +326,15 @@ def _turned(arm: Point, cosine: Any, sine: Any) -> tuple[Any, Any]:
     return x * cosine - y * sine, x * sine + y * cosine
 
 
+def _wave(turn: Any) -> tuple[Any, Any]:
+    """Return cosine and sine of a number or an array [rad]."""
+    if isinstance(turn, float):
+        return math.cos(turn), math.sin(turn)
+    import numpy as np
+
+    return np.cos(turn), np.sin(turn)
+
+
 def _over(theta_deg: Any, formula: Callable[..., Any], limit_deg: float, why: str) -> Any:
     what = f"a rotation from 0 to {limit_deg:.6g} degrees, where {why}"
     if isinstance(theta_deg, int | float | str) or not hasattr(theta_deg, "__len__"):
@@ -238,7 +342,7 @@ def _over(theta_deg: Any, formula: Callable[..., Any], limit_deg: float, why: st
         if not 0.0 <= theta <= limit_deg:
             raise InputError(f"theta_deg = {theta:g} is out of range: give {what}")
         turn = math.radians(theta)
-        return float(formula(math.cos(turn), math.sin(turn), SCALAR))
+        return float(formula(turn, math.cos(turn), math.sin(turn), SCALAR))
     # Kept apart so that single numbers do not load numpy.
     import numpy as np
 
@@ -248,4 +352,4 @@ def _over(theta_deg: Any, formula: Callable[..., Any], limit_deg: float, why: st
         raise InputError(f"theta_deg = {thetas[outside][0]:g} is out of range: give {what}")
     turns = np.radians(thetas)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return formula(np.cos(turns), np.sin(turns), array_elementwise())
+        return formula(turns, np.cos(turns), np.sin(turns), array_elementwise())

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.rotated_yield import (
+    confined_limit_deg,
     kct_after_rotation,
     kr_after_rotation,
     ks_after_rotation,
@@ -165,3 +166,53 @@ def test_limits(function: Any, pair: tuple[float, float], theta: Any, word: str)
 def test_limit_of_free_toppling() -> None:
     with pytest.raises(InputError, match="front face meets the base"):
         kr_after_rotation(Block.from_angles(-10.0, 25.0, 1.0), 120.0, beta_deg=0.0)
+
+
+def test_a_back_plane_that_turns_with_the_block() -> None:
+    # Fig. 3.20b of the dissertation: the numbers are its own construction, done by hand
+    block = Block.from_angles(45.0, 65.0, 1.0)
+    planes = {"beta_deg": 0.0, "phi_deg": 35.0}
+    expected = {0.0: (0.618, 0.524, 0.491), 0.5: (0.618, 0.570, 0.580), 1.0: (0.618, 0.622, 0.681)}
+    for share, values in expected.items():
+        for theta, value in zip((0.0, 20.0, 30.0), values, strict=True):
+            found = ks_after_rotation(block, theta, **planes, back_follows=share)
+            assert found == pytest.approx(value, abs=1e-3)
+    thetas = np.linspace(0.0, block.gamma_deg, 500)
+    turning = ks_after_rotation(block, thetas, **planes, back_follows=1.0)
+    assert turning.min() == pytest.approx(0.597, abs=1e-3)
+    assert thetas[turning.argmin()] == pytest.approx(9.15, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("pair", "function", "sense"),
+    [((45.0, 65.0), ks_after_rotation, 1.0), ((-60.0, 20.0), kct_after_rotation, -1.0)],
+)
+def test_a_plane_that_follows_altogether_by_three_equations(
+    pair: tuple[float, float], function: Any, sense: float
+) -> None:
+    # block and back plane turned together: both forces and k from equilibrium
+    block, theta, share = Block.from_angles(*pair, 1.0), math.radians(7.0), 1.0
+    gamma, phi = math.radians(block.gamma_deg) - sense * share * theta, math.radians(35.0)
+    turn = np.array([[math.cos(theta), -sense * math.sin(theta)],
+                     [sense * math.sin(theta), math.cos(theta)]])  # fmt: skip
+    on_base, on_back = (block.heel, block.back) if sense > 0 else (block.toe, block.heel)
+    r1, r2 = turn @ on_base, turn @ on_back
+    u1 = np.array([-math.sin(phi), math.cos(phi)])
+    u2 = np.array([math.sin(gamma - sense * phi), math.cos(gamma - sense * phi)])
+    # R1 u1 + R2 u2 + (k, -1) = 0 and no moment, the base being level
+    moments = [r[0] * u[1] - r[1] * u[0] for r, u in ((r1, u1), (r2, u2))]
+    *_, k = np.linalg.solve(
+        [[u1[0], u2[0], 1.0], [u1[1], u2[1], 0.0], [*moments, 0.0]], [0.0, 1.0, 0.0]
+    )
+    found = function(block, 7.0, beta_deg=0.0, phi_deg=35.0, back_follows=share)
+    assert found == pytest.approx(k, rel=1e-12)
+
+
+def test_how_far_a_confined_topple_turns_before_its_plane_lets_it_go() -> None:
+    block = Block.from_angles(-40.0, 20.0, 1.0)
+    free = block.gamma_deg - 90.0
+    assert confined_limit_deg(block) == free
+    assert confined_limit_deg(block, back_follows=0.5) == pytest.approx(2.0 * free)
+    assert confined_limit_deg(block, back_follows=1.0) == 180.0 - block.gamma_deg
+    with pytest.raises(InputError, match="from 0 to 1"):
+        confined_limit_deg(block, back_follows=-0.1)

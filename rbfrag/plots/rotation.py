@@ -1,0 +1,125 @@
+"""Figure of the yield of a block that turns against its back plane, over the rotation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from typing import NamedTuple
+
+import numpy as np
+
+from rbfrag.errors import InputError
+from rbfrag.plots.canvas import (
+    BLUE,
+    MODE_COLOURS,
+    RED,
+    ROCK,
+    light_grid,
+    mode_title,
+    new_figure,
+    plot_path,
+    save_figure,
+)
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.stability.modes import words_of_mode
+from rbfrag.solver.stability.rotated_yield import BY_MODE
+from rbfrag.solver.stability.single import stability
+
+SHARES = (0.0, 0.5, 1.0)
+"""Shares of the rotation by which the back plane turns, where nothing else is said."""
+
+_POINTS = 721
+_LINES = ("-", "--", ":", "-.")
+
+
+class YieldLine(NamedTuple):
+    """The yield over the rotation for one share.
+
+    Args:
+        share: by how much of the block's rotation the back plane turns.
+        at_rest_g: yield at rest [g].
+        least_g: least yield [g].
+        least_deg: rotation at which it is [deg].
+        end_g: yield at the end of the range [g].
+        end_deg: end of the range [deg].
+    """
+
+    share: float
+    at_rest_g: float
+    least_g: float
+    least_deg: float
+    end_g: float
+    end_deg: float
+
+
+def plot_rotation(
+    block: Block,
+    path: str | PathLike[str],
+    *,
+    beta_deg: float,
+    phi_deg: float,
+    phi_back_deg: float | None = None,
+    shares: Sequence[float] = SHARES,
+) -> tuple[YieldLine, ...]:
+    """Draw the yield of a slump or a confined topple over its rotation, and return its numbers.
+
+    The figures 3.20a, 3.20b and 3.21 of Gibson's dissertation, for any block.
+
+    Args:
+        block: the block.
+        path: file to write: .png, .pdf or .svg.
+        beta_deg: dip of the base, out of the slope positive [deg].
+        phi_deg: friction angle of the base [deg].
+        phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
+        shares: shares of the rotation by which the back plane turns, from 0 to 1; at most four.
+
+    Raises:
+        InputError: a block of another mode, a share out of range, too many of them.
+    """
+    plot_path(path)
+    planes = {"beta_deg": beta_deg, "phi_deg": phi_deg, "phi_back_deg": phi_back_deg}
+    judged = stability(block, **planes)  # type: ignore[arg-type]
+    if judged.mode not in BY_MODE:
+        raise InputError(
+            f"the mode of the block is {words_of_mode(judged.mode)}: the yield over a rotation is "
+            f"that of {' or '.join(map(words_of_mode, BY_MODE))}, against a back plane"
+        )
+    if not 1 <= len(shares) <= len(_LINES):
+        raise InputError(f"{len(shares)} shares of the rotation: give 1 to {len(_LINES)}")
+    law = BY_MODE[judged.mode]
+    figure = new_figure(7.0, 4.6)
+    axes = figure.add_subplot()
+    colours = (MODE_COLOURS[judged.mode], BLUE, RED, ROCK)
+    lines = []
+    for share, style, colour in zip(shares, _LINES, colours, strict=False):
+        end_deg = law.limit_deg(block, back_follows=share)
+        theta = np.linspace(0.0, end_deg, _POINTS)
+        k = law.yield_g(block, theta, **planes, back_follows=share)
+        shown = np.where(np.isfinite(k), k, np.nan)
+        label = "the back plane stays" if share == 0.0 else f"it turns by {share:g} of the rotation"
+        axes.plot(theta, shown, style, color=colour, lw=1.8, label=label)
+        least = int(np.argmin(k))
+        if 0 < least < k.size - 1:
+            axes.plot(theta[least], k[least], "o", color=colour, ms=4)
+        lines.append(
+            YieldLine(share, *map(float, (k[0], k[least], theta[least], k[-1], theta[-1])))
+        )
+    axes.axhline(judged.ky, color="black", lw=0.8, alpha=0.6)
+    axes.annotate(
+        "$k_y$, sliding", (1.0, judged.ky), xycoords=("axes fraction", "data"), xytext=(-4, 3),
+        textcoords="offset points", ha="right", fontsize=8,
+    )  # fmt: skip
+    axes.set_xlim(0.0, None)
+    axes.margins(y=0.12)
+    axes.set_xlabel(f"rotation of the block [deg], until {law.end}")
+    axes.set_ylabel("yield acceleration [g]")
+    light_grid(axes)
+    axes.legend(fontsize=8.5, framealpha=0.9)
+    axes.set_title(
+        f"{mode_title(judged.mode)}: $\\alpha_1$ = {block.alpha1_deg:.4g}, $\\alpha_3$ = "
+        f"{block.alpha3_deg:.4g}, $\\beta$ = {beta_deg:g}, $\\varphi_1$ = {phi_deg:g}, "
+        f"$\\varphi_2$ = {judged.phi_back_deg:g} deg",
+        fontsize=10,
+    )
+    save_figure(figure, path)
+    return tuple(lines)

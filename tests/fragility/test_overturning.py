@@ -1,0 +1,131 @@
+"""Models of free-standing blocks: restitution, what mechanics rules out, what is refused."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rbfrag.db.model_file import ModelRow
+from rbfrag.errors import InputError
+from rbfrag.fragility.lookup import block_of, find_model
+from rbfrag.fragility.methods import method_named
+from rbfrag.fragility.methods.overturning import BLOCK
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.predict import Prediction, answer_given
+from rbfrag.fragility.prediction_array import PredictionArray
+
+G = 9.80665
+T2 = (7.377, -1.818, 4.575, -8.514, -1.102, 0.0, 0.0)
+"""Coefficients of the five-term model of (p, k_r, e, PGV, PGA)."""
+
+
+def stored(term: str, b: tuple[float, ...], **changes: Any) -> FragilityModel:
+    names = method_named("overturning").forms[term].parameters
+    values: dict[str, Any] = {
+        "name": f"{BLOCK.kind}-{term}",
+        "kind": BLOCK.kind,
+        "term": term,
+        "method": "overturning",
+        "coefficients": dict(zip(names, b, strict=True)),
+        "covariance": tuple(tuple(0.01 * (i == j) for j in names) for i in names),
+        "domain": {"restitution": (0.6, 1.0)},
+        "data_fingerprint": "f",
+        "diagnostics": {},
+    }
+    return FragilityModel.from_row(ModelRow(**{**values, **changes}))
+
+
+def one(model: FragilityModel, **given: float) -> Prediction:
+    answer = answer_given(model, given, 0.95)
+    assert isinstance(answer, Prediction)
+    return answer
+
+
+def five_terms(p2: float, kr: float, e: float, pgv: float, pga: float) -> float:
+    log_odds = math.log(kr / (pga - kr))
+    z, s = math.sqrt(p2) * pgv / (pga * G), math.sqrt(1.0 - e)
+    eta = 7.377 - 1.818 * log_odds + 4.575 * math.log(z) - 8.514 * s - 1.102 * s * log_odds
+    return 1.0 / (1.0 + math.exp(-eta))
+
+
+@pytest.mark.parametrize("e", [None, 1.0, 0.7])
+def test_restitution_is_that_of_the_rectangle_unless_it_is_given(e: float | None) -> None:
+    model = stored("pgv_pga", T2)
+    p2, kr, pgv, pga = 3.0, 0.2, 0.6, 0.5
+    block = {"p2": p2, "kr": kr} | ({} if e is None else {"restitution": e})
+    housner = 1.0 - 1.5 * math.sin(math.atan(kr)) ** 2
+    answer = one(model, **block, pgv_m_s=pgv, pga_g=pga)
+    expected = five_terms(p2, kr, housner if e is None else e, pgv, pga)
+    assert answer.probability == pytest.approx(expected, rel=1e-12)
+    assert (answer.kind, answer.failure) == ("rocking", "overturning")
+    assert answer.in_domain
+    columns = {name: np.array([value, value]) for name, value in block.items()}
+    many = answer_given(model, {**columns, "pgv_m_s": pgv, "pga_g": pga}, 0.95)
+    assert isinstance(many, PredictionArray)
+    assert many.probability == pytest.approx([answer.probability] * 2, rel=1e-12)
+
+
+def test_a_block_that_the_ground_cannot_lift_cannot_overturn() -> None:
+    for term, b in (("pgv_pga", T2), ("pgv", (0.4, -1.9, 1.5, -0.3, -5.0, -1.2))):
+        model = stored(term, b)
+        answer = one(model, p2=3.0, kr=0.5, pgv_m_s=2.0, pga_g=0.5)
+        assert answer.probability == answer.ci_high == 0.0
+        assert any("cannot overturn" in text for text in answer.warnings)
+        weaker = one(model, p2=3.0, kr=0.49, pgv_m_s=2.0, pga_g=0.5)
+        assert weaker.probability > 0.0
+        assert not any("cannot overturn" in text for text in weaker.warnings)
+        safe = one(model, p2=3.0, kr=0.49, pgv_m_s=1e-3, pga_g=0.5)
+        assert 0.0 < safe.probability < 1e-3
+        assert not any("cannot overturn" in text for text in safe.warnings)
+
+
+@pytest.mark.parametrize("e", [0.0, -0.1, 1.0001, math.nan, math.inf])
+def test_restitution_is_above_zero_and_up_to_one(e: float) -> None:
+    model = stored("pgv_pga", T2)
+    with pytest.raises(InputError, match="restitution = "):
+        one(model, p2=3.0, kr=0.2, restitution=e, pgv_m_s=0.6, pga_g=0.5)
+    given = {"p2": 3.0, "kr": 0.2, "restitution": np.array([e, 0.9]), "pgv_m_s": 0.6, "pga_g": 0.5}
+    many = answer_given(model, given, 0.95)
+    assert isinstance(many, PredictionArray)
+    assert np.isnan(many.probability).tolist() == [True, False]
+    assert "restitution" in many.reason[0]
+
+
+def test_restitution_that_was_not_fitted_is_outside_the_domain() -> None:
+    model = stored("pgv_pga", T2)
+    given = one(model, p2=3.0, kr=0.2, restitution=0.5, pgv_m_s=0.6, pga_g=0.5)
+    # a stocky block: its formula gives less than 0.6
+    stocky = one(model, p2=3.0, kr=0.7, pgv_m_s=2.0, pga_g=1.5)
+    for answer in (given, stocky):
+        assert not answer.in_domain
+        assert any("restitution = " in text for text in answer.warnings)
+    # so stocky that the formula is below zero: as if no speed were left
+    assert 0.0 < one(model, p2=3.0, kr=2.0, pgv_m_s=5.0, pga_g=2.1).probability < 1.0
+
+
+def test_less_restitution_less_shaking_and_more_strength_are_safer() -> None:
+    models = (
+        stored("pgv_pga", (8.0, -2.56, 5.9, -8.4, -1.1, 0.46, -0.31)),
+        stored("pgv", (0.43, -1.92, 1.54, -0.34, -5.0, -1.26)),
+    )
+    block = {"p2": 3.0, "kr": 0.2, "restitution": 0.9}
+    for model in models:
+
+        def p(model: FragilityModel = model, **changes: float) -> float:
+            return one(model, **{**block, "pgv_m_s": 0.5, "pga_g": 0.5, **changes}).probability
+
+        assert p(restitution=0.8) < p() < p(restitution=1.0)
+        assert p(kr=0.25) < p() < p(kr=0.15)
+        assert p(pgv_m_s=0.4, pga_g=0.4) < p() < p(pgv_m_s=0.6, pga_g=0.6)
+
+
+def test_a_description_says_which_blocks_are_meant() -> None:
+    assert block_of(["p2", "kr", "pgv_m_s"]).kind == "toppling"
+    assert block_of(["pgv_m_s"]).kind == "toppling"
+    assert block_of(["p2", "kr", "restitution"]) is BLOCK
+    assert block_of(["ky"]).kind == "sliding"
+    with pytest.raises(InputError, match="ky"):
+        find_model(stored("pgv", (0.0,) * 6), ["ky", "displacement_m", "pgv_m_s"])
