@@ -48,13 +48,19 @@ def _finite(text: str) -> float:
     return value
 
 
+def _whole(text: str) -> int:
+    if not -(2**63) <= (value := int(text)) < 2**63:
+        raise ValueError(text)
+    return value
+
+
 def _some(text: str) -> str:
     if not text.strip():
         raise ValueError(text)
     return text
 
 
-_KINDS: Mapping[type, Callable[[str], object]] = {int: int, float: _finite, str: _some}
+_KINDS: Mapping[type, Callable[[str], object]] = {int: _whole, float: _finite, str: _some}
 _IN_WORDS = {int: "a whole number", float: "a number", str: "a name"}
 
 
@@ -157,11 +163,8 @@ class _Head:
     @classmethod
     def of(cls, path: Path) -> _Head:
         stated: dict[str, str] = {}
-        with (
-            reading(path, "an export of OpenQuake"),
-            path.open(newline="", encoding="utf-8-sig") as f,
-        ):
-            for number, row in enumerate(csv.reader(f), start=1):
+        with reading(path, "an export of OpenQuake"), closing(_lines(path)) as lines:
+            for number, row in lines:
                 if row and row[0].lstrip().startswith("#"):
                     matches = _STATED.finditer(",".join(row))
                     stated |= {one.group(1): one.group(2) or one.group(3) or "" for one in matches}
@@ -220,7 +223,12 @@ class _Head:
                         yield cells
             except pd.errors.EmptyDataError:
                 return
-            except (ValueError, pd.errors.ParserError, pd.errors.ParserWarning) as error:
+            except (
+                ValueError,
+                OverflowError,
+                pd.errors.ParserError,
+                pd.errors.ParserWarning,
+            ) as error:
                 raise self._trouble(columns) or InputError(f"{self.path}: {error}") from None
 
     def whole(self, columns: Mapping[str, type]) -> dict[str, NDArray[Any]]:
@@ -236,22 +244,31 @@ class _Head:
     def _trouble(self, columns: Mapping[str, type]) -> InputError | None:
         """Return the first line that cannot be read in words."""
         place = {name: self.names.index(name) for name in columns}
-        with self.path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            for row in reader:
-                where = f"{self.path}, line {reader.line_num}"
-                if reader.line_num <= self.lines or not row:
-                    continue
-                if len(row) != len(self.names):
-                    return InputError(f"{where}: {len(row)} cells under {len(self.names)} columns")
-                for name, kind in columns.items():
-                    try:
-                        _KINDS[kind](row[place[name]])
-                    except ValueError:
-                        return InputError(
-                            f"{where}: {name} is {row[place[name]]!r}, not {_IN_WORDS[kind]}"
-                        )
+        for number, row in _lines(self.path):
+            where = f"{self.path}, line {number}"
+            if number <= self.lines or not row:
+                continue
+            if len(row) != len(self.names):
+                return InputError(f"{where}: {len(row)} cells under {len(self.names)} columns")
+            for name, kind in columns.items():
+                try:
+                    _KINDS[kind](row[place[name]])
+                except ValueError:
+                    return InputError(
+                        f"{where}: {name} is {row[place[name]]!r}, not {_IN_WORDS[kind]}"
+                    )
         return None
+
+
+def _lines(path: Path) -> Generator[tuple[int, list[str]]]:
+    """Yield the rows of a file that may be large, each with the number of its last line."""
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        reader = csv.reader(file)
+        try:
+            for row in reader:
+                yield reader.line_num, row
+        except csv.Error as error:
+            raise InputError(f"{path}, line {reader.line_num}: not a CSV file: {error}") from None
 
 
 def read_events(
@@ -344,7 +361,7 @@ def _weights(head: _Head) -> tuple[dict[int, float], list[str]]:
         if numbers.index(number) != row:
             raise InputError(f"{head.line(row)}: {name} {number} is there twice")
     total = float(values.sum())
-    if not total > 0.0:
+    if not 0.0 < total < np.inf:
         raise InputError(f"{head.path}: the weights of the realizations sum to {total:g}")
     remarks = []
     if abs(total - 1.0) > 1e-3:
@@ -419,7 +436,7 @@ def _duration(
             "name the file with --ruptures, or give --investigation-time and --ses as in job.ini"
         )
     sets = known["ses_per_logic_tree_path"]
-    if sets != int(sets):
+    if not math.isfinite(sets) or sets != int(sets):
         raise InputError(f"ses_per_logic_tree_path = {sets:g} is no whole number")
     return Duration(known["investigation_time"], int(sets))
 

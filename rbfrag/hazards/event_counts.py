@@ -213,8 +213,8 @@ def _shaken(part: Part) -> Iterator[tuple[int, Shaken]]:
         rows = np.flatnonzero(events.site == site)
         at_once = max(1, _VALUES_AT_ONCE // (own.size * weight.size))
         for start in range(0, rows.size, at_once):
-            some = rows[start : start + at_once]
-            shaking = {n: events.measures[n][some, None, None] for n in portfolio.measures}
+            chunk = rows[start : start + at_once]
+            shaking = {n: events.measures[n][chunk, None, None] for n in portfolio.measures}
             points = (z[:, 0, None], z[:, 1, None], z[:, 2, None])
             at_points, inside = portfolio.probability(own, shaking, points)
             p, outside = (
@@ -222,7 +222,7 @@ def _shaken(part: Part) -> Iterator[tuple[int, Shaken]]:
                 for values in (at_points, at_points * ~inside)
             )
             which, block = np.nonzero(p > NOTHING)
-            parts.append((own[block], some[which], p[which, block], outside[which, block]))
+            parts.append((own[block], chunk[which], p[which, block], outside[which, block]))
     if not parts:
         return
     block, row, p, outside = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -231,9 +231,11 @@ def _shaken(part: Part) -> Iterator[tuple[int, Shaken]]:
     event = events.event[row]
     starts = np.flatnonzero(np.diff(event, prepend=-1))
     for first, last in pairwise([*starts.tolist(), event.size]):
-        part_of = slice(first, last)
-        columns = (column[part_of] for column in (block, row, np.minimum(p, 1.0), outside))
-        yield int(event[first]), Shaken(*columns)
+        some = slice(first, last)
+        yield (
+            int(event[first]),
+            Shaken(block[some], row[some], np.minimum(p[some], 1.0), outside[some]),
+        )
 
 
 def _closed_form(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -29,7 +30,9 @@ IntArray = NDArray[np.int64]
 MOST_BLOCKS = 100_000
 """Blocks of a portfolio, like ones of a count with them."""
 
-_SCATTER_POINTS, _SIGMA_POINTS, _REACH = 17, 9, 5.0
+_REACH, _STEP, _FEWEST_POINTS = 5.0, 0.1, 9
+"""How far a logarithm's scatter is integrated, in standard deviations, and in which steps of it."""
+
 _LEVEL = 0.95  # no interval is computed: any level will do
 
 
@@ -192,9 +195,8 @@ class Portfolio:
 
         What does not scatter has the one point 0.
         """
-        scatters = (self.component.scatter > 0.0, self.p2_sigma.any(), self.kr_sigma.any())
-        numbers = (_SCATTER_POINTS, _SIGMA_POINTS, _SIGMA_POINTS)
-        axes = [normal_steps(m if s else 1, _REACH) for m, s in zip(numbers, scatters, strict=True)]
+        scatters = (self.component.scatter, float(self.p2_sigma.max()), float(self.kr_sigma.max()))
+        axes = [normal_steps(_points(scatter), _REACH) for scatter in scatters]
         grids = np.meshgrid(*(x for x, _ in axes), indexing="ij")
         weight = np.einsum("i,j,k->ijk", *(w for _, w in axes))
         return np.stack([grid.ravel() for grid in grids], axis=1), weight.ravel()
@@ -242,6 +244,11 @@ class Portfolio:
                 f"{self.p2[block]:g} and kr = {self.kr[block]:g}"
             )
         return p, in_domain
+
+
+def _points(scatter: float) -> int:
+    """Return how many points the scatter of a logarithm takes."""
+    return max(_FEWEST_POINTS, 2 * math.ceil(_REACH * scatter / _STEP) + 1) if scatter else 1
 
 
 def _site_indices(columns: Mapping[str, Any], site_ids: Sequence[str]) -> IntArray:

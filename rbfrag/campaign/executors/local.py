@@ -25,6 +25,9 @@ QUEUED_PER_WORKER = 2
 """Chunks handed out ahead of each worker: enough to keep it busy, little enough for memory."""
 
 
+GO_ON = "what was finished is stored: run the same command again to go on"
+"""What to do after workers have died, of work whose results are stored."""
+
 CLUSTER = "a cluster"
 """Stands for the processor where workers are elsewhere: nobody's bits are promised then."""
 
@@ -39,7 +42,11 @@ def check_workers(jobs: int | None, scheduler: str | None) -> None:
 
 @contextmanager
 def executor(
-    run_work: Callable[[W], R], jobs: int | None, scheduler: str | None
+    run_work: Callable[[W], R],
+    jobs: int | None,
+    scheduler: str | None,
+    *,
+    after_a_death: str = GO_ON,
 ) -> Iterator[Callable[[Iterator[W], int], Iterator[R]]]:
     """Offer, for a ``with`` block, a function that does work and yields answers in any order.
 
@@ -49,17 +56,18 @@ def executor(
         run_work: does one chunk of work; a function of a module, which workers can find.
         jobs: worker processes; None for one per processor.
         scheduler: address of a Dask scheduler whose workers take their place.
+        after_a_death: what to do next when workers have died.
     """
     if scheduler is None:
         yield lambda work, chunks: run_locally(
             run_work,
             work,
             min(jobs or os.cpu_count() or 1, chunks),
-            after_a_death="what was finished is stored: run the same command again to go on",
+            after_a_death=after_a_death,
         )
         return
     with connected(scheduler) as client:
-        yield lambda work, _: run_on_cluster(client, run_work, work)
+        yield lambda work, _: run_on_cluster(client, run_work, work, after_a_death)
 
 
 def run_locally(
