@@ -20,6 +20,7 @@ from rbfrag.db.location import reference_file
 from rbfrag.db.model_file import read_models
 from rbfrag.db.models import save_model
 from rbfrag.exchange.batch import predict_table
+from rbfrag.exchange.block_draws import read_draws
 from rbfrag.exchange.block_table import waiting_blocks, write_block_table
 from rbfrag.exchange.branch_weights import realization_weights
 from rbfrag.exchange.fragility_function import (
@@ -248,6 +249,7 @@ READERS: tuple[Reader, ...] = (
     Reader("blocks CSV", ".csv", lambda: BLOCKS, waiting_blocks),
     Reader("blocks Parquet", ".parquet", _parquet, waiting_blocks),
     Reader("blocks GeoJSON", ".geojson", lambda: GEOJSON, waiting_blocks),
+    Reader("block draws", ".csv", lambda: BLOCKS, read_draws),
     Reader("predicted CSV", ".csv", lambda: BLOCKS, _predict),
     Reader("predicted Parquet", ".parquet", _parquet, _predict),
     Reader("mesh OBJ", ".obj", lambda: _meshes(".obj"), block_from_mesh),

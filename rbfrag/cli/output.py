@@ -206,6 +206,7 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     of = next((n for n in (100, 1000) if p * n >= 1.0 and (1.0 - p) * n >= 1.0), 10_000)
     if high == 0.0:
         return ("P: no such block fails.",)
+    of_block = document.get("block_sd")
     return (
         f"P: of {of} such blocks {_count(p, of)} fail, over all earthquakes and sites with these "
         "measures.",
@@ -214,6 +215,14 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
         if event_low is None
         else f"In one single earthquake {_range(event_low, event_high, of)} of {of} such blocks "
         f"fail ({level}).",
+        *(
+            ()
+            if of_block is None
+            else (
+                "The block is uncertain: among what it may be, P differs with a standard "
+                f"deviation of {of_block:.2g}.",
+            )
+        ),
     )
 
 
@@ -234,5 +243,5 @@ _OF_POLARITY = (
 )  # fmt: skip
 """Keys that are shown of each polarity."""
 
-_LEFT_OUT = ("y_m_s", "median_displacement_m", "unknown_share")
+_LEFT_OUT = ("y_m_s", "median_displacement_m", "unknown_share", "block_sd")
 """Keys that a table leaves out where they do not apply."""

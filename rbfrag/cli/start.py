@@ -28,6 +28,7 @@ NUMBERS = {
     "--displacement": "displacement_m",
     "--ks": "ks",
     "--ps2": "ps2",
+    "--restitution": "restitution",
     "--rotation": "rotation_deg",
     "--pgv": "pgv_m_s",
     "--pga": "pga_g",

@@ -21,6 +21,7 @@ from rbfrag.exchange.batch_table import (
     parquet_writer,
 )
 from rbfrag.exchange.block_table import (
+    BLOCK_COLUMNS,
     NUMBERS,
     RECTANGLE,
     is_of_rectangles,
@@ -30,7 +31,7 @@ from rbfrag.exchange.block_table import (
 from rbfrag.files import reading, written_whole
 from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.measures import STATED
-from rbfrag.fragility.methods import TOPPLING_BLOCK
+from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, arrays, methods
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
@@ -38,24 +39,18 @@ from rbfrag.solver.kinds import model_of_kind
 
 FloatArray = NDArray[np.float64]
 
-BLOCK_COLUMNS = {
-    "p2_1_s2": "p2",
-    "kr": "kr",
-    "ky": "ky",
-    "displacement_m": "displacement_m",
-    "beta_deg": "beta_deg",
-    "ks": "ks",
-    "ps2_1_s2": "ps2",
-    "leaves_g": "leaves_g",
-}
-"""Columns that describe blocks, with the names that `predict` has for them."""
-
 NUMBERS_OF_ANSWERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
 
 ANSWERS = (*NUMBERS_OF_ANSWERS, "in_domain", "reason")
 """The columns that are appended; a table that has them gets new ones."""
 
-NUMERIC = (*BLOCK_COLUMNS, *RECTANGLE, *STATED)
+OF_UNCERTAIN = "block_sd"
+"""The column that is appended too where blocks are uncertain."""
+
+DEVIATIONS = tuple(sorted({sigma for method in methods() for sigma in method.block.sigmas}))
+"""Columns of standard deviations of blocks of any kind, of which an empty cell is 0."""
+
+NUMERIC = (*BLOCK_COLUMNS, *DEVIATIONS, *RECTANGLE, *STATED)
 """Columns that hold numbers."""
 
 OTHER_MODE = "the block's mode is {mode}: the {kind} model says nothing about it"
@@ -104,17 +99,19 @@ def predict_table(
         with reading(origin, "a block table"), ExitStack() as stack:
             opened = csv_parts if suffix == ".csv" else parquet_parts
             header, parts = opened(origin, NUMERIC, stack)
-            names = _columns(origin, header, given)
+            names = _columns(origin, header, given, kind)
             known = [*_known_names(names), *given]
             chosen = find_model(model, known, db, kind=kind, rotation_deg=rotation_deg)
             partial = stack.enter_context(written_whole(goal))
             writer = csv_writer if goal.suffix.lower() == ".csv" else parquet_writer
-            kept = [name for name in header if name not in ANSWERS]
-            write = writer(partial, kept, ANSWERS, NUMERIC, stack)
+            uncertain = not set(known).isdisjoint(DEVIATIONS)
+            answers = (*ANSWERS, OF_UNCERTAIN) if uncertain else ANSWERS
+            kept = [name for name in header if name not in (*ANSWERS, OF_UNCERTAIN)]
+            write = writer(partial, kept, answers, NUMERIC, stack)
             counts = np.zeros(3, dtype=np.int64)
             for first_line, part in parts:
                 answer = _answer(origin, part, names, first_line, given, chosen, level)
-                for name in ANSWERS:
+                for name in (*ANSWERS, OF_UNCERTAIN):
                     part.pop(name, None)
                 write(part, answer)
                 finite = np.isfinite(answer["probability"])
@@ -135,11 +132,13 @@ def predict_table(
     }
 
 
-def _columns(origin: Path, header: list[str], given: Mapping[str, float]) -> dict[str, str]:
+def _columns(
+    origin: Path, header: list[str], given: Mapping[str, float], kind: str | None
+) -> dict[str, str]:
     """Return what each column of numbers is called in `predict`."""
-    block = block_of([*(BLOCK_COLUMNS.get(name, "") for name in header), *given])
+    block = block_of([*(BLOCK_COLUMNS.get(name, "") for name in header), *given], kind)
     rectangles = (
-        block is TOPPLING_BLOCK
+        block.names == TOPPLING_BLOCK.names
         and is_of_rectangles(header)
         and not {*block.names}.intersection(given)
     )
@@ -161,12 +160,23 @@ def _columns(origin: Path, header: list[str], given: Mapping[str, float]) -> dic
     doubled = [name for name in header if header.count(name) > 1]
     if doubled:
         raise InputError(f"{origin}: the column {doubled[0]} is there twice")
-    columns |= {name: name for name in STATED}
+    columns |= {name: name for name in (*block.sigmas, *STATED)}
     present = {column: name for column, name in columns.items() if column in header}
     for column, name in present.items():
         if name in given:
             raise InputError(f"{column} is an option and a column of {origin}: give it once")
     return present
+
+
+def _fill_options(values: dict[str, FloatArray], block: BlockParameters) -> None:
+    """Put what a block has of itself where the cell of an option is empty."""
+    for name in block.options:
+        if block.adjust is not None and name in values and np.isnan(values[name]).any():
+            own: dict[str, Any] = {n: value for n, value in values.items() if n != name}
+            with np.errstate(all="ignore"):
+                block.adjust(own, arrays())
+            if name in own:
+                values[name] = np.where(np.isnan(values[name]), own[name], values[name])
 
 
 def _known_names(names: Mapping[str, str]) -> list[str]:
@@ -191,13 +201,19 @@ def _answer(
         numbers_of = rectangle_columns(values)
         values = {name: value for name, value in values.items() if name not in RECTANGLE}
         values |= {BLOCK_COLUMNS[name]: value for name, value in numbers_of.items()}
+    _fill_options(values, model.method.block)
+    for name in set(DEVIATIONS).intersection(values):
+        values[name] = np.nan_to_num(values[name], nan=0.0, posinf=np.inf)
     predicted = answer_given(model, {**values, **given}, level)
     assert isinstance(predicted, PredictionArray)
     answer: dict[str, NDArray[Any]] = {name: getattr(predicted, name) for name in ANSWERS}
+    answer[OF_UNCERTAIN] = np.zeros(predicted.probability.shape)
+    if predicted.block_sd is not None:
+        answer[OF_UNCERTAIN] = predicted.block_sd
     if "mode" in part:
         modes = np.array(["" if m is None else str(m).strip() for m in part["mode"]], dtype=object)
         other = ~np.isin(modes.astype(str), ("", str(model_of_kind(model.kind).mode)))
-        for name in NUMBERS_OF_ANSWERS:
+        for name in (*NUMBERS_OF_ANSWERS, OF_UNCERTAIN):
             answer[name][other] = np.nan
         answer["in_domain"][other] = False
         for i in np.flatnonzero(other).tolist():

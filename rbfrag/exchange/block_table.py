@@ -34,6 +34,19 @@ SUFFIXES = (".csv", ".parquet")
 NUMBERS = ("p2_1_s2", "kr")
 """Columns of a block that topples."""
 
+BLOCK_COLUMNS = {
+    "p2_1_s2": "p2",
+    "kr": "kr",
+    "ky": "ky",
+    "displacement_m": "displacement_m",
+    "beta_deg": "beta_deg",
+    "ks": "ks",
+    "ps2_1_s2": "ps2",
+    "leaves_g": "leaves_g",
+    "restitution": "restitution",
+}
+"""Columns that describe blocks of any kind, with the names that `predict` has for them."""
+
 SIGMAS = ("p2_sigma", "kr_sigma")
 """Columns of the standard deviations of ln p² and ln k_r of such a block; an empty cell is 0."""
 

@@ -16,6 +16,7 @@ from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, SPECTRAL
 from rbfrag.fragility.methods import Numbers
 from rbfrag.fragility.model import LEAST, Answer, FragilityModel
+from rbfrag.fragility.unknown_outcomes import NOTABLE_SHARE
 
 _SIZE = "p² = m g r/I of the block, 0.1 to 30 1/s² for blocks of 74 m to 0.25 m"
 _STRENGTH = (
@@ -38,6 +39,11 @@ _DESCRIPTIONS = {
     ),
     "displacement_m": ("m", "the displacement that is too far in m, above 0"),
     "restitution": ("", "the speed after an impact over that before it, above 0 and up to 1"),
+    **{
+        f"{name}_sigma": ("", f"the standard deviation of ln {name}, 0 or more")
+        for name in ("p2", "ps2", "kr", "ky", "ks")
+    },
+    "restitution_sigma": ("", "the standard deviation of the restitution, 0 or more"),
     "beta_deg": ("°", "the dip of the base in degrees, out of the slope positive"),
     "leaves_g": ("g", "the acceleration in g at which the block leaves its back plane"),
     "pgv_m_s": ("m/s", "the peak ground velocity in m/s, 0 or more"),
@@ -111,6 +117,11 @@ class Contradiction(Finding):
 
 
 _RATIO_NAMES = frozenset(ratio.name for ratio in RATIOS)
+
+PARTLY_OUTSIDE = (
+    f"{100.0 * NOTABLE_SHARE:g} % or more of what the uncertain block may be lies outside the "
+    "fitted ranges: the answer is an extrapolation there"
+)
 
 NO_SHAKING = "no shaking: P = 0 by definition, not by the model"
 
@@ -209,14 +220,14 @@ def answer_with_findings(
     say(no_shaking, Finding(no_shaking, "", 0.0, NO_SHAKING))
     unanswered = missing | at_rest | no_shaking
     ruled = unanswered
-    bounds = model.form.bounds
-    if "pga_g" in given and not model.vertical and block.at_rest not in bounds:
-        bounds = (block.at_rest, *bounds)
-    for bound in bounds:
+    for bound in model.bounds(given):
         holds = bound.holds(values) & _not(ruled)
         say(holds, Finding(holds, bound.about, values.get(bound.about), bound.text))
         ruled = ruled | holds
-    answer = _never(model) if ruled is True else model.answer(values, quantiles, ns)
+    answer = _never(model) if ruled is True else model.answer(values, quantiles, ns, floored)
+    if answer.outside is not None:
+        partly = (answer.outside >= NOTABLE_SHARE) & _not(ruled)
+        say(partly, Finding(partly, "", answer.outside, PARTLY_OUTSIDE))
     in_domain = _not(missing)
     for finding in outside_domain(model, values):
         holds = finding.holds & _not(ruled)
@@ -234,7 +245,8 @@ def answer_with_findings(
 def _never(model: FragilityModel) -> Answer:
     """Return the answer where a single number is ruled: P = 0."""
     of_event = None if model.event_spread is None else 0.0
-    return Answer(0.0, 0.0, 0.0, of_event, of_event, None, None)
+    of_block = (0.0, 0.0) if model.uncertain else (None, None)
+    return Answer(0.0, 0.0, 0.0, of_event, of_event, None, None, *of_block)
 
 
 def _not(condition: Any) -> Any:

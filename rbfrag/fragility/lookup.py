@@ -57,11 +57,24 @@ _rows_before: dict[int, tuple[ModelRow, FragilityModel]] = {}
 _MOST_ROWS = 64
 
 
-def block_of(given: Collection[str]) -> BlockParameters:
-    """Return what a question describes its block by; toppling where that does not tell."""
+def block_of(given: Collection[str], kind: str | None = None) -> BlockParameters:
+    """Return what a question describes its block by; toppling where that does not tell.
+
+    Args:
+        given: names of what it gives.
+        kind: how the block is asked to fail, if the question says so.
+    """
+    described = {name for name in given if name not in MEASURES}
+    if kind is None and described <= {*TOPPLING_BLOCK.names, *TOPPLING_BLOCK.sigmas}:
+        return TOPPLING_BLOCK  # without loading the methods
     blocks = dict.fromkeys((TOPPLING_BLOCK, *(method.block for method in methods())))
+
+    def read(block: BlockParameters) -> int:
+        return len({*block.names, *block.options}.intersection(given))
+
+    of_kind = [block for block in blocks if block.kind == kind and read(block)]
     # the first of those that read most of what is said
-    return max(blocks, key=lambda block: len({*block.names, *block.options}.intersection(given)))
+    return max(of_kind or blocks, key=read)
 
 
 def find_model(
@@ -203,7 +216,8 @@ def _check_block(
     """
     described = [name for name in given if name not in MEASURES]
     missing = [name for name in block.names if name not in given]
-    others = [name for name in described if name not in block.names and name not in block.options]
+    own = {*block.names, *block.options, *block.sigmas}
+    others = [name for name in described if name not in own]
     if not described or not (missing or others):
         return
     if others and len(missing) == len(block.names):

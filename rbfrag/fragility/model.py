@@ -6,16 +6,17 @@ import math
 import shlex
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from rbfrag.db.model_file import MODEL_FORM, ModelRow
 from rbfrag.errors import InputError, ModelError
-from rbfrag.fragility.dependence import EventSpread
+from rbfrag.fragility.dependence import Dependence, EventSpread
 from rbfrag.fragility.domain import Ratio, Spread, ratios_of, stored_spread
 from rbfrag.fragility.intervals import ParameterErrors, Quantiles, packed
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, TERMS, Term
 from rbfrag.fragility.methods import (
     TOPPLING_BLOCK,
+    Bound,
     Form,
     Method,
     Numbers,
@@ -52,8 +53,12 @@ class Answer(NamedTuple):
         event_low: lower end of the share failing in one future earthquake; None where the model
             does not know it.
         event_high: upper end of it.
-        eta: argument of the link; None where nothing had to be evaluated.
+        eta: argument of the link; None where nothing had to be evaluated, and where the block is
+            uncertain.
         log_sigma: logarithm of the scatter, of models that have one.
+        block_sd: standard deviation of P over what an uncertain block may be; None of a certain
+            one.
+        outside: share of what it may be that lies outside the fitted ranges; None likewise.
     """
 
     probability: Any
@@ -63,6 +68,8 @@ class Answer(NamedTuple):
     event_high: Any
     eta: Any
     log_sigma: Any
+    block_sd: Any = None
+    outside: Any = None
 
 
 @dataclass(frozen=True)
@@ -167,6 +174,15 @@ class FragilityModel:
         )
 
     @property
+    def dependence(self) -> Dependence | None:
+        """The copula of blocks of one earthquake that is stored with the model, if there is one."""
+        stored = self.row.dependence
+        names = Dependence.__dataclass_fields__
+        if stored is None or not set(names) <= set(stored):
+            return None
+        return Dependence(**{name: float(cast("float", stored[name])) for name in names})
+
+    @property
     def name(self) -> str:
         """Unique name in the database."""
         return self.row.name
@@ -175,6 +191,11 @@ class FragilityModel:
     def kind(self) -> str:
         """The kind of failure."""
         return self.row.kind
+
+    @property
+    def uncertain(self) -> bool:
+        """Whether it answers for blocks that are not known exactly."""
+        return False
 
     @property
     def meaning(self) -> str:
@@ -240,14 +261,17 @@ class FragilityModel:
         key = tuple(values)
         ranges = self.ranges.get(key)
         if ranges is None:
+            block = self.method.block
             ranges = self.ranges[key] = tuple(
                 self._clear_range(name)
                 for name in key
-                if name in self.row.domain or name not in self.method.block.options
+                if name in self.row.domain or name not in block.options
             )
         return ranges
 
     def _clear_range(self, name: str) -> Range:
+        if name in self.method.block.sigmas:
+            return Range(name, 0.0, HIGHEST)
         low, high = LOWEST, HIGHEST
         for least, most, *_ in (
             self.row.domain.get(name, (low, high)),
@@ -256,14 +280,30 @@ class FragilityModel:
             low, high = max(low, least), min(high, most)
         return Range(name, low, high)
 
-    def answer(self, values: Mapping[str, Any], quantiles: Quantiles | None, ns: Numbers) -> Answer:
+    def bounds(self, given: Collection[str]) -> tuple[Bound, ...]:
+        """Return what mechanics forbids of a question that gives values of some names."""
+        bounds, at_rest = self.form.bounds, self.method.block.at_rest
+        if "pga_g" not in given or self.vertical or at_rest in bounds:
+            return bounds
+        return (at_rest, *bounds)
+
+    def answer(
+        self,
+        values: Mapping[str, Any],
+        quantiles: Quantiles | None,
+        ns: Numbers,
+        given: Mapping[str, Any],
+    ) -> Answer:
         """Return P with its interval, the range of one future earthquake, and eta.
 
         Args:
             values: completed values, within what the bounds allow.
             quantiles: of the confidence level; None for P and eta alone.
             ns: functions for the kind of number given.
+            given: the values that were completed, which a model of uncertain blocks completes
+                for each that one may be.
         """
+        del given
         unscaled, h = self.form.unscaled(self.parameters, values, ns)
         eta = unscaled.eta * h
         link = self.method.link.probability

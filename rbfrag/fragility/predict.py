@@ -30,6 +30,11 @@ if TYPE_CHECKING:
 Model = ModelRow | FragilityModel | str
 Polarity = Literal["forward", "reverse", "both"]
 
+SIMULATED = (
+    "what a known motion does to an uncertain block is simulated, by  rbfrag respond MOTION --draws"
+    "  or rbfrag.respond_draws"
+)
+
 _SINGLE_TYPES = (float, int, str, bytes)
 
 
@@ -58,10 +63,12 @@ class Prediction:
         pgv_over_pga_s: PGV over PGA [s] where both are known, else None: what tells long from
             short pulses where Tm is not known.
         median_displacement_m: the displacement that is exceeded with P = 1/2 [m]; None where the
-            kind has none and where the block does not move.
+            kind has none, where the block does not move and where it is uncertain.
         unknown_share: of the outcomes that the model was fitted to, of like strength and shaking,
             the share that is not known because blocks left their model before they failed; None
             where all are known.
+        block_sd: standard deviation of P over what an uncertain block may be; None where it is
+            certain.
     """
 
     kind: str
@@ -82,6 +89,7 @@ class Prediction:
     pgv_over_pga_s: float | None = None
     median_displacement_m: float | None = None
     unknown_share: float | None = None
+    block_sd: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
@@ -125,6 +133,13 @@ def predict(
     ps2: float | None = ...,
     rotation_deg: float | None = ...,
     leaves_g: float | None = ...,
+    restitution: float | None = ...,
+    p2_sigma: float | None = ...,
+    kr_sigma: float | None = ...,
+    ky_sigma: float | None = ...,
+    ks_sigma: float | None = ...,
+    ps2_sigma: float | None = ...,
+    restitution_sigma: float | None = ...,
     pgv_m_s: float | None = ...,
     pga_g: float | None = ...,
     tm_s: float | None = ...,
@@ -137,6 +152,7 @@ def predict(
     db: str | PathLike[str] | None = ...,
     nan: Literal["propagate", "raise"] = ...,
     interval: bool = ...,
+    weights: ArrayLike | None = ...,
 ) -> Prediction: ...
 
 
@@ -153,6 +169,13 @@ def predict(
     ps2: ArrayLike | None = ...,
     rotation_deg: float | None = ...,
     leaves_g: ArrayLike | None = ...,
+    restitution: ArrayLike | None = ...,
+    p2_sigma: ArrayLike | None = ...,
+    kr_sigma: ArrayLike | None = ...,
+    ky_sigma: ArrayLike | None = ...,
+    ks_sigma: ArrayLike | None = ...,
+    ps2_sigma: ArrayLike | None = ...,
+    restitution_sigma: ArrayLike | None = ...,
     pgv_m_s: ArrayLike | None = ...,
     pga_g: ArrayLike | None = ...,
     tm_s: ArrayLike | None = ...,
@@ -165,6 +188,7 @@ def predict(
     db: str | PathLike[str] | None = ...,
     nan: Literal["propagate", "raise"] = ...,
     interval: bool = ...,
+    weights: ArrayLike | None = ...,
 ) -> Prediction | PredictionArray: ...
 
 
@@ -180,6 +204,13 @@ def predict(
     ps2: ArrayLike | None = None,
     rotation_deg: float | None = None,
     leaves_g: ArrayLike | None = None,
+    restitution: ArrayLike | None = None,
+    p2_sigma: ArrayLike | None = None,
+    kr_sigma: ArrayLike | None = None,
+    ky_sigma: ArrayLike | None = None,
+    ks_sigma: ArrayLike | None = None,
+    ps2_sigma: ArrayLike | None = None,
+    restitution_sigma: ArrayLike | None = None,
     pgv_m_s: ArrayLike | None = None,
     pga_g: ArrayLike | None = None,
     tm_s: ArrayLike | None = None,
@@ -192,6 +223,7 @@ def predict(
     db: str | PathLike[str] | None = None,
     nan: Literal["propagate", "raise"] = "propagate",
     interval: bool = True,
+    weights: ArrayLike | None = None,
 ) -> Prediction | PredictionArray:
     """Return the probability that a block fails, with its confidence interval.
 
@@ -203,8 +235,11 @@ def predict(
     single earthquake. Without shaking, and where mechanics forbids failure (k >= PGA, say), P is 0
     whatever the model says.
 
-    A block is given by p2 and kr (it topples), by ky and displacement_m (it slides further than
-    that), or by ks and ps2 (it slumps); each is a number or an array.
+    A block is given by p2 and kr (it topples, or rocks if `kind` says so), by ky and displacement_m
+    (it slides further than that), or by ks and ps2 (it slumps); each is a number or an array. What
+    is given with a standard deviation is the median of what the block may be: P is then the mean
+    over all that, with its interval, and ``block_sd`` how much P differs among them. Strength and
+    size are lognormal, a restitution is normal, cut off at 0 and 1, and all are independent.
 
     Args:
         p2: frequency parameter p² of the block [1/s²].
@@ -219,6 +254,14 @@ def predict(
             model; None for failure past recovery.
         leaves_g: with ks: acceleration at which the block leaves its back plane [g]: above it the
             answer warns.
+        restitution: of a block that rocks: speed after an impact over that before it, above 0 and
+            up to 1; None for what angular momentum leaves.
+        p2_sigma: standard deviation of ln p2.
+        kr_sigma: standard deviation of ln kr.
+        ky_sigma: standard deviation of ln ky.
+        ks_sigma: standard deviation of ln ks.
+        ps2_sigma: standard deviation of ln ps2.
+        restitution_sigma: standard deviation of the restitution.
         pgv_m_s: peak ground velocity of the horizontal component [m/s].
         pga_g: peak ground acceleration [g].
         tm_s: mean period [s].
@@ -238,6 +281,8 @@ def predict(
             used, ``raise`` refuses such arrays.
         interval: in arrays, False leaves interval and range out (their ends are then NaN), which
             takes less time.
+        weights: makes the arrays that describe the block draws of one block, of these weights (1:
+            all the same): one answer, over all of them.
 
     Returns:
         :class:`Prediction` when every argument is a single number (with `motion` and both
@@ -270,6 +315,20 @@ def predict(
         given["ps2"] = ps2
     if leaves_g is not None:
         given["leaves_g"] = leaves_g
+    if restitution is not None:
+        given["restitution"] = restitution
+    if p2_sigma is not None:
+        given["p2_sigma"] = p2_sigma
+    if kr_sigma is not None:
+        given["kr_sigma"] = kr_sigma
+    if ky_sigma is not None:
+        given["ky_sigma"] = ky_sigma
+    if ks_sigma is not None:
+        given["ks_sigma"] = ks_sigma
+    if ps2_sigma is not None:
+        given["ps2_sigma"] = ps2_sigma
+    if restitution_sigma is not None:
+        given["restitution_sigma"] = restitution_sigma
     if pgv_m_s is not None:
         given["pgv_m_s"] = pgv_m_s
     if pga_g is not None:
@@ -281,12 +340,14 @@ def predict(
     if sa_g is not None:
         given |= spectral(sa_g)
     if motion is not None:
+        if weights is not None:
+            raise InputError(f"weights given beside a motion: {SIMULATED}")
         return _predict_motion(
             given, motion, kind=kind, rotation_deg=rotation_deg, polarity=polarity, model=model,
             level=level, db=db,
         )  # fmt: skip
     chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
-    return answer_given(chosen, given, level, nan=nan, interval=interval)
+    return answer_given(chosen, given, level, nan=nan, interval=interval, weights=weights)
 
 
 def spectral(sa_g: Mapping[float, ArrayLike]) -> dict[str, ArrayLike]:
@@ -315,6 +376,7 @@ def answer_given(
     *,
     nan: Literal["propagate", "raise"] = "propagate",
     interval: bool = True,
+    weights: ArrayLike | None = None,
 ) -> Prediction | PredictionArray:
     """Return the answer of one model for values by name; see :func:`predict`."""
     for name in model.method.block.names:
@@ -324,6 +386,15 @@ def answer_given(
                 f"{' and '.join(model.method.block.names)}"
             )
     quantiles = quantiles_of(checked_level(level))
+    if weights is not None:
+        from rbfrag.fragility.uncertain import drawn_model
+
+        model, given = drawn_model(model, given, weights)
+    elif not model.method.block.sigmas.keys().isdisjoint(given):
+        # Kept apart: most questions are about certain blocks, and need no numpy.
+        from rbfrag.fragility.uncertain import uncertain_model
+
+        model, given = uncertain_model(model, given)
     singles: dict[str, float] = {}
     for name, value in given.items():
         if type(value) is float:  # for speed
@@ -366,17 +437,17 @@ def _predict_one(
     method, warnings = model.method, model.notes
     try:
         values = model.with_ratios(method.block.completed(given, model.term, SINGLE))
-        clear = _is_clear(model, values)
+        clear = not model.uncertain and _is_clear(model, values)
     except (ArithmeticError, ValueError):  # the checks find the words
         clear = False
     if clear:
-        answer = model.answer(values, quantiles, SINGLE)
+        answer = model.answer(values, quantiles, SINGLE, given)
         x, in_domain = values["intensity_m_s"], True
     else:
         judgement, sentences = _answer_with_diagnostics(model, given, quantiles)
         answer, values, x, _, in_domain, _ = judgement
         warnings = (*warnings, *sentences)
-    probability, low, high, event_low, event_high, eta, log_sigma = answer
+    probability, low, high, event_low, event_high, eta, log_sigma, block_sd, _ = answer
     median = None
     if method.median_of is not None and eta is not None:
         # the asked value, not the one that is adjusted for the base's dip
@@ -405,6 +476,7 @@ def _predict_one(
         values.get("pgv_over_pga_s"),
         median,
         share,
+        block_sd,
     )
 
 
@@ -474,6 +546,9 @@ def _predict_motion(
         )
     if polarity not in ("forward", "reverse", "both"):
         raise InputError(f"polarity = {polarity!r}: use 'forward', 'reverse' or 'both'")
+    uncertain = [name for name in given if name.endswith("_sigma")]
+    if uncertain:
+        raise InputError(f"{uncertain[0]} given beside a motion: {SIMULATED}")
     several = [name for name, value in given.items() if not is_single(value)]
     if several:
         raise InputError(
@@ -506,7 +581,7 @@ def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
         name: mean(name)
         for name in (
             "probability", "ci_low", "ci_high", "event_low", "event_high", "intensity_m_s",
-            "unknown_share",
+            "unknown_share", "block_sd",
         )
     }  # fmt: skip
     return MotionPrediction(
@@ -522,7 +597,7 @@ def _mean(forward: Prediction, reverse: Prediction) -> MotionPrediction:
 
 
 def prediction_document(
-    given: Mapping[str, float],
+    given: Mapping[str, ArrayLike],
     *,
     kind: str | None = None,
     rotation_deg: float | None = None,
@@ -532,6 +607,7 @@ def prediction_document(
     level: float = 0.95,
     db: str | PathLike[str] | None = None,
     remarks: Sequence[str] = (),
+    weights: ArrayLike | None = None,
 ) -> dict[str, Any]:
     """Return the answer under the keys of the JSON contract, and that of every suited model.
 
@@ -546,6 +622,7 @@ def prediction_document(
         level: confidence level of the interval.
         db: database of the models, as for :func:`predict`.
         remarks: warnings about the block, which go before those of the answer.
+        weights: of draws of the block, which the arrays are then.
 
     Raises:
         InputError: a value that cannot be used, or measures no model can work with.
@@ -567,7 +644,10 @@ def prediction_document(
             if model is None
             else [find_model(model, given, db, **criterion)]
         )
-        others = [answer_given(each, given, level) for each in suited]  # type: ignore[misc]
+        others = [
+            answer_given(each, given, level, weights=weights)  # type: ignore[misc]
+            for each in suited
+        ]
     recommended = others[0]
     document = recommended.as_dict()
     document["warnings"] = [*remarks, *recommended.warnings]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.checks import Finding, answer_with_findings
 from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.methods import Numbers, arrays
-from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.fragility.unknown_outcomes import IN_GENERAL, NOTABLE_SHARE
 
 FloatArray = NDArray[np.float64]
@@ -66,6 +66,8 @@ class PredictionArray:
         notes: sentences about the model that hold for every element.
         unknown_share: of the outcomes that the model was fitted to, of like strength and shaking,
             the share that is not known; None where all are known.
+        block_sd: standard deviation of P over what each uncertain block may be; None where all are
+            certain.
     """
 
     kind: str
@@ -84,6 +86,7 @@ class PredictionArray:
     method: str
     notes: tuple[str, ...] = ()
     unknown_share: FloatArray | None = None
+    block_sd: FloatArray | None = None
 
     @cached_property
     def reason(self) -> NDArray[np.object_]:
@@ -104,6 +107,7 @@ class _Columns:
     x: FloatArray
     in_domain: NDArray[np.bool_]
     unknown: FloatArray | None = None
+    block_sd: FloatArray | None = None
 
 
 def predict_many(
@@ -133,8 +137,9 @@ def predict_many(
     p, low, high, event_low, event_high, y, x = np.empty((7, size))
     unknown = None if model.unknown is None else np.empty(size)
     out = _Columns(
-        p, low, high, event_low, event_high, y, x, np.ones(size, dtype=np.bool_), unknown
-    )
+        p, low, high, event_low, event_high, y, x, np.ones(size, dtype=np.bool_), unknown,
+        np.empty(size) if model.uncertain else None,
+    )  # fmt: skip
     reach = quantiles if interval else None
     if not interval:
         out.low[:] = out.high[:] = np.nan
@@ -176,6 +181,7 @@ def predict_many(
         method=model.method.name,
         notes=model.notes,
         unknown_share=None if unknown is None else unknown.reshape(shape),
+        block_sd=None if out.block_sd is None else out.block_sd.reshape(shape),
     )
 
 
@@ -204,9 +210,7 @@ def _answer_part(
     for name, least, most in model.clear_ranges(values):
         clear &= values[name] >= least
         clear &= values[name] <= most
-    bounds = [*model.form.bounds, *block.refuses, *block.doubts]
-    if "pga_g" in values and block.at_rest not in bounds:
-        bounds.append(block.at_rest)
+    bounds = (*model.bounds(values), *block.refuses, *block.doubts)
     flags = [bound.holds(values) for bound in bounds]
     if method.doubts is not None:
         flags += [holds for holds, _, _ in method.doubts(model.parameters, values, ns)]
@@ -217,10 +221,11 @@ def _answer_part(
     if model.unknown is not None and out.unknown is not None:
         out.unknown[part] = share = model.unknown.array(values)
         clear &= np.logical_not(share >= NOTABLE_SHARE)
-    answer = model.answer(values, quantiles, ns)
-    for column, value in zip(_answered(out), answer, strict=False):
-        if value is not None:
-            column[part] = value
+    answer = model.answer(values, quantiles, ns, given)
+    if answer.outside is not None:
+        clear &= answer.outside < NOTABLE_SHARE
+    for column, value in _answered(out, answer):
+        column[part] = value
     out.y[part] = values.get("y_m_s", np.nan)
     out.x[part] = values["intensity_m_s"]
     return np.flatnonzero(~clear)
@@ -255,17 +260,16 @@ def _answer_with_diagnostics(
         sentences.add(holds, "unstable")
 
     block = model.method.block
-    needed = [*block.names, *model.term.inputs, *(o for o in block.options if o in given)]
+    stated = [name for name in (*block.options, *block.sigmas) if name in given]
+    needed = [*block.names, *model.term.inputs, *stated]
     judgement = answer_with_findings(
         model, given, needed, quantiles, arrays(),
         say=say, refuse=refuse, unstable=unstable,
         nothing=np.zeros(places.size, dtype=np.bool_),
     )  # fmt: skip
-    for column, answer in zip(_answered(out), judgement.answer, strict=False):
-        if answer is None:
-            continue
+    for column, answer in _answered(out, judgement.answer):
         values = np.where(judgement.ruled, 0.0, answer)
-        values[at_rest] = 1.0
+        values[at_rest] = 0.0 if column is out.block_sd else 1.0
         values[judgement.missing] = np.nan
         column[places] = values
     y = judgement.values.get("y_m_s", np.nan)
@@ -277,9 +281,14 @@ def _answer_with_diagnostics(
     return sentences.texts()
 
 
-def _answered(out: _Columns) -> tuple[FloatArray, ...]:
-    """Return the columns that a model answers, in the order of its answer."""
-    return out.probability, out.low, out.high, out.event_low, out.event_high
+def _answered(out: _Columns, answer: Answer) -> list[tuple[FloatArray, Any]]:
+    """Return the columns that a model answers, each with what is to stand there."""
+    pairs = (
+        (out.probability, answer.probability), (out.low, answer.low), (out.high, answer.high),
+        (out.event_low, answer.event_low), (out.event_high, answer.event_high),
+        (out.block_sd, answer.block_sd),
+    )  # fmt: skip
+    return [(column, value) for column, value in pairs if column is not None and value is not None]
 
 
 class _Sentences:

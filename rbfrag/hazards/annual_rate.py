@@ -12,22 +12,6 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.hazards.curve import HazardCurve
 
-
-def normal_steps(count: int, reach: float = 4.0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return points of a standard normal variable in equal steps, and weights that sum to 1.
-
-    For smooth integrands as good as Gauss-Hermite, and much better for a fragility that is steep
-    beside the scatter.
-
-    Args:
-        count: number of points; 1 for the mean alone.
-        reach: the outermost point, in standard deviations.
-    """
-    x = np.linspace(-reach, reach, count) if count > 1 else np.zeros(1)
-    weight = np.exp(-0.5 * x * x)
-    return x, weight / weight.sum()
-
-
 FloatArray = NDArray[np.float64]
 
 Fragility = Callable[[FloatArray], FloatArray]

@@ -80,7 +80,7 @@ class JointRate:
         if COPULA not in rates:
             why = (
                 "what the blocks share in one earthquake is not known to this model"
-                if blocks.dependence is None
+                if blocks.model.dependence is None
                 else f"what more than {MOST_JOINT} blocks share in one earthquake is not computed"
             )
             text = f"{here}; {why}: bounds has annual_rate_any under full dependence and if they "

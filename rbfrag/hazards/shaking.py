@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.hazards.annual_rate import normal_steps
+from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.curve import ANSWERED, HazardCurve

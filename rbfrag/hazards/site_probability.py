@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 from os import PathLike
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +15,12 @@ from rbfrag.fragility.joint import event_ranges
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.hazards.annual_rate import normal_steps
+from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import Component
-from rbfrag.hazards.correlations import correlations
+from rbfrag.hazards.site_shaking import SiteShaking
 
 FloatArray = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 REACH = 4.0
 """Standard deviations of the shaking that are integrated over, to both sides."""
@@ -50,12 +50,10 @@ class SiteProbability:
         event_high: upper end.
         in_domain: whether every block and the site's shaking lie in the ranges fitted.
         level: confidence level.
-        model: name of the model that answered.
-        term: its intensity term.
-        method: how it was fitted.
-        measures: the measures that it read.
-        integrated: those of them whose standard deviations were integrated over.
-        advice: what is to be said of a measure that tells little; empty for nothing.
+        shaking: what the model reads of the shaking, and its scatter.
+        site: sites of the pairs of site and block of which any can fail, shape (k,).
+        block: their blocks.
+        each: P of each pair.
     """
 
     probability: FloatArray
@@ -65,12 +63,10 @@ class SiteProbability:
     event_high: FloatArray
     in_domain: NDArray[np.bool_]
     level: float
-    model: str
-    term: str
-    method: str
-    measures: tuple[str, ...]
-    integrated: tuple[str, ...]
-    advice: str
+    shaking: SiteShaking
+    site: Indices
+    block: Indices
+    each: FloatArray
 
 
 def site_probability(
@@ -107,54 +103,50 @@ def site_probability(
         level: confidence level.
         db: as in :func:`rbfrag.predict`.
     """
-    chosen = find_model(model, ("p2", "kr", *measures), db)
-    names = chosen.term.inputs
-    n = measures[names[0]].size
+    shaking = SiteShaking.of(
+        measures, component, std_ln or {}, find_model(model, ("p2", "kr", *measures), db)
+    )
+    chosen, n = shaking.model, shaking.median.shape[0]
     weights = np.full(p2.size, 1.0) if weight is None else weight
-    weights = weights / weights.sum()
-    given = integrated_deviations(names, std_ln or {})
-    deviations = np.stack([given.get(name, np.zeros(n)) for name in names], axis=-1)
-    # the component's scatter is common to all measures
-    covariance = correlations(names) * deviations[:, :, None] * deviations[:, None, :]
-    factors = _cholesky(covariance + component.scatter**2)
-    mean = np.ones(1) if own_block else weights
-    widest = float(factors[:, 0, 0].max(initial=0.0))
+    weights = np.ones(n) if own_block else weights / weights.sum()
+    blocks = 1 if own_block else p2.size
+    across = bool(shaking.integrated)
+    widest = float(shaking.factors[:, 0, 0].max(initial=0.0))
 
-    def answers(sites: NDArray[np.intp], points: FloatArray) -> PredictionArray:
-        """Return answers of shape (sites, blocks, points) at normal scores, shape (points, k)."""
-        logs = np.einsum("sij,pj->isp", factors[sites], points)
-        sizes, strengths = (
-            (values[sites, None, None] if own_block else values[None, :, None])
-            for values in (p2, kr)
-        )
-        shaking: dict[str, Any] = {
-            name: (measures[name][sites, None] / component.ratio * np.exp(own))[:, None, :]
-            for name, own in zip(names, logs, strict=True)
-        }
-        answer = answer_given(chosen, {"p2": sizes, "kr": strengths, **shaking}, level)
+    def answers(site: Indices, block: Indices, points: FloatArray) -> PredictionArray:
+        """Return answers for pairs of site and block at normal scores, shape (pairs, points)."""
+        given = {"p2": p2[block, None], "kr": kr[block, None], **shaking.at(site, points)}
+        answer = answer_given(chosen, given, level)
         assert isinstance(answer, PredictionArray)
         return answer
 
-    probability, low, high = (np.zeros(n) for _ in range(3))
+    k = len(shaking.names)
     in_domain = np.empty(n, dtype=bool)
-    median_point = np.zeros((1, len(names)))
-    strong = median_point if widest == 0.0 else _strongest(len(names), across=bool(given))
-    blocks = 1 if own_block else p2.size
+    median_point = np.zeros((1, k))
+    strong = median_point if widest == 0.0 else _strongest(k, across=across)
+    alive = []
     for sites in _chunks(np.arange(n), _CHUNK // (blocks * len(strong))):
+        site = np.repeat(sites, blocks)
+        block = site if own_block else np.tile(np.arange(blocks), sites.size)
         # the median answers for the domain, the strongest shaking for what can fail at all
-        in_domain[sites] = answers(sites, median_point).in_domain[:, :, 0].all(axis=1)
-        strongest = answers(sites, strong)
-        probability[sites] = np.nan_to_num(strongest.ci_high, nan=np.inf).max(axis=(1, 2))
-    alive = np.flatnonzero(probability > NOTHING)
-    probability[probability <= NOTHING] = 0.0
+        median = answers(site, block, median_point)
+        in_domain[sites] = median.in_domain.reshape(-1, blocks).all(axis=1)
+        strongest = np.nan_to_num(answers(site, block, strong).ci_high, nan=np.inf).max(axis=1)
+        alive.append(np.stack([site, block])[:, strongest > NOTHING])
+    site, block = np.concatenate(alive, axis=1)
     points, both = median_point, np.ones(1)
     if widest > 0.0:
-        points, both = _points(len(names), widest, across=bool(given))
-    for sites in _chunks(alive, _CHUNK // (blocks * both.size)):
-        answer = answers(sites, points)
-        probability[sites] = (answer.probability @ both) @ mean
-        low[sites] = (answer.ci_low @ both) @ mean
-        high[sites] = (answer.ci_high @ both) @ mean
+        points, both = _points(k, widest, across=across)
+    each = np.empty((3, site.size))
+    for some in _chunks(np.arange(site.size), _CHUNK // both.size):
+        answer = answers(site[some], block[some], points)
+        for row, values in zip(
+            each, (answer.probability, answer.ci_low, answer.ci_high), strict=True
+        ):
+            row[some] = values @ both
+    probability, low, high = (
+        np.bincount(site, row * weights[block], n).astype(np.float64) for row in each
+    )
     event_low = event_high = np.full(n, np.nan)
     if chosen.event_spread is not None:
         event_low, event_high = event_ranges(probability, chosen.event_spread.root**2, level)
@@ -166,42 +158,11 @@ def site_probability(
         event_high=event_high,
         in_domain=in_domain,
         level=level,
-        model=chosen.name,
-        term=chosen.term.name,
-        method=chosen.row.method,
-        measures=names,
-        integrated=tuple(given),
-        advice=chosen.term.advice,
+        shaking=shaking,
+        site=site,
+        block=block,
+        each=each[0],
     )
-
-
-def integrated_deviations(
-    names: tuple[str, ...], std_ln: Mapping[str, FloatArray]
-) -> dict[str, FloatArray]:
-    """Return the standard deviations that are integrated over of the measures that a model reads.
-
-    All or none, lest a measure varies while one that goes with it does not; PGA alone may be
-    missing beside PGV, which tells most.
-    """
-    needed = names[:1] if names[0] == "pgv_m_s" else names
-    if not all(name in std_ln for name in needed):
-        return {}
-    return {name: std_ln[name] for name in names if name in std_ln}
-
-
-def _cholesky(covariance: FloatArray) -> FloatArray:
-    """Return lower factors of covariances that may be singular, shape (n, k, k)."""
-    n, k, _ = covariance.shape
-    factor = np.zeros((n, k, k))
-    for i in range(k):
-        for j in range(i + 1):
-            rest = covariance[:, i, j] - np.einsum("sm,sm->s", factor[:, i, :j], factor[:, j, :j])
-            if i == j:
-                factor[:, i, i] = np.sqrt(np.maximum(rest, 0.0))
-            else:
-                pivot = factor[:, j, j]
-                factor[:, i, j] = np.divide(rest, pivot, out=np.zeros(n), where=pivot > 0.0)
-    return factor
 
 
 def _chunks(places: NDArray[np.intp], size: int) -> list[NDArray[np.intp]]:

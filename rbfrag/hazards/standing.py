@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 from scipy.special import logsumexp
 
 from rbfrag.errors import InputError
-from rbfrag.hazards.annual_rate import normal_steps
+from rbfrag.fragility.uncertain import normal_steps
 
 FloatArray = NDArray[np.float64]
 

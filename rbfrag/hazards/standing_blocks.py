@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import UNKNOWN, Placement, any_failure
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.hazards.annual_rate import Fragility, failure_rate, normal_steps
+from rbfrag.fragility.uncertain import normal_steps
+from rbfrag.hazards.annual_rate import Fragility, failure_rate
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.shaking import Shaking, warn_of_ends
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -154,7 +154,7 @@ def _joint_laws(n: int, blocks: ModelBlocks | None) -> dict[str, Joint]:
         DEPENDENT: lambda p: p.max(axis=2),
         INDEPENDENT: lambda p: 1.0 - (1.0 - p).prod(axis=2),
     }
-    law = None if blocks is None else blocks.dependence
+    law = None if blocks is None else blocks.model.dependence
     if blocks is None or law is None:
         return bounds
     where, known = blocks.placement(), law
@@ -268,15 +268,6 @@ class ModelBlocks:
             )
             for i in range(0, p2.size, size)
         ]  # fmt: skip
-
-    @property
-    def dependence(self) -> Dependence | None:
-        """The copula that is stored with the model, if there is one."""
-        stored = self.model.row.dependence
-        names = Dependence.__dataclass_fields__
-        if stored is None or not set(names) <= set(stored):
-            return None
-        return Dependence(**{name: float(cast("float", stored[name])) for name in names})
 
     @property
     def warnings(self) -> tuple[str, ...]:

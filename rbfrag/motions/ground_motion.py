@@ -47,6 +47,7 @@ class GroundMotion:
         processing_applied: every parameter of what rbfrag did to the samples; None where they
             are those of the file.
         source_sha256: hash of the samples as the file has them; empty where these are they.
+        stated_unit: unit of acceleration as the file spells it; empty where it states none.
 
     Raises:
         InputError: no samples, a sample that is not finite, dt_s not positive, times that fall.
@@ -70,6 +71,7 @@ class GroundMotion:
     start_time: datetime | None = None
     processing_applied: Mapping[str, object] | None = None
     source_sha256: str = ""
+    stated_unit: str = ""
 
     def __post_init__(self) -> None:
         samples = _finite_vector(self.acceleration_g, "acceleration sample", "g")

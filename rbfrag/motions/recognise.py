@@ -194,6 +194,7 @@ def _motion(file: RecordFile, trace: Trace, **place: Any) -> GroundMotion:
         source_file=file.path.name,
         remarks=(*trace.remarks, *filter(None, further)),
         is_partial=is_partial,
+        stated_unit=trace.unit.text if trace.unit else "",
         **labels,
         **place,
     )
@@ -204,17 +205,24 @@ def _unit_in_g(file: RecordFile, field: Field | None) -> float:
     if field is None:
         file.require_units()
         field = Field(file.units or "", 1)
-    unit: str | None = None
-    if not TENTH_OF_G.fullmatch(field.text):
-        try:
-            unit = acceleration_unit(field.text)
-        except InputError as error:
-            raise file.error(str(error), field.line) from None
-    if file.units is not None and acceleration_unit(file.units) != unit:
+    try:
+        in_g = stated_in_g(field.text)
+    except InputError as error:
+        raise file.error(str(error), field.line) from None
+    if file.units is not None and unit_in_g(file.units) != in_g:
         raise file.error(
             f"the header says {field.text}, not {file.units}: leave --units out", field.line
         )
-    return 0.1 if unit is None else unit_in_g(unit)
+    return in_g
+
+
+def stated_in_g(text: str) -> float:
+    """Return how many g one unit is that a header states, g/10 among them.
+
+    Raises:
+        InputError: no unit of acceleration.
+    """
+    return 0.1 if TENTH_OF_G.fullmatch(text) else unit_in_g(text)
 
 
 def _reader(file: Path, text: str) -> ModuleType:

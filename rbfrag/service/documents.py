@@ -48,7 +48,8 @@ class PredictAnswer(_Document):
     `probability` is the share of such blocks that fail over all earthquakes and sites with these
     measures, `ci_low` and `ci_high` the interval of that share as far as the data tell it,
     `event_low` and `event_high` between which shares fail in one single earthquake; null where that
-    is not known.
+    is not known. `block_sd` is the standard deviation of P over what an uncertain block may be;
+    null where it is certain.
     """
 
     kind: str
@@ -69,6 +70,7 @@ class PredictAnswer(_Document):
     pgv_over_pga_s: float | None
     median_displacement_m: float | None
     unknown_share: float | None
+    block_sd: float | None
     answers: list[ModelAnswer]
 
 
@@ -80,6 +82,7 @@ class PredictArrays(_Fitted):
     ci_high: list[float | None]
     event_low: list[float | None]
     event_high: list[float | None]
+    block_sd: list[float | None] | None
     in_domain: list[bool]
     reason: list[str]
     kind: str

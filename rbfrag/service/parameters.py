@@ -50,6 +50,14 @@ DISPLACEMENT = _words("Sliding: the displacement that is too far [m].")
 KS = _words("Slumping: yield acceleration coefficient k_s.")
 PS2 = _words("Slumping: frequency parameter p_s² at rest [1/s²].")
 ROTATION = _words("Slumping: rotation that is too far [deg]. Default: failure past recovery.")
+RESTITUTION = _words(
+    "Rocking: speed after an impact over that before it, above 0 and up to 1. Default: what "
+    "angular momentum leaves."
+)
+P2_SIGMA, KR_SIGMA, KY_SIGMA, KS_SIGMA, PS2_SIGMA, RESTITUTION_SIGMA = (
+    _words(f"Standard deviation of {symbol} of what the block may be: P is the mean over it.")
+    for symbol in ("ln p²", "ln k_r", "ln k_y", "ln k_s", "ln p_s²", "the restitution")
+)
 PGV = _words("Peak ground velocity [m/s].")
 PGA = _words("Peak ground acceleration [g].")
 TM = _words("Mean period [s].")
@@ -72,6 +80,13 @@ MEASURES = {
 }  # fmt: skip
 NUMBERS = {"p2": "p2", "kr": "kr", "ky": "ky", "ks": "ks", "ps2": "ps2"}
 SLIDING = {"displacement": "displacement_m", "beta": "beta_deg"}
+UNCERTAIN = {
+    name: name
+    for name in (
+        "p2_sigma", "kr_sigma", "ky_sigma", "ks_sigma", "ps2_sigma", "restitution",
+        "restitution_sigma",
+    )
+}  # fmt: skip
 RECTANGLE = {"height": "height_m", "width": "width_m", "dip": "dip_deg"}
 PLANES = {
     "beta": "beta_deg", "phi": "phi_deg", "phi_back": "phi_back_deg", "cohesion": "cohesion_pa",
@@ -223,6 +238,13 @@ class PredictQuery(Motion, TopplingBlock):
     displacement: Annotated[Positive | None, DISPLACEMENT] = None
     ks: Annotated[Positive | None, KS] = None
     ps2: Annotated[Positive | None, PS2] = None
+    restitution: Annotated[Positive | None, RESTITUTION] = None
+    p2_sigma: Annotated[NotNegative | None, P2_SIGMA] = None
+    kr_sigma: Annotated[NotNegative | None, KR_SIGMA] = None
+    ky_sigma: Annotated[NotNegative | None, KY_SIGMA] = None
+    ks_sigma: Annotated[NotNegative | None, KS_SIGMA] = None
+    ps2_sigma: Annotated[NotNegative | None, PS2_SIGMA] = None
+    restitution_sigma: Annotated[NotNegative | None, RESTITUTION_SIGMA] = None
     rotation: Annotated[float | None, ROTATION] = None
     level: Annotated[float, LEVEL] = 0.95
 
@@ -240,6 +262,13 @@ class PredictRows(Parameters):
     beta: Annotated[Column | None, BETA] = None
     ks: Annotated[Column | None, KS] = None
     ps2: Annotated[Column | None, PS2] = None
+    restitution: Annotated[Column | None, RESTITUTION] = None
+    p2_sigma: Annotated[Column | None, P2_SIGMA] = None
+    kr_sigma: Annotated[Column | None, KR_SIGMA] = None
+    ky_sigma: Annotated[Column | None, KY_SIGMA] = None
+    ks_sigma: Annotated[Column | None, KS_SIGMA] = None
+    ps2_sigma: Annotated[Column | None, PS2_SIGMA] = None
+    restitution_sigma: Annotated[Column | None, RESTITUTION_SIGMA] = None
     pgv: Annotated[Column | None, PGV] = None
     pga: Annotated[Column | None, PGA] = None
     tm: Annotated[Column | None, TM] = None

@@ -18,6 +18,7 @@ from rbfrag.service.parameters import (
     NUMBERS,
     RECTANGLE,
     SLIDING,
+    UNCERTAIN,
     PredictQuery,
     PredictRows,
 )
@@ -34,7 +35,10 @@ def answer_one(query: PredictQuery, db: str | None) -> PredictAnswer:
     """Return what `rbfrag predict --json` prints."""
     block, remarks = query.numbers(query.kind)
     document = prediction_document(
-        block | query.given(MEASURES) | query.given({"displacement": "displacement_m"}),
+        block
+        | query.given(MEASURES)
+        | query.given({"displacement": "displacement_m"})
+        | query.given(UNCERTAIN),
         kind=query.kind,
         rotation_deg=query.rotation,
         model=query.model,
@@ -62,7 +66,7 @@ def columns_of(body: PredictRows, row_limit: int) -> dict[str, Any]:
     if len({length for length in lengths.values() if length > 1}) > 1:
         sizes = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise InputError(f"the lists differ in length: {sizes}; give one length, or one number")
-    return body.given({**RECTANGLE, **NUMBERS, **SLIDING, **MEASURES})
+    return body.given({**RECTANGLE, **NUMBERS, **SLIDING, **UNCERTAIN, **MEASURES})
 
 
 def answer_many(given: dict[str, Any], chosen: dict[str, Any], db: str | None) -> bytes:
@@ -93,6 +97,7 @@ def answer_many(given: dict[str, Any], chosen: dict[str, Any], db: str | None) -
             "ci_high": _with_null(answers.ci_high),
             "event_low": _with_null(answers.event_low),
             "event_high": _with_null(answers.event_high),
+            "block_sd": None if answers.block_sd is None else _with_null(answers.block_sd),
             "in_domain": answers.in_domain.tolist(),
             "reason": answers.reason.tolist(),
             "kind": answers.kind,

@@ -114,3 +114,33 @@ def test_refusals(
     Path("bad.geojson").write_text('{"type": "FeatureCollection", "features": [{}]}')
     assert words in refuses("shakemap", grid, *options)
     assert not Path("a.csv").exists()
+
+
+def test_how_many_fail_together(shell: Shell, grid: Path) -> None:
+    block = ("--p2", "3", "--kr", "0.1", "--out", "a.csv", *SINGLE, "--uncertainty")
+    told = shell.json("shakemap", grid, *block, "uncertainty.xml")
+    p = np.genfromtxt("a.csv", delimiter=",", names=True)["probability"]
+    assert told["expected_failures"] == pytest.approx(p.sum(), rel=1e-12)
+    assert told["failures_p05"] <= told["failures_p50"] <= told["failures_p95"] <= 6
+    assert p.max() <= told["probability_any"] <= p.sum()
+    assert (told["joint_law"], told["seed"]) == ("the model's copula", 0)
+    assert told["draws"] == 10_000  # few blocks
+    assert any("correlated over 25.7 km (Jayaram and Baker 2009)" in t for t in told["warnings"])
+    again = shell.json("shakemap", grid, *block, "uncertainty.xml", "--seed", "1", "--draws", "200")
+    assert (again["draws"], again["seed"]) == (200, 1)
+    # the 6 nodes hold every one of three blocks, two of the second
+    Path("b.csv").write_text("p2_1_s2,kr,weight\n3,0.1,1\n3,0.1,2\n")
+    more = shell.json("shakemap", grid, "--blocks", "b.csv", *block[4:], "uncertainty.xml")
+    assert more["expected_failures"] == pytest.approx(3.0 * p.sum(), rel=1e-9)
+
+
+def test_a_model_that_does_not_know_what_blocks_share(shell: Shell, grid: Path) -> None:
+    with opened_database("rbfrag.db", create=True) as engine, engine.begin() as connection:
+        save_model(connection, model_row(name="other", dependence=None))
+    told = shell.json(
+        "shakemap", grid, "--p2", "3", "--kr", "0.1", "--out", "a.geojson", "--model", "other"
+    )
+    assert told["joint_law"] == "bounds"
+    assert told["probability_any"] is None
+    ends = [told["bounds"][law]["probability_any"] for law in ("fully_dependent", "independent")]
+    assert 0.0 < ends[0] < ends[1] + 0.01  # 10,000 draws

@@ -213,3 +213,21 @@ def test_tables_of_blocks_that_slide_or_slump(tmp_path: Path) -> None:
     source.write_text("ky,pgv_m_s\n0.1,0.5\n")
     with pytest.raises(InputError, match="no column displacement_m"):
         predict_table(source, target, given={}, model=None, level=0.95, db=str(REFERENCE))
+
+
+def test_uncertain_blocks_are_integrated_over(answer: Answer, tmp_path: Path) -> None:
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    source.write_text(f"{HEAD},kr_sigma\na,3,0.1,0.6,0.2\nb,3,0.1,0.6,\nc,3,0.1,0.6,-1\n")
+    answer(source, target)
+    uncertain, certain, refused = rows_of(target)
+    db = str(tmp_path / "model.db")
+    expected = predict(3.0, 0.1, pgv_m_s=0.6, kr_sigma=0.2, db=db)
+    for name in ("probability", "ci_low", "ci_high", "event_high", "block_sd"):
+        assert float(uncertain[name]) == pytest.approx(getattr(expected, name), rel=1e-12)
+    by_itself = predict(3.0, 0.1, pgv_m_s=0.6, db=db)
+    assert float(certain["probability"]) == pytest.approx(by_itself.probability, rel=1e-9)
+    assert float(certain["block_sd"]) == pytest.approx(0.0, abs=1e-7)
+    assert refused["probability"] == refused["block_sd"] == ""
+    assert "kr_sigma is negative" in refused["reason"]
+    answer(target, tmp_path / "again.csv", p2_sigma=0.1)  # the answers give way to new ones
+    assert [*rows_of(tmp_path / "again.csv")[0]].count("block_sd") == 1

@@ -117,3 +117,17 @@ def test_an_unknown_model_is_named_without_the_place_of_the_database(client, dat
     assert problem["type"] == "urn:rbfrag:problem:unknown-model"
     assert "'nobody' in the database" in problem["detail"]
     assert str(database.parent) not in problem["detail"]
+
+
+def test_uncertain_blocks_are_answered_as_from_python(client, database):
+    asked = {"p2": 3.0, "kr": 0.1, "pgv": 0.6, "kr_sigma": 0.2}
+    own = rbfrag.predict(3.0, 0.1, pgv_m_s=0.6, kr_sigma=0.2, db=database)
+    found = client.get("/v1/predict", params=asked).json()
+    assert {name: found[name] for name in ("probability", "ci_low", "block_sd")} == {
+        "probability": own.probability, "ci_low": own.ci_low, "block_sd": own.block_sd,
+    }  # fmt: skip
+    many = client.post("/v1/predict", json={**asked, "kr_sigma": [0.2, 0.2]}).json()
+    assert many["block_sd"] == pytest.approx([own.block_sd] * 2, rel=1e-12)
+    certain = client.post("/v1/predict", json={"p2": 3.0, "kr": [0.1], "pgv": 0.6}).json()
+    assert certain["block_sd"] is None
+    assert client.get("/v1/predict", params={**asked, "kr_sigma": -1}).status_code == 422

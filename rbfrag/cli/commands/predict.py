@@ -7,7 +7,7 @@ from typing import Any
 
 from rbfrag.cli.output import print_json, print_pairs, print_warnings, show_prediction
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import WAYS, BlockOptions, option_of
+from rbfrag.cli.parameters.block import WAYS, BlockOptions, UncertaintyOptions, option_of
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.errors import InputError
 from rbfrag.solver.described import numbers_of_kind
@@ -20,8 +20,12 @@ class Failure:
     """How a block fails, and the numbers of one that does not topple."""
 
     kind: str | None = option(
-        "How the block fails: toppling, slumping or sliding. Default: what the block is "
-        "given by, --p2, --ks or --ky."
+        "How the block fails: toppling (backed by a slope), rocking (free-standing), slumping or "
+        "sliding. Default: what the block is given by, --p2 (toppling), --ks or --ky."
+    )
+    restitution: float | None = option(
+        "Rocking: speed after an impact over that before it, above 0 and up to 1. Default: what "
+        "angular momentum leaves."
     )
     ky: float | None = option(
         "Sliding: yield acceleration coefficient tan(phi - beta), with --beta."
@@ -69,6 +73,7 @@ class Table:
 def predict(
     block: BlockOptions,
     failure: Failure,
+    known: UncertaintyOptions,
     measures: options.Measures,
     record: Record,
     reading: options.Reading,
@@ -87,14 +92,17 @@ def predict(
     measures suffice for several models, each is answered.
 
     Toppling answers are for blocks backed by a slope; free-standing blocks fail at weaker
-    shaking.
+    shaking: ask for --kind rocking.
+
+    A block of which --kr-sigma and the like are given is uncertain: P is the mean over all that it
+    may be, and block_sd how much P differs among them.
     """
     numbers = {
         "p2": block.p2, "kr": block.kr, "ky": failure.ky, "displacement_m": failure.displacement,
-        "ks": failure.ks, "ps2": failure.ps2,
+        "ks": failure.ks, "ps2": failure.ps2, "restitution": failure.restitution,
     }  # fmt: skip
-    given = {name: value for name, value in numbers.items() if value is not None}
-    given |= measures.given()
+    given: dict[str, Any] = {name: value for name, value in numbers.items() if value is not None}
+    given |= {**known.sigmas(), **measures.given()}
     question: dict[str, Any] = {
         "rotation_deg": failure.rotation, "model": answering.model, "level": answering.level,
         "db": answering.db,
@@ -109,7 +117,14 @@ def predict(
         return
     from rbfrag.fragility.predict import prediction_document
 
-    remarks = _complete(given, block, failure.kind)
+    remarks: tuple[str, ...] = ()
+    if known.block_draws is not None:
+        from rbfrag.exchange.block_draws import read_draws
+
+        draws, question["weights"] = read_draws(known.block_draws)
+        given = {**draws, **given}
+    else:
+        remarks = _complete(given, block, failure.kind)
     if record.motion is not None:
         from rbfrag.cli.parameters.motion import find_motion
 
@@ -128,7 +143,7 @@ def _complete(given: dict[str, float], block: BlockOptions, kind: str | None) ->
     from rbfrag.fragility.lookup import block_of
 
     remarks: tuple[str, ...] = ()
-    known_by = block_of(given)
+    known_by = block_of(given, kind)
     shape = block.described()
     if shape is not None:
         values, remarks = numbers_of_kind(shape, known_by.kind if kind is None else kind)
@@ -137,10 +152,10 @@ def _complete(given: dict[str, float], block: BlockOptions, kind: str | None) ->
                 f"{option_of(doubled[0])} does not go with a shape, which describes the block"
             )
         given |= values
-        known_by = block_of(given)
+        known_by = block_of(given, kind)
     elif block.beta is not None:
         given["beta_deg"] = block.beta
-        known_by = block_of(given)
+        known_by = block_of(given, kind)
     missing = [name for name in known_by.names if name not in given]
     if missing and kind in (None, known_by.kind):
         raise InputError(

@@ -31,6 +31,16 @@ class MapOptions:
     allow_partial: bool = option("Read a grid that has not its declared size.", False)
 
 
+@dataclass(frozen=True, kw_only=True)
+class DrawOptions:
+    """How the number of failures is drawn."""
+
+    draws: int | None = option(
+        "Number of draws of shaking and blocks. Default: 100, more where blocks are few."
+    )
+    seed: int = option("Seed of these draws.", 0)
+
+
 @stacked
 def shakemap(
     *,
@@ -38,6 +48,7 @@ def shakemap(
     out: str = option("File to write: .geojson, .csv, .parquet or .gpkg (extra gis).", ...),
     blocks: BlocksOptions,
     meaning: MapOptions,
+    drawing: DrawOptions,
     answering: options.Answering,
     n: int = option("Number of realisations of the rock mass.", 200),
     plot: str | None = option("Draw the map (.png, .pdf, .svg)."),
@@ -48,19 +59,20 @@ def shakemap(
     One block, a table without lon and lat, or a rock mass stands at every node; a table with lon
     and lat [deg] is answered block by block. The best model that the map's measures suffice for
     answers: PGV and PGA, or, without PGV, PGA with spectral accelerations. Blocks are backed by a
-    slope; free-standing ones fail at weaker shaking.
+    slope; free-standing ones fail at weaker shaking. How many of all fail together is drawn.
     """
     import numpy as np
 
     from rbfrag.exchange.shakemap import at_places, read_shakemap
     from rbfrag.files import output_path
     from rbfrag.hazards.conversions import component as component_named
+    from rbfrag.hazards.map_failures import Places, map_failures
     from rbfrag.hazards.site_probability import site_probability
 
     target = output_path(out, SUFFIXES, "map")
     check_files(plot=plot)
     component = component_named(meaning.component)
-    class_blocks, _, remarks = blocks.toppling_blocks(n=n)
+    class_blocks, is_class, remarks = blocks.toppling_blocks(n=n)
     shaken = read_shakemap(
         grid, uncertainty=meaning.uncertainty, allow_partial=meaning.allow_partial
     )
@@ -85,24 +97,37 @@ def shakemap(
         if component.name != "single"
         else "the map is taken to be of one component"
     )
+    here = on_map if own else slice(None)
+    p2, kr = class_blocks["p2_1_s2"][here], class_blocks["kr"][here]
+    weight = class_blocks.get("weight")
     answer = site_probability(
-        {name: values[on_map] for name, values in measures.items()},
-        class_blocks["p2_1_s2"][on_map] if own else class_blocks["p2_1_s2"],
-        class_blocks["kr"][on_map] if own else class_blocks["kr"],
-        component=component, weight=None if own else class_blocks.get("weight"), own_block=own,
+        {name: values[on_map] for name, values in measures.items()}, p2, kr,
+        component=component, weight=None if own else weight, own_block=own,
         std_ln={name: values[on_map] for name, values in std_ln.items()},
         model=answering.model, level=answering.level, db=answering.db,
     )  # fmt: skip
-    if answer.advice:
-        warnings.append(answer.advice)
+    shaking, chosen = answer.shaking, answer.shaking.model
+    if chosen.term.advice:
+        warnings.append(chosen.term.advice)
     if "pgv_m_s" not in measures:
-        read = " and ".join(name.partition("_")[0].upper() for name in answer.measures)
+        read = " and ".join(name.partition("_")[0].upper() for name in shaking.names)
         warnings.append(f"the map has no PGV, which tells most: a model of {read} answers")
-    if not answer.integrated:
+    if not shaking.integrated:
         warnings.append(
-            f"the map's uncertainty of {' and '.join(answer.measures)} is not given: its values "
+            f"the map's uncertainty of {' and '.join(shaking.names)} is not given: its values "
             "are taken as certain; name uncertainty.xml with --uncertainty"
         )
+
+    if weight is None:  # of a rock mass: one block at each node, of any of its realisations
+        weight = np.full(kr.size, 1.0 / kr.size if is_class else 1.0)
+    names = class_blocks.get("site_id") if own else None
+    failures = map_failures(
+        answer, p2, kr,
+        Places.of(lon[on_map], lat[on_map], None if names is None else names[on_map]),
+        weight=weight if weight.size == kr.size else weight[here],
+        draws=drawing.draws, seed=drawing.seed,
+    )  # fmt: skip
+    warnings += failures.warnings
 
     def placed(values: Any, empty: Any = np.nan) -> Any:
         whole = np.full(on_map.size, empty)
@@ -118,7 +143,7 @@ def shakemap(
         **{
             name: values
             for name, values in measures.items()
-            if name in ("pgv_m_s", "pga_g", *answer.measures)
+            if name in ("pgv_m_s", "pga_g", *shaking.names)
         },
         "probability": placed(answer.probability),
         "ci_low": placed(answer.ci_low),
@@ -134,18 +159,19 @@ def shakemap(
             "model was fitted on (in_domain)"
         )
     event = shaken.event
-    document = {
+    document: dict[str, Any] = {
         "event_id": event.event_id,
         "event": event.description,
         "magnitude": event.magnitude,
         "time": event.time,
-        "model": answer.model,
-        "term": answer.term,
-        "method": answer.method,
+        "model": chosen.name,
+        "term": chosen.term.name,
+        "method": chosen.row.method,
         "level": answering.level,
-        "measures": " ".join(answer.measures),
-        "uncertainty_integrated": bool(answer.integrated),
+        "measures": " ".join(shaking.names),
+        "uncertainty_integrated": bool(shaking.integrated),
     }
+    document |= {**failures.as_dict(), "seed": drawing.seed}
     _write(columns, {**document, "warnings": warnings}, target)
     if plot is not None:
         from rbfrag.plots.shakemap import plot_shakemap
@@ -154,7 +180,8 @@ def shakemap(
         size = "" if event.magnitude is None else f", M {event.magnitude:g}"
         plot_shakemap(
             lon, lat, columns["probability"], plot,
-            title=f"{name}{size}\n{_what(class_blocks, own)}; model {answer.model}",
+            title=f"{name}{size}\n{_what(class_blocks, own)}; model {chosen.name}"
+            + ("" if shaking.integrated else "\nvalues of the map taken as certain"),
             epicentre=None if event.lon is None or event.lat is None else (event.lon, event.lat),
             shape=(shaken.rows, shaken.columns) if shaken.is_whole and not own else None,
         )  # fmt: skip
@@ -167,8 +194,6 @@ def shakemap(
         "largest_at_lon": float(lon[best]),
         "largest_at_lat": float(lat[best]),
     }
-    if own:
-        document["expected_failures"] = float(answer.probability.sum())
     if json:
         print_json({**document, "warnings": warnings})
         return

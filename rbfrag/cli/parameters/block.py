@@ -108,6 +108,28 @@ class NumberOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
+class UncertaintyOptions:
+    """How well a block is known; the option that states a value states its median."""
+
+    p2_sigma: _Number = option("Standard deviation of ln p².")
+    kr_sigma: _Number = option("Standard deviation of ln k_r.")
+    ky_sigma: _Number = option("Standard deviation of ln k_y.")
+    ks_sigma: _Number = option("Standard deviation of ln k_s.")
+    ps2_sigma: _Number = option("Standard deviation of ln p_s².")
+    restitution_sigma: _Number = option("Standard deviation of the restitution.")
+    block_draws: str | None = option(
+        "Table of what the one block may be (.csv, .parquet), a row each, with the columns of a "
+        "block table and weight if they weigh differently.",
+        metavar="FILE",
+    )
+
+    def sigmas(self) -> dict[str, float]:
+        """Return the standard deviations that were given, by name."""
+        values = {name: value for name, value in vars(self).items() if name.endswith("sigma")}
+        return {name: value for name, value in values.items() if value is not None}
+
+
+@dataclass(frozen=True, kw_only=True)
 class BlockOptions(ShapeOptions, NumberOptions):
     """A block by numbers or by its shape."""
 

@@ -9,6 +9,9 @@ from rbfrag.errors import InputError
 
 NUMBERS = ("--p2", "--kr")
 SHAPE = ("--height", "--width", "--dip", "--alpha1", "--alpha3", "--r3", "--s1", "--s2", "--gamma")
+SIGMAS = (
+    "--p2-sigma", "--kr-sigma", "--ky-sigma", "--ks-sigma", "--ps2-sigma", "--restitution-sigma",
+)  # fmt: skip
 PLANES = ("--beta", "--phi", "--phi-back", "--no-back")
 MEASURES = ("--pgv", "--pga", "--tm", "--pgd", "--sa03", "--sa10", "--sa20", "--sa30")
 
@@ -59,6 +62,10 @@ CONFLICTS = (
     Conflict(("--polygon",), ("--block",), ONCE),
     Conflict(TABLES, (*SHAPE, *FILES), ONCE),
     Conflict(("--mesh",), (*SHAPE, *FILES), ONCE),
+    Conflict(
+        ("--block-draws",), (*NUMBERS, *SHAPE, *FILES, *PLANES, *SIGMAS), "the table has the block"
+    ),
+    Conflict(("--block-draws",), ("--batch",), "one question is about one block"),
     Conflict(
         (*PLANES, "--cohesion", "--kv"),
         ("--mesh",),

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from importlib import import_module
 from typing import Any, Literal, NamedTuple
 
@@ -112,16 +112,40 @@ class Link(NamedTuple):
     Args:
         name: as reports call it.
         probability: F(eta, functions).
+        density: F'(eta, functions).
+        quantile: eta of a probability between 0 and 1, from it and functions.
     """
 
     name: str
     probability: Callable[[Any, Numbers], Any]
+    density: Callable[[Any, Numbers], Any]
+    quantile: Callable[[Any, Numbers], Any]
 
 
-NORMAL = Link("normal", lambda eta, ns: ns.ndtr(eta))
-LOGIT = Link("logit", lambda eta, ns: 1.0 / (1.0 + ns.exp(-eta)))
-LOGLOG = Link("loglog", lambda eta, ns: ns.exp(-ns.exp(-eta)))
-COMPLEMENT = Link("complement", lambda eta, ns: -ns.expm1(-ns.maximum(eta, 0.0)))
+NORMAL = Link(
+    "normal",
+    lambda eta, ns: ns.ndtr(eta),
+    lambda eta, ns: ns.exp(-0.5 * eta * eta) / math.sqrt(2.0 * math.pi),
+    lambda p, ns: ns.ndtri(p),
+)
+LOGIT = Link(
+    "logit",
+    lambda eta, ns: 1.0 / (1.0 + ns.exp(-eta)),
+    lambda eta, ns: ns.exp(-abs(eta)) / (1.0 + ns.exp(-abs(eta))) ** 2,
+    lambda p, ns: ns.log(p / (1.0 - p)),
+)
+LOGLOG = Link(
+    "loglog",
+    lambda eta, ns: ns.exp(-ns.exp(-eta)),
+    lambda eta, ns: ns.exp(-eta - ns.exp(-eta)),
+    lambda p, ns: -ns.log(-ns.log(p)),
+)
+COMPLEMENT = Link(
+    "complement",
+    lambda eta, ns: -ns.expm1(-ns.maximum(eta, 0.0)),
+    lambda eta, ns: ns.exp(-ns.maximum(eta, 0.0)) * (eta > 0.0),
+    lambda p, ns: -ns.log(1.0 - p),
+)
 
 
 class Bound(NamedTuple):
@@ -174,6 +198,8 @@ class BlockParameters:
         criterion: name of the criterion of failure that a model is fitted for, if there are
             several.
         options: names of what else a question may state.
+        fractions: those of the options that lie between 0 and 1 and whose scatter is one of
+            their value; of strength and size it is one of the logarithm.
         adjust: changes the values by what is stated so, before anything reads them.
         refuses: the combinations of values that no block has.
         doubts: the combinations that make an answer doubtful.
@@ -188,10 +214,17 @@ class BlockParameters:
     at_rest: Bound
     criterion: str | None = None
     options: tuple[str, ...] = ()
+    fractions: tuple[str, ...] = ()
     adjust: Callable[[dict[str, Any], Numbers], None] | None = None
     refuses: tuple[Bound, ...] = ()
     doubts: tuple[Bound, ...] = ()
     presumes: str = ""
+
+    @cached_property
+    def sigmas(self) -> dict[str, str]:
+        """What a question may leave uncertain, by the name of its standard deviation."""
+        uncertain = (self.size, self.strength, *self.fractions)
+        return {f"{name}_sigma": name for name in uncertain if name is not None}
 
     def completed(self, given: Mapping[str, Any], term: Term, ns: Numbers) -> dict[str, Any]:
         """Return the given values with what formulas read.

@@ -59,13 +59,15 @@ BLOCK = BlockParameters(
         "cannot overturn: P = 0 by mechanics, not by the model"
     ),
     options=("restitution",),
+    fractions=("restitution",),
     adjust=_restitution,
     refuses=(
         Bound(
             lambda v: (v["restitution"] <= 0.0) | (v["restitution"] > 1.0),
             "restitution",
-            "is no ratio of speeds: give the speed after an impact over that before it, above 0 "
-            "and up to 1",
+            "is no ratio of speeds that the model knows: give the speed after an impact over that "
+            "before it, above 0 and up to 1 (a block that comes to rest at its first impact is "
+            "outside the model)",
         ),
     ),
     presumes="the block is taken to stand free: a symmetric rectangle on level ground that rocks "

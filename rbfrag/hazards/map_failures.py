@@ -1,0 +1,323 @@
+"""How many blocks of a map fail together in one earthquake, by draws of shaking and blocks.
+
+The residual of the logarithm of a measure at a site is
+
+    ε = σ [√β B + √(1-β) W(x)] + s ξ
+
+with σ the map's standard deviation there, B common to the earthquake, W(x) the within-event
+residual with the spatial correlation of Jayaram and Baker (2009), and s ξ the scatter of a single
+component, independent from site to site. Residuals of several measures at a place correlate as in
+:func:`rbfrag.hazards.correlations.correlation`; they share the range of the first. Given the
+shaking the blocks fail by the copula of the model that answers, so that every block's P is the mean
+that :func:`rbfrag.hazards.site_probability.site_probability` integrates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.dependence import Dependence
+from rbfrag.fragility.joint import UNKNOWN, Placement
+from rbfrag.fragility.joint_sampling import JointSampler
+from rbfrag.fragility.predict import answer_given
+from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.hazards.correlations import correlations
+from rbfrag.hazards.site_probability import SiteProbability
+from rbfrag.hazards.site_shaking import SiteShaking
+from rbfrag.hazards.spatial_field import SpatialField, correlation_range_km
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+FloatArray = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Normals = Callable[[int, np.random.Generator], FloatArray]
+
+BETWEEN = 0.346**2 / (0.346**2 + 0.552**2)
+"""β, the share of the map's variance that is taken as between-event, 0.28.
+
+That of PGV for M ≥ 5.5 of Boore, D. M., Stewart, J. P., Seyhan, E. & Atkinson, G. M. (2014):
+NGA-West2 equations for predicting PGA, PGV, and 5% damped PSA for shallow crustal earthquakes.
+Earthquake Spectra 30(3), 1057-1085 (τ = 0.346, φ = 0.552). A ShakeMap states the total deviation
+alone. Where many stations recorded the earthquake, its B is nearly known and less is shared; the
+deviation itself, which is conditional on the stations, is then smaller near them.
+"""
+
+COPULA, DEPENDENT, INDEPENDENT = "the model's copula", "fully_dependent", "independent"
+
+LEFT_OUT = 1e-4
+"""Part of the expected failures that the least probable blocks may hold and not be drawn."""
+
+QUANTILES = (0.05, 0.5, 0.95)
+
+DRAWS, MOST_DRAWS = 100, 10_000
+"""Draws where none are asked for: as many as `_VALUES` allow of the blocks drawn, in this range."""
+
+_VALUES = 5_000_000
+_FEWEST, _MOST = 10, 1_000_000
+_VALUES_AT_ONCE = 2_000_000
+
+
+@dataclass(frozen=True)
+class Failures:
+    """How many fail, by one law of how blocks fail together.
+
+    Args:
+        probability_any: probability that at least one fails.
+        p05: number that is not exceeded with probability 0.05.
+        p50: the same of 0.5.
+        p95: the same of 0.95.
+    """
+
+    probability_any: float
+    p05: float
+    p50: float
+    p95: float
+
+    KEYS: ClassVar[tuple[str, ...]] = (
+        "failures_p05", "failures_p50", "failures_p95", "probability_any"
+    )  # fmt: skip
+
+    def as_dict(self) -> dict[str, float]:
+        """Return the numbers under the keys of the JSON contract."""
+        values = (self.p05, self.p50, self.p95, self.probability_any)
+        return dict(zip(self.KEYS, values, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class MapFailures:
+    """Failures of all blocks of a map in its earthquake.
+
+    Args:
+        expected: their expected number, Σ w P.
+        by_law: what is drawn, by law: the model's copula, or, where it has none, both bounds.
+        range_km: range of the correlation of the shaking [km]; None where it is taken as certain.
+        drawn: weighted number of failures in each draw by law, shape (draws,).
+    """
+
+    expected: float
+    by_law: Mapping[str, Failures]
+    range_km: float | None
+    drawn: Mapping[str, FloatArray]
+
+    @property
+    def draws(self) -> int:
+        """Number of draws."""
+        return next(iter(self.drawn.values())).size
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the numbers under the keys of the JSON contract."""
+        one = self.by_law.get(COPULA)
+        known = dict.fromkeys(Failures.KEYS) if one is None else one.as_dict()
+        bounds = {} if one else {name: law.as_dict() for name, law in self.by_law.items()}
+        return {
+            "expected_failures": self.expected,
+            **known,
+            "joint_law": "bounds" if one is None else COPULA,
+            **({"bounds": bounds} if bounds else {}),
+            "draws": self.draws,
+        }
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What these numbers take for granted."""
+        texts = []
+        if self.range_km is not None:
+            texts.append(
+                f"failures and probability_any take {100 * BETWEEN:.0f} % of the variance of the "
+                "map's values as common to the earthquake, and the rest as correlated over "
+                f"{self.range_km:g} km (Jayaram and Baker 2009)"
+            )
+        if COPULA not in self.by_law:
+            texts.append(
+                "what the blocks share in one earthquake is not known to this model: bounds has "
+                "both under full dependence and if they fail independently"
+            )
+        return tuple(texts)
+
+
+_SAME_SITE_DEG = 0.001
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where sites lie, and which of them are one site to the blocks.
+
+    Args:
+        lon: longitudes [deg], shape (n,).
+        lat: latitudes [deg], shape (n,).
+        group: numbers of what is one site, shape (n,).
+    """
+
+    lon: FloatArray
+    lat: FloatArray
+    group: Indices
+
+    @classmethod
+    def of(
+        cls, lon: FloatArray, lat: FloatArray, names: NDArray[np.object_] | None = None
+    ) -> Places:
+        """Return places of which one site are those of one name, or else within 0.001° (100 m).
+
+        Args:
+            lon: longitudes [deg], shape (n,).
+            lat: latitudes [deg], shape (n,).
+            names: names of their sites, shape (n,), or None.
+        """
+        if names is None:
+            cells = np.rint(np.column_stack([lon, lat]) / _SAME_SITE_DEG).astype(np.int64)
+            group = np.unique(cells, axis=0, return_inverse=True)[1]
+        else:
+            group = np.unique(names.astype(str), return_inverse=True)[1]
+        return cls(lon, lat, np.asarray(group, dtype=np.intp))
+
+    def only(self, chosen: Indices) -> Places:
+        """Return some of the places."""
+        return Places(self.lon[chosen], self.lat[chosen], self.group[chosen])
+
+
+def map_failures(
+    answer: SiteProbability,
+    p2: FloatArray,
+    kr: FloatArray,
+    places: Places,
+    *,
+    weight: FloatArray | None = None,
+    draws: int | None = None,
+    seed: int = 0,
+    between: float = BETWEEN,
+    range_km: float | None = None,
+) -> MapFailures:
+    """Return how many blocks fail together; they face unknown azimuths.
+
+    Args:
+        answer: probabilities of the sites and their blocks.
+        p2: frequency parameters [1/s²] that they were answered for, shape (m,).
+        kr: toppling yield acceleration coefficients, shape (m,).
+        places: where the sites lie.
+        weight: how many blocks each one stands for, shape (m,); None for 1.
+        draws: number of draws, 10 or more; None for 100, and for more where blocks are few.
+        seed: of the random numbers.
+        between: β, 0 to 1.
+        range_km: range of the within-event correlation [km]; None for that of the first measure
+            that the model reads (:func:`~rbfrag.hazards.spatial_field.correlation_range_km`).
+
+    Raises:
+        InputError: a number of draws, a seed or a share that makes no sense.
+    """
+    weights = np.ones(p2.size) if weight is None else weight
+    each = answer.each * weights[answer.block]
+    some = _worth_drawing(each)
+    site, block = answer.site[some], answer.block[some]
+    draws = _number(draws, site.size)
+    if not 0.0 <= between <= 1.0:
+        raise InputError(f"between = {between:g}: a share of the variance is between 0 and 1")
+    if seed < 0:
+        raise InputError(f"seed = {seed}: give 0 or more")
+    if range_km is None:
+        range_km = correlation_range_km(answer.shaking.names[0])
+    used, here = np.unique(site, return_inverse=True)
+    residuals = _Residuals(answer.shaking, used, places.only(used), between, range_km)
+    laws = _laws(answer, p2[block], kr[block], places.group[site])
+    generator = np.random.default_rng(seed)
+    drawn = {name: np.zeros(draws) for name in laws}
+    any_fails = {name: np.zeros(draws, dtype=np.bool_) for name in laws}
+    given = {"p2": p2[block, None], "kr": kr[block, None]}
+    at_once = max(1, _VALUES_AT_ONCE // max(site.size, 1))
+    for start in range(0, draws if site.size else 0, at_once):
+        part = slice(start, min(start + at_once, draws))
+        count = part.stop - start
+        shaken = answer.shaking.shaken(used, residuals.draw(count, generator))
+        values = {name: measure[here] for name, measure in shaken.items()}
+        prediction = answer_given(
+            answer.shaking.model, {**given, **values}, answer.level, interval=False
+        )
+        assert isinstance(prediction, PredictionArray)
+        for name, normals in laws.items():
+            fails = ndtr(normals(count, generator).T) <= prediction.probability
+            drawn[name][part] = weights[block] @ fails
+            any_fails[name][part] = fails.any(axis=0)
+    counted = answer.each[each > 0.0]
+    bounds = float(counted.max(initial=0.0)), min(float(counted.sum()), 1.0)
+    by_law = {
+        name: Failures(
+            # the frequency, between bounds that hold for every law
+            float(np.clip(any_fails[name].mean(), *bounds)),
+            *(float(q) for q in np.quantile(counts, QUANTILES, method="inverted_cdf")),
+        )
+        for name, counts in drawn.items()
+    }
+    known = bool(answer.shaking.integrated)
+    return MapFailures(float(each.sum()), by_law, range_km if known else None, drawn)
+
+
+def _number(draws: int | None, blocks: int) -> int:
+    if draws is None:
+        return min(max(DRAWS, _VALUES // max(blocks, 1)), MOST_DRAWS)
+    if not _FEWEST <= draws <= _MOST:
+        raise InputError(f"draws = {draws}: give {_FEWEST} to {_MOST}")
+    return draws
+
+
+def _worth_drawing(expected: FloatArray) -> Indices:
+    """Return where the most probable ones stand, but `LEFT_OUT` of their sum."""
+    order = np.argsort(expected, kind="stable")
+    below = np.cumsum(expected[order])
+    first = int(np.searchsorted(below, LEFT_OUT * below[-1])) if below.size else 0
+    return np.sort(order[first:])
+
+
+def _laws(
+    answer: SiteProbability, p2: FloatArray, kr: FloatArray, site: Indices
+) -> dict[str, Normals]:
+    """Return draws of Z of some blocks, shape (draws, n), by the law that joins them."""
+    law = Dependence.of_stored(answer.shaking.model.row.dependence)
+    if law is not None:
+        p = np.sqrt(p2)
+        y = kr * STANDARD_GRAVITY_M_S2 / p
+        where = Placement.of(np.log(p), np.log(y), site=site, polarity=UNKNOWN)
+        return {COPULA: JointSampler(law, where).normals}
+    return {
+        DEPENDENT: lambda draws, generator: np.broadcast_to(
+            generator.standard_normal((draws, 1)), (draws, p2.size)
+        ),
+        INDEPENDENT: lambda draws, generator: generator.standard_normal((draws, p2.size)),
+    }
+
+
+class _Residuals:
+    """Draws residuals of the logarithms of the measures at some sites."""
+
+    def __init__(
+        self,
+        shaking: SiteShaking,
+        site: Indices,
+        places: Places,
+        between: float,
+        range_km: float,
+    ) -> None:
+        self._deviations = shaking.deviations[site]
+        self._scatter = shaking.scatter
+        self._parts = np.sqrt(between), np.sqrt(1.0 - between)
+        self._factor = np.linalg.cholesky(correlations(shaking.names))
+        self._field = SpatialField(places.lon, places.lat, range_km) if shaking.integrated else None
+        self._group = np.unique(places.group, return_inverse=True)[1]
+
+    def draw(self, count: int, generator: np.random.Generator) -> FloatArray:
+        """Return residuals, shape (sites, count, k)."""
+        n, k = self._deviations.shape
+        logs = np.zeros((n, count, k))
+        if self._field is not None:
+            common, own = self._parts
+            event = common * generator.standard_normal((count, k))
+            within = self._field.draw(count * k, generator).reshape(n, count, k)
+            logs += (event + own * within) @ self._factor.T * self._deviations[:, None]
+        if self._scatter > 0.0:
+            xi = generator.standard_normal((int(self._group.max(initial=-1)) + 1, count))
+            logs += self._scatter * xi[self._group][:, :, None]
+        return logs

@@ -1,0 +1,53 @@
+"""`predict` of uncertain blocks: sigmas and a table of draws, as from Python and the service."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rbfrag.fragility.predict import predict
+from tests.cli.conftest import Refuses, Shell
+
+ASKED = ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
+DRAWS = "block_id,p2_1_s2,kr,weight\nrock,3,0.1,1\nrock,2.5,0.12,3\n"
+
+
+def test_sigmas_are_integrated_over_and_said(shell: Shell) -> None:
+    told = shell.json(*ASKED, "--kr-sigma", "0.2", "--p2-sigma", "0.1")
+    answers = told.pop("answers")
+    own = predict(3.0, 0.1, pgv_m_s=0.6, kr_sigma=0.2, p2_sigma=0.1)
+    assert told == own.as_dict()
+    assert answers[0]["probability"] == own.probability
+    words = shell(*ASKED, "--kr-sigma", "0.2").stdout
+    assert "P differs with a standard deviation of" in words
+    assert "uncertain" not in shell(*ASKED).stdout
+
+
+def test_draws_of_a_table_are_one_block(shell: Shell) -> None:
+    Path("draws.csv").write_text(DRAWS)
+    told = shell.json("predict", "--block-draws", "draws.csv", "--pgv", "0.6", "--pga", "0.3")
+    told.pop("answers")
+    own = predict([3.0, 2.5], [0.1, 0.12], pgv_m_s=0.6, pga_g=0.3, weights=[1.0, 3.0])
+    assert told == own.as_dict()
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--kr-sigma", "-1"), "kr_sigma = -1: give a standard deviation of 0 or more"),
+        (("--restitution-sigma", "0.1"), "restitution_sigma does not go with kind toppling"),
+        (("--block-draws", "draws.csv"), "--block-draws does not go with --p2"),
+    ],
+)
+def test_what_does_not_fit_is_refused(refuses: Refuses, more: tuple[str, ...], words: str) -> None:
+    Path("draws.csv").write_text(DRAWS)
+    assert words in refuses(*ASKED, *more)
+
+
+def test_a_known_motion_is_simulated_instead(refuses: Refuses, tmp_path: Path) -> None:
+    record = tmp_path / "a.csv"
+    record.write_text("0\n0.1\n-0.2\n0\n")
+    asked = ("predict", "--p2", "3", "--kr", "0.1", "--motion", record, "--dt", "0.1")
+    message = refuses(*asked, "--units", "g", "--kr-sigma", "0.1")
+    assert "rbfrag respond MOTION --draws" in message
