@@ -185,8 +185,8 @@ def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     Args:
         path: file with ``p2_1_s2`` [1/s²] and ``kr``, or ``height_m`` and ``width_m`` (and
             ``dip_deg``), and ``block_id``, ``p2_sigma``, ``kr_sigma``, ``weight``, ``lon`` and
-            ``lat`` [deg] if it has them; a table also ``site_id``, ``kind``, ``count``, ``loss``
-            and ``loss_sigma``.
+            ``lat`` [deg] if it has them; a table also ``restitution``, ``site_id``, ``kind``,
+            ``count``, ``loss`` and ``loss_sigma``.
 
     Returns:
         Columns of one length; ``block_id`` are texts, numbers from 1 on where there are none.
@@ -257,7 +257,7 @@ def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     columns = read_columns(
         path,
         (),
-        optional=(*NUMBERS, *SIGMAS, *RECTANGLE, *PORTFOLIO, "lon", "lat", "weight"),
+        optional=(*NUMBERS, *SIGMAS, *RECTANGLE, *PORTFOLIO, "lon", "lat", "weight", "restitution"),
         texts=("block_id", "site_id", "kind"),
     )
     if is_of_rectangles(columns):

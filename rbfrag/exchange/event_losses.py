@@ -50,7 +50,8 @@ def losses(
             ``height_m`` and ``width_m`` [m], with ``site_id`` (text), and, if there are,
             ``block_id``, ``kind``, ``count`` (like blocks, each with an azimuth of its own),
             ``weight`` (what a failure counts, and its loss with it), ``loss`` (in the median) and
-            ``loss_sigma`` (standard deviation of its logarithm), ``p2_sigma`` and ``kr_sigma``.
+            ``loss_sigma`` (standard deviation of its logarithm), ``p2_sigma``, ``kr_sigma`` and
+            ``restitution``.
         files: files by what they hold: gmf_data, events, sitemesh, realizations, ruptures.
         samples: samples of each event.
         expected: do without samples; then there are no curves of exceedance.

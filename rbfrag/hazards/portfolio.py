@@ -6,8 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from os import PathLike
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.hazards.annual_rate import normal_steps
+from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import Component
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -53,6 +54,8 @@ class Portfolio:
         loss: what a failure costs in the median, its weight included, shape (n,); None where
             nothing is stated.
         loss_sigma: standard deviation of the logarithm of that, shape (n,).
+        options: what else a model may read of a block, by name, shape (n,) each; NaN where it is
+            not stated.
         model: index of the model that answers for each block, shape (n,).
         models: the models as stored.
         measures: what the models read of the shaking.
@@ -70,6 +73,7 @@ class Portfolio:
     weight: FloatArray
     loss: FloatArray | None
     loss_sigma: FloatArray
+    options: Mapping[str, FloatArray]
     model: IntArray
     models: tuple[ModelRow, ...]
     measures: tuple[str, ...]
@@ -92,8 +96,8 @@ class Portfolio:
         Args:
             columns: ``block_id``, ``p2_1_s2`` [1/s²] and ``kr`` of each row, and, if there are,
                 ``site_id``, ``kind``, ``count`` (like blocks, each with an azimuth of its own),
-                ``weight`` (what a failure counts), ``loss``, ``loss_sigma``, ``p2_sigma`` and
-                ``kr_sigma``.
+                ``weight`` (what a failure counts), ``loss``, ``loss_sigma``, ``p2_sigma``,
+                ``kr_sigma`` and options of the kind such as ``restitution``.
             site_ids: names of the sites of the event set.
             measures: what is known of the shaking, by the names of :func:`rbfrag.predict`.
             component: what its values mean.
@@ -142,6 +146,7 @@ class Portfolio:
         row = np.repeat(np.arange(n), count.astype(np.int64))
         row = row[np.argsort(sites[row], kind="stable")]
         loss = numbers("loss", 0.0) * weight if "loss" in columns else None
+        reads = {name for one in chosen.values() for name in one.method.block.options}
         return cls(
             block_ids=tuple(str(name) for name in names),
             site_ids=tuple(site_ids[i] for i in sites.tolist()),
@@ -154,6 +159,10 @@ class Portfolio:
             weight=weight[row],
             loss=None if loss is None else loss[row],
             loss_sigma=numbers("loss_sigma", 0.0)[row],
+            options={
+                name: np.asarray(columns[name], dtype=np.float64)[row]
+                for name in sorted(reads & set(columns))
+            },
             model=np.array([places[one] for one in kinds], dtype=np.int64)[row],
             models=tuple(one.row for one in chosen.values()),
             measures=tuple(dict.fromkeys(n for one in chosen.values() for n in one.term.inputs)),
@@ -173,11 +182,7 @@ class Portfolio:
     @cached_property
     def dependence(self) -> Dependence | None:
         """What the failures of one earthquake share; None where that is not known."""
-        stored = self.models[0].dependence
-        names = Dependence.__dataclass_fields__
-        if len(self.models) > 1 or stored is None or not set(names) <= set(stored):
-            return None
-        return Dependence(**{name: float(cast("float", stored[name])) for name in names})
+        return self._answering[0].dependence if len(self.models) == 1 else None
 
     @property
     def is_uncertain(self) -> bool:
@@ -205,6 +210,29 @@ class Portfolio:
     def _answering(self) -> tuple[FragilityModel, ...]:
         return tuple(FragilityModel.from_row(row) for row in self.models)
 
+    @cached_property
+    def _alike(self) -> tuple[tuple[int, tuple[str, ...]], ...]:
+        """Models, and which of their options are stated: blocks that are answered together."""
+        ways = [
+            tuple(name for name, is_stated in zip(self.options, way, strict=True) if is_stated)
+            for way in product((False, True), repeat=len(self.options))
+        ]
+        return tuple(
+            (number, way)
+            for number, model in enumerate(self._answering)
+            for way in ways
+            if set(way) <= set(model.method.block.options)
+        )
+
+    def _states(self, names: Sequence[str]) -> NDArray[np.bool_]:
+        """Return which blocks state these options of their model, and no others, shape (n,)."""
+        exact = np.ones(self.size, dtype=np.bool_)
+        for number, model in enumerate(self._answering):
+            own = self.model == number
+            for name in set(self.options) & set(model.method.block.options):
+                exact[own] &= np.isfinite(self.options[name][own]) == (name in names)
+        return exact
+
     def probability(
         self,
         some: NDArray[np.intp],
@@ -229,10 +257,13 @@ class Portfolio:
         shape = np.broadcast_shapes(*(value.shape for value in given.values()))
         given = {name: np.broadcast_to(value, shape) for name, value in given.items()}
         p, in_domain = np.empty(shape), np.empty(shape, dtype=np.bool_)
-        for number, model in enumerate(self._answering):
-            own = self.model[some] == number
-            reads = ("p2", "kr", *model.term.inputs)
-            part = {name: given[name][..., own] for name in reads}
+        for number, stated in self._alike:
+            own = (self.model[some] == number) & self._states(stated)[some]
+            if not own.any():
+                continue
+            model = self._answering[number]
+            part = {name: given[name][..., own] for name in ("p2", "kr", *model.term.inputs)}
+            part |= {name: self.options[name][some][own] for name in stated}
             answer = answer_given(model, part, _LEVEL, interval=False)
             assert isinstance(answer, PredictionArray)
             p[..., own], in_domain[..., own] = answer.probability, answer.in_domain

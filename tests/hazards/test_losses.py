@@ -13,10 +13,13 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import binom, chi2
 
+from rbfrag.db.engine import opened_database
+from rbfrag.db.models import save_model
 from rbfrag.errors import InputError
 from rbfrag.exchange.event_losses import losses
 from rbfrag.exchange.hazard_curves import read_hazard_curves
 from rbfrag.exchange.openquake_events import JobFiles, read_events
+from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.predict import predict
 from rbfrag.hazards import event_counts
 from rbfrag.hazards.answer import hazard
@@ -417,3 +420,35 @@ def test_a_scenario_of_the_engine(formats_dir: Path) -> None:
     mean = probability(0.4, 0.01 * np.array(pgv)).mean()
     assert answer.as_dict()["expected_failures"] == pytest.approx(mean, rel=1e-9)
     assert answer.as_dict()["probability_any"] == pytest.approx(mean, rel=1e-9)
+
+
+def test_kinds_and_their_options(job: Path) -> None:
+    """Free-standing blocks with and without a stated restitution beside one that is backed."""
+    values = (1.0, -3.0, 0.1, 0.0, -6.0, 0.0)
+    names = method_named("overturning").forms["pgv"].parameters
+    free = model_row(
+        name="free", kind="rocking", method="overturning", term="pgv", dependence=None,
+        coefficients=dict(zip(names, values, strict=True)),
+        covariance=tuple(tuple(0.0 for _ in names) for _ in names), domain={},
+    )  # fmt: skip
+    with opened_database(job / "models.db", create=True) as engine, engine.begin() as connection:
+        save_model(connection, free)
+        save_model(connection, model_row(is_default=True))
+    blocks = table([0.4, 0.4, 0.4], "0012", kind=np.array(["", "rocking", "rocking"], dtype=object))
+    blocks["restitution"] = np.array([np.nan, 0.9, np.nan])
+    answer = losses(job, blocks, component="single", expected=True, db=job / "models.db")
+    kr, pgv = float(blocks["kr"][0]), np.array([0.6, 0.8, 0.9])
+    weight = np.array([0.005, 0.005, 0.002])
+    alone = [
+        predict(
+            p2=4.0, kr=kr, pgv_m_s=pgv, kind=kind, restitution=restitution, db=job / "models.db"
+        )
+        for kind, restitution in (("toppling", None), ("rocking", 0.9), ("rocking", None))
+    ]
+    rows = answer.as_dict()["blocks"]
+    assert [row["average_annual_failures"] for row in rows] == pytest.approx(
+        [float(weight @ one.probability) for one in alone]
+    )
+    assert rows[1]["average_annual_failures"] != rows[2]["average_annual_failures"]
+    assert answer.as_dict()["kind"] == "toppling, rocking"
+    assert any("several models have no joint law" in text for text in answer.warnings)
