@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import product
 from os import PathLike
@@ -168,6 +168,10 @@ class Portfolio:
             measures=tuple(dict.fromkeys(n for one in chosen.values() for n in one.term.inputs)),
             component=component,
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        # models read anew travel as rows alone: their formulas cannot
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def size(self) -> int:

@@ -19,6 +19,9 @@ CONNECT_TIMEOUT_S = 10.0
 WORKER_TIMEOUT_S = 60.0
 """How long to wait for the first worker of a scheduler that has none [s]."""
 
+GO_ON = "what was finished is stored: run the same command again to go on"
+"""What to do after workers have died, of work whose results are stored."""
+
 QUEUED_PER_THREAD = 2
 """Motions handed out ahead of each thread of the cluster."""
 
@@ -58,7 +61,10 @@ def connected(address: str) -> Iterator[Any]:
 
 
 def run_on_cluster(
-    client: Any, run_work: Callable[[Work], Results], work: Iterator[Work], after_a_death: str
+    client: Any,
+    run_work: Callable[[Work], Results],
+    work: Iterator[Work],
+    after_a_death: str = GO_ON,
 ) -> Iterator[Results]:
     """Yield the answers as they come from a cluster.
 

@@ -14,7 +14,7 @@ from functools import partial
 from multiprocessing.connection import wait as wait_for_end
 from typing import Any, TypeVar
 
-from rbfrag.campaign.executors.dask import connected, run_on_cluster
+from rbfrag.campaign.executors.dask import GO_ON, connected, run_on_cluster
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.solver.integrator.compiled import callbacks, on_compilation
 
@@ -24,9 +24,6 @@ R = TypeVar("R")
 QUEUED_PER_WORKER = 2
 """Chunks handed out ahead of each worker: enough to keep it busy, little enough for memory."""
 
-
-GO_ON = "what was finished is stored: run the same command again to go on"
-"""What to do after workers have died, of work whose results are stored."""
 
 CLUSTER = "a cluster"
 """Stands for the processor where workers are elsewhere: nobody's bits are promised then."""
