@@ -223,6 +223,7 @@ def test_an_independent_integrator_agrees() -> None:
     runs = [compare(each) for each in draw(Records(motions, "made up"), 8, seed=3)]
     certain = [run for run in runs if not run.sensitive]
     assert len(certain) >= 6
+    assert all(run.impacts >= 0 for run in runs)
     for run in certain:
         assert run.same
         if not math.isnan(run.deviation) and run.impacts <= 30:
