@@ -187,12 +187,15 @@ class SearchPoints:
         outcome: :class:`Outcome` values as text, length n.
         displacement_m: displacement down a level plane of blocks that slide [m], shape (n,);
             None for other kinds.
+        sensitive: of free-standing blocks, whether the outcome is another one for the motion times
+            1 ± 1e-6, shape (n,); None for other kinds.
     """
 
     kr_over_pga: FloatArray
     theta_n: FloatArray
     outcome: tuple[str, ...]
     displacement_m: FloatArray | None = None
+    sensitive: NDArray[np.bool_] | None = None
 
 
 IntervalOutcome = Literal["topples", "safe", "undecided"]
