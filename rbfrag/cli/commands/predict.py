@@ -40,6 +40,14 @@ class Failure:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Uncertainty(UncertaintyOptions):
+    """How well a block is known that fails in any way."""
+
+    ks_sigma: float | None = option("Standard deviation of ln k_s.")
+    ps2_sigma: float | None = option("Standard deviation of ln p_s².")
+
+
+@dataclass(frozen=True, kw_only=True)
 class Record:
     """The accelerogram itself."""
 
@@ -73,7 +81,7 @@ class Table:
 def predict(
     block: BlockOptions,
     failure: Failure,
-    known: UncertaintyOptions,
+    known: Uncertainty,
     measures: options.Measures,
     record: Record,
     reading: options.Reading,

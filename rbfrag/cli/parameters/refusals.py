@@ -66,6 +66,9 @@ CONFLICTS = (
         ("--block-draws",), (*NUMBERS, *SHAPE, *FILES, *PLANES, *SIGMAS), "the table has the block"
     ),
     Conflict(("--block-draws",), ("--batch",), "one question is about one block"),
+    Conflict(("--block-draws",), ("--ky", "--restitution"), "the table has the block"),
+    Conflict(("--draws",), ("--csv", "--plot", "--animate"), "they show one run", ("respond",)),
+    Conflict(("--polarity",), ("--reverse",), "one of them is enough"),
     Conflict(
         (*PLANES, "--cohesion", "--kv"),
         ("--mesh",),
@@ -116,6 +119,13 @@ NEEDS = (
         "a motion or a measure of it",
         f"give --motion, or {_MEASURE.removeprefix('give ')}",
         ("rockmass",),
+    ),
+    Need(
+        (*SIGMAS, "--block-draws", "--polarity", "--seed", "--displacement"),
+        ("--draws",),
+        "--draws",
+        "it is about what the block may be, of which so many are run",
+        ("respond",),
     ),
     Need(("--exaggerate",), ("--animate",), "--animate", "it is a factor on what the film shows"),
     Need(("--up", "--contact-mm"), ("--mesh",), "--mesh", "it is about the pose of a mesh"),
