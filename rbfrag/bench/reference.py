@@ -151,14 +151,14 @@ def rocking_reference(case: Case, restitution: float) -> Answer:
 
 def _departure(a: Real, da: Real, g: Real, dg: Real, at: Real) -> tuple[Real, int, bool]:
     """Return where a block at rest lifts off, in which sense, and whether k_h just reaches k_r."""
-    found = (Real(1), 0, False)
+    first = (Real(1), 0, False)
     for side in (1, -1):
         above, slope = side * a - g, side * da - dg
         if above + slope * at > 0:
             return at, side, False
-        if above + slope > 0 and -above / slope < found[0]:
-            found = (max(at, -above / slope), side, True)
-    return found
+        if above + slope > 0 and -above / slope < first[0]:
+            first = (max(at, -above / slope), side, True)
+    return first
 
 
 def _coefficients(
