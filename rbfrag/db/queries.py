@@ -158,12 +158,15 @@ class OutcomeGrid:
             stored, undetermined, or outside the model.
         theta_n: peak rotation over the critical angle; NaN where it fails.
         displacement_m: displacement down a level plane [m]; NaN for blocks that do not slide.
+        sensitive: 1 where another outcome follows from the motion times 1 ± 1e-6, 0 where not, NaN
+            of kinds that store it of no block.
     """
 
     k_over_pga: NDArray[np.float64]
     outcome: NDArray[np.float64]
     theta_n: NDArray[np.float64]
     displacement_m: NDArray[np.float64]
+    sensitive: NDArray[np.float64]
 
 
 def outcome_grid(connection: Connection, combination_id: ArrayLike) -> OutcomeGrid:
@@ -187,14 +190,15 @@ def outcome_grid(connection: Connection, combination_id: ArrayLike) -> OutcomeGr
             fails,
             column.theta_n,
             column.displacement_m,
+            column.sensitive,
         ).where(
             column.combination_id.between(int(wanted.min()), int(wanted.max())),
             column.grid.is_not(None),
         )
         rows = list(connection.execute(query))
-    values = np.array([tuple(row) for row in rows], dtype=np.float64).reshape(-1, 6)
+    values = np.array([tuple(row) for row in rows], dtype=np.float64).reshape(-1, 7)
     owner, number = values[:, 0].astype(np.int64), values[:, 1].astype(np.int64)
-    grid = np.full((4, wanted.size, int(number.max(initial=-1)) + 1), np.nan)
+    grid = np.full((5, wanted.size, int(number.max(initial=-1)) + 1), np.nan)
     order = np.argsort(wanted)
     at = np.searchsorted(wanted, owner, sorter=order)
     at = order[np.minimum(at, wanted.size - 1)]

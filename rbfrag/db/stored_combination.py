@@ -105,6 +105,9 @@ def stored_combination(connection: Connection, natural_key: str) -> StoredCombin
             displacement_m=None
             if all(point.displacement_m is None for point in points)
             else _floats([point.displacement_m for point in points]),
+            sensitive=None
+            if any(point.sensitive is None for point in points)
+            else np.array([point.sensitive for point in points], dtype=np.bool_),
         ),
         intervals=OutcomeIntervals(
             k_lo=_floats([interval.k_lo for interval in intervals]),

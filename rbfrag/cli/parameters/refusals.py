@@ -133,6 +133,7 @@ NEEDS = (
         ("--out",), ("--mesh",), "--mesh", "only a mesh makes a table, of its azimuths", ("block",)
     ),
     Need(("--n",), ("--rockmass",), "--rockmass", "only a rock mass is drawn anew"),
+    Need(("--shares",), ("--rockmass",), "--rockmass", "they are shares of its blocks"),
 )
 
 
