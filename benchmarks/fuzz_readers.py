@@ -36,7 +36,7 @@ from rbfrag.motions.quality import quality_flags
 from rbfrag.motions.recognise import read_motions
 from tests.motions.test_network_round_trips import STATE_NO_UNIT, WRITTEN
 from tests.motions.written import AT2_SAMPLING, at2, two_columns, v2a
-from tests.motions.written_by_networks import knet
+from tests.motions.written_by_networks import csmip_v1, knet
 from tests.synthetic import shaking
 
 SLOW_S = 2.0
@@ -81,6 +81,8 @@ def bases(records: Path | None) -> dict[str, list[bytes]]:
     found = {name: [make().encode()] for name, make in WRITTEN.items()}
     borehole = knet([int(1000.0 * value) for value in shaking(4, 200)], 100, direction="1")
     found["K-NET/KiK-net ASCII"].append(borehole.encode())
+    series = csmip_v1([("360 Deg", [f".{i:06d}" for i in range(60)])], 0.005)
+    found["CDMG V1"].append(series.encode())
     found["PEER AT2"] = [at2(TOKENS, 0.005, sampling=form).encode() for form in AT2_SAMPLING]
     found["GeoNet V2A"] = [v2a([("N28W", DECIMALS), ("UP", DECIMALS)], 0.02).encode()]
     found["delimited text"] = [

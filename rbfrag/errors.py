@@ -3,7 +3,8 @@
     RbfragError
     ├── InputError                  a value, option or file that cannot be used   (exit 2)
     │   ├── MotionFileError         an accelerogram that cannot be read
-    │   │   └── UnknownFormatError  no reader recognises the content
+    │   │   ├── UnknownFormatError  no reader recognises the content
+    │   │   └── UnitNotStatedError  neither the file nor the caller says the unit
     │   └── MissingExtraError       an optional dependency is not installed
     ├── DatabaseError               a database that cannot be used                (exit 2)
     │   ├── DatabaseNotFoundError
@@ -97,6 +98,10 @@ def _rebuild_motion_file_error(
 
 class UnknownFormatError(MotionFileError):
     """No reader recognises the content of the file."""
+
+
+class UnitNotStatedError(MotionFileError):
+    """Neither the file nor the caller says in which unit its accelerations are."""
 
 
 class MissingExtraError(InputError):

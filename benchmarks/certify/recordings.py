@@ -74,7 +74,7 @@ def recordings(folder: str | os.PathLike[str] | None = None) -> list[Recording]:
         except InputError:  # the file states no unit
             motions = read_motions(path, units=about[0].units)
         for row in about:
-            motion = motions[row.trace_index]
+            motion = motions[row.trace_index or 0]
             name = f"{path.relative_to(root)}#{row.trace_index}"
             if row.is_vertical:
                 upward[row.companion_group] = motion

@@ -121,7 +121,8 @@ def add_motions(
         db: the database (path, URL, or None for the default).
         suite: suite to put the motions into.
         metadata: CSV that states, by file and trace, earthquake, units and direction.
-        units: unit of text files that do not state it.
+        units: unit of files that do not state it; one that states another is read by what it
+            states, with a warning, and refused where it is the only file.
         dt_s: sampling interval [s] of text files that hold accelerations only.
         raw: store every record as its file has it; uncorrected ones are flagged.
         allow_partial: read files whose header states another number of samples than follow;
@@ -153,6 +154,7 @@ def add_motions(
         for number, file in enumerate(files, 1):
             try:
                 traces = read_traces(file, stated, units, dt_s, allow_partial)
+                _take_note_of_units(run, file, traces, units, alone=len(files) == 1)
                 if engine is None:
                     engine = stack.enter_context(opened_database(db, create=True))
                 with engine.begin() as connection:
@@ -188,6 +190,19 @@ def _take_note(run: _Run, stored: list[_Stored]) -> None:
             )
         elif one.doubt:
             run.warnings.append(one.doubt)
+
+
+def _take_note_of_units(
+    run: _Run, file: Path, traces: list[Trace], units: str | None, *, alone: bool
+) -> None:
+    other = next((trace.other_unit for trace in traces if trace.other_unit), "")
+    if other and alone:
+        raise MotionFileError(file, f"{other} is stated for it, not {units}: leave --units out")
+    if other:
+        run.warnings.append(
+            f"{file} is in {other}, as is stated for it, not in {units}: --units is for the files "
+            "that state none"
+        )
 
 
 def _mixed_intervals(connection: Connection, touched: dict[int, str]) -> list[str]:

@@ -167,7 +167,7 @@ def plan_campaign(
             cases=tuple(
                 _planned(row, up, polarity, case)
                 for up in _verticals(vertical, fitting.get(row.id))
-                for polarity in POLARITIES
+                for polarity in model_of_kind(kind).polarities
                 for case in cases
             ),
         )
@@ -197,8 +197,9 @@ def remaining_work(connection: Connection, plan: CampaignPlan, wanted: Wanted) -
             for ratio in _histories(known.get(case.natural_key), wanted)
         ),
     )
-    # X(p) is a measure of blocks that are described by p²
-    described = "p2" in model_of_kind(plan.kind).parameters
+    # X(p) is a measure of blocks that are described by p² and backed by a slope
+    model = model_of_kind(plan.kind)
+    described = "p2" in model.parameters and not model.free_standing
     sizes = list(dict.fromkeys(c.case.p2 for c in plan.cases if c.case.p2 and described))
     spectra = spectrum_values(connection, p2=sizes) if sizes else {}
     motions = []

@@ -6,6 +6,7 @@ import math
 import random
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from sqlalchemy import Connection
 
@@ -49,8 +50,21 @@ _VALUES = (
 ROTATION_ERROR = 1e-6
 """Relative error of a rotation or displacement that another processor's last bits can make."""
 
-End = tuple[str, float | None, float | None]
-"""Outcome, θ_n and displacement [m] of one block; None where there is none."""
+
+class End(NamedTuple):
+    """How one simulated block ended.
+
+    Args:
+        outcome: its outcome.
+        theta_n: peak rotation over the critical angle; None where there is none.
+        displacement_m: how far it slid [m]; None where it does not.
+        sensitive: whether the outcome is; None of kinds whose outcomes are not.
+    """
+
+    outcome: str
+    theta_n: float | None
+    displacement_m: float | None
+    sensitive: bool | None
 
 
 @dataclass(frozen=True)
@@ -175,15 +189,18 @@ def ends_of(points: SearchPoints | None) -> dict[float, End]:
     """Return how simulated blocks ended, by k/PGA."""
     if points is None:
         return {}
-    slid = points.displacement_m
+    slid, sensitive = points.displacement_m, points.sensitive
     rows = zip(
         points.kr_over_pga.tolist(),
         points.outcome,
         points.theta_n.tolist(),
         [math.nan] * len(points.outcome) if slid is None else slid.tolist(),
+        [None] * len(points.outcome) if sensitive is None else sensitive.tolist(),
         strict=True,
     )
-    return {k: (str(word), _number(theta), _number(at)) for k, word, theta, at in rows}
+    return {
+        k: End(str(word), _number(theta), _number(at), flips) for k, word, theta, at, flips in rows
+    }
 
 
 def differences(stored: StoredCombination, again: ComputedAgain) -> Iterator[str]:
@@ -225,20 +242,35 @@ def deviations(stored: StoredCombination, again: ComputedAgain) -> Iterator[str]
         yield from _map_differences(stored, critical)
         borders = [*critical.intervals.k_lo.tolist(), *critical.intervals.k_hi.tolist()]
         borders += [edge for edge in (critical.lower, critical.upper) if edge is not None]
-    for k, (outcome, theta, slid) in ends_of(stored.points).items():
+    for k, then in ends_of(stored.points).items():
         if k not in again.ends:
             continue
-        now, theta_now, slid_now = again.ends[k]
-        if outcome != now:
-            if not any(math.isclose(k, at, rel_tol=BORDER_ERROR) for at in borders):
-                yield f"the simulation at kr/PGA {k!r} is {outcome}, computed again {now}"
-        elif not (_close(theta, theta_now) or _within(again.error(k), theta, theta_now)):
+        now = again.ends[k]
+        theta, theta_now = then.theta_n, now.theta_n
+        if then.outcome != now.outcome:
+            # another processor's last bits turn a sensitive outcome as other motions do
+            if not (
+                then.sensitive
+                or now.sensitive
+                or any(math.isclose(k, at, rel_tol=BORDER_ERROR) for at in borders)
+            ):
+                yield (
+                    f"the simulation at kr/PGA {k!r} is {then.outcome}, computed again "
+                    f"{now.outcome}"
+                )
+        # where outcomes may be sensitive the size of peaks may be chaotic
+        elif then.sensitive is None and not (
+            _close(theta, theta_now) or _within(again.error(k), theta, theta_now)
+        ):
             yield (
                 f"the simulation at kr/PGA {k!r} reaches {theta!r} of the critical angle, "
                 f"computed again {theta_now!r}"
             )
-        elif not _close(slid, slid_now):
-            yield f"the block of ky/PGA {k!r} slides {slid!r} m, computed again {slid_now!r}"
+        elif not _close(then.displacement_m, now.displacement_m):
+            yield (
+                f"the block of ky/PGA {k!r} slides {then.displacement_m!r} m, computed again "
+                f"{now.displacement_m!r}"
+            )
 
 
 def _map_differences(stored: StoredCombination, critical: CriticalResult) -> Iterator[str]:
@@ -251,8 +283,12 @@ def _map_differences(stored: StoredCombination, critical: CriticalResult) -> Ite
 def _described(end: End | None) -> object:
     if end is None:
         return "none"
-    outcome, theta, slid = end
-    return (outcome, theta) if slid is None else (outcome, theta, f"{slid!r} m")
+    parts: list[object] = [end.outcome, end.theta_n]
+    if end.displacement_m is not None:
+        parts.append(f"{end.displacement_m!r} m")
+    if end.sensitive is not None:
+        parts.append("sensitive" if end.sensitive else "not sensitive")
+    return tuple(parts)
 
 
 def _close(then: float | None, now: float | None) -> bool:

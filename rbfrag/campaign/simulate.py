@@ -53,6 +53,7 @@ OPTIONS = {
     "rotations_deg": "--rotation",
     "displacements_m": "--displacement",
     "family": "family",
+    "restitution_factors": "--restitution-factor",
     "grid": "--grid",
     "store_responses": "--store-responses",
     "full_map": "--map",
@@ -135,6 +136,7 @@ def simulate(
     rotations_deg: Sequence[float | None] | None = None,
     displacements_m: Sequence[float] | None = None,
     family: Sequence[Any] | None = None,
+    restitution_factors: Sequence[float] | None = None,
     vertical: Vertical = "without",
     grid: int | Sequence[float] | None = None,
     store_responses: Sequence[float | Literal["critical"]] | None = None,
@@ -156,12 +158,15 @@ def simulate(
         db: the database (path, URL, or None for the default).
         kind: what the blocks do; an option of another kind is refused.
         suite: only the motions of this suite.
-        p2: toppling: frequency parameters p² [1/s²]; None for 30, 10, 3, 1, 0.3 and 0.1.
+        p2: toppling and rocking: frequency parameters p² [1/s²]; None for 30, 10, 3, 1, 0.3 and
+            0.1.
         rotations_deg: slumping: rotations that count as failure [deg], None among them for
             failure past recovery; None for 2 and past recovery.
         displacements_m: sliding: displacements on a level plane [m]; None for 0.01, 0.05, 0.15
             and 0.3.
         family: slumping: the blocks; None for `rbfrag.solver.models.slumping.FAMILY`.
+        restitution_factors: rocking: factors on the restitution of the rectangle, 1 - 1.5 sin² α
+            (Housner 1963); None for 1, 0.95, 0.9 and 0.8.
         vertical: ``without`` vertical motion, ``with`` that of the same recording, or ``both``.
         grid: toppling: run more blocks for themselves: at these k_r/PGA, or at that many from
             0.99 down to 0.01, equally spaced in the logarithm.
@@ -181,7 +186,7 @@ def simulate(
     """
     check_workers(jobs, scheduler)
     blocks = {"p2": p2, "rotations_deg": rotations_deg, "displacements_m": displacements_m,
-              "family": family}  # fmt: skip
+              "family": family, "restitution_factors": restitution_factors}  # fmt: skip
     described = {name: value for name, value in blocks.items() if value is not None}
     extras = {"grid": grid, "store_responses": store_responses, "full_map": full_map or None}
     cases = _cases(kind, described, [name for name, given in extras.items() if given is not None])

@@ -6,21 +6,25 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from rbfrag.errors import InputError, MotionFileError
+from rbfrag.errors import InputError, MotionFileError, UnitNotStatedError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.metadata import MotionMetadata, TraceMetadata
-from rbfrag.motions.recognise import read_motions
-from rbfrag.motions.units import acceleration_unit
+from rbfrag.motions.recognise import read_motions, stated_in_g
+from rbfrag.motions.units import acceleration_unit, unit_in_g
 
 NOTHING_STATED = TraceMetadata(file="", line=0)
 
 
 @dataclass(frozen=True)
 class Trace:
-    """One trace as its file has it, and what the metadata state of it, empty where nothing."""
+    """One trace as its file has it, and what the metadata state of it, empty where nothing.
+
+    `other_unit` is what file or metadata state where the caller stated another unit; else empty.
+    """
 
     motion: GroundMotion
     stated: TraceMetadata
+    other_unit: str = ""
 
     @property
     def is_vertical(self) -> bool | None:
@@ -41,7 +45,8 @@ def read_traces(
     Args:
         file: the file.
         metadata: the table, or None.
-        units: unit that the caller states; else that of the table is used.
+        units: unit that the caller states for files that state none, neither by themselves nor
+            by the table; :attr:`Trace.other_unit` names one that does state another.
         dt_s: sampling interval that the caller states [s]; likewise.
         allow_partial: as for :func:`rbfrag.motions.recognise.read_motions`.
 
@@ -51,10 +56,13 @@ def read_traces(
     rows = [] if metadata is None else metadata.file(file)
     if rows:
         _refuse_rows_apart(file, rows)
-        units = units or _known_unit(rows[0].units)
         dt_s = dt_s or rows[0].dt_s
-    motions = read_motions(file, units=units, dt_s=dt_s, allow_partial=allow_partial)
-    by_index = {row.trace_index: row for row in rows}
+    by_table = _known_unit(rows[0].units) if rows else None
+    try:
+        motions = read_motions(file, units=by_table, dt_s=dt_s, allow_partial=allow_partial)
+    except UnitNotStatedError:
+        motions = read_motions(file, units=units, dt_s=dt_s, allow_partial=allow_partial)
+    by_index = _rows_of_traces(file, rows, motions)
     for index, row in by_index.items():
         if index >= len(motions):
             raise MotionFileError(
@@ -62,7 +70,14 @@ def read_traces(
                 f"line {row.line} of the metadata names trace {index}, but the file holds "
                 f"{len(motions)}, counted from 0: correct trace_index",
             )
-    traces = [Trace(motion, by_index.get(motion.trace_index, NOTHING_STATED)) for motion in motions]
+    traces = [
+        Trace(
+            motion,
+            by_index.get(motion.trace_index, NOTHING_STATED),
+            _other_unit(units, motion.stated_unit or by_table),
+        )
+        for motion in motions
+    ]
     for trace in traces:
         _refuse_other_direction(file, trace)
     return traces
@@ -88,6 +103,28 @@ def missing_files(
         seen.add(place)
         if any(place == searched or searched in place.parents for searched in places):
             yield str(named), row
+
+
+def _rows_of_traces(
+    file: Path, rows: list[TraceMetadata], motions: list[GroundMotion]
+) -> dict[int, TraceMetadata]:
+    """Rows by trace: a row without an index is the row of every trace of the file."""
+    whole = next((row for row in rows if row.trace_index is None), None)
+    if whole is None:
+        return {row.trace_index: row for row in rows if row.trace_index is not None}
+    if len(motions) > 1 and whole.component:
+        raise MotionFileError(
+            file,
+            f"line {whole.line} of the metadata calls all {len(motions)} traces of the file "
+            f"{whole.component}: give each a row with its trace_index, from 0",
+        )
+    return dict.fromkeys(range(len(motions)), whole)
+
+
+def _other_unit(units: str | None, stated: str | None) -> str:
+    if units is None or not stated or stated_in_g(stated) == unit_in_g(units):
+        return ""
+    return stated
 
 
 def _refuse_rows_apart(file: Path, rows: list[TraceMetadata]) -> None:

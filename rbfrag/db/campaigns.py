@@ -29,7 +29,8 @@ _OF_A_MAP = ("island_width", "kr_over_pga_resolved", "reentrant", "n_runs", "war
 GRID_MEETS_POINT = (
     "(combination_id, kr_over_pga) DO UPDATE SET theta_n = excluded.theta_n, "
     "outcome = excluded.outcome, displacement_m = excluded.displacement_m, "
-    "grid = excluded.grid, digest = excluded.digest WHERE simulation.grid IS NULL"
+    "grid = excluded.grid, sensitive = excluded.sensitive, digest = excluded.digest "
+    "WHERE simulation.grid IS NULL"
 )
 """What becomes of a block that was run before, for another reason, where the grid meets it."""
 
@@ -301,7 +302,7 @@ def _point_rows(
     combination_id: int, points: SearchPoints, numbers: Iterable[int | None]
 ) -> Iterator[tuple[object, ...]]:
     # A search may come back to a point; a run of the same input gives the same answer.
-    slid = points.displacement_m
+    slid, sensitive = points.displacement_m, points.sensitive
     return zip(
         repeat(combination_id),
         points.kr_over_pga.tolist(),
@@ -309,6 +310,7 @@ def _point_rows(
         map(str, points.outcome),
         repeat(None) if slid is None else map(_number, slid.tolist()),
         numbers,
+        repeat(None) if sensitive is None else sensitive.tolist(),
         strict=False,
     )
 

@@ -84,13 +84,17 @@ class Interval(NamedTuple):
 
 
 class Point(NamedTuple):
-    """One simulated block; `grid` is its number in the kind's outcome grid, None beside it."""
+    """One simulated block; `grid` is its number in the kind's outcome grid, None beside it.
+
+    `sensitive` is None of kinds whose outcomes are not.
+    """
 
     kr_over_pga: float
     theta_n: float | None
     outcome: str
     displacement_m: float | None
     grid: int | None
+    sensitive: bool | None = None
 
 
 SPECTRAL_COLUMNS = ("sa03_g", "sa10_g", "sa20_g", "sa30_g")

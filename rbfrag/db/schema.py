@@ -278,7 +278,7 @@ combination = _table(
     "combination",
     "Critical searches: the strongest block of size p² that a motion topples, or that it slides a"
     " stated distance; for blocks that slump, their strength over the critical factor on the "
-    "record.",
+    "record. Of free-standing blocks, which have no critical value, the grid of outcomes alone.",
     _row_number(),
     _column("natural_key", Text, _KEY),
     _reference("campaign_id", "campaign.id", "RESTRICT", "the campaign that made it"),
@@ -288,7 +288,8 @@ combination = _table(
         "block",
         Text,
         "JSON object: shape, size, friction and dip of a block that slumps or topples confined, "
-        "or the plane that it slides on; missing for toppling",
+        "the plane that it slides on, or the factor on Housner's restitution of one that rocks; "
+        "missing for toppling",
     ),
     _column("settings", Text, "JSON: what else decided the answer, part of the natural key"),
     _column("numerics_version", Text, _NUMERICS),
@@ -389,6 +390,12 @@ simulation = _table(
         Integer,
         "number of the block in the grid of its kind, which does not depend on outcomes; missing "
         "for a block beside it",
+    ),
+    _optional(
+        "sensitive",
+        Boolean,
+        "of a free-standing block: true where the outcome is another one for the motion times 1 + "
+        "1e-6 or 1 - 1e-6; missing for others",
     ),
     PrimaryKeyConstraint("combination_id", "kr_over_pga"),
     CheckConstraint("kr_over_pga > 0", name="kr_over_pga"),

@@ -21,6 +21,7 @@ from rbfrag.fragility.checks import refusals
 from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.methods import SINGLE, BlockParameters, Bound, Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
+from rbfrag.solver.scatter import fraction, lognormal
 
 FloatArray = NDArray[np.float64]
 
@@ -31,7 +32,6 @@ STRENGTH_POINTS, OTHER_POINTS = 65, 33
 """Points of the strength, in which P is steepest, and of what else is uncertain."""
 
 _AT_ONCE = 1 << 16
-_LEAST_FRACTION = 1e-12
 
 
 def normal_steps(count: int, reach: float = 4.0) -> tuple[FloatArray, FloatArray]:
@@ -96,12 +96,11 @@ class Scatter:
 
     def blocks(self, given: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Return the values that change, shape (k, n), for what is given, shape (n,) each."""
-        return {
-            name: of_scatter(
-                z[:, None], given[name], given[f"{name}_sigma"], name in self.fractions
-            )
-            for name, z in self.z.items()
-        }
+        result = {}
+        for name, z in self.z.items():
+            law = fraction if name in self.fractions else lognormal
+            result[name] = law(z[:, None], given[name], given[f"{name}_sigma"])
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,24 +128,6 @@ class Draws:
             place = np.searchsorted(np.cumsum(self.weight[order]), 0.5)
             result[name] = float(drawn[order[min(int(place), drawn.size - 1)]])
         return result
-
-
-def of_scatter(z: FloatArray, median: Any, sigma: Any, fraction: bool) -> FloatArray:
-    """Return values at standard normal points.
-
-    Args:
-        z: the points.
-        median: median; of a fraction the mean before it is cut.
-        sigma: standard deviation of the logarithm; of a fraction that of the value.
-        fraction: whether the value lies between 0 and 1: normal, cut off there.
-    """
-    if not fraction:
-        return np.asarray(median * np.exp(sigma * z))
-    ns = arrays()
-    with np.errstate(all="ignore"):
-        low, high = ns.ndtr(-median / sigma), ns.ndtr((1.0 - median) / sigma)
-        drawn = median + sigma * ns.ndtri(low + (high - low) * ns.ndtr(z))
-    return np.asarray(np.where(sigma > 0.0, np.clip(drawn, _LEAST_FRACTION, 1.0), median))
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Model
+from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import checked_years, failure_rate, probability_in
 from rbfrag.hazards.branches import (
     checked_weights,
@@ -67,8 +68,8 @@ class BranchRate:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class HazardAnswer:
+@dataclass(frozen=True, eq=False, repr=False)
+class HazardAnswer(Tabular):
     """Annual rates of toppling of m blocks at one site.
 
     Args:

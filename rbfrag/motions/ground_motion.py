@@ -21,7 +21,7 @@ LONGEST_S = 1e100
 """Beyond this nothing can be integrated."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class GroundMotion:
     """A recorded or analytic ground acceleration, piecewise linear between its samples.
 
@@ -47,6 +47,7 @@ class GroundMotion:
         processing_applied: every parameter of what rbfrag did to the samples; None where they
             are those of the file.
         source_sha256: hash of the samples as the file has them; empty where these are they.
+        stated_unit: unit of acceleration as the file spells it; empty where it states none.
 
     Raises:
         InputError: no samples, a sample that is not finite, dt_s not positive, times that fall.
@@ -70,6 +71,7 @@ class GroundMotion:
     start_time: datetime | None = None
     processing_applied: Mapping[str, object] | None = None
     source_sha256: str = ""
+    stated_unit: str = ""
 
     def __post_init__(self) -> None:
         samples = _finite_vector(self.acceleration_g, "acceleration sample", "g")
@@ -210,6 +212,11 @@ class GroundMotion:
         """A short name for tables and plots."""
         parts = [p for p in (self.event, self.station, self.component) if p]
         return " ".join(parts) or self.source_file or "motion"
+
+    def __repr__(self) -> str:
+        """Return what it is, in one line."""
+        step = "nodes" if self.dt_s is None else f"samples of {self.dt_s:g} s"
+        return f"GroundMotion({self.label!r}, {self.npts} {step}, PGA {self.pga_g:.3g} g)"
 
 
 def _finite_vector(values: ArrayLike, what: str, unit: str) -> FloatArray:

@@ -39,7 +39,7 @@ class TraceMetadata:
     Args:
         file: the file as the table names it.
         line: line of the table, from 1.
-        trace_index: position of the trace in its file, from 0.
+        trace_index: position of the trace in its file, from 0; None for all traces of the file.
         event_id: key of the earthquake.
         units: unit of acceleration; from the column ``file_units`` it may be any words.
         is_vertical: whether the trace is the vertical component.
@@ -55,7 +55,7 @@ class TraceMetadata:
 
     file: str
     line: int
-    trace_index: int = 0
+    trace_index: int | None = None
     event_id: str = ""
     units: str | None = None
     is_vertical: bool | None = None
@@ -89,7 +89,7 @@ class MotionMetadata:
     def trace(self, path: str | os.PathLike[str], trace_index: int) -> TraceMetadata | None:
         """Return the row of one trace, or None when the table does not name it."""
         for row in self.file(path):
-            if row.trace_index == trace_index:
+            if row.trace_index in (None, trace_index):
                 return row
         return None
 
@@ -99,11 +99,12 @@ def read_metadata(path: str | os.PathLike[str]) -> MotionMetadata:
 
     Args:
         path: CSV with the columns of :data:`COLUMNS` (``file`` at least). Files are named
-            relative to the folder of the CSV. A ``trace_index`` left out means 0.
+            relative to the folder of the CSV. A row without ``trace_index``
+            is about all traces of its file.
     """
     table = Path(path)
     rows: list[TraceMetadata] = []
-    seen: dict[tuple[Path, int], int] = {}
+    seen: dict[tuple[Path, int | None], int] = {}
     by_file: dict[Path, list[TraceMetadata]] = {}
     header: list[str] | None = None
     folder = table.absolute().parent
@@ -125,7 +126,16 @@ def read_metadata(path: str | os.PathLike[str]) -> MotionMetadata:
         if first != line:
             raise MotionFileError(
                 table,
-                f"trace {row.trace_index} of {row.file} was given in line {first}: keep one row",
+                f"{_named(row)} was given in line {first}: keep one row",
+                line=line,
+            )
+        others = by_file.get(place, [])
+        if others and None in (row.trace_index, others[0].trace_index):
+            raise MotionFileError(
+                table,
+                f"{_named(row)} and {_named(others[0])} (line {others[0].line}) are described: "
+                "give one row without trace_index for the whole file, or one with it for each "
+                "trace, from 0",
                 line=line,
             )
         rows.append(row)
@@ -133,7 +143,7 @@ def read_metadata(path: str | os.PathLike[str]) -> MotionMetadata:
     if header is None:
         raise MotionFileError(table, "the table is empty: its first row names the columns")
     by_place = {
-        place: tuple(sorted(traces, key=lambda row: row.trace_index))
+        place: tuple(sorted(traces, key=lambda row: row.trace_index or 0))
         for place, traces in by_file.items()
     }
     return MotionMetadata(os.fspath(path), tuple(rows), by_place)
@@ -190,8 +200,8 @@ def _row(table: Path, stated: Mapping[str, str], line: int) -> TraceMetadata:
 
     if not text("file"):
         raise MotionFileError(table, "the cell 'file' is empty: name the record's file", line=line)
-    index = text("trace_index") or "0"
-    if not (index.isascii() and index.isdigit() and len(index) < 10):
+    index = text("trace_index")
+    if index and not (index.isascii() and index.isdigit() and len(index) < 10):
         raise MotionFileError(
             table, f"trace_index {index!r} must be a whole number from 0", line=line
         )
@@ -206,7 +216,7 @@ def _row(table: Path, stated: Mapping[str, str], line: int) -> TraceMetadata:
     return TraceMetadata(
         file=text("file"),
         line=line,
-        trace_index=int(index),
+        trace_index=int(index) if index else None,
         event_id=text("event_id"),
         units=text("units") or text("file_units") or None,
         is_vertical=_TRUTH[vertical.lower()],
@@ -223,6 +233,10 @@ def _row(table: Path, stated: Mapping[str, str], line: int) -> TraceMetadata:
         component=text("component"),
         dt_s=number("dt_s", lambda value: value > 0.0, "a positive number of seconds"),
     )
+
+
+def _named(row: TraceMetadata) -> str:
+    return row.file if row.trace_index is None else f"trace {row.trace_index} of {row.file}"
 
 
 def _place(path: Path) -> Path:

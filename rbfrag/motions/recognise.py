@@ -7,7 +7,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeAlias
 
 from rbfrag.errors import InputError, MotionFileError, UnknownFormatError
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
@@ -34,6 +34,9 @@ from rbfrag.motions.text.file import cut_number, decoded, read_text
 from rbfrag.motions.text.record_file import Field, RecordFile, Trace
 from rbfrag.motions.text.times import first_sample_time
 from rbfrag.motions.units import acceleration_unit, unit_in_g
+
+MotionLike: TypeAlias = GroundMotion | str | os.PathLike[str]
+"""What an argument that is a motion may be: a motion, or ``FILE`` or ``FILE#trace_index``."""
 
 READERS: tuple[ModuleType, ...] = (
     rbfrag_csv,
@@ -194,6 +197,7 @@ def _motion(file: RecordFile, trace: Trace, **place: Any) -> GroundMotion:
         source_file=file.path.name,
         remarks=(*trace.remarks, *filter(None, further)),
         is_partial=is_partial,
+        stated_unit=trace.unit.text if trace.unit else "",
         **labels,
         **place,
     )
@@ -204,17 +208,24 @@ def _unit_in_g(file: RecordFile, field: Field | None) -> float:
     if field is None:
         file.require_units()
         field = Field(file.units or "", 1)
-    unit: str | None = None
-    if not TENTH_OF_G.fullmatch(field.text):
-        try:
-            unit = acceleration_unit(field.text)
-        except InputError as error:
-            raise file.error(str(error), field.line) from None
-    if file.units is not None and acceleration_unit(file.units) != unit:
+    try:
+        in_g = stated_in_g(field.text)
+    except InputError as error:
+        raise file.error(str(error), field.line) from None
+    if file.units is not None and unit_in_g(file.units) != in_g:
         raise file.error(
             f"the header says {field.text}, not {file.units}: leave --units out", field.line
         )
-    return 0.1 if unit is None else unit_in_g(unit)
+    return in_g
+
+
+def stated_in_g(text: str) -> float:
+    """Return how many g one unit is that a header states, g/10 among them.
+
+    Raises:
+        InputError: no unit of acceleration.
+    """
+    return 0.1 if TENTH_OF_G.fullmatch(text) else unit_in_g(text)
 
 
 def _reader(file: Path, text: str) -> ModuleType:
@@ -258,6 +269,26 @@ def read_motion(
     trouble = f"holds {len(motions)} traces" if index is None else f"has no trace #{index}"
     raise MotionFileError(
         name, f"the file {trouble}: name one of  {listed}  as {name}#0, for example"
+    )
+
+
+def as_motion(given: MotionLike, name: str = "motion") -> GroundMotion:
+    """Return a motion that an argument gives, reading it where a file is named.
+
+    Args:
+        given: a motion, or a file of one as for :func:`read_motion`.
+        name: of the argument, for the message.
+
+    Raises:
+        InputError: something else; the list of :func:`read_motions` is of several motions.
+    """
+    if isinstance(given, GroundMotion):
+        return given
+    if isinstance(given, str | os.PathLike):
+        return read_motion(given)
+    raise InputError(
+        f"{name} is of type {type(given).__name__}: give a GroundMotion, or the path of a file "
+        "(rbfrag.read_motions returns a list, with one motion for each trace)"
     )
 
 

@@ -32,7 +32,13 @@ _SPELLINGS = {
     "mm/sec2": "mm/s2",
     "mm/s/s": "mm/s2",
     "mm/sec/sec": "mm/s2",
+    "ms-2": "m/s2",
+    "cms-2": "cm/s2",
+    "mms-2": "mm/s2",
 }
+
+_AS_TYPED = str.maketrans({"²": "2", "⁻": "-", **dict.fromkeys("^*·⋅ \u00a0")})
+"""Powers and products in the form of the table above."""
 
 ACCELERATION_UNITS = tuple(_IN_G)
 """The unit names that options and metadata files use."""
@@ -47,7 +53,7 @@ def acceleration_unit(text: str) -> str:
     Returns:
         One of ``g``, ``m/s2``, ``cm/s2``, ``mm/s2``.
     """
-    key = text.strip().lower().replace("^", "").replace("**", "").replace("²", "2").replace(" ", "")
+    key = text.strip().lower().translate(_AS_TYPED)
     try:
         return _SPELLINGS[key]
     except KeyError:

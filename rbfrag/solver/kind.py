@@ -18,6 +18,7 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.results import (
     MAP_DEPTH,
+    POLARITIES,
     CriticalResult,
     FloatArray,
     Outcome,
@@ -173,6 +174,7 @@ class Kind:
         no_search: why it has no critical value; empty where there is none yet.
         campaign: whether campaigns store it.
         campaign_options: what :meth:`cases` may be asked.
+        polarities: those that campaigns run; one alone where the other is its mirror image.
     """
 
     kind: str
@@ -186,6 +188,7 @@ class Kind:
     no_search: str = ""
     campaign: bool = False
     campaign_options: tuple[str, ...] = ()
+    polarities: tuple[Polarity, ...] = POLARITIES
 
     def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
         """Return what the block does."""
@@ -193,6 +196,18 @@ class Kind:
 
     def runner(self, site: BlockOnPlanes) -> Runner:
         """Return a function that says how the block ends under an excitation."""
+        raise NotImplementedError
+
+    def numbers_of(self, block: Block, beta_rad: float) -> tuple[dict[str, float], tuple[str, ...]]:
+        """Return what predictions read of a free-standing block, by name, and warnings.
+
+        Args:
+            block: shape and size.
+            beta_rad: dip of its base [rad].
+
+        Raises:
+            InputError: the block does not stand of itself.
+        """
         raise NotImplementedError
 
     def critical(self, motion: GroundMotion, **options: Any) -> CriticalResult:

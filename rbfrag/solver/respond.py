@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from rbfrag.errors import InputError
-from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.described import NOT_BACKED
 from rbfrag.solver.kind import BlockOnPlanes, Kind, Shaking
@@ -20,7 +20,7 @@ from rbfrag.solver.stability.single import Stability, stability
 
 
 def respond(
-    motion: GroundMotion,
+    motion: MotionLike,
     *,
     p2: float | None = None,
     kr: float | None = None,
@@ -32,7 +32,7 @@ def respond(
     back_fracture: bool = True,
     cohesion_pa: float = 0.0,
     density_kg_m3: float | None = None,
-    vertical: GroundMotion | None = None,
+    vertical: MotionLike | None = None,
     polarity: Polarity = "forward",
     kind: str | None = None,
     two_way: bool = False,
@@ -48,7 +48,7 @@ def respond(
     user states; a kind refuses those of another.
 
     Args:
-        motion: horizontal ground motion.
+        motion: horizontal ground motion, or its file.
         p2: frequency parameter p² of a toppling or rocking block [1/s²], > 0.
         kr: its rocking acceleration coefficient k_r = tan(critical angle), > 0.
         ky: yield acceleration coefficient tan(φ - β) of a block that slides, whatever its
@@ -77,6 +77,8 @@ def respond(
             fails at rest or that nothing moves, an unknown kind or polarity, an option of
             another model, components that cannot be brought together.
     """
+    motion = as_motion(motion)
+    vertical = None if vertical is None else as_motion(vertical, "vertical")
     settings = {
         "two_way": two_way or None,
         "horizontal": horizontal or None,
@@ -89,7 +91,6 @@ def respond(
         "phi_back_deg": phi_back_deg,
         "density_kg_m3": density_kg_m3,
     }
-    given = [name for name, value in conditions.items() if value is not None]
     if block is not None:
         for name, value in (("p2", p2), ("kr", kr), ("ky", ky)):
             if value is not None:
@@ -115,24 +116,42 @@ def respond(
             site = replace(site, phi_rad=0.5 * math.pi)
         remarks = _remarks(judged, model)
         return model.respond(site, Shaking(motion, vertical, polarity, history, remarks))
-    shaking = Shaking(motion, vertical, polarity, history)
-    if ky is not None:
-        if p2 is not None or kr is not None:
+    numbers = {"p2": p2, "kr": kr, "ky": ky, **conditions}
+    model, site = known_by_numbers(kind, numbers, settings)
+    return model.respond(site, Shaking(motion, vertical, polarity, history))
+
+
+def known_by_numbers(
+    kind: str | None, numbers: Mapping[str, float | None], settings: Mapping[str, Any]
+) -> tuple[Kind, BlockOnPlanes]:
+    """Return a block that is given by numbers, and the model that answers for it.
+
+    Args:
+        kind: the model; None for that of the mode which the numbers mean.
+        numbers: ``p2`` and ``kr``, or ``ky`` and perhaps ``beta_deg``; None for what is not given.
+        settings: options of one model or another; None for what is not given.
+
+    Raises:
+        InputError: a block given in no way or in two, or an option of another model.
+    """
+    given = {name: value for name, value in numbers.items() if value is not None}
+    if "ky" in given:
+        if "p2" in given or "kr" in given:
             raise InputError("ky belongs to sliding, p2 and kr to toppling: give one or the other")
-        if extra := [name for name in given if name != "beta_deg"]:
+        if extra := [name for name in given if name not in ("ky", "beta_deg")]:
             raise InputError(f"{extra[0]} does not go with ky: it follows from ky and beta_deg")
         model = _by_numbers(kind, "slide", ("ky",))
-        site = _sliding_site(ky, beta_deg or 0.0, _known(model, settings))
-        return model.respond(site, shaking)
-    if p2 is None or kr is None:
-        missing = "p2" if p2 is None else "kr"
-        raise InputError(
-            f"{missing} is missing: give p2 and kr, or ky, or a block with beta_deg and phi_deg"
-        )
-    if given:
-        raise InputError(f"{given[0]} does not go with p2 and kr, which say all about the block")
+        beta_deg = given.get("beta_deg", 0.0)
+        return model, _sliding_site(given["ky"], beta_deg, _known(model, settings))
+    for name in ("p2", "kr"):
+        if name not in given:
+            raise InputError(
+                f"{name} is missing: give p2 and kr, or ky, or a block with beta_deg and phi_deg"
+            )
+    if extra := [name for name in given if name not in ("p2", "kr")]:
+        raise InputError(f"{extra[0]} does not go with p2 and kr, which say all about the block")
     model = _by_numbers(kind, "topple", ("p2", "kr"))
-    return model.respond(block_of_numbers(p2, kr, _known(model, settings)), shaking)
+    return model, block_of_numbers(given["p2"], given["kr"], _known(model, settings))
 
 
 def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> BlockOnPlanes:

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import POLARITIES as POLARITIES
 from rbfrag.motions.polarity import Polarity as Polarity
 
@@ -109,8 +110,8 @@ class ModeChange:
     motion: str
 
 
-@dataclass(frozen=True, eq=False)
-class Response:
+@dataclass(frozen=True, eq=False, repr=False)
+class Response(Tabular):
     """The answer of one run.
 
     Args:
@@ -187,12 +188,15 @@ class SearchPoints:
         outcome: :class:`Outcome` values as text, length n.
         displacement_m: displacement down a level plane of blocks that slide [m], shape (n,);
             None for other kinds.
+        sensitive: of free-standing blocks, whether the outcome is another one for the motion times
+            1 ± 1e-6, shape (n,); None for other kinds.
     """
 
     kr_over_pga: FloatArray
     theta_n: FloatArray
     outcome: tuple[str, ...]
     displacement_m: FloatArray | None = None
+    sensitive: NDArray[np.bool_] | None = None
 
 
 IntervalOutcome = Literal["topples", "safe", "undecided"]
@@ -219,8 +223,8 @@ def no_intervals() -> OutcomeIntervals:
     return OutcomeIntervals(np.empty(0), np.empty(0), ())
 
 
-@dataclass(frozen=True, eq=False)
-class CriticalResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class CriticalResult(Tabular):
     """The critical block of one motion: the strongest one that it brings down.
 
     For kinds whose record is scaled, k/PGA is the block's yield acceleration over the PGA of the

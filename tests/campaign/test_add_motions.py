@@ -47,6 +47,58 @@ def pairs(db: Path, suite: str | None = None) -> dict[int, VerticalPair]:
         return vertical_pairs(connection, suite=suite)
 
 
+def mixed(folder: Path) -> Path:
+    """Files that state g, g/10, m/s2 and nothing."""
+    volume_1(folder / "tenths.V1", "L1")
+    write_at2(folder / "g.AT2", shaking(11))
+    for name, header, seed in (("none.txt", "", 12), ("metres.txt", "Zeit [s],a [m/s²]\n", 13)):
+        lines = [f"{0.01 * i:.2f},{value:.6f}" for i, value in enumerate(shaking(seed))]
+        (folder / name).write_text(header + "\n".join(lines) + "\n")
+    return folder
+
+
+def test_units_are_for_the_files_that_state_none(tmp_path: Path, db: Path) -> None:
+    folder = tmp_path / "records"
+    folder.mkdir()
+    report = add_motions([mixed(folder)], db=db, units="g", raw=True)
+    assert report.failed == ()
+    found = {row.source_file: row.pga_g for row in rows(db)}
+    assert found["none.txt"] == pytest.approx(np.abs(shaking(12)).max(), rel=1e-5)
+    assert found["metres.txt"] == pytest.approx(np.abs(shaking(13)).max() / 9.80665, rel=1e-5)
+    # what was stated is checked against the others, each of which keeps its own
+    warned = [text for text in report.warnings if "--units is for the files" in text]
+    assert [Path(text.split(" is in ")[0]).name for text in warned] == ["metres.txt", "tenths.V1"]
+    assert "in m/s², as is stated for it, not in g" in warned[0]
+
+
+def test_units_of_the_metadata_are_a_statement_too(tmp_path: Path, db: Path) -> None:
+    folder = mixed(tmp_path)
+    table = tmp_path / "meta.csv"
+    table.write_text("file,units\nnone.txt,mm/s2\n")
+    report = add_motions([folder], db=db, units="g", metadata=table, raw=True)
+    found = {row.source_file: row.pga_g for row in rows(db)}
+    expected = np.abs(shaking(12)).max() / 9806.65
+    assert found["none.txt"] == pytest.approx(expected, rel=1e-5)
+    assert any("none.txt is in mm/s2" in text for text in report.warnings)
+
+
+def test_units_that_contradict_the_only_file(tmp_path: Path, db: Path) -> None:
+    (bad,) = add_motions([mixed(tmp_path) / "metres.txt"], db=db, units="g").failed
+    assert "m/s² is stated for it, not g: leave --units out" in bad.reason
+
+
+def test_a_row_without_an_index_is_about_the_whole_file(tmp_path: Path, db: Path) -> None:
+    volume_1(tmp_path / "a.V1", "L1", "V2", "T3")
+    table = tmp_path / "meta.csv"
+    table.write_text("file,event_id,magnitude,companion_group\na.V1,quake,6.1,one\n")
+    add_motions([tmp_path], db=db, metadata=table)
+    assert len(rows(db)) == 3
+    assert {(row.event_id, row.magnitude, row.recording) for row in rows(db)} == {
+        ("quake", 6.1, "one")
+    }
+    assert not any("event_guessed" in row.flags for row in rows(db))
+
+
 def test_texts_about_the_records_are_passed_over_in_a_folder_only(tmp_path: Path, db: Path) -> None:
     volume_1(tmp_path / "records" / "a.V1", "L1")
     about = tmp_path / "records" / "README.md"
@@ -192,6 +244,8 @@ def test_a_file_that_the_metadata_name_is_missing(tmp_path: Path, db: Path) -> N
         ("file,trace_index,dt_s\na.V1,0,0.02\na.V1,1,0.01\n", "state dt_s 0.01 and 0.02"),
         ("file,trace_index,dt_s\na.V1,0,0.01\n", "not 0.01"),
         ("file,trace_index,is_vertical\na.V1,0,1\n", "line 2 of the metadata says vertical"),
+        ("file,is_vertical\na.V1,0\n", "line 2 of the metadata says horizontal"),
+        ("file,component\na.V1,N\n", "calls all 2 traces of the file N: give each a row"),
     ],
 )  # fmt: skip
 def test_metadata_that_contradict_the_file(

@@ -249,10 +249,10 @@ def test_what_two_databases_found_is_merged_and_exported(
         ({"kind": "slumping", "rotations_deg": (2.0, 2.0)}, "2 is in the list twice"),
         ({"kind": "slumping", "rotations_deg": (25.0,)}, "lies on its back edge"),
         ({"kind": "sliding", "displacements_m": (0.0,)}, "above zero"),
-        ({"kind": "confined_toppling"}, "campaigns are of sliding, slumping, toppling"),
+        ({"kind": "confined_toppling"}, "campaigns are of rocking, sliding, slumping, toppling"),
         ({"kind": "sliding", "jobs": 0}, "at least 1"),
         ({"kind": "sliding", "full_map": True}, "--map goes with --kind slumping or toppling"),
-        ({"kind": "slumping", "p2": (1.0,)}, "--p2 goes with --kind toppling, not with slumping"),
+        ({"kind": "slumping", "p2": (1.0,)}, "--p2 goes with --kind rocking or topp"),
         ({"rotations_deg": (2.0,)}, "--rotation goes with --kind slumping, not with toppling"),
     ],
 )

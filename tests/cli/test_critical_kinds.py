@@ -57,7 +57,7 @@ def test_sliding_answers_as_python_does(shell: Shell, record: Path) -> None:
     assert told["ky_over_pga"] == told["thresholds"][0]["ky_over_pga"]
     curve = [row["displacement_m"] for row in told["displacements"]]
     assert curve == sliding_displacements(motion, KY_OVER_PGA).tolist()
-    assert "on a base that dips" in shell("critical", record, "--kind", "sliding").stdout
+    assert "On a base that dips" in shell("critical", record, "--kind", "sliding").stdout
 
 
 @pytest.mark.parametrize(
@@ -91,3 +91,15 @@ def test_a_block_of_another_mode_is_refused(refuses: Refuses, record: Path, slum
     slump.write_text(SLUMP.replace("phi_deg = 30", "phi_deg = 60"))
     message = refuses("critical", record, "--kind", "slumping", "--block", slump)
     assert "slump.toml: the block is not of kind slumping: its mode is slide" in message
+
+
+def test_a_sentence_and_four_numbers_unless_more_is_asked_for(shell: Shell, record: Path) -> None:
+    answer = shell.json("critical", record, "--p2", "3")
+    short = shell("critical", record, "--p2", "3").stdout.splitlines()
+    assert short[0].startswith("The strongest block of p² = 3 1/s² that this motion topples has")
+    assert ("certified)" in short[0]) == answer["certified"]
+    assert float(short[0].split("k_r = ")[1].split()[0]) == pytest.approx(answer["kr"], rel=5e-3)
+    names = [line.split()[0] for line in short[2:]]
+    assert names == ["kr", "kr_over_pga", "y_m_s", "pga_g"]
+    every = shell("critical", record, "--p2", "3", "--verbose").stdout
+    assert all(f"\n{name} " in every for name in answer if name != "warnings")

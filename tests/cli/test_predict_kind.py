@@ -113,7 +113,9 @@ def test_a_campaign_is_run_fitted_and_asked(shell: Shell, tmp_path: Path) -> Non
 
 
 def test_options_of_one_kind_do_not_go_with_another(refuses: Refuses) -> None:
-    assert "--p2 goes with --kind toppling" in refuses("simulate", "--kind", "sliding", "--p2", "1")
+    assert "--p2 goes with --kind rocking or toppling" in refuses(
+        "simulate", "--kind", "sliding", "--p2", "1"
+    )
     assert "campaigns are of" in refuses("simulate", "--kind", "falling")
     message = refuses("fit", "--kind", "sliding", "--term", "pgv", "--method", "wls")
     assert "method wls fits blocks known by p2 and kr, not those of kind sliding" in message

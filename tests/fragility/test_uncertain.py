@@ -16,7 +16,7 @@ from rbfrag.fragility.methods import SINGLE, arrays, method_named, methods
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Prediction, answer_given, predict
 from rbfrag.fragility.prediction_array import PredictionArray
-from rbfrag.fragility.uncertain import of_scatter
+from rbfrag.solver.scatter import fraction
 from tests.fragility.test_overturning import T2, one, stored
 
 G = 9.80665
@@ -109,11 +109,11 @@ def test_mechanics_is_asked_of_each_block_that_it_may_be() -> None:
 
 def test_a_restitution_is_normal_between_0_and_1() -> None:
     z = np.linspace(-4.0, 4.0, 9)
-    drawn = of_scatter(z, 0.9, 0.1, fraction=True)
+    drawn = fraction(z, 0.9, 0.1)
     law = truncnorm(-9.0, 1.0, loc=0.9, scale=0.1)
     assert drawn == pytest.approx(law.ppf(norm.cdf(z)), abs=1e-9)
     assert np.all(drawn <= 1.0)
-    assert of_scatter(z, 0.9, np.zeros(9), fraction=True) == pytest.approx([0.9] * 9)
+    assert fraction(z, 0.9, np.zeros(9)) == pytest.approx([0.9] * 9)
 
 
 def test_rocking_blocks_of_uncertain_strength_size_and_restitution() -> None:

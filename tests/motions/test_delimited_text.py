@@ -50,6 +50,10 @@ def refusal(
         ("# Acceleration in mm/s2, sampled at 200 Hz\n", 0.001 / G),
         ("# Accelerogram (corrected), units of g\n", 1.0),
         ("# Ground acceleration [cm/sec**2] at the crest\n# t, a\n", 0.01 / G),
+        ("Zeit [s],Beschleunigung [m/s²]\n", 1.0 / G),
+        ("# Zeit (s), Beschleunigung (m s^-2)\n", 1.0 / G),
+        ("temps {s},signal {cm·s⁻²}\n", 0.01 / G),
+        ("zaman,ivme [gal]\n", 0.01 / G),
     ],
 )
 def test_units_of_header(tmp_path: Path, header: str, in_g: float) -> None:
@@ -70,6 +74,11 @@ def test_unit_is_never_guessed(tmp_path: Path) -> None:
         assert "--units" in refusal(tmp_path, header + "0,1\n0.01,2\n").reason
 
 
+def test_unit_in_brackets_is_not_overruled(tmp_path: Path) -> None:
+    text = "Zeit [s],Beschleunigung [m/s²]\n0,1\n0.01,2\n"
+    assert "m/s², not g" in refusal(tmp_path, text, units="g").reason
+
+
 def test_header_and_caller_disagree(tmp_path: Path) -> None:
     text = "# Time (s),Acceleration (m/s2)\n0,1\n0.01,2\n"
     assert read(tmp_path, text, units="m/sec/sec").npts == 2
@@ -87,6 +96,8 @@ def test_header_and_caller_disagree(tmp_path: Path) -> None:
         ("# Time (ms),Acceleration (g)\n", 1, ("'ms'", "seconds")),
         ("# Time (s),Velocity (cm/s)\n", 1, ("Velocity", "acceleration")),
         ("Acceleration (g),Time (s)\n", 1, ("swap",)),
+        ("Zeit [ms],Beschleunigung [m/s²]\n", 1, ("'ms'", "seconds")),
+        ("Beschleunigung [m/s²],Zeit [s]\n", 1, ("swap",)),
     ],
 )
 def test_headers_that_say_something_else(

@@ -50,7 +50,7 @@ def test_file_alone_states_nothing(tmp_path: Path) -> None:
     assert traced.magnitude is None
     assert traced.units is None
     assert traced.dt_s is None
-    assert metadata.trace(tmp_path / "a.AT2", 1) is None
+    assert metadata.trace(tmp_path / "a.AT2", 1) is traced
     assert metadata.trace(tmp_path / "b.AT2", 0) is None
     assert metadata.file(tmp_path / "b.AT2") == []
 
@@ -59,6 +59,14 @@ def test_traces_of_a_file_in_order(tmp_path: Path) -> None:
     path = table(tmp_path, "file,trace_index,component\na.V2A,2,UP\na.V2A,0,N\na.V2A,1,E\n")
     names = [traced.component for traced in read_metadata(path).file(tmp_path / "a.V2A")]
     assert names == ["N", "E", "UP"]
+
+
+@pytest.mark.parametrize("order", [("", "1"), ("0", "")])
+def test_a_whole_file_and_one_of_its_traces(tmp_path: Path, order: tuple[str, str]) -> None:
+    first, second = order
+    path = table(tmp_path, f"file,trace_index\na.V2A,{first}\na.V2A,{second}\n")
+    with pytest.raises(MotionFileError, match="one row without trace_index for the whole file"):
+        read_metadata(path)
 
 
 def test_byte_order_mark_and_windows_newlines(tmp_path: Path) -> None:

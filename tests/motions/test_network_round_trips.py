@@ -10,10 +10,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rbfrag.errors import MotionFileError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import READERS, read_motion, read_motions
 from rbfrag.motions.units import unit_in_g
 from tests.motions import written_by_networks as written
+from tests.synthetic import shaking
 
 in_folder = settings(
     max_examples=40,
@@ -140,6 +142,44 @@ def test_cdmg_v1(tmp_path: Path, channels: list[tuple[str, list[str]]], dt_ms: i
         missing = "the header says 3 channels, but the file holds"
         assert all(remark.startswith(missing) for remark in motion.remarks)
         assert len(motion.remarks) == (len(channels) < 3)
+
+
+@pytest.mark.parametrize("series", written.SERIES_LINES)
+@pytest.mark.parametrize("unit", written.UNIT_LINES)
+@pytest.mark.parametrize("last", [0, 1])
+def test_csmip_v1_accelerations_alone(tmp_path: Path, series: str, unit: str, last: int) -> None:
+    tokens = [f"{value:.6f}".replace("0.", ".", 1) for value in shaking(7, 100)]
+    channels = [("360 Deg", tokens), ("Up", tokens[::-1])]
+    text = written.csmip_v1(channels, 0.005, unit=unit, series=series, last=last)
+    first, second = read(tmp_path, text)
+    assert first.acceleration_g.tolist() == [float(token) for token in tokens]
+    assert second.acceleration_g.tolist() == first.acceleration_g.tolist()[::-1]
+    assert first.dt_s == 0.005
+    assert (first.orientation_deg, second.is_vertical) == (0.0, True)
+    assert first.is_corrected is False
+    assert first.recording == second.recording
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("data are sec and g.", "data are sec and g/10.", "in g by this line, but in g/10"),
+        ("  100 Acc", "   99 Acc", "99 points follow by this line, but 100"),
+        ("at 200 pts/sec in", "at 100 pts/sec in", "last 1 s, but the header says 0.500"),
+        ("at 200 pts/sec in", "at   0 pts/sec in", "must be positive"),
+    ],
+)
+def test_csmip_v1_that_contradicts_itself(tmp_path: Path, old: str, new: str, words: str) -> None:
+    text = written.csmip_v1([("360 Deg", ["  .000001"] * 100)], 0.005)
+    assert old in text
+    with pytest.raises(MotionFileError, match=words):
+        read(tmp_path, text.replace(old, new))
+
+
+def test_csmip_v1_without_a_unit(tmp_path: Path) -> None:
+    text = written.csmip_v1([("360 Deg", ["  .000001"] * 100)], 0.005, unit="")
+    with pytest.raises(MotionFileError, match="no unit of acceleration"):
+        read(tmp_path, text.replace("in units of g", ""))
 
 
 def test_cdmg_v1_channel_of_zeros(tmp_path: Path) -> None:

@@ -135,6 +135,49 @@ def cdmg_v1(channels: Channels, dt_s: float) -> str:
     return _file(lines)
 
 
+SERIES_LINES = {
+    "new": "{npts:6d} Accelerogram points at {rate:3d} pts/sec in units of g.     Format: (8f9.6)",
+    "old": "{npts:6d} POINTS OF ACCEL DATA EQUALLY SPACED AT {dt:.3f} SEC.  (UNITS: G)",
+}
+
+UNIT_LINES = {
+    "new": "Units of uncor data are sec and g.         Max  =  -.105 g, at   31.575 sec.",
+    "old": "UNITS OF UNCOR ACCEL IS G.                 MAX  =   .058 G, AT   9.425 SEC.",
+    "": "",
+}
+
+
+def csmip_v1(
+    channels: Channels, dt_s: float, *, unit: str = "new", series: str = "new", last: int = 1
+) -> str:
+    """V1 with accelerations alone; `last` is 0 where the record length is that of the intervals."""
+    lines: list[str] = []
+    for number, (name, tokens) in enumerate(channels, 1):
+        npts = len(tokens)
+        about = SERIES_LINES[series].format(npts=npts, rate=round(1.0 / dt_s), dt=dt_s)
+        lines += [
+            "Uncorrected Accelerogram Data             Processed: 08/29/18, CGS  ce23837j    ",
+            "Rcrd of Tue Aug 28, 2018 19:33:00.0 PDT               (Avol1 v2.0, 4/18 CSMIP)  ",
+            "CSMIP Preliminary Processing            (Origin:  To be determined)             ",
+            "23837-L1193-18241.36                 Start time:  8/29/18, 02:33:  .0 UTC (GPS) ",
+            "Station No. 23837   34.063N, 117.785W    Etna    s/n 1193  (3 Chns of  3 at Sta)",
+            "Somewhere - Grove                         CGS   Data: Acceleration              ",
+            f"Chan  {number}: {name}                ",
+            "Rcrd of Tue Aug 28, 2018 19:33:00.0 PDT    Tue Aug 28, 2018 19:33:00.0 PDT      ",
+            "Hypocenter:  To be determined.               ML:  To be determined.             ",
+            "Instr Period =  .0111 sec,  Damping =  .670,  Sensitivity =  .63 v/g            ",
+            f"No. of Points = {npts:6d}  Record Length ={(npts - 1 + last) * dt_s:7.3f} sec",
+            UNIT_LINES[unit],
+            "RMS calc for complete record =        .   Chn. metadata effective date: 11/05/02",
+            *_numeric_header(16, 5, "1"),
+            *_numeric_header(8, 10, "0.000", 50),
+            about,
+            *rows(tokens, 8, 9),
+            f"/&  ----------  End of data for channel {number}  ----------",
+        ]
+    return _file(lines)
+
+
 def bhrc_v1(channels: Channels, dt_s: float) -> str:
     lines: list[str] = []
     for name, tokens in channels:

@@ -17,6 +17,7 @@ from rbfrag.cli.parameters.block import WAYS, ShapeOptions
 from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.cli.parameters.values import number_list
+from rbfrag.cli.sentences import critical_in_words, slides_in_words
 from rbfrag.errors import InputError
 from rbfrag.solver.described import TAKEN_TO_TOPPLE
 
@@ -30,25 +31,8 @@ EXAMPLE = "Example:  rbfrag critical record.AT2 --p2 3 --json"
 FINE_ENOUGH_TO_DRAW = 1e-7
 """Width of k_r/PGA to which the map of a figure is made, borders being thin lines."""
 
-STATUS = {
-    "found": "the largest k_r/PGA that topples lies in [lower, upper]",
-    "below_limit": "no block down to the search limit topples",
-    "no_motion": "no block down to the search limit ever lifts off its base",
-    "outside_model": "the motion throws the block off its base",
-}
-
-SCALED_STATUS = {
-    "found": "a record of this factor brings the block down; one of the lower end does not",
-    "below_limit": "no factor up to scale_limit brings the block down, as far as it was looked at",
-    "no_motion": "no factor up to scale_limit moves the block",
-}
-
-SLIDING_STATUS = {
-    "found": "blocks with k_y/PGA below this slide further than displacement_m on a level plane",
-    "below_limit": "no block down to the search limit slides that far",
-    "no_motion": "no block down to the search limit slides",
-    "outside_model": "the vertical motion throws blocks off their base",
-}
+SHORT = ("kr", "kr_over_pga", "scale", "y_m_s", "pga_g")
+"""Values that are shown without --verbose."""
 
 
 @stacked
@@ -81,7 +65,7 @@ def critical(
         metavar="FILE",
     ),
     db: options.Db = None,
-    json: options.Json = False,
+    printing: options.Printing,
 ) -> None:
     """Find the critical block of one accelerogram, with its bracket.
 
@@ -111,7 +95,8 @@ def critical(
     say_when_compiling()
     if "displacement_m" in model.search_options:
         distances = None if displacement is None else number_list(displacement, "--displacement")
-        _slides(model.kind, ground, upward, direction.polarity, distances, remarks, json=json)
+        document = _slides(model.kind, ground, upward, direction.polarity, distances, remarks)
+        print_json(document) if printing.json else _show_slides(document, verbose=printing.verbose)
         return
     settings: dict[str, Any] = {"p2": p2, "rotation_deg": rotation, **of_shape}
     if "full_map" in model.search_options:
@@ -129,13 +114,16 @@ def critical(
 
         plot_islands(ground, result, plot, vertical=upward, title=ground.label)
     answer = critical_as_dict(result, remarks=remarks, full_map=full_map)
-    if json:
+    if printing.json:
         print_json(answer)
         return
     warnings = answer.pop("warnings")
     rows = answer.pop("map", [])
-    print_pairs(answer)
-    print(f"{result.status}: {(SCALED_STATUS if 'scale' in answer else STATUS)[result.status]}")
+    print(critical_in_words(answer))
+    print()
+    print_pairs(
+        answer if printing.verbose else {name: answer[name] for name in SHORT if name in answer}
+    )
     for row in rows:
         print(f"{row['k_lo']:.12f}  {row['k_hi']:.12f}  {row['outcome']}")
     print_warnings(warnings)
@@ -211,10 +199,8 @@ def _slides(
     polarity: Polarity,
     distances: list[float] | None,
     remarks: list[str],
-    *,
-    json: bool,
-) -> None:
-    """Print the strengths that slide stated distances, and how far blocks of any strength slide."""
+) -> dict[str, Any]:
+    """Return the strengths that slide stated distances, and how far blocks slide by strength."""
     from rbfrag.solver.critical import critical as search
     from rbfrag.solver.models.sliding import KY_OVER_PGA, THRESHOLDS_M, sliding_displacements
     from rbfrag.solver.reports import critical_as_dict
@@ -231,20 +217,19 @@ def _slides(
         {"ky_over_pga": k, "displacement_m": None if d != d else d}
         for k, d in zip(KY_OVER_PGA, curve.tolist(), strict=True)
     ]
-    if json:
-        document = {
-            **results[0],
-            "warnings": warnings,
-            "thresholds": results,
-            "displacements": rows,
-        }
-        print_json(document)
-        return
-    names = ("displacement_m", "ky_over_pga", "ky", "lower", "upper", "status", "n_runs")
-    print_pairs({name: results[0][name] for name in ("kind", "polarity", "pga_g")})
-    print_table(names, [[each[name] for name in names] for each in results])
-    for status in dict.fromkeys(each["status"] for each in results):
-        print(f"{status}: {SLIDING_STATUS[status]}")
-    print("\non a base that dips, times cos(phi - beta)/cos(phi):")
+    return {**results[0], "warnings": warnings, "thresholds": results, "displacements": rows}
+
+
+def _show_slides(document: dict[str, Any], *, verbose: bool) -> None:
+    thresholds, rows = document["thresholds"], document["displacements"]
+    for sentence in slides_in_words(document):
+        print(sentence)
+    print()
+    names = ["displacement_m", "ky_over_pga", "ky"]
+    if verbose:
+        print_pairs({name: document[name] for name in ("kind", "polarity", "pga_g")})
+        names += ["lower", "upper", "status", "n_runs"]
+    print_table(names, [[each[name] for name in names] for each in thresholds])
+    print("\ndisplacement of blocks by strength:")
     print_table(tuple(rows[0]), [list(row.values()) for row in rows])
-    print_warnings(warnings)
+    print_warnings(document["warnings"])

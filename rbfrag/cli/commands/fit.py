@@ -42,8 +42,8 @@ def fit(
     ),
     data: Data,
     kind: str = option(
-        "What the blocks do: toppling; slumping or sliding, on the terms pgv and pgv_pga; "
-        "or another kind that campaigns store.",
+        "What the blocks do: toppling; slumping or sliding, on the terms pgv and pgv_pga; rocking "
+        "(free-standing), also on sa10 and pga_sa10; or another kind that campaigns store.",
         "toppling",
     ),
     rotation: float | None = option(
@@ -54,7 +54,7 @@ def fit(
         "Blocks known by p² and kr. Of critical values: wls (weighted least squares, the "
         "dissertation's), lognormal (with censored motions). Of outcomes: logistic, weibull, "
         "bounded; of outcomes on xp: record, power. Default: wls. Sliding: displacement; "
-        "slumping: capacity.",
+        "slumping: capacity; rocking: overturning.",
         show_default=False,
     ),
     free_m: bool = option(
@@ -126,6 +126,8 @@ def print_report(report: FitReport, *, json: bool) -> None:
     if "n_outcomes" in details:
         counts["outcomes fitted (toppled)"] = f"{details['n_outcomes']} ({details['n_toppled']})"
         counts["outcomes certain by mechanics"] = details["n_bounded"]
+    if "sensitive_share" in details:
+        counts["sensitive outcomes, share"] = details["sensitive_share"]
     print_pairs(counts)
     law = details.get("power_law")
     if law:

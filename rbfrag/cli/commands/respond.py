@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.output import print_json, print_pairs, print_warnings, say_when_compiling
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import WAYS, BlockOptions
+from rbfrag.cli.parameters.block import WAYS, BlockOptions, UncertaintyOptions
 from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.errors import InputError
@@ -16,6 +16,7 @@ from rbfrag.solver.described import TAKEN_NOT_TO_SLIP, TAKEN_TO_TOPPLE, toppling
 
 if TYPE_CHECKING:
     from rbfrag.solver.block.geometry import Block
+    from rbfrag.solver.respond_draws import DrawnResponses
     from rbfrag.solver.results import Response
 
 EXAMPLE = "Example:  rbfrag respond record.AT2 --p2 3 --kr 0.1 --plot response.png"
@@ -44,6 +45,25 @@ class Rocking:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Draws(UncertaintyOptions):
+    """What the block may be, and how many of it are run."""
+
+    draws: int | None = option(
+        "Run so many blocks that the one may be, by the standard deviations or --block-draws, and "
+        "print which share of them fails."
+    )
+    seed: int = option("With --draws: seed of the draws.", 1)
+    polarity: str = option(
+        "With --draws: forward, reverse, or both (every other draw the one way) where it is not "
+        "known how the motion points at the block.",
+        "forward",
+    )
+    displacement: float | None = option(
+        "With --draws: displacement beyond which a sliding block has failed [m]."
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class Files:
     """What is written."""
 
@@ -68,6 +88,7 @@ def respond(
     block: BlockOptions,
     sliding: Sliding,
     rocking: Rocking,
+    drawn: Draws,
     direction: options.Direction,
     files: Files,
     reading: options.Reading,
@@ -87,10 +108,32 @@ def respond(
     The block is --p2 and --kr (toppling, or with --kind rocking a free-standing one on level
     ground), --ky (sliding), or its shape, from which the failure mode and with it the model follow;
     of a rectangle without --phi, that it topples.
+
+    With --draws it is a block that is not known exactly: the answer is the share of the drawn
+    blocks that fail, with its counting error.
     """
     from rbfrag.solver.reports import response_as_dict, write_history
     from rbfrag.solver.respond import respond as run
 
+    if drawn.draws is not None:
+        from rbfrag.solver.respond_draws import respond_draws
+
+        possible, remarks = _possible(drawn, block, ky, kind)
+        ground, upward, about = find_shaking(motion, direction, db=db, reading=reading)
+        say_when_compiling()
+        shares = respond_draws(
+            ground,
+            vertical=upward,
+            polarity=direction.polarity if direction.reverse else drawn.polarity,  # type: ignore[arg-type]
+            two_way=sliding.two_way,
+            horizontal=sliding.horizontal,
+            draws=drawn.draws,
+            seed=drawn.seed,
+            displacement_m=drawn.displacement,
+            **{"restitution": rocking.restitution, **possible},
+        )
+        _show_shares(replace(shares, warnings=(*about, *remarks, *shares.warnings)), json=json)
+        return
     body, what, remarks = _body(block, ky, kind)
     if files.animate is not None:
         if body is None:
@@ -143,6 +186,54 @@ def respond(
         print(f"from {change['time_s']:.6g} s on the block {change['motion']}")
     print(response.outcome.advice)
     print_warnings(response.warnings)
+
+
+def _possible(
+    drawn: Draws, block: BlockOptions, ky: float | None, kind: str | None
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return the keywords that say what the one block may be, and warnings."""
+    if drawn.block_draws is not None:
+        from rbfrag.exchange.block_draws import read_draws
+
+        values, weights = read_draws(drawn.block_draws)
+        return {"kind": kind, **values, "weights": weights}, ()
+    body, what, remarks = _body(block, ky, kind)
+    if body is not None:
+        what = {"kind": what["kind"], **_numbers_of(body, what)}
+    return {**what, **drawn.sigmas()}, remarks
+
+
+def _numbers_of(body: Block, what: dict[str, Any]) -> dict[str, float]:
+    """Return the numbers of a block that stands free, evenly and level, or refuse its shape."""
+    from rbfrag.solver.kinds import model_of_kind
+
+    free = what["kind"] is not None and model_of_kind(what["kind"]).free_standing
+    if free and what["beta_deg"] == 0.0 and math.isclose(body.alpha1_deg, -body.alpha3_deg):
+        return {"p2": body.p2, "kr": body.tan_alpha3}
+    raise InputError(
+        "--draws runs blocks that are given by numbers, --p2 and --kr or --ky (rbfrag block prints "
+        "those of a shape), rectangles and tables; scattered joint sets are run by  rbfrag "
+        "rockmass --motion"
+    )
+
+
+def _show_shares(shares: DrawnResponses, *, json: bool) -> None:
+    """Print the answer to --draws."""
+    answer = shares.as_dict()
+    if json:
+        print_json(answer)
+        return
+    warnings, outcomes = answer.pop("warnings"), answer.pop("outcomes")
+    print(
+        f"Of {shares.draws} blocks that it may be {shares.failed} fail: "
+        f"{100.0 * shares.share_failed:.3g} % (by the count alone {100.0 * shares.ci_low:.3g} to "
+        f"{100.0 * shares.ci_high:.3g} %)."
+    )
+    print()
+    print_pairs(answer)
+    for name, count in outcomes.items():
+        print(f"outcome {name}: {count}")
+    print_warnings(warnings)
 
 
 def _body(

@@ -41,9 +41,15 @@ def simulate(
     *,
     workers: Workers,
     suite: options.Suite = None,
-    kind: str = option("What the blocks do: toppling, slumping or sliding.", "toppling"),
+    kind: str = option("What the blocks do: toppling, rocking, slumping or sliding.", "toppling"),
     p2: str | None = option(
-        "Toppling: frequency parameters p² [1/s²], separated by commas. Default: 30,10,3,1,0.3,0.1."
+        "Toppling and rocking: frequency parameters p² [1/s²], separated by commas. Default: "
+        "30,10,3,1,0.3,0.1."
+    ),
+    restitution_factor: str | None = option(
+        "Rocking: factors on the restitution 1 - 1.5 sin² α of the rectangle. Default: "
+        "1,0.95,0.9,0.8.",
+        metavar="LIST",
     ),
     rotation: str | None = option(
         "Slumping: rotations that count as failure [deg], and the word recovery for "
@@ -81,7 +87,8 @@ def simulate(
     A combination is a motion, without or with its vertical one, in one polarity, and a block. Of
     toppling the critical block of each p2 and the outcomes of a grid of blocks; with --kind
     slumping, the factor on each record that brings each block of a documented family down; with
-    --kind sliding, the strengths that slide stated displacements.
+    --kind sliding, the strengths that slide stated displacements; with --kind rocking, the outcomes
+    of a grid of free-standing blocks, which have no critical one, in one polarity.
 
     After Ctrl-C, a crash or a kill, the same command goes on where it stopped; what is stored is
     not computed again, and what a stored combination lacks is added.
@@ -102,6 +109,7 @@ def simulate(
             p2=_numbers(p2, "--p2"),
             rotations_deg=None if rotation is None else _rotations(rotation),
             displacements_m=_numbers(displacement, "--displacement"),
+            restitution_factors=_numbers(restitution_factor, "--restitution-factor"),
             vertical=cast("Vertical", vertical),  # any other word is refused
             grid=None if grid is None else _grid(grid),
             store_responses=None if store_responses is None else _blocks(store_responses),

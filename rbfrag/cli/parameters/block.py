@@ -114,8 +114,6 @@ class UncertaintyOptions:
     p2_sigma: _Number = option("Standard deviation of ln p².")
     kr_sigma: _Number = option("Standard deviation of ln k_r.")
     ky_sigma: _Number = option("Standard deviation of ln k_y.")
-    ks_sigma: _Number = option("Standard deviation of ln k_s.")
-    ps2_sigma: _Number = option("Standard deviation of ln p_s².")
     restitution_sigma: _Number = option("Standard deviation of the restitution.")
     block_draws: str | None = option(
         "Table of what the one block may be (.csv, .parquet), a row each, with the columns of a "

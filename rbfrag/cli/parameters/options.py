@@ -89,6 +89,14 @@ Jobs = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
+class Printing:
+    """How an answer is printed: a sentence and a short table unless more is asked for."""
+
+    verbose: bool = option("Print every value, with six digits.", False)
+    json: Json = False
+
+
+@dataclass(frozen=True, kw_only=True)
 class Reading:
     """What a text file of an accelerogram leaves open."""
 

@@ -66,6 +66,9 @@ CONFLICTS = (
         ("--block-draws",), (*NUMBERS, *SHAPE, *FILES, *PLANES, *SIGMAS), "the table has the block"
     ),
     Conflict(("--block-draws",), ("--batch",), "one question is about one block"),
+    Conflict(("--block-draws",), ("--ky", "--restitution"), "the table has the block"),
+    Conflict(("--draws",), ("--csv", "--plot", "--animate"), "they show one run", ("respond",)),
+    Conflict(("--polarity",), ("--reverse",), "one of them is enough"),
     Conflict(
         (*PLANES, "--cohesion", "--kv"),
         ("--mesh",),
@@ -76,6 +79,7 @@ CONFLICTS = (
     Conflict(PLANES, TABLES, "the file has the planes", ("hazard", "shakemap", "nrml", "pelicun")),
     Conflict(PLANES[1:], ("--ky",), "the strength follows from --ky and --beta"),
     Conflict((*SHAPE, *FILES, *PLANES[1:], "--motion"), ("--batch",), "the table has the blocks"),
+    Conflict(("--samples", "--seed", "--plot"), ("--expected",), "curves and samples need draws"),
     Conflict(
         ("--motion",),
         MEASURES,
@@ -87,6 +91,10 @@ _NAME_IT = "name the accelerogram, too"
 _MEASURE = "give --pgv, --pga or --sa10, or --pgd and --tm, too"
 
 NEEDS = (
+    Need(
+        ("--ses",), ("--investigation-time",), "--investigation-time", "both say how long it took"
+    ),
+    Need(("--investigation-time",), ("--ses",), "--ses", "both say how long the events took"),
     Need(("--batch",), ("--out",), "--out", "--out FILE names the table of answers"),
     Need(("--out",), ("--batch",), "--batch", "--batch FILE names the table of blocks"),
     Need(
@@ -117,12 +125,20 @@ NEEDS = (
         f"give --motion, or {_MEASURE.removeprefix('give ')}",
         ("rockmass",),
     ),
+    Need(
+        (*SIGMAS, "--block-draws", "--polarity", "--seed", "--displacement"),
+        ("--draws",),
+        "--draws",
+        "it is about what the block may be, of which so many are run",
+        ("respond",),
+    ),
     Need(("--exaggerate",), ("--animate",), "--animate", "it is a factor on what the film shows"),
     Need(("--up", "--contact-mm"), ("--mesh",), "--mesh", "it is about the pose of a mesh"),
     Need(
         ("--out",), ("--mesh",), "--mesh", "only a mesh makes a table, of its azimuths", ("block",)
     ),
     Need(("--n",), ("--rockmass",), "--rockmass", "only a rock mass is drawn anew"),
+    Need(("--shares",), ("--rockmass",), "--rockmass", "they are shares of its blocks"),
 )
 
 

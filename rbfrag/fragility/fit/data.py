@@ -10,20 +10,21 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError, InputError
+from rbfrag.fragility.domain import INSIDE
 from rbfrag.fragility.fit.censoring import censoring_weights
 from rbfrag.fragility.fit.domain import ranges_of, ratio_columns
 from rbfrag.fragility.fit.scores import Judged, critical_outcomes
 from rbfrag.fragility.measures import SPECTRAL, Term
-from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, Method
+from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, Method, arrays
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 if TYPE_CHECKING:
@@ -68,6 +69,9 @@ class FitSource:
             combination is about blocks of any strength.
         recording: number of the recording that each combination's motion is of, shape (n,); None
             where that is not known.
+        sensitive: whether outcomes of the grid are other ones for the motion times 1 ± 1e-6, shape
+            (n, m), NaN where that is not stored; None where it is of none.
+        of_block: what is stored of the blocks beside their size, by name, shape (n,).
     """
 
     table: CombinationTable
@@ -77,6 +81,8 @@ class FitSource:
     displacement_m: FloatArray | None = None
     strength_g: FloatArray | None = None
     recording: NDArray[np.int64] | None = None
+    sensitive: FloatArray | None = None
+    of_block: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @classmethod
     def of_table(cls, table: CombinationTable) -> FitSource:
@@ -87,15 +93,13 @@ class FitSource:
     def only(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> FitSource:
         """Return some of the combinations."""
         part = {f.name: getattr(self.table, f.name)[chosen] for f in fields(self.table)}
-        slid, strength, recording = self.displacement_m, self.strength_g, self.recording
-        return FitSource(
-            CombinationTable(**part),
-            self.xp_m_s[chosen],
-            self.k_over_pga[chosen],
-            self.failed[chosen],
-            None if slid is None else slid[chosen],
-            None if strength is None else strength[chosen],
-            None if recording is None else recording[chosen],
+        columns: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
+        del columns["table"], columns["of_block"]
+        return replace(
+            self,
+            table=CombinationTable(**part),
+            of_block={name: v[chosen] for name, v in self.of_block.items()},
+            **{name: v[chosen] for name, v in columns.items() if v is not None},
         )
 
     def judged_outcomes(self, strength: FloatArray, critical: FloatArray) -> tuple[FloatArray, str]:
@@ -169,8 +173,13 @@ def read_source(
         grid.k_over_pga,
         grid.outcome,
         grid.displacement_m,
-        np.array([_yield_g(kind_read, block or "{}") for block in table.block], dtype=np.float64),
+        np.array([_yield_g(kind_read, text or "{}") for text in table.block], dtype=np.float64),
         np.array([recordings[motion] for motion in table.motion_id.tolist()], dtype=np.int64),
+        grid.sensitive if np.isfinite(grid.sensitive).any() else None,
+        {
+            name: np.array([_number_of(text, name) for text in table.block], dtype=np.float64)
+            for name in block.stored
+        },
     )
     if grid.outcome.shape[1] == 0 and block.strength == "kr":
         k, failed = _nothing_known(table)
@@ -205,6 +214,14 @@ def _yield_g(kind: str, block: str) -> float:
         ) from None
 
 
+def _number_of(block: str | None, name: str) -> float:
+    """Return a number that is stored of a block."""
+    value = json.loads(block or "{}").get(name)
+    if not isinstance(value, int | float):
+        raise FitError(f"a stored block {block} has no {name}: run  rbfrag db check")
+    return float(value)
+
+
 @dataclass(frozen=True, eq=False)
 class FitData:
     """Rows of one fit: the points at which blocks just fail, and the blocks of the grid.
@@ -235,6 +252,8 @@ class FitData:
         fingerprint: hash of natural keys and fitted values.
         weights: what each outcome counts where it is judged, shape (n, m), so that those known
             stand for those not known; None: each the same.
+        sensitive: whether the outcomes are sensitive to the motion's last digits, shape (n, m);
+            None where that is stored of none.
     """
 
     kind: str
@@ -258,6 +277,7 @@ class FitData:
     guessed_events: int = 0
     fingerprint: str = ""
     weights: FloatArray | None = None
+    sensitive: FloatArray | None = None
 
     @property
     def x(self) -> FloatArray:
@@ -309,6 +329,7 @@ class _Points:
     ranges: dict[str, FloatArray]
     weights: FloatArray | None = None
     scored: NDArray[np.bool_] | None = None
+    sensitive: FloatArray | None = None
 
 
 def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None = None) -> FitData:
@@ -369,6 +390,7 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
         guessed_events=len(set(table.event_id[own][table.event_guessed[own]].tolist())),
         fingerprint=_fingerprint(keys[chosen], names[event], values, observed, failed, of_outcomes),
         weights=None if points.weights is None else points.weights[chosen],
+        sensitive=None if points.sensitive is None else points.sensitive[chosen],
     )
     _refuse_thin(data, method, term)
     return data
@@ -460,6 +482,7 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     readable = np.isin(status, ("found", *_CENSORED, "not_searched"))
     of_motion = {name: given[name] for name in dict.fromkeys(("pgv_m_s", "pga_g", *term.inputs))}
     of_motion |= {"tm_s": table.tm_s, "p2": table.p2, "p": p, "intensity_m_s": x}
+    of_motion |= source.of_block
     kr = source.k_over_pga * table.pga_g[:, None]
     y0 = source.k_over_pga * (pga_m_s2 / p)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -481,18 +504,27 @@ def _strengths(source: FitSource, method: Method, term: Term) -> _Points:
     }
     if not of_outcomes:
         ranges = {name: np.where(observed, v, np.nan) for name, v in ranges.items()}
+    blocks = {**_column(of_motion), "kr": kr[:, some], "y_m_s": y0[:, some]}
+    if method.block.adjust is not None:
+        method.block.adjust(blocks, arrays())
+        fitted = read[:, some] & ~method.block.at_rest.holds(blocks)
+        # few blocks lie far down
+        for name in method.block.options if fitted.any() else ():
+            least = np.quantile(blocks[name][fitted], 1.0 - INSIDE)
+            ranges[name] = np.where(fitted & (blocks[name] >= least), blocks[name], np.nan)
     return _Points(
         values={**of_motion, "kr": y * p / STANDARD_GRAVITY_M_S2, "y_m_s": y},
         observed=observed,
         usable=defined & readable,
         combination=np.arange(x.size),
         order=np.zeros(x.size),
-        blocks={**_column(of_motion), "kr": kr[:, some], "y_m_s": y0[:, some]},
+        blocks=blocks,
         failed=failed[:, some],
         read=read[:, some],
         outcomes=source_of_outcomes,
         ranges=ranges,
         scored=scored[:, some],
+        sensitive=None if source.sensitive is None else source.sensitive[:, some],
     )
 
 

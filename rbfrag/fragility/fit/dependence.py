@@ -121,7 +121,8 @@ def dependence_of_fit(
 ) -> DependenceEstimate:
     """Estimate the copula of the blocks that a model was fitted to.
 
-    Blocks without a size count as those of one size, their strength as their velocity.
+    Blocks without a size count as those of one size, their strength as their velocity. Of blocks
+    that differ in more than size and strength those are read that have the most of it.
 
     Args:
         data: the rows of the fit.
@@ -141,9 +142,12 @@ def dependence_of_fit(
 
     size = np.ones(shape) if block.size is None else data.grid(block.size)
     strength = data.grid("y_m_s" if "y_m_s" in data.blocks else block.strength)
+    alike = np.ones(shape[0], dtype=np.bool_)
+    for name in block.stored:
+        alike &= data.values[name] == data.values[name].max()
     return estimate_dependence(
         held_out.ravel(),
-        np.where(data.read, data.failed, np.nan).ravel(),
+        np.where(data.read & alike[:, None], data.failed, np.nan).ravel(),
         each(data.event),
         each(data.recording),
         each(data.motion),
@@ -293,17 +297,29 @@ def _own(
         share = start.rho_o / max(start.rho_o + start.rho_v, 1e-9)
         l_v, l_o, l_y = np.log([start.l_v, start.l_o, start.l_y]).tolist()
         starts = [(share, l_v, l_o, l_y)]
-    x = _least(loss, starts, 1)
+    # blocks run in one polarity alone do not tell what changes its sign with it: nothing does
+    most = 1.0 if (own.sign < 0.0).any() else 0.0
+    x = _least(loss, starts, 1, most)
     l_v, l_o, l_y = np.exp(x[1:]).tolist()
     return float(x[0]), l_v, l_o, l_y
 
 
 def _least(
-    loss: Callable[[FloatArray], float], starts: Sequence[Sequence[float]], shares: int
+    loss: Callable[[FloatArray], float],
+    starts: Sequence[Sequence[float]],
+    shares: int,
+    most: float = 1.0,
 ) -> FloatArray:
-    """Return where a function of shares and logarithms of lengths is least, from several starts."""
+    """Return where a function of shares and logarithms of lengths is least, from several starts.
+
+    Args:
+        loss: the function.
+        starts: where the search begins.
+        shares: how many of its arguments are shares.
+        most: greatest share.
+    """
     low, high = (float(np.log(length)) for length in LENGTHS)
-    bounds = [(0.0, 1.0) if k < shares else (low, high) for k in range(len(starts[0]))]
+    bounds = [(0.0, most) if k < shares else (low, high) for k in range(len(starts[0]))]
     scale = 1e4 / max(1.0, abs(loss(np.asarray(starts[0]))))
 
     def scaled(x: FloatArray) -> float:

@@ -70,7 +70,8 @@ def fit(
             critical values, for a term that is one number), ``logistic`` (of outcomes, the same
             terms), ``weibull`` and ``bounded`` (of outcomes, the terms with PGV), ``record`` and
             ``power`` (``xp``). Sliding: ``displacement``; slumping: ``capacity`` (``pgv`` and
-            ``pgv_pga``). None: ``wls``, or the only one that there is for the kind.
+            ``pgv_pga``); rocking: ``overturning`` (also ``sa10`` and ``pga_sa10``). None: ``wls``,
+            or the only one that there is for the kind.
         suite: suite of motions to fit (connection only); None for all motions.
         name: name of the model; None for method and term, such as ``wls-pgv``, of another kind
             such as ``sliding-pgv``.

@@ -88,9 +88,11 @@ def fit_outcomes(
         {"cr1_standard_errors": np.sqrt(np.diag(cr1)),
          "naive_standard_errors": np.sqrt(np.diag(naive))},
     )  # fmt: skip
-    with np.errstate(invalid="ignore", divide="ignore"):
-        median = median_y_m_s(form, method, b, data)
-        residual = np.where(data.observed, np.log(data.y) - np.log(median), np.nan)
+    residual = None
+    if data.observed.any():
+        with np.errstate(invalid="ignore", divide="ignore"):
+            median = median_y_m_s(form, method, b, data)
+            residual = np.where(data.observed, np.log(data.y) - np.log(median), np.nan)
     return method_result(
         data,
         estimates,
@@ -103,10 +105,18 @@ def fit_outcomes(
             "n_toppled": failures,
             "n_bounded": int(rows.bounded.sum()),
             "n_bounded_toppled": rows.bounded_failed,
+            **sensitive_share(data, rows),
             "natural": natural_parameters(names, method, b, estimates.covariance),
         },
         warnings=_warnings(data, rows, estimates),
     )
+
+
+def sensitive_share(data: FitData, rows: OutcomeRows) -> dict[str, float]:
+    """Return the share of the fitted outcomes that are sensitive, where some can be."""
+    if data.sensitive is None:
+        return {}
+    return {"sensitive_share": float(np.nanmean(data.sensitive.ravel()[rows.place]))}
 
 
 def parameter_names(method: Method, term: Term, *, estimate_m: bool = False) -> tuple[str, ...]:

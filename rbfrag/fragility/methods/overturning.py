@@ -8,8 +8,8 @@ tan α = k_r, unless it is given. Where PGV and PGA are not both known, with l =
 u = ln(y/x), x being PGV or SA(1.0) g/2π, Q = ln(SA(1.0)/(2π PGA)) and h(p) = exp(A l - B l²):
 
     pgv        A = .35, B = .02   h (b0 + b1 u + b2 l + b3 l² + b4 s + b5 s u)
-    sa10       A = .45, B = .04   h (the same + b6 ln x)
-    pga_sa10   A = .40, B = .04   h (b0 + b1 L + b2 l + b3 l² + b4 s + b5 s L + b6 Q + b7 Q l)
+    sa10       A = .45, B = .04   the same
+    pga_sa10   A = .40, B = .04   h (b0 + b1 L + b2 l + b3 l² + b4 s + b5 s L + b6 Q)
 
 How well they do stands in docs/theory/rocking.md.
 """
@@ -59,6 +59,7 @@ BLOCK = BlockParameters(
         "cannot overturn: P = 0 by mechanics, not by the model"
     ),
     options=("restitution",),
+    stored=("restitution_factor",),
     fractions=("restitution",),
     adjust=_restitution,
     refuses=(
@@ -92,17 +93,16 @@ def _pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
 
 
 def _velocity(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
-    x, s = v["intensity_m_s"], v["speed_loss"]
-    u, l = ns.log(v["y_m_s"] / x), ns.log(v["p"])  # noqa: E741  as in the formula
-    slopes = (1.0, u, l, l * l, s, s * u)
-    return _sum(b, slopes if len(b) == len(slopes) else (*slopes, ns.log(x)))
+    s = v["speed_loss"]
+    u, l = ns.log(v["y_m_s"] / v["intensity_m_s"]), ns.log(v["p"])  # noqa: E741  as in the formula
+    return _sum(b, (1.0, u, l, l * l, s, s * u))
 
 
 def _pga_sa10(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     odds, s = _log_odds(v, ns), v["speed_loss"]
     l = ns.log(v["p"])  # noqa: E741  as in the formula
     q = ns.log(v["sa10_g"] / v["pga_g"] * (0.5 / math.pi))
-    return _sum(b, (1.0, odds, l, l * l, s, s * odds, q, q * l))
+    return _sum(b, (1.0, odds, l, l * l, s, s * odds, q))
 
 
 _OF_VELOCITY = ("b0", "b_ln_y_over_x", "b_ln_p", "b_ln_p_squared", "b_s", "b_s_ln_y_over_x")
@@ -118,10 +118,9 @@ METHOD = Method(
             _pgv_pga, 0, (BLOCK.at_rest,),
         ),
         "pgv": Form(_OF_VELOCITY, _velocity, 0, size_factor=SizeFactor(0.35, 0.02)),
-        "sa10": Form((*_OF_VELOCITY, "b_ln_x"), _velocity, 0, size_factor=SizeFactor(0.45, 0.04)),
+        "sa10": Form(_OF_VELOCITY, _velocity, 0, size_factor=SizeFactor(0.45, 0.04)),
         "pga_sa10": Form(
-            ("b0", "b_logit_r", "b_ln_p", "b_ln_p_squared", "b_s", "b_s_logit_r", "b_ln_q10",
-             "b_ln_q10_ln_p"),
+            ("b0", "b_logit_r", "b_ln_p", "b_ln_p_squared", "b_s", "b_s_logit_r", "b_ln_q10"),
             _pga_sa10, 0, (BLOCK.at_rest,), size_factor=SizeFactor(0.4, 0.04),
         ),
     },

@@ -60,6 +60,10 @@ _UNITS_WORD = re.compile(
 _TIME_UNIT = re.compile(
     r"(?<![A-Za-z])(?:time[^,;\t()\[\]]*|t\s*)[(\[]\s*([^)\]]+?)\s*[)\]]", re.IGNORECASE
 )
+_BRACKETS = re.compile(r"[(\[{]\s*([^()\[\]{}]+?)\s*[)\]}]")
+"""Whatever the columns are called, and in whatever language, their units may stand in brackets."""
+
+_OTHER_TIMES = frozenset({"ms", "msec", "µs", "us", "min", "h", "hr"})
 _SECONDS = frozenset({"s", "sec", "sec.", "secs", "second", "seconds"})
 
 _TITLE = re.compile(
@@ -278,6 +282,9 @@ def _spellings(header: Header) -> Iterator[tuple[int, str]]:
             # a title may well have brackets: "Accelerogram (corrected)"
             if names_columns or _is_unit(match[1]):
                 yield number, match[1]
+        for match in _BRACKETS.finditer(line):
+            if _is_unit(match[1]):
+                yield number, match[1]
         for match in _ACCELERATION_SUFFIX.finditer(line):
             yield number, match[1].replace("_", "/")
         for match in _UNITS_WORD.finditer(line):
@@ -296,6 +303,7 @@ def _check_columns(file: RecordFile, header: Header) -> None:
     for number, line in header:
         time = _TIME.search(line)
         if not time:
+            _check_units(file, number, [match[1] for match in _BRACKETS.finditer(line)])
             continue
         if (unit := _TIME_UNIT.search(line)) and unit[1].lower() not in _SECONDS:
             raise file.error(
@@ -308,4 +316,16 @@ def _check_columns(file: RecordFile, header: Header) -> None:
             raise file.error(f"the header names {other[0]!r}: an acceleration is needed", number)
         # a title such as "Accelerations, time series" is no list of columns
         if acceleration and acceleration.start() < time.start() and _TIME_UNIT.search(line):
+            raise file.error("the acceleration stands before the time: swap the columns", number)
+
+
+def _check_units(file: RecordFile, number: int, units: list[str]) -> None:
+    """Refuse columns whose names say nothing, but whose units do: other times, or a swap."""
+    at = next((place for place, unit in enumerate(units) if _is_unit(unit)), None)
+    if at is None:
+        return
+    for place, unit in enumerate(units):
+        if unit.lower() in _OTHER_TIMES:
+            raise file.error(f"the times are in {unit!r}: convert them to seconds", number)
+        if unit.lower() in _SECONDS and place > at:
             raise file.error("the acceleration stands before the time: swap the columns", number)

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rbfrag.errors import MotionFileError
+from rbfrag.errors import MotionFileError, UnitNotStatedError
 from rbfrag.motions.text.file import (
     MOST_DIGITS,
     finite_number,
@@ -202,9 +202,10 @@ class RecordFile:
     def require_units(self, states: str = "the file states") -> None:
         """Refuse a file that states no unit of acceleration unless the caller states it."""
         if self.units is None:
-            raise self.error(
+            raise UnitNotStatedError(
+                self.path,
                 f"{states} no unit of acceleration, and it is never guessed: give it with --units "
-                "g, m/s2, cm/s2 or mm/s2"
+                "g, m/s2, cm/s2 or mm/s2",
             )
 
     def dt(self, field: Field, what: str = "dt") -> float:

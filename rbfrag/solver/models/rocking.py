@@ -11,19 +11,42 @@ there is no search (docs/theory/rocking.md).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
+from rbfrag.solver.integrator.free_batch import simulate_free
 from rbfrag.solver.integrator.free_rocking import Corner
 from rbfrag.solver.integrator.two_corners import RockingRun
-from rbfrag.solver.kind import BlockOnPlanes, Kind, RunEnd, Runner, Shaking
+from rbfrag.solver.kind import (
+    BlockOnPlanes,
+    Case,
+    CaseResult,
+    Kind,
+    Measures,
+    RunEnd,
+    Runner,
+    Shaking,
+    each_once,
+)
 from rbfrag.solver.quantity import number, positive
-from rbfrag.solver.results import FloatArray, Outcome, Response, ResponseHistory
+from rbfrag.solver.results import (
+    DEFAULT_P2,
+    MAP_DEPTH,
+    FloatArray,
+    Outcome,
+    Polarity,
+    Response,
+    ResponseHistory,
+    SearchPoints,
+)
 from rbfrag.solver.rocking_run import (
     MOST_IMPACTS,
     FreeBlock,
@@ -38,6 +61,16 @@ from rbfrag.solver.toppling_run import OUTCOMES, refuse_endless
 
 SENSITIVITY = 1e-6
 """Change of the motion whose effect on the outcome makes it a sensitive one."""
+
+FACTOR = "restitution_factor"
+"""Name of the factor on the restitution in what is stored of a block."""
+
+RESTITUTION_FACTORS = (1.0, 0.95, 0.9, 0.8)
+"""Factors of the outcome grid on the restitution of the rectangle."""
+
+Y_OVER_PGV = np.geomspace(0.1, 8.0, 25)
+"""Toppling velocity of the blocks of the outcome grid over PGV: all but the largest overturn at the
+first of them, none does from 5.5 on."""
 
 CHAOTIC = 1e-3
 """Error over the critical angle from which on the size of a peak means nothing."""
@@ -68,10 +101,17 @@ def free_block(site: BlockOnPlanes) -> FreeBlock:
 
 def _symmetric(p2: float, kr: float, given: float | None) -> FreeBlock:
     """Return the rectangle on level ground that has these numbers."""
-    sine2 = kr * kr / (1.0 + kr * kr)
-    both = corner(kr, p2, 1.0 - 1.5 * sine2 if given is None else given)
+    both = corner(kr, p2, restitution_of_rectangle(kr) if given is None else given)
     half, height = rectangle_r3_m(p2) * both.sin, rectangle_r3_m(p2) * both.cos
     return FreeBlock(both, both, 2.0 * half, (half, height), 0.0)
+
+
+def restitution_of_rectangle(kr: float) -> float:
+    """Return 1 - 1.5 sin² α of the rectangle with tan α = k_r (Housner 1963).
+
+    Not above 0 for a block so stocky that an impact leaves it no speed.
+    """
+    return 1.0 - 1.5 * kr * kr / (1.0 + kr * kr)
 
 
 def _of_shape(block: Block, beta_rad: float, given: float | None) -> FreeBlock:
@@ -114,7 +154,7 @@ def _corner(
 
 
 class Rocking(Kind):
-    """The model of free-standing blocks."""
+    """The model of free-standing blocks; campaigns run symmetric ones on level ground."""
 
     kind = "rocking"
     mode = "topple"
@@ -125,6 +165,9 @@ class Rocking(Kind):
         "what overturns a free-standing block is no interval of k_r (up to 122 islands for one "
         "record), so that no value is certain to be the last"
     )
+    campaign = True
+    campaign_options = ("p2", "restitution_factors")
+    polarities = ("forward",)
 
     def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
         """Return what the block does.
@@ -187,12 +230,117 @@ class Rocking(Kind):
 
         return run
 
+    def numbers_of(self, block: Block, beta_rad: float) -> tuple[dict[str, float], tuple[str, ...]]:
+        """Return p² and k_r of the corner that fails first and the restitution of both.
+
+        Predictions are about symmetric blocks on level ground: of another block, about the one
+        that is as weak as its weaker sense and loses as much speed in two impacts, √(e31 e13).
+
+        Raises:
+            InputError: the block does not stand of itself.
+        """
+        free = _of_shape(block, beta_rad, None)
+        weaker = min(free.toe, free.heel, key=lambda corner: corner.theta_c)
+        kept = math.sqrt(max(free.toe.passed_on, 0.0) * max(free.heel.passed_on, 0.0))
+        values = {"p2": weaker.p**2, "kr": weaker.kr, "restitution": kept}
+        if math.isclose(free.toe.theta_c, free.heel.theta_c, rel_tol=1e-6):
+            return values, ()
+        sense = "forward" if weaker is free.toe else "backward"
+        return values, (
+            "the block does not stand alike on both corners: the answer is that of the symmetric "
+            f"block of its weaker sense, {sense}; respond runs it as it stands",
+        )
+
+    def cases(self, **request: Any) -> tuple[Case, ...]:
+        """Return every size with every factor on the restitution of the rectangle.
+
+        Raises:
+            InputError: an empty list, a value that repeats or cannot be meant.
+        """
+        self.refuse_foreign(request, self.campaign_options)
+        sizes = [positive(value, "p2", "1/s²") for value in request.get("p2", DEFAULT_P2)]
+        each_once(sizes, "p2")
+        factors = [
+            positive(value, FACTOR, "a factor on the restitution")
+            for value in request.get("restitution_factors", RESTITUTION_FACTORS)
+        ]
+        each_once(factors, FACTOR)
+        for factor in factors:
+            if factor > 1.0:
+                raise InputError(
+                    f"{FACTOR} = {factor:g}: slender blocks would gain speed at their impacts; "
+                    "give factors above 0 and up to 1"
+                )
+        return tuple(Case(self.kind, p2, {FACTOR: factor}) for p2 in sizes for factor in factors)
+
+    def grid(self, case: Case, measures: Measures) -> FloatArray:
+        """Return k_r/PGA of the blocks whose toppling velocities are fixed ratios of PGV."""
+        assert case.p2 is not None
+        ground = measures.pga_g * STANDARD_GRAVITY_M_S2
+        if not (ground > 0.0 and measures.pgv_m_s > 0.0):
+            return np.empty(0)
+        strengths: FloatArray = math.sqrt(case.p2) * measures.pgv_m_s / ground * Y_OVER_PGV
+        return strengths
+
+    def run_cases(
+        self,
+        motion: GroundMotion,
+        vertical: GroundMotion | None,
+        polarity: Polarity,
+        cases: Sequence[Case],
+        *,
+        search: bool = True,
+        grid: bool = True,
+        full_map: bool = False,
+        map_depth: float = MAP_DEPTH,
+    ) -> list[CaseResult]:
+        """Return the outcome grid of every case under one motion, all blocks in one call."""
+        strengths = [self.grid(case, motion) for case in cases]
+        if not grid or not any(map(len, strengths)):
+            return [CaseResult(None, None)] * len(cases)
+        excited = excitation(motion, vertical, polarity)
+        blocks = [
+            _symmetric(_size_of(case), kr, _factor_of(case) * restitution_of_rectangle(kr))
+            for case, ratios in zip(cases, strengths, strict=True)
+            for kr in (ratios * excited.pga_g).tolist()
+        ]
+        refuse_endless(excited, max(_size_of(case) for case in cases))
+        runs = simulate_free(
+            excited,
+            np.array([(block.toe, block.heel) for block in blocks]),
+            np.array([block.rest_speed for block in blocks]),
+            most_impacts=MOST_IMPACTS,
+            change=SENSITIVITY,
+        )
+        words = [OUTCOMES[code].value for code in runs.outcome.tolist()]
+        results, start = [], 0
+        for ratios in strengths:
+            own = slice(start, start + len(ratios))
+            start += len(ratios)
+            sensitive = runs.sensitive[own] > 0
+            points = SearchPoints(ratios, runs.theta_n[own], tuple(words[own]), sensitive=sensitive)
+            results.append(CaseResult(None, points))
+        return results
+
     def _block(self, site: BlockOnPlanes) -> FreeBlock:
         if site.cohesive:
             raise InputError(
                 f"cohesion_pa does not go with {self.kind}: the block lifts off its base"
             )
         return free_block(site)
+
+
+def _size_of(case: Case) -> float:
+    assert case.p2 is not None
+    return case.p2
+
+
+def _factor_of(case: Case) -> float:
+    """Return the factor on the restitution of the blocks of a case."""
+    factor = (case.block or {}).get(FACTOR)
+    if not isinstance(factor, int | float):
+        raise InputError(f"its block {case.block} is not described as free-standing ones are")
+    return float(factor)
 
 
 def peaks(run: RockingRun, outcome: Outcome) -> tuple[float | None, float | None]:

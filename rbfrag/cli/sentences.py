@@ -1,0 +1,74 @@
+"""Answers in words: the number that decides, rounded as an engineer would write it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+STATUS = {
+    "below_limit": "This motion topples no block of this size down to the search limit.",
+    "no_motion": "This motion lifts no block of this size down to the search limit off its base.",
+    "outside_model": "The motion throws blocks off their base, which the model does not follow.",
+}
+
+SCALED_STATUS = {
+    "below_limit": "No factor on the motion up to scale_limit brings the block down, as far as it "
+    "was looked at.",
+    "no_motion": "No factor on the motion up to scale_limit moves the block.",
+}
+
+SLIDING_STATUS = {
+    "below_limit": "No block down to the search limit slides {:g} m.",
+    "no_motion": "No block down to the search limit slides.",
+    "outside_model": "The vertical motion throws blocks off their base, which the model does not "
+    "follow.",
+}
+
+
+def rounded(value: float) -> str:
+    """Return a number with three digits and without an exponent where people write none."""
+    if value != 0.0 and not 1e-4 <= abs(value) < 1e7:
+        return f"{value:.2g}"
+    text = f"{value:#.3g}"
+    return f"{float(text):,.0f}" if abs(value) >= 100.0 else text.rstrip(".")
+
+
+def critical_in_words(answer: Mapping[str, Any]) -> str:
+    """Return what a search has found.
+
+    Args:
+        answer: a critical value under the keys of the JSON contract: k_r/PGA, or a scale.
+    """
+    if "scale" in answer:
+        return _scale_in_words(answer)
+    if answer["status"] != "found":
+        return STATUS[answer["status"]]
+    half_width = 0.5 * (answer["upper"] - answer["lower"]) * answer["pga_g"]
+    certified = "certified" if answer["certified"] else "not certified"
+    return (
+        f"The strongest block of p² = {answer['p2']:g} 1/s² that this motion topples has "
+        f"k_r = {rounded(answer['kr'])} (± {half_width:.0e}, {certified}), "
+        f"{rounded(answer['kr_over_pga'])} of the PGA of {rounded(answer['pga_g'])} g."
+    )
+
+
+def _scale_in_words(answer: Mapping[str, Any]) -> str:
+    if answer["scale"] is None:
+        return SCALED_STATUS[answer["status"]]
+    factor, pga = answer["scale"], answer["scale"] * answer["pga_g"]
+    return (
+        f"This motion times {rounded(factor)} brings the block down, at a PGA of {rounded(pga)} g."
+    )
+
+
+def slides_in_words(document: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what a search for sliding blocks has found: the smallest distance, and what holds."""
+    first = document["thresholds"][0]
+    if first["status"] == "found":
+        yield (
+            f"On a level plane, blocks of k_y below {rounded(first['ky'])} slide further than "
+            f"{first['displacement_m']:g} m."
+        )
+    else:
+        yield SLIDING_STATUS[first["status"]].format(first["displacement_m"])
+    yield "On a base that dips, displacements are cos(phi - beta)/cos(phi) times these."

@@ -1,0 +1,67 @@
+"""`respond --draws`: as from Python, and what does not go with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rbfrag
+from tests.cli.conftest import Refuses, Shell
+
+ASKED = ("respond", "a.csv", "--units", "g", "--dt", "0.01", "--p2", "7")
+
+
+@pytest.fixture(autouse=True)
+def record(shell: Shell) -> None:
+    Path("a.csv").write_text("\n".join(f"{0.4 * np.sin(0.08 * i):.6f}" for i in range(400)))
+    Path("draws.csv").write_text("p2_1_s2,kr,restitution,weight\n7,0.12,0.9,1\n6,0.2,0.8,2\n")
+
+
+def test_shares_are_those_of_python(shell: Shell) -> None:
+    told = shell.json(
+        *ASKED, "--kr", "0.12", "--kr-sigma", "0.3", "--kind", "rocking", "--restitution", "0.9",
+        "--restitution-sigma", "0.05", "--draws", "40", "--seed", "4", "--polarity", "both",
+    )  # fmt: skip
+    motion = rbfrag.read_motions("a.csv", units="g", dt_s=0.01)[0]
+    own = rbfrag.respond_draws(
+        motion, p2=7.0, kr=0.12, kr_sigma=0.3, kind="rocking", restitution=0.9,
+        restitution_sigma=0.05, draws=40, seed=4, polarity="both",
+    )  # fmt: skip
+    assert {**told, "warnings": []} == {**own.as_dict(), "warnings": []}
+    words = shell(*ASKED, "--kr", "0.12", "--draws", "5").stdout
+    assert "Of 5 blocks that it may be" in words
+
+
+def test_a_table_and_a_rectangle_are_drawn_from(shell: Shell) -> None:
+    table = shell.json(
+        *ASKED[:6], "--block-draws", "draws.csv", "--kind", "rocking", "--draws", "9"
+    )
+    assert sum(table["outcomes"].values()) == 9
+    shape = ("--height", "0.6", "--width", "0.12", "--kind", "rocking")
+    block = rbfrag.Block.rectangle(0.6, 0.12)
+    numbers = ("--p2", repr(block.p2), "--kr", repr(block.tan_alpha3), "--kind", "rocking")
+    drawn = ("--kr-sigma", "0.3", "--draws", "30")
+    one = shell.json(*ASKED[:6], *shape, *drawn)
+    other = shell.json(*ASKED[:6], *numbers, *drawn)
+    assert one["outcomes"] == other["outcomes"]
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--kr", "0.1", "--kr-sigma", "0.1"), "--kr-sigma goes with --draws"),
+        (("--kr", "0.1", "--draws", "0"), "draws = 0"),
+        (("--kr", "0.1", "--draws", "3", "--csv", "x.csv"), "--draws does not go with --csv"),
+        (("--kr", "0.1", "--draws", "3", "--reverse", "--polarity", "both"), "--polarity does not"),
+        (("--draws", "3", "--block-draws", "draws.csv"), "--block-draws does not go with --p2"),
+    ],
+)
+def test_what_does_not_fit_is_refused(refuses: Refuses, more: tuple[str, ...], words: str) -> None:
+    assert words in refuses(*ASKED, *more)
+
+
+def test_shapes_without_numbers_are_refused(refuses: Refuses) -> None:
+    shape = ("--s1", "1", "--s2", "0.6", "--gamma", "25", "--beta", "20", "--phi", "40")
+    assert "rockmass --motion" in refuses(*ASKED[:6], *shape, "--draws", "3")

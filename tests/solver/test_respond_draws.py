@@ -1,0 +1,125 @@
+"""Shares of simulated draws: against closed forms of pulses, single runs and their own counts."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+import rbfrag
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.respond_draws import respond_draws, wilson
+
+G = 9.80665
+
+PULSE = GroundMotion.from_nodes(np.array([0.0, 0.5, 0.5, 0.6]), np.array([0.4, 0.4, 0.0, 0.0]))
+SHAKEN = GroundMotion(
+    0.4 * np.sin(2.0 * math.pi * np.arange(0.0, 4.0, 0.01) / 0.8) * np.linspace(1.0, 0.0, 400),
+    0.01,
+)  # fmt: skip
+
+
+def test_toppling_under_a_pulse_is_the_lognormal_strength_below_the_critical_one() -> None:
+    critical = rbfrag.critical(PULSE, p2=3.0).kr
+    assert critical is not None
+    answer = respond_draws(PULSE, p2=3.0, kr=0.9 * critical, kr_sigma=0.2, draws=1000)
+    expected = norm.cdf(-math.log(0.9) / 0.2)
+    assert answer.kind == "toppling"
+    assert abs(answer.share_failed - expected) < 4.0 * answer.standard_error
+    assert answer.outcomes == {"stable": 1000 - answer.failed, "toppled": answer.failed}
+
+
+def test_sliding_under_a_pulse_is_the_strength_below_that_of_newmark() -> None:
+    # a pulse a of duration T slides v²/(2 k g)·(1 - k/a) with v = a g T (Newmark 1965)
+    a, duration, limit = 0.4, 0.5, 0.4
+    v = a * G * duration
+    at_limit = v * v / (2.0 * G * limit + v * v / a)
+    answer = respond_draws(
+        PULSE, ky=at_limit, ky_sigma=0.3, displacement_m=limit, horizontal=True, draws=1000, seed=3
+    )
+    assert abs(answer.share_failed - 0.5) < 4.0 * answer.standard_error
+    assert answer.outcomes == {"stable": 1000}
+
+
+@pytest.mark.parametrize("kind", ["toppling", "rocking"])
+def test_without_scatter_every_draw_is_the_single_run(kind: str) -> None:
+    for kr in (0.05, 0.3):
+        single = rbfrag.respond(SHAKEN, p2=7.0, kr=kr, kind=kind)
+        answer = respond_draws(SHAKEN, p2=7.0, kr=kr, kind=kind, draws=3)
+        assert answer.outcomes == {single.outcome.value: 3}
+        assert answer.standard_error == 0.0
+        assert answer.ci_high - answer.ci_low > 0.4
+
+
+def test_an_unknown_direction_is_every_other_draw_the_one_way() -> None:
+    asked: Any = {"p2": 7.0, "kr": 0.1, "kr_sigma": 0.3, "kind": "rocking"}
+    skewed = GroundMotion(np.maximum(SHAKEN.acceleration_g, -0.1), SHAKEN.dt_s)
+    one, other, both = (
+        respond_draws(skewed, **asked, draws=400, polarity=way)
+        for way in ("forward", "reverse", "both")
+    )
+    mean = 0.5 * (one.share_failed + other.share_failed)
+    assert abs(both.share_failed - mean) < 4.0 * both.standard_error
+    assert both.polarity == "both"
+    # a symmetric block on level ground rocks alike both ways, if both ways are the same motion
+    level = respond_draws(SHAKEN, **asked, draws=50)
+    turned = respond_draws(SHAKEN, **asked, draws=50, polarity="reverse")
+    assert level.outcomes == turned.outcomes
+
+
+def test_seeds_repeat_and_differ() -> None:
+    asked: Any = {"p2": 7.0, "kr": 0.12, "kr_sigma": 0.4, "kind": "rocking", "draws": 60}
+    assert respond_draws(SHAKEN, **asked, seed=2) == respond_draws(SHAKEN, **asked, seed=2)
+    shares = {respond_draws(SHAKEN, **asked, seed=i).failed for i in range(8)}
+    assert len(shares) > 1
+
+
+def test_a_table_of_draws_is_drawn_from_by_weight() -> None:
+    weak, strong = 0.02, 3.0
+    answer = respond_draws(SHAKEN, p2=7.0, kr=[weak, strong], weights=[1.0, 3.0], draws=800)
+    assert abs(answer.share_failed - 0.25) < 4.0 * answer.standard_error
+
+
+def test_restitution_scatters_between_0_and_1() -> None:
+    loses = respond_draws(
+        SHAKEN, p2=7.0, kr=0.12, kind="rocking", restitution=0.95, restitution_sigma=0.2, draws=100
+    )
+    assert sum(loses.outcomes.values()) == 100
+
+
+def test_the_interval_of_a_count_is_that_of_wilson() -> None:
+    for failed, count in ((0, 20), (3, 20), (10, 20), (20, 20)):
+        for end in wilson(failed, count):
+            if 0.0 < end < 1.0:
+                z = (failed / count - end) / math.sqrt(end * (1.0 - end) / count)
+                assert abs(z) == pytest.approx(norm.ppf(0.975), rel=1e-9)
+    assert wilson(0, 20)[0] == 0.0
+    assert wilson(20, 20)[1] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"draws": 0}, "draws = 0"),
+        ({"draws": 2.5}, "draws = 2.5"),
+        ({"seed": -1}, "seed = -1"),
+        ({"kr_sigma": -0.1}, "kr_sigma = -0.1"),
+        ({"polarity": "sideways"}, "polarity = 'sideways'"),
+        ({"ky_sigma": 0.1}, "ky_sigma goes with ky"),
+        ({"displacement_m": 0.1}, "displacement_m does not go with kind toppling"),
+        ({"p2": None, "kr": None, "ky": 0.1}, "displacement_m is missing"),
+        ({"restitution": 0.9}, "restitution does not go with toppling"),
+        ({"restitution": 1.2, "kind": "rocking"}, "restitution = 1.2"),
+        ({"kr": [0.1, 0.2], "kr_sigma": 0.1}, "does not go with draws"),
+        ({"kr": [0.1, -0.2], "weights": [0.0, 1.0]}, "kr = -0.2"),
+        ({"kr": [0.1, 0.2], "weights": [-1.0, 1.0]}, "weights of draws"),
+        ({"kr": [0.1, 0.2], "weights": [1.0, 1.0, 1.0]}, "one length"),
+    ],
+)
+def test_what_is_no_draw_is_refused(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        respond_draws(SHAKEN, **{"p2": 7.0, "kr": 0.12, "draws": 5, **given})
