@@ -72,10 +72,10 @@ def failure_rate(
             None for a fragility that is known at every level: panels where it is abrupt are halved.
     """
     u = np.log(curve.levels)
-    pieces = np.maximum(np.ceil(np.diff(u) / PANEL), 1.0).astype(np.intp)
-    width = np.repeat(np.diff(u) / pieces, pieces)
-    within = np.arange(width.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    left = np.repeat(u[:-1], pieces) + within * width
+    number = np.maximum(np.ceil(np.diff(u) / PANEL), 1.0).astype(np.intp)
+    width = np.repeat(np.diff(u) / number, number)
+    within = np.arange(width.size) - np.repeat(np.cumsum(number) - number, number)
+    left = np.repeat(u[:-1], number) + within * width
     edges = np.append(left, u[-1])
     right, home = edges[1:], np.arange(left.size)
 
@@ -95,9 +95,8 @@ def failure_rate(
         apart = np.abs(fine - rough)
         if scale is None:
             scale = np.maximum(fine.sum(axis=1) + above, np.finfo(np.float64).tiny)
-        settled = (apart <= TOLERANCE / edges.size * scale[:, None]).all(axis=0)
-        if coarse is not None or halving == _MOST_HALVINGS:
-            settled[:] = True
+        last_time = coarse is not None or halving == _MOST_HALVINGS
+        settled = (apart <= TOLERANCE / edges.size * scale[:, None]).all(axis=0) | last_time
         np.add.at(contribution.T, home[settled], fine[:, settled].T)
         error += apart[:, settled].sum(axis=1)
         todo = ~settled

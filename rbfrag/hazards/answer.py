@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -28,7 +28,6 @@ from rbfrag.hazards.joint_rate import MOST_JOINT, USUAL_COUNTS, JointRate
 from rbfrag.hazards.joint_thresholds import JointThresholds
 from rbfrag.hazards.model_blocks import BlockTable, ModelBlocks
 from rbfrag.hazards.shaking import NOTABLE, Shaking, warn_of_ends
-from rbfrag.hazards.standing_blocks import bounds
 
 FloatArray = NDArray[np.float64]
 
@@ -222,7 +221,14 @@ def hazard(
         w * probability_in(years, part.annual_rate) for w, part in zip(shares, parts, strict=True)
     )
     widest = max(parts, key=lambda part: part.edges.size)
+    contribution = _contribution(parts, shares, widest.edges)
+    warnings.extend(site.domain_warnings(widest.edges, contribution, mean["annual_rate"]))
     joints = [part.joint for part in parts if part.joint is not None]
+    if joints:
+        warnings.append(
+            f"annual_rate_any: all {p2s.size} blocks are taken as those of one site, of unknown "
+            "azimuth"
+        )
     if joints and site.thresholds is None:
         why = (
             "what the blocks share in one earthquake is not known to this model"
@@ -247,7 +253,7 @@ def hazard(
         term=chosen.term.name,
         method=chosen.row.method,
         edges=widest.edges,
-        contribution=_contribution(parts, shares, widest.edges),
+        contribution=contribution,
         measure=curves[0].measure,
         joint=JointRate.mean(joints, shares) if joints else None,
         curve_kind="weighted branches" if weight is not None else curves[0].statistic or None,
@@ -318,12 +324,12 @@ class _Site:
         tables = [some.tabled(curves, mean=one_class) for some in blocks]
         if one_class or p2.size < 2:
             return cls(blocks, tables, None, None)
-        greatest, none = 0.0, 1.0
+        size = tables[0].values.shape[-1]
+        greatest, none = np.zeros((1, 1, size)), np.ones((1, 1, size))
         for table in tables:
             p = table.values[:, :1]
-            of_part = bounds(p) if p.shape[2] > 1 else {"": p[:, :, 0], " ": p[:, :, 0]}
-            most, some = of_part.values()
-            greatest, none = np.maximum(greatest, most), none * (1.0 - some)
+            greatest = np.maximum(greatest, p.max(axis=2))
+            none = none * (1.0 - p).prod(axis=2)
         first = tables[0]
         any_of = BlockTable(first.low, first.step, np.stack([greatest, 1.0 - none]))
         thresholds = None
@@ -333,11 +339,11 @@ class _Site:
 
     def under(self, curve: HazardCurve, years: float) -> _Rates:
         """Return the rates under a curve."""
-        found = [failure_rate(curve, table.fine, table.coarse) for table in self.tables]
+        failures = [failure_rate(curve, table.fine, table.coarse) for table in self.tables]
 
         def joined(name: str, row: int = 0) -> FloatArray:
             """Return one value of all blocks; of the rates, the rows are P and its two ends."""
-            parts = (getattr(one, name) for one in found)
+            parts = (getattr(one, name) for one in failures)
             return np.concatenate([part.reshape(3, -1, *part.shape[1:])[row] for part in parts])
 
         rate, low, high = (joined("annual_rate", row) for row in range(3))
@@ -345,8 +351,7 @@ class _Site:
         warn_of_ends(
             curve, rate, joined("above"), joined("above_at_most"), joined("below"), warnings
         )
-        edges, contribution = found[0].edges, joined("contribution")
-        self._warn_of_domain(edges, contribution, rate, warnings)
+        edges, contribution = failures[0].edges, joined("contribution")
         joint = None
         if self.any_of is not None:
             any_bounds = failure_rate(curve, self.any_of.fine, self.any_of.coarse)
@@ -357,16 +362,17 @@ class _Site:
             edges, contribution, joint, warnings,
         )  # fmt: skip
 
-    def _warn_of_domain(
-        self, edges: FloatArray, contribution: FloatArray, rate: FloatArray, warnings: list[str]
-    ) -> None:
+    def domain_warnings(
+        self, edges: FloatArray, contribution: FloatArray, rate: FloatArray
+    ) -> Iterator[str]:
+        """Yield what is to be said of rates that come from outside the model's domain."""
         middle = np.sqrt(edges[1:] * edges[:-1])
         outside = np.concatenate([some.outside(middle) for some in self.blocks])
         if contribution.shape[0] == 1:  # a class
             outside = outside.mean(axis=0, keepdims=True)
         part = (outside * contribution).sum(axis=1) / np.maximum(rate, np.finfo(np.float64).tiny)
         if (part > NOTABLE).any():
-            warnings.append(
+            yield (
                 f"up to {100.0 * float(part.max()):.3g} % of the rate comes from blocks and "
                 "shaking outside the ranges that the model was fitted on"
             )
@@ -417,12 +423,12 @@ def _branches(
 
 def _quantiles(parts: Sequence[_Rates], shares: FloatArray) -> dict[float, dict[str, Any]]:
     rates = weighted_quantiles(np.stack([part.annual_rate for part in parts]), shares, QUANTILES)
-    found: dict[float, dict[str, Any]] = {
+    result: dict[float, dict[str, Any]] = {
         q: {"annual_rate": row} for q, row in zip(QUANTILES, rates, strict=True)
     }
     any_rates = [None if part.joint is None else part.joint.annual_rate_any for part in parts]
     if all(one is not None for one in any_rates):
         of_any = weighted_quantiles(np.array(any_rates, dtype=np.float64), shares, QUANTILES)
         for q, value in zip(QUANTILES, of_any.tolist(), strict=True):
-            found[q]["annual_rate_any"] = value
-    return found
+            result[q]["annual_rate_any"] = value
+    return result

@@ -91,8 +91,10 @@ class JointRate:
             years: period T [a].
         """
         ends: list[str] = []
-        parts = ("annual_rate", "above", "above_at_most", "below")
-        warn_of_ends(curve, *(getattr(any_bounds, name)[1:] for name in parts), ends)
+        warn_of_ends(
+            curve, any_bounds.annual_rate[1:], any_bounds.above[1:], any_bounds.above_at_most[1:],
+            any_bounds.below[1:], ends,
+        )  # fmt: skip
         rates = any_bounds.annual_rate
         bounds = {
             name.replace(" ", "_"): {
@@ -104,7 +106,7 @@ class JointRate:
         here = tuple(f"annual_rate_any: {text}" for text in ends)
         if thresholds is None:
             return cls(None, None, None, (), NO_LAW, bounds, here)
-        found, errors = thresholds.rates(curve, block_rates)
+        rates_at, errors = thresholds.rates(curve, block_rates)
         tiny = np.finfo(np.float64).tiny
         at_least = tuple(
             CountRate(
@@ -112,13 +114,13 @@ class JointRate:
                 float(probability_in(years, rate)),
             )
             for count, rate, error in zip(
-                thresholds.counts, found[:, 0, 0], errors, strict=True
+                thresholds.counts, rates_at[:, 0, 0], errors, strict=True
             )
         )  # fmt: skip
         first = at_least[0]
         return cls(
             annual_rate_any=first.annual_rate,
-            annual_rate_any_ci=(float(found[0, 0, 1]), float(found[0, 0, 2])),
+            annual_rate_any_ci=(float(rates_at[0, 0, 1]), float(rates_at[0, 0, 2])),
             probability_any=first.probability,
             at_least=at_least,
             joint_law=COPULA,

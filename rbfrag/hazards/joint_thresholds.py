@@ -81,7 +81,7 @@ class JointThresholds:
         at = [count - 1 for count in ordered]
         inverse = _inverse(table)
         first = np.arange(n) * inverse.shape[-1]
-        found, every = [], []
+        result, every = [], []
         for z, generator in zip(
             points.replicates(), np.random.default_rng(seed).spawn(REPLICATES), strict=True
         ):
@@ -103,9 +103,9 @@ class JointThresholds:
                     else:
                         levels.partition(at, axis=1)
                         replicate[:, draw, band, some] = levels[:, at].T
-            found.append(replicate)
+            result.append(replicate)
             every.extend([np.concatenate(own)] if own else [])
-        return cls(tuple(ordered), np.stack(found, axis=3), np.stack(every) if every else None)
+        return cls(tuple(ordered), np.stack(result, axis=3), np.stack(every) if every else None)
 
     def rates(
         self, curve: HazardCurve, block_rates: FloatArray | None

@@ -56,17 +56,11 @@ class BlockTable:
     @property
     def nodes(self) -> FloatArray:
         """ln x of the nodes."""
-        return self.low + self.step * np.arange(self.values.shape[-1])
+        return np.asarray(self.low + self.step * np.arange(self.values.shape[-1]))
 
     def rows(self) -> FloatArray:
         """Return the probabilities, shape (rows, nodes)."""
         return self.values.reshape(-1, self.values.shape[-1])
-
-    def with_rows(self, *more: FloatArray) -> BlockTable:
-        """Return a table of these rows and more, each of shape (..., nodes)."""
-        size = self.values.shape[-1]
-        rows = np.concatenate([self.rows(), *(part.reshape(-1, size) for part in more)])
-        return BlockTable(self.low, self.step, rows)
 
     @property
     def fine(self) -> Fragility:
@@ -84,12 +78,12 @@ class BlockTable:
         x = np.clip(x, 0.0, table.shape[1] - 1.0)
         first = np.clip(np.floor(x).astype(np.intp) - 1, 0, table.shape[1] - 4)
         t = x - first
-        found = np.zeros((table.shape[0], levels.size))
+        result = np.zeros((table.shape[0], levels.size))
         for node in range(4):  # Lagrange's cubic
             others = [other for other in range(4) if other != node]
             weight = np.prod([(t - other) / (node - other) for other in others], axis=0)
-            found += weight * table[:, first + node]
-        return np.clip(found, 0.0, 1.0, out=found)
+            result += weight * table[:, first + node]
+        return np.clip(result, 0.0, 1.0, out=result)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,9 +208,9 @@ class ModelBlocks:
                     part += weight * bands[..., i * each : i * each + size]
         return BlockTable(low, step, table)
 
-    def outside(self, levels: FloatArray) -> FloatArray:
+    def outside(self, levels: FloatArray) -> NDArray[np.bool_]:
         """Return where median blocks and levels are outside the model's domain, (m, n)."""
-        return ~self._at_medians(levels).in_domain
+        return np.asarray(~self._at_medians(levels).in_domain)
 
     def share_outside(self, levels: FloatArray) -> FloatArray:
         """Return which part of the median blocks' P is outside the model's domain, shape (n,)."""

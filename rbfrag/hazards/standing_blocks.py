@@ -80,7 +80,9 @@ class StandingBlocks:
         k, several = self.weight.size, len(self.laws) - (self.thresholds is not None)
         rates = failures.annual_rate.reshape(several, k, -1)
         if self.thresholds is not None:
-            each = self.each and failure_rate(curve, self.each.fine, self.each.coarse).annual_rate
+            each = None
+            if self.each is not None:
+                each = failure_rate(curve, self.each.fine, self.each.coarse).annual_rate
             rates = np.concatenate([self.thresholds.rates(curve, each)[0], rates])
         part = self._mean(failures, "contribution", several)
         outside = 0.0
@@ -88,8 +90,11 @@ class StandingBlocks:
             share = self.of_model.share_outside(np.sqrt(failures.edges[1:] * failures.edges[:-1]))
             outside = float(part @ share) / max(float(part.sum()), np.finfo(np.float64).tiny)
         warnings: list[str] = []
-        ends = ("annual_rate", "above", "above_at_most", "below")
-        warn_of_ends(curve, *(self._mean(failures, name, several)[None] for name in ends), warnings)
+        rate, above, most, below = (
+            self._mean(failures, name, several)[None]
+            for name in ("annual_rate", "above", "above_at_most", "below")
+        )
+        warn_of_ends(curve, rate, above, most, below, warnings)
         mean = float(self.weight @ rates[0, :, 0])
         return AnyRate(rates, mean, outside, tuple(warnings))
 

@@ -197,7 +197,7 @@ def test_keys_of_several_sites() -> None:
     curves = [power_law("A"), power_law("B")]
     row = model_row(dependence=SHARED)
     answers = [hazard(c, [3.0, 3.0], [0.1, 0.2], component="single", model=row) for c in curves]
-    found = as_dict(curves, ["x", "y"], answers)
+    found = as_dict(curves, [["x", "y"]] * 2, answers)
     assert [(row["site"], row["block_id"]) for row in found["blocks"]] == [
         ("A", "x"), ("A", "y"), ("B", "x"), ("B", "y"),
     ]  # fmt: skip
