@@ -14,12 +14,8 @@ from functools import partial
 from multiprocessing.connection import wait as wait_for_end
 from typing import Any, TypeVar
 
-<<<<<<< HEAD
-from rbfrag.campaign.executors.dask import connected, run_on_cluster
-from rbfrag.campaign.interrupt import Stopped, held_back, never
-=======
 from rbfrag.campaign.executors.dask import GO_ON, connected, run_on_cluster
->>>>>>> main
+from rbfrag.campaign.interrupt import Stopped, held_back, never
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.solver.integrator.compiled import callbacks, on_compilation
 
@@ -47,39 +43,35 @@ def executor(
     run_work: Callable[[W], R],
     jobs: int | None,
     scheduler: str | None,
-<<<<<<< HEAD
     stopped: Stopped = never,
-=======
     *,
     after_a_death: str = GO_ON,
->>>>>>> main
 ) -> Iterator[Callable[[Iterator[W], int], Iterator[R]]]:
     """Offer, for a ``with`` block, a function that does work and yields answers in any order.
 
-    The function takes the work and the number of its chunks.
+        The function takes the work and the number of its chunks.
 
-    Args:
-        run_work: does one chunk of work; a function of a module, which workers can find.
-        jobs: worker processes; None for one per processor.
-        scheduler: address of a Dask scheduler whose workers take their place.
-<<<<<<< HEAD
-        stopped: says whether to end after the chunks in hand.
-=======
-        after_a_death: what to do next when workers have died.
->>>>>>> main
+        Args:
+            run_work: does one chunk of work; a function of a module, which workers can find.
+            jobs: worker processes; None for one per processor.
+            scheduler: address of a Dask scheduler whose workers take their place.
+    <<<<<<< HEAD
+            stopped: says whether to end after the chunks in hand.
+    =======
+            after_a_death: what to do next when workers have died.
+    >>>>>>> main
     """
     if scheduler is None:
         yield lambda work, chunks: run_locally(
             run_work,
             work,
             min(jobs or os.cpu_count() or 1, chunks),
-<<<<<<< HEAD
-            after_a_death="what was finished is stored: run the same command again to go on",
+            after_a_death=after_a_death,
             stopped=stopped,
         )
         return
     with connected(scheduler) as client:
-        yield lambda work, _: _until(stopped, run_on_cluster(client, run_work, work))
+        yield lambda work, _: _until(stopped, run_on_cluster(client, run_work, work, after_a_death))
 
 
 def _until(stopped: Stopped, results: Iterator[R]) -> Iterator[R]:
@@ -88,13 +80,6 @@ def _until(stopped: Stopped, results: Iterator[R]) -> Iterator[R]:
         yield result
         if stopped():
             return
-=======
-            after_a_death=after_a_death,
-        )
-        return
-    with connected(scheduler) as client:
-        yield lambda work, _: run_on_cluster(client, run_work, work, after_a_death)
->>>>>>> main
 
 
 def run_locally(
