@@ -26,6 +26,7 @@ lint: $(VENV)/.installed-dev  ## style
 
 types: $(VENV)/.installed-dev  ## static types
 	$(RUN) mypy
+	$(RUN) mypy examples
 
 # -E: an unchanged page whose warning stopped the last build would pass this one.
 docs: $(VENV)/.installed-dev  ## the documentation, into docs/_build/html

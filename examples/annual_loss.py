@@ -76,22 +76,30 @@ def print_falls(falls_per_year: float, sites: list[Site]) -> None:
         least, most = in_50_years(site.fully_dependent), in_50_years(site.independent)
         print(f"  any block of {site.name} falls: {shown} ({least} if all fall together, {most} "
               "if independently)")  # fmt: skip
+        rate = "not known" if site.rate_any is None else f"{site.rate_any:.2g}"
+        print(f"    earthquakes a year that bring down any: {rate} "
+              f"({site.fully_dependent:.2g} to {site.independent:.2g})")  # fmt: skip
     low = [site.fully_dependent if site.rate_any is None else site.rate_any for site in sites]
     high = [site.independent if site.rate_any is None else site.rate_any for site in sites]
     print(f"  any block of the road falls: {in_50_years(max(low))} to {in_50_years(sum(high))}")
     print(
-        f"not {in_50_years(falls_per_year)}: that takes every block to have earthquakes of its own"
+        f"not {in_50_years(falls_per_year)}, by the sum of the rates of all blocks: that takes "
+        "every block to have earthquakes of its own"
     )
 
 
 def main() -> None:
     """Print the table and the sums."""
-    table, sites = annual_loss(pd.read_csv(HERE / "segments.csv"), *(sys.argv[1:] or [None]))
+    table, sites = annual_loss(
+        pd.read_csv(HERE / "segments.csv"), sys.argv[1] if sys.argv[1:] else None
+    )
     shown = ["segment", "blocks", "falls_per_year", "loss_per_year_eur", "loss_low_eur",
              "loss_high_eur"]  # fmt: skip
     print(table[shown].to_string(index=False, float_format=lambda value: f"{value:.4g}"))
     # the parameters of the model are common to all segments, so the ends add up
     loss, low, high = (table[f"loss_{end}_eur"].sum() for end in ("per_year", "low", "high"))
+    if not np.isfinite([loss, low, high]).all():
+        sys.exit("no loss: a number is missing among the segments or the answers")
     print(f"\nmean annual loss {loss:.0f} EUR (95 % interval {low:.0f} to {high:.0f})")
     print_falls(float(table["falls_per_year"].sum()), sites)
 

@@ -41,9 +41,9 @@ def shares(motion: rbfrag.GroundMotion, p2: np.ndarray, kr: np.ndarray) -> dict[
     found = {"simulated": float(np.mean(toppled)), "from the record": float(np.mean(by_record))}
     for name, given in (("from PGV, PGA, Tm", more), ("from PGV", known)):
         answer = rbfrag.predict(p2, kr, **given)
-        found[name] = float(answer.probability.mean())
-        found[f"{name}, low"] = float(answer.ci_low.mean())
-        found[f"{name}, high"] = float(answer.ci_high.mean())
+        found[name] = float(np.mean(answer.probability))
+        found[f"{name}, low"] = float(np.mean(answer.ci_low))
+        found[f"{name}, high"] = float(np.mean(answer.ci_high))
     return found
 
 

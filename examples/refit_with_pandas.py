@@ -2,7 +2,7 @@
 
     python examples/refit_with_pandas.py DATABASE
 
-Nothing is simulated: critical blocks and intensity measures come out of the database. As an
+Nothing is simulated: critical blocks of toppling and measures come out of the database. As an
 example the critical toppling velocity is regressed on PGV and Tm, ln y = a + b ln PGV + c ln Tm,
 each earthquake counting the same however many records it has.
 """
@@ -21,7 +21,7 @@ def refit(db: str) -> tuple[np.ndarray, float, pd.DataFrame]:
     """Return a, b and c, the scatter of ln y, and the rows that were used."""
     motion = rbfrag.read_table("motion", db=db).set_index("id")
     recording = rbfrag.read_table("recording", db=db).set_index("id")
-    rows = rbfrag.read_table("combination", db=db).query("status == 'found'")
+    rows = rbfrag.read_table("combination", db=db).query("kind == 'toppling' and status == 'found'")
     rows = rows.join(motion[["recording_id", "pgv_m_s", "tm_s"]], on="motion_id")
     rows = rows.join(recording["earthquake_id"], on="recording_id").dropna(subset=["tm_s"])
     weight = 1.0 / rows.groupby("earthquake_id")["y_m_s"].transform("size")
@@ -37,6 +37,8 @@ def refit(db: str) -> tuple[np.ndarray, float, pd.DataFrame]:
 def main() -> None:
     """Print coefficients, scatter, and the scatter of each earthquake's mean."""
     (a, b, c), scatter, rows = refit(sys.argv[1])
+    if not np.isfinite([a, b, c, scatter]).all():
+        sys.exit("no fit: a number is missing among the critical blocks or their motions")
     print(f"ln y = {a:.3f} + {b:.3f} ln PGV + {c:.3f} ln Tm, scatter {scatter:.3f}")
     between = rows.groupby("earthquake_id")["residual"].mean()
     print(f"{len(rows)} critical blocks of {len(between)} earthquakes; "

@@ -72,8 +72,8 @@ def block_functions(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    x = np.geomspace(_LOWEST, _HIGHEST, _SCANNED)
-    kind, about, parts = _probabilities(x, p2, kr, measure, levels, model, db)
+    x = scanned_levels()
+    kind, about, parts = probabilities_over(x, p2, kr, measure, levels, model, db)
     if one_class:
         total = np.zeros_like(x)
         for part in parts:
@@ -86,7 +86,12 @@ def block_functions(
     return functions, about
 
 
-def _probabilities(
+def scanned_levels() -> FloatArray:
+    """Return the levels [m/s or g] that fragilities are looked for on, of equal ratios."""
+    return np.geomspace(_LOWEST, _HIGHEST, _SCANNED)
+
+
+def probabilities_over(
     x: FloatArray,
     p2: FloatArray,
     kr: FloatArray,

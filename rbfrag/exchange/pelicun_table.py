@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from rbfrag.exchange.fragility_function import (
 )
 from rbfrag.files import csv_rows, source_text
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.version import __version__
 
 _DEMANDS = {"pga_g": ("Peak Ground Acceleration", "g"), "pgv_m_s": ("Peak Ground Velocity", "mps")}
 
@@ -61,10 +63,7 @@ def pelicun_text(functions: Sequence[FragilityFunction]) -> str:
     """
     if not functions:
         raise InputError("there is no fragility function to write")
-    names = [function.name for function in functions]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"block {name!r} is there twice: give every block its own block_id")
+    _check_names([function.name for function in functions])
     out = io.StringIO()
     table = csv.writer(out, lineterminator="\n")
     table.writerow([*_HEAD, *(f"LS1-{name}" for name in _LIMIT)])
@@ -74,8 +73,8 @@ def pelicun_text(functions: Sequence[FragilityFunction]) -> str:
                 f"{function.name}: pelicun has no demand for {function.kind.imt}: export PGV or PGA"
             )
         demand, unit = _DEMANDS[function.kind.measure]
-        # directional: else pelicun multiplies the demand by 1.2, as for the larger of two
-        row: list[object] = [function.name, 0, demand, unit, 0, 1]
+        # offset 0, not directional: as the rows of PGV in SimCenter's library are
+        row: list[object] = [function.name, 0, demand, unit, 0, 0]
         if function.is_lognormal:
             row += ["lognormal", _text(function.median), _text(function.beta), ""]
         else:
@@ -84,6 +83,76 @@ def pelicun_text(functions: Sequence[FragilityFunction]) -> str:
             row += ["multilinear_CDF", theta, "", ""]
         table.writerow(row)
     return out.getvalue()
+
+
+def without_dashes(
+    functions: Sequence[FragilityFunction],
+) -> tuple[list[FragilityFunction], list[str]]:
+    """Return the functions with dots for dashes in their names, and a warning where there are any.
+
+    Loaders of these tables split an ID at its dashes into the levels of an index.
+    """
+    dashed = [function.name for function in functions if "-" in function.name]
+    named = [replace(function, name=function.name.replace("-", ".")) for function in functions]
+    if not dashed:
+        return named, []
+    return named, [
+        f"{len(dashed)} of {len(functions)} IDs have dots for dashes, at which the loader splits "
+        f"an ID: {dashed[0]!r} is written as {dashed[0].replace('-', '.')!r}"
+    ]
+
+
+def metadata_text(
+    functions: Sequence[FragilityFunction],
+    descriptions: Sequence[str],
+    about: tuple[str, ...],
+) -> str:
+    """Return what goes beside the table as ``fragility.json``, as simcenter-dlml 3 has it.
+
+    Args:
+        functions: the functions of the table.
+        descriptions: a sentence on each block.
+        about: name, term and method of the model.
+    """
+    model, term, method = about
+    document: dict[str, object] = {
+        "_GeneralInformation": {
+            "ShortName": "Rock blocks in earthquakes",
+            "Description": "Probability that rock blocks which rest on a slope fail in an "
+            "earthquake. Peak ground velocity and acceleration are those of one horizontal "
+            "component of any direction: run pelicun with NonDirectionalMultipliers ALL = 1.0.",
+            "Version": __version__,
+            "ComponentGroups": ["Rock blocks"],
+        },
+        "References": {
+            "rbfrag": f"The rbfrag developers. rbfrag: seismic fragility of rock blocks, version "
+            f"{__version__}. Software.",
+        },
+    }
+    for function, description in zip(functions, descriptions, strict=True):
+        document[function.name] = {
+            "Description": description,
+            "Comments": f"Model {model}: method {method}, intensity term {term}.",
+            "SuggestedComponentBlockSize": "1 EA",
+            "RoundUpToIntegerQuantity": "True",
+            "Reference": ["rbfrag"],
+            "LimitStates": {
+                "LS1": {"DS1": {"Description": f"The block has failed ({function.limit_state})."}}
+            },
+        }
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+
+
+def _check_names(names: list[str]) -> None:
+    """Refuse IDs that a table of the library cannot have."""
+    for name in names:
+        if not name.strip() or "-" in name or name.startswith("_") or name == "References":
+            raise InputError(
+                f"block {name!r}: an ID of a fragility table has no dash, does not begin with _ "
+                "and is neither empty nor References: give the block another block_id"
+            )
+        if names.count(name) > 1:
+            raise InputError(f"block {name!r} is there twice: give every block its own block_id")
 
 
 def read_pelicun(path: str | os.PathLike[str]) -> PelicunTable:

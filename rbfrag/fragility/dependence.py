@@ -9,9 +9,9 @@ nothing. For single numbers no library is loaded; what needs arrays is in
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rbfrag.errors import InputError
 
@@ -69,14 +69,6 @@ class Dependence:
                 f"rho_e + rho_s + rho_v + rho_o is {total:.10g} and must be 1: they are shares of "
                 "one variance"
             )
-
-    @classmethod
-    def of_stored(cls, stored: Mapping[str, object] | None) -> Dependence | None:
-        """Return the copula that is stored with a model; None where there is none."""
-        names = cls.__dataclass_fields__
-        if stored is None or not set(names) <= set(stored):
-            return None
-        return cls(**{name: float(cast("float", stored[name])) for name in names})
 
     def of_pairs(
         self,

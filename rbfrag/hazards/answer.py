@@ -15,6 +15,7 @@ from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import checked_years, failure_rate, probability_in
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.joint_rate import JointRate
@@ -26,8 +27,8 @@ FloatArray = NDArray[np.float64]
 _CHUNK = 512
 
 
-@dataclass(frozen=True, eq=False)
-class HazardAnswer:
+@dataclass(frozen=True, eq=False, repr=False)
+class HazardAnswer(Tabular):
     """Annual rates of toppling of m blocks at one site.
 
     Args:

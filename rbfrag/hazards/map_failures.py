@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import UNKNOWN, Placement
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.predict import answer_given
@@ -276,7 +275,7 @@ def _laws(
     answer: SiteProbability, p2: FloatArray, kr: FloatArray, site: Indices
 ) -> dict[str, Normals]:
     """Return draws of Z of some blocks, shape (draws, n), by the law that joins them."""
-    law = Dependence.of_stored(answer.shaking.model.row.dependence)
+    law = answer.shaking.model.dependence
     if law is not None:
         p = np.sqrt(p2)
         y = kr * STANDARD_GRAVITY_M_S2 / p

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.predict import Model
+from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import Fragility
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.shaking import NOTABLE, Shaking
@@ -63,8 +64,8 @@ class BranchSurvival:
         return {name: value for name, value in vars(self).items() if name != "standing"}
 
 
-@dataclass(frozen=True, eq=False)
-class SurvivalAnswer:
+@dataclass(frozen=True, eq=False, repr=False)
+class SurvivalAnswer(Tabular):
     """What blocks that stand say of seismic hazard.
 
     Args:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from rbfrag.errors import InputError
-from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.described import NOT_BACKED
 from rbfrag.solver.kind import BlockOnPlanes, Kind, Shaking
@@ -20,7 +20,7 @@ from rbfrag.solver.stability.single import Stability, stability
 
 
 def respond(
-    motion: GroundMotion,
+    motion: MotionLike,
     *,
     p2: float | None = None,
     kr: float | None = None,
@@ -32,7 +32,7 @@ def respond(
     back_fracture: bool = True,
     cohesion_pa: float = 0.0,
     density_kg_m3: float | None = None,
-    vertical: GroundMotion | None = None,
+    vertical: MotionLike | None = None,
     polarity: Polarity = "forward",
     kind: str | None = None,
     two_way: bool = False,
@@ -48,7 +48,7 @@ def respond(
     user states; a kind refuses those of another.
 
     Args:
-        motion: horizontal ground motion.
+        motion: horizontal ground motion, or its file.
         p2: frequency parameter p² of a toppling or rocking block [1/s²], > 0.
         kr: its rocking acceleration coefficient k_r = tan(critical angle), > 0.
         ky: yield acceleration coefficient tan(φ - β) of a block that slides, whatever its
@@ -77,6 +77,8 @@ def respond(
             fails at rest or that nothing moves, an unknown kind or polarity, an option of
             another model, components that cannot be brought together.
     """
+    motion = as_motion(motion)
+    vertical = None if vertical is None else as_motion(vertical, "vertical")
     settings = {
         "two_way": two_way or None,
         "horizontal": horizontal or None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -111,6 +112,36 @@ def test_a_rock_mass_is_the_mean_of_its_toppling_blocks(shell: Shell) -> None:
     each = rbfrag.predict(rows["p2_1_s2"][:, None], rows["kr"][:, None], pgv_m_s=x[None, :])
     mean = each.probability.mean(axis=0)
     assert np.abs(found.at(x) - mean).max() < 1.2 * told["largest_grid_error"] + 1e-6
+
+
+@pytest.mark.usefixtures("database")
+def test_a_rock_mass_with_several_limit_states(shell: Shell, refuses: Callable[..., str]) -> None:
+    Path("mass.toml").write_text(
+        "realisations = 100\nseed = 2\n[base]\ndip_deg = 5.0\n"
+        'spacing_m = { distribution = "uniform", low = 1.0, high = 2.0 }\n'
+        "[back]\ndip_deg = 85.0\nspacing_m = 0.4\n[friction]\nphi_deg = 40.0\n"
+    )
+    mass = ("export", "nrml", "--rockmass", "mass.toml", "--name", "face", "--out", "a.xml")
+    told = shell.json(*mass, "--shares", "1,10,50")
+    assert told["functions"] == 3
+    assert [(f.name, f.limit_state) for f in read_nrml("a.xml")] == [
+        ("face", f"failed_{share}_percent") for share in (1, 10, 50)
+    ]
+    assert "'x' is no number" in refuses(*mass, "--shares", "1,x")
+    other = ("export", "nrml", "--p2", "3", "--kr", "0.1", "--out", "b.xml", "--shares", "50")
+    assert "--shares" in refuses(*other)
+
+
+@pytest.mark.usefixtures("database")
+def test_pelicun_has_a_description_beside_the_table(shell: Shell) -> None:
+    Path("blocks.csv").write_text("block_id,p2_1_s2,kr\nA-7,3,0.1\nB2,10,0.3\n")
+    told = shell.json("export", "pelicun", "--blocks", "blocks.csv", "--out", "fragility.csv")
+    assert told["description"] == "fragility.json"
+    entries = json.loads(Path("fragility.json").read_text())
+    assert {"A.7", "B2"} == set(entries) - {"_GeneralInformation", "References"}
+    assert "p² = 3 1/s²" in entries["A.7"]["Description"]
+    assert [f.name for f in read_pelicun("fragility.csv").functions] == ["A.7", "B2"]
+    assert any("'A-7' is written as 'A.7'" in text for text in told["warnings"])
 
 
 @pytest.mark.usefixtures("database")

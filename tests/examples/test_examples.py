@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import re
+import runpy
 import sqlite3
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -79,6 +82,14 @@ def test_any_fall_on_the_road(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
     assert (low, high) == pytest.approx((sites[0][0], sites[0][0] + sites[1][0]), abs=0.11)
     (wrong,) = percent(next(line for line in lines if line.startswith("not ")))
     assert wrong > 4 * high
+    rates = [re.findall(r"[0-9.e-]*[0-9]", line) for line in lines if "bring down any:" in line]
+    for rate, together, apart in rates:
+        assert float(together) < float(rate) < float(apart)
+    # the documentation tells the same
+    for page in ("docs/howto/examples.md", "README.md"):
+        text = " ".join((ROOT / page).read_text().split())
+        assert f"{low:g} to {high:g} % in 50 years" in text, page
+        assert f"{wrong:g} %" in text, page
 
 
 def test_the_road_without_an_estimate_of_what_blocks_share(database: Path, tmp_path: Path) -> None:
@@ -103,6 +114,29 @@ def test_refit_with_pandas(database: Path) -> None:
     assert f"{len(found)} critical blocks of 12 earthquakes" in printed
 
 
+def test_refit_with_pandas_on_the_reference() -> None:
+    printed = run("refit_with_pandas.py", ROOT / "rbfrag" / "reference" / "reference.db")
+    assert "nan" not in printed
+    slope = re.search(r"\+ (\S+) ln PGV", printed)
+    assert slope
+    assert 0.9 < float(slope.group(1)) < 1.1
+
+
+def test_no_example_prints_what_is_not_a_number(
+    database: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read_table = rbfrag.read_table
+
+    def without_values(name: str, **options: str) -> pd.DataFrame:
+        table = read_table(name, **options)
+        return table.assign(y_m_s=np.nan) if name == "combination" else table
+
+    monkeypatch.setattr(rbfrag, "read_table", without_values)
+    monkeypatch.setattr(sys, "argv", ["refit_with_pandas.py", str(database)])
+    with pytest.raises(SystemExit, match="a number is missing"):
+        runpy.run_path(str(EXAMPLES / "refit_with_pandas.py"), run_name="__main__")
+
+
 def test_canterbury(records_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # no database here: the reference answers
     monkeypatch.delenv("RBFRAG_DB", raising=False)
@@ -115,6 +149,26 @@ def test_canterbury(records_dir: Path, tmp_path: Path, monkeypatch: pytest.Monke
     assert Path("a.png").stat().st_size > 10_000
 
 
+READ_BACK = """
+import pathlib, sys
+import dlml
+from dlml import _catalog
+
+_catalog.data_root = lambda: pathlib.Path(sys.argv[1])
+name = "seismic/rock_slope/component/made up"
+assert dlml.list_datasets() == [name]
+table, entries = dlml.get_fragility(name), dlml.get_metadata(name, "fragility")
+assert list(table.index) == ["block"]
+assert table.index.nlevels == 1
+assert table[("Demand", "Type")].iloc[0] in dlml.DEMAND_TYPES
+assert table[("Demand", "Directional")].iloc[0] == 0
+assert table[("LS1", "Family")].iloc[0] in dlml.DISTRIBUTION_FAMILIES
+assert set(entries) - {"_GeneralInformation", "References"} == {"block"}
+assert set(entries["block"]["LimitStates"]) == {"LS1"}
+"""
+"""The table as simcenter-dlml reads a data set of its own library."""
+
+
 def test_pelicun(database: Path, tmp_path: Path) -> None:
     python = os.environ.get("RBFRAG_TEST_PELICUN_PYTHON")
     if not python:
@@ -123,6 +177,12 @@ def test_pelicun(database: Path, tmp_path: Path) -> None:
     arguments = ["export", "pelicun", "--p2", "3", "--kr", "0.1", "--out", str(table), "--db",
                  str(database)]  # fmt: skip
     assert CliRunner().invoke(app, arguments).exit_code == 0
+    library = tmp_path / "seismic" / "rock_slope" / "component" / "made up"
+    library.mkdir(parents=True)
+    table.rename(library / "fragility.csv")
+    table.with_suffix(".json").rename(library / "fragility.json")
+    table = library / "fragility.csv"
+    subprocess.run([python, "-c", READ_BACK, tmp_path], check=True, capture_output=True, text=True)
     for pgv in (0.5, 0.7, 0.9):
         done = subprocess.run(
             [python, EXAMPLES / "pelicun_damage.py", table, str(pgv)],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,12 @@ import pytest
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import IntensityType, discrete_function, lognormal_function
-from rbfrag.exchange.pelicun_table import pelicun_text, read_pelicun
+from rbfrag.exchange.pelicun_table import (
+    metadata_text,
+    pelicun_text,
+    read_pelicun,
+    without_dashes,
+)
 
 PGV = IntensityType("pgv_m_s", 0.01)
 
@@ -39,8 +45,8 @@ def test_there_and_back(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text(pelicun_text([curved, smooth]))
     rows = list(csv.DictReader(path.read_text().splitlines()))
-    # a non-directional demand would be multiplied by 1.2
-    assert [row["Demand-Directional"] for row in rows] == ["1", "1"]
+    for row in rows:  # as the library's rows of PGV
+        assert (row["Demand-Offset"], row["Demand-Directional"]) == ("0", "0")
     back = {f.name: f for f in read_pelicun(path).functions}
     inside = np.linspace(0.1, 2.0, 500)
     assert np.abs(back["smooth"].at(inside) - smooth.at(inside)).max() < 1e-9
@@ -59,6 +65,38 @@ def test_what_cannot_be_written() -> None:
     spectral = lognormal_function("a", "toppled", IntensityType("sa_g", 1.0, 0.5), 1, 1, "test")
     with pytest.raises(InputError, match=r"no demand for SA\(0.5\)"):
         pelicun_text([spectral])
+
+
+def test_ids_have_no_dashes() -> None:
+    named = [lognormal_function(name, "toppled", PGV, 0.5, 0.3, "test") for name in ("A-7", "B")]
+    functions, warnings = without_dashes(named)
+    assert [f.name for f in functions] == ["A.7", "B"]
+    assert "'A-7' is written as 'A.7'" in warnings[0]
+    assert without_dashes(functions)[1] == []
+    for name in ("A-7", " ", "_x", "References"):
+        with pytest.raises(InputError, match="an ID of a fragility table has no dash"):
+            pelicun_text([lognormal_function(name, "toppled", PGV, 0.5, 0.3, "test")])
+    twice = [lognormal_function(name, "toppled", PGV, 1, 1, "test") for name in ("A-7", "A.7")]
+    with pytest.raises(InputError, match=r"'A\.7' is there twice"):
+        pelicun_text(without_dashes(twice)[0])
+
+
+def test_the_description_has_what_the_library_asks_for() -> None:
+    functions = [lognormal_function(n, "toppled", PGV, 0.5, 0.3, "test") for n in ("A", "B")]
+    text = metadata_text(functions, ["one", "two"], ("m", "pgv", "lognormal"))
+    document = json.loads(text)
+    general, references = document.pop("_GeneralInformation"), document.pop("References")
+    assert set(general) == {"ShortName", "Description", "Version", "ComponentGroups"}
+    assert list(document) == ["A", "B"]
+    for entry in document.values():
+        assert set(entry) == {
+            "Description", "Comments", "SuggestedComponentBlockSize", "RoundUpToIntegerQuantity",
+            "Reference", "LimitStates",
+        }  # fmt: skip
+        assert set(entry["Reference"]) <= set(references)
+        assert list(entry["LimitStates"]) == ["LS1"]
+        assert entry["LimitStates"]["LS1"]["DS1"]["Description"]
+    assert document["B"]["Description"] == "two"
 
 
 HEAD = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
@@ -11,6 +11,7 @@ from rbfrag.cli.output import print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import command_group, option, stacked
+from rbfrag.cli.parameters.values import number_list
 from rbfrag.errors import InputError
 
 app = command_group(
@@ -19,6 +20,22 @@ app = command_group(
 )
 
 Out = Annotated[str, typer.Option("--out", help="File to write.")]
+
+
+class Exported(NamedTuple):
+    """Fragility functions to be written.
+
+    Args:
+        functions: the functions.
+        about: name, term and method of the model that answered.
+        warnings: what is to be said of them.
+        descriptions: a sentence on the block of each.
+    """
+
+    functions: list[Any]
+    about: tuple[str, ...]
+    warnings: list[str]
+    descriptions: list[str]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,9 +48,42 @@ class FunctionOptions(BlocksOptions):
     model: options.Model = None
     db: options.Db = None
 
-    def functions(self) -> tuple[list[Any], tuple[str, ...], list[str]]:
-        """Return the functions, name, term and method of their model, and warnings."""
+    def functions(self) -> Exported:
+        """Return the functions of the blocks."""
+        measure = self.measure()
         from rbfrag.exchange.block_fragility import block_functions
+
+        table, is_class, remarks = self.toppling_blocks(name=self.name)
+        p2, kr = table["p2_1_s2"], table["kr"]
+        functions, about = block_functions(
+            [self.name] if is_class else list(table["block_id"]), p2, kr,
+            measure, one_class=is_class, levels=self.levels,
+            model=self.model, db=self.db,
+        )  # fmt: skip
+        descriptions = (
+            [f"Mean over {kr.size} stable toppling blocks of a rock mass, backed by a slope."]
+            if is_class
+            else [
+                f"Rock block backed by a slope, p² = {a:.6g} 1/s², k_r = {b:.6g}."
+                for a, b in zip(p2.tolist(), kr.tolist(), strict=True)
+            ]
+        )
+        return Exported(functions, about, list(remarks), descriptions)
+
+    def limit_states(self, shares: list[float]) -> Exported:
+        """Return functions of a rock mass, one a share of its blocks [%]."""
+        from rbfrag.exchange.share_fragility import share_functions
+
+        measure = self.measure()
+        table, _, remarks = self.toppling_blocks(name=self.name)
+        functions, about, warnings = share_functions(
+            self.name, table["p2_1_s2"], table["kr"], measure, shares, levels=self.levels,
+            model=self.model, db=self.db,
+        )  # fmt: skip
+        return Exported(functions, about, [*remarks, *warnings], [])
+
+    def measure(self) -> str:
+        """Return the measure that the functions are of, as `predict` calls it."""
         from rbfrag.exchange.fragility_function import openquake_type
         from rbfrag.fragility.measures import SPECTRAL
         from rbfrag.hazards.curve import ANSWERED
@@ -42,26 +92,33 @@ class FunctionOptions(BlocksOptions):
         measure = kind.measure if kind.period_s is None else SPECTRAL.get(kind.period_s)
         if measure is None:
             raise InputError(f"--imt {self.imt}: use one of {ANSWERED}")
-        table, is_class, remarks = self.toppling_blocks(name=self.name)
-        functions, about = block_functions(
-            [self.name] if is_class else list(table["block_id"]), table["p2_1_s2"], table["kr"],
-            measure, one_class=is_class, levels=self.levels,
-            model=self.model, db=self.db,
-        )  # fmt: skip
-        return functions, about, list(remarks)
+        return measure
 
 
 @app.command("nrml", epilog="Example:  rbfrag export nrml --blocks blocks.csv --out blocks.xml")
 @stacked
-def nrml(out: Out, blocks: FunctionOptions, json: options.Json = False) -> None:
+def nrml(
+    out: Out,
+    blocks: FunctionOptions,
+    shares: str | None = option(
+        "Shares of the blocks of a rock mass [%]: a limit state each, that at least so many fail. "
+        "Example: 1,10,50.",
+        metavar="LIST",
+    ),
+    json: options.Json = False,
+) -> None:
     """Write an OpenQuake fragility model, NRML 0.5 (.xml); PGV is in cm/s there."""
     from rbfrag.exchange.nrml import nrml_text
     from rbfrag.files import output_path, write_text
 
     target = output_path(out, (".xml",), "NRML file")
-    functions, about, warnings = blocks.functions()
+    functions, about, warnings, _ = (
+        blocks.functions()
+        if shares is None
+        else blocks.limit_states(number_list(shares, "--shares"))
+    )
     write_text(nrml_text(functions, description=_sentence(about)), target)
-    _tell(str(target), functions, about, warnings, json)
+    _print_answer(str(target), functions, about, warnings, json)
 
 
 @app.command(
@@ -69,26 +126,41 @@ def nrml(out: Out, blocks: FunctionOptions, json: options.Json = False) -> None:
 )
 @stacked
 def pelicun(out: Out, blocks: FunctionOptions, json: options.Json = False) -> None:
-    """Write a fragility table of pelicun and SimCenter (.csv); PGV is in m/s (mps) there."""
-    from rbfrag.exchange.pelicun_table import pelicun_text
+    """Write a fragility table of pelicun and SimCenter (.csv), and its description (.json).
+
+    PGV is in m/s (mps) there. The description has the table's name: fragility.json stands beside
+    fragility.csv, as SimCenter's library has them.
+    """
+    from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text, without_dashes
     from rbfrag.files import output_path, write_text
 
     target = output_path(out, (".csv",), "fragility table")
-    functions, about, warnings = blocks.functions()
-    write_text(pelicun_text(functions), target)
-    _tell(str(target), functions, about, warnings, json)
+    beside = output_path(str(target.with_suffix(".json")), (".json",), "description")
+    functions, about, warnings, descriptions = blocks.functions()
+    functions, renamed = without_dashes(functions)
+    table = pelicun_text(functions)
+    write_text(metadata_text(functions, descriptions, about), beside)
+    write_text(table, target)
+    more = {"description": str(beside)}
+    _print_answer(str(target), functions, about, [*warnings, *renamed], json, more)
 
 
 def _sentence(about: tuple[str, ...]) -> str:
     return f"Toppling of rock blocks, model {about[0]} ({about[2]} on {about[1]})"
 
 
-def _tell(
-    path: str, functions: list[Any], about: tuple[str, ...], warnings: list[str], json: bool
+def _print_answer(
+    path: str,
+    functions: list[Any],
+    about: tuple[str, ...],
+    warnings: list[str],
+    json: bool,
+    more: dict[str, Any] | None = None,
 ) -> None:
     errors = [function.grid_error for function in functions if function.grid_error is not None]
     document = {
         "file": path,
+        **(more or {}),
         "functions": len(functions),
         "lognormal": sum(function.is_lognormal for function in functions),
         "largest_grid_error": max(errors, default=0.0),

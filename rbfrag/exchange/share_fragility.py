@@ -1,0 +1,134 @@
+"""The fragility of a rock mass with several limit states: shares of its blocks that fail."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from os import PathLike
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from rbfrag.errors import InputError
+from rbfrag.exchange.block_fragility import probabilities_over, scanned_levels
+from rbfrag.exchange.fragility_function import FragilityFunction, discrete_function
+from rbfrag.fragility.joint import Placement
+from rbfrag.fragility.joint_sampling import JointSampler
+from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.predict import Model
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+FloatArray = NDArray[np.float64]
+
+DRAWS = 20_000
+"""Draws of what the blocks share: probabilities have a standard error of at most 0.0035."""
+
+_VALUES_AT_ONCE = 2**22
+_FARTHEST = 38.0
+_EVERY = 4  # levels: between them a score is straight in ln x
+
+
+def share_functions(
+    name: str,
+    p2: FloatArray,
+    kr: FloatArray,
+    measure: str,
+    shares: Sequence[float],
+    *,
+    levels: int = 80,
+    seed: int = 0,
+    model: Model | None = None,
+    db: str | PathLike[str] | None = None,
+) -> tuple[list[FragilityFunction], tuple[str, ...], list[str]]:
+    """Return the probabilities that at least some shares of a rock mass's blocks fail.
+
+    The blocks of a rock mass stand at one site and face one way. In each draw of what they have in
+    common (the copula of :mod:`rbfrag.fragility.dependence`) block i fails from the level on at
+    which its P reaches Φ(Z_i), and a share of the blocks from the level on at which so many have
+    failed; the distribution of that level over the draws is the fragility. It never falls, and that
+    of a greater share never exceeds that of a smaller one.
+
+    Args:
+        name: identifier of the rock mass.
+        p2: frequency parameters of its blocks [1/s²], shape (m,).
+        kr: their toppling yield acceleration coefficients, shape (m,).
+        measure: as for :func:`~rbfrag.exchange.block_fragility.block_functions`.
+        shares: shares of the blocks in percent, rising, above 0 to 100.
+        levels: number of levels, common to all limit states.
+        seed: of the draws.
+        model: as in :func:`rbfrag.predict`; it must know what its blocks share.
+        db: as in :func:`rbfrag.predict`.
+
+    Returns:
+        One function a share, name, term and method of the model, and warnings.
+
+    Raises:
+        InputError: shares that make no sense, or a model without an estimate of the dependence.
+    """
+    _check(shares)
+    chosen = find_model(model, ("p2", "kr", measure), db)
+    if chosen.dependence is None:
+        raise InputError(
+            f"model {chosen.name!r} does not know what the blocks of one earthquake share, so how "
+            "many of a rock mass fail together is not known: fit it on more earthquakes, or name "
+            "another with --model"
+        )
+    x = scanned_levels()[::_EVERY]
+    kind, about, parts = probabilities_over(x, p2, kr, measure, levels, chosen, db)
+    scores = np.concatenate([_scores(part) for part in parts])
+    p = np.sqrt(p2)
+    blocks = Placement.of(np.log(p), np.log(kr * STANDARD_GRAVITY_M_S2 / p))
+    sampler, generator = JointSampler(chosen.dependence, blocks), np.random.default_rng(seed)
+    counts = [max(1, math.ceil(share / 100.0 * p2.size - 1e-9)) for share in shares]
+    reached = np.empty((len(counts), DRAWS))
+    at_once = max(1, _VALUES_AT_ONCE // p2.size)
+    for start in range(0, DRAWS, at_once):
+        z = sampler.normals(min(at_once, DRAWS - start), generator)
+        own = np.stack([_level_of(z[:, i], scores[i], np.log(x)) for i in range(p2.size)], axis=1)
+        own.partition([count - 1 for count in counts], axis=1)
+        reached[:, start : start + at_once] = own[:, [count - 1 for count in counts]].T
+    ends = reached[np.isfinite(reached)]
+    if ends.size == 0 or np.ptp(ends) == 0.0:
+        raise InputError(f"{name}: no share of its blocks fails at any level of {measure}")
+    grid = np.geomspace(np.exp(ends.min()), np.exp(ends.max()), levels)
+    grid[[0, -1]] *= 1.0 - 1e-9, 1.0 + 1e-9
+    functions = []
+    for share, row in zip(shares, np.sort(reached, axis=1), strict=True):
+        probability = np.searchsorted(row, np.log(grid), side="right") / DRAWS
+        state = f"failed_{share:g}_percent"
+        functions.append(discrete_function(name, state, kind, grid, probability, name))
+    warnings = [
+        f"all {p2.size} blocks are taken to stand at one site and to face one way; probabilities "
+        f"are frequencies of {DRAWS} draws, with a standard error of at most 0.0035"
+    ]
+    few = [share for share in shares if share / 100.0 * p2.size < 1.0]
+    if few:
+        warnings.append(
+            f"{few[0]:g} % of {p2.size} blocks is less than one: that limit state is one block; "
+            "give the rock mass more realisations"
+        )
+    return functions, about, warnings
+
+
+def _check(shares: Sequence[float]) -> None:
+    rising = all(a < b for a, b in pairwise(shares))
+    if not shares or not rising or not all(0.0 < share <= 100.0 for share in shares):
+        raise InputError(
+            f"shares {', '.join(f'{share:g}' for share in shares)}: give rising percentages above "
+            "0 and up to 100, such as 1,10,50"
+        )
+
+
+def _scores(probability: FloatArray) -> FloatArray:
+    """Return Φ⁻¹ of P of some blocks over rising levels, which never falls."""
+    rising = np.maximum.accumulate(probability, axis=-1)
+    return np.asarray(np.clip(ndtri(rising), -_FARTHEST, _FARTHEST))
+
+
+def _level_of(z: FloatArray, score: FloatArray, ln_x: FloatArray) -> FloatArray:
+    """Return ln of the level at which a block's score reaches Z; infinite beyond the last."""
+    first = int(np.searchsorted(score, score[0], side="right")) - 1
+    part = slice(max(first, 0), None)
+    return np.asarray(np.where(z > score[-1], np.inf, np.interp(z, score[part], ln_x[part])))
