@@ -49,17 +49,14 @@ def executor(
 ) -> Iterator[Callable[[Iterator[W], int], Iterator[R]]]:
     """Offer, for a ``with`` block, a function that does work and yields answers in any order.
 
-        The function takes the work and the number of its chunks.
+    The function takes the work and the number of its chunks.
 
-        Args:
-            run_work: does one chunk of work; a function of a module, which workers can find.
-            jobs: worker processes; None for one per processor.
-            scheduler: address of a Dask scheduler whose workers take their place.
-    <<<<<<< HEAD
-            stopped: says whether to end after the chunks in hand.
-    =======
-            after_a_death: what to do next when workers have died.
-    >>>>>>> main
+    Args:
+        run_work: does one chunk of work; a function of a module, which workers can find.
+        jobs: worker processes; None for one per processor.
+        scheduler: address of a Dask scheduler whose workers take their place.
+        stopped: says whether to end after the chunks in hand.
+        after_a_death: what to do next when workers have died.
     """
     if scheduler is None:
         yield lambda work, chunks: run_locally(
