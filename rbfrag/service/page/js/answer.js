@@ -59,7 +59,9 @@ export function showAnswer(answer) {
     answer.event_low === null
       ? ""
       : ` In one single earthquake ${percent(answer.event_low)} to ${percent(answer.event_high)}.`;
-  speak(`Probability of toppling ${percent(answer.probability)}, ${interval}, ${range}.${event}`);
+  const failure = `Probability of ${answer.failure}`;
+  byId("answer-title").textContent = failure;
+  speak(`${failure} ${percent(answer.probability)}, ${interval}, ${range}.${event}`);
 }
 
 /**

@@ -7,7 +7,7 @@ import { latest } from "./latest.js";
 import { modelNamed } from "./models.js";
 import { fromField, quantity } from "./numbers.js";
 import { byId } from "./page.js";
-import { percent } from "./percent.js";
+import { percent, verbOf } from "./percent.js";
 import { labelOf, planeOf } from "./plane.js";
 import { MEASURES } from "./question.js";
 import { askCurve, askGrid } from "./service.js";
@@ -49,9 +49,9 @@ export function figures(moved, failed) {
 
   const drawGrid = latest(
     async (/** @type {Answered} */ { question, answer, plane: on, present }) => {
-      const held = MEASURES.filter((name) => name !== on.across).map(
-        (name) => question.values[name],
-      );
+      const held = ["restitution", ...MEASURES]
+        .filter((name) => name !== on.across)
+        .map((name) => question.values[name]);
       const key = JSON.stringify([answer.model, on, held]);
       try {
         if (key !== gridShown) chart.showGrid(await askGrid(on, answer.model, question));
@@ -105,7 +105,7 @@ export function figures(moved, failed) {
       drawCurve({ question, answer, plane, kr, present });
       writeText(byId("chart-caption"), chartCaption(question, answer, plane));
       byId("curve-caption").textContent =
-        `Share of such blocks that topple over ${labelOf(plane.across).name}. Dark band: its ` +
+        `Share of such blocks that ${verbOf(answer)}, against ${labelOf(plane.across).name}. Dark band: its ` +
         `interval, as far as the data tell it.` +
         (answer.event_low === null ? "" : " Light band: the share in one single earthquake.") +
         ` Both ${percent(answer.level)}.`;
@@ -128,7 +128,7 @@ export function figures(moved, failed) {
       this.stale();
       chart.hidePoint();
       curve.showSpot(null);
-      if (!plane) byId("chart-caption").textContent = "Drawn once the block topples.";
+      if (!plane) byId("chart-caption").textContent = "Drawn once the block has an answer.";
     },
   };
 }
@@ -140,7 +140,7 @@ function chartCaption(question, answer, plane) {
     .map((name) => `${NAMES[name]} = ${quantity(fromField(question.values[name]), UNITS[name])}`);
   const all = [`p² = ${quantity(plane.p2, "1/s²")}`, ...held].join(", ");
   return (
-    `Lines of equal probability of toppling by model ${answer.model}, with ${all} held. ` +
+    `Lines of equal probability of ${answer.failure} by model ${answer.model}, with ${all} held. ` +
     "Hatched: outside the fitted range, where answers are extrapolations."
   );
 }
