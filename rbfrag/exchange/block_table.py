@@ -53,6 +53,9 @@ SIGMAS = ("p2_sigma", "kr_sigma")
 RECTANGLE = ("height_m", "width_m", "dip_deg")
 """Columns of a rectangle, which are read where those are not all there; the dip may be missing."""
 
+PORTFOLIO = ("count", "loss", "loss_sigma")
+"""Columns of how many like blocks a row is, what a failure costs, and how that scatters."""
+
 _ROWS = 1 << 14
 
 
@@ -191,7 +194,8 @@ def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     Args:
         path: file with ``p2_1_s2`` [1/s²] and ``kr``, or ``height_m`` and ``width_m`` (and
             ``dip_deg``), and ``block_id``, ``p2_sigma``, ``kr_sigma``, ``weight``, ``lon`` and
-            ``lat`` [deg] if it has them.
+            ``lat`` [deg] if it has them; a table also ``restitution``, ``site_id``, ``kind``,
+            ``count``, ``loss`` and ``loss_sigma``.
 
     Returns:
         Columns of one length; ``block_id`` are texts, numbers from 1 on where there are none.
@@ -262,8 +266,8 @@ def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     columns = read_columns(
         path,
         (),
-        optional=(*NUMBERS, *SIGMAS, *RECTANGLE, "lon", "lat", "weight"),
-        texts=("block_id",),
+        optional=(*NUMBERS, *SIGMAS, *RECTANGLE, *PORTFOLIO, "lon", "lat", "weight", "restitution"),
+        texts=("block_id", "site_id", "kind"),
     )
     if is_of_rectangles(columns):
         columns |= rectangle_columns(columns)
