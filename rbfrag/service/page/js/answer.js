@@ -65,6 +65,15 @@ export function showAnswer(answer) {
 }
 
 /**
+ * Say something more of the model that has answered.
+ * @param {string} sentence
+ */
+export function sayOfModel(sentence) {
+  const about = byId("about");
+  if (!about.textContent?.includes(sentence)) about.append(sentence);
+}
+
+/**
  * Show that there is no answer, and why.
  * @param {string} why
  */

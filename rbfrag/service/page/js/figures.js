@@ -1,5 +1,6 @@
 /** Design chart and fragility curve: what they ask, and whether they answer the present question. */
 
+import { sayOfModel } from "./answer.js";
 import { Refusal } from "./ask.js";
 import { designChart } from "./chart.js";
 import { fragilityCurve } from "./curve.js";
@@ -93,6 +94,7 @@ export function figures(moved, failed) {
      */
     async show(question, answer, block, present) {
       const model = await modelNamed(answer.model);
+      if (model?.sensitive_share) sayOfModel(sensitivity(model.sensitive_share));
       plane = planeOf(answer, block, question.values, model?.domain ?? {}, plane);
       const x = fromField(question.values[plane.across]);
       const { kr } = block;
@@ -131,6 +133,17 @@ export function figures(moved, failed) {
       if (!plane) byId("chart-caption").textContent = "Drawn once the block has an answer.";
     },
   };
+}
+
+/**
+ * What the sensitive outcomes of free-standing blocks mean for an answer.
+ * @param {number} share
+ */
+function sensitivity(share) {
+  return (
+    ` Of the simulated outcomes behind it ${percent(share)} are sensitive: others for a motion ` +
+    "that differs by a millionth."
+  );
 }
 
 /** @type {(question: Question, answer: any, plane: Plane) => string} */
