@@ -13,6 +13,9 @@ const NAMES = [
   ...[...MEASURES, "model", "level", "units", "dt", "trace"],
 ];
 
+/** Fields of which no 0 is answered. */
+const ABOVE_ZERO = new Set(["p2", "kr", "restitution", "r3", "s1", "s2", "tm", "level"]);
+
 /** Names of fields as they stand in the service's sentences, with or without their unit. */
 const NAMED = new RegExp(`(?<![\\w.])(${NAMES.join("|")})(?:_m_s|_deg|_g|_s|_m)?(?!\\w)`, "g");
 
@@ -79,8 +82,9 @@ export function formFields(form, changed) {
  * @param {HTMLInputElement} input
  */
 function isHalfTyped(input) {
-  const typed = document.activeElement === input && input.inputMode !== "";
-  return typed && /^[-+]?(0*\.?0*|.*[.e+-])$/i.test(input.value.trim()) && input.value !== "";
+  if (document.activeElement !== input || input.inputMode === "") return false;
+  const text = input.value.trim();
+  return /[e+-]$/i.test(text) || (ABOVE_ZERO.has(input.id) && /^\+?(0+\.?0*|\.0*)$/.test(text));
 }
 
 /**
