@@ -178,14 +178,14 @@ def rectangle_columns(
     with np.errstate(all="ignore"):
         leans = np.abs(dip) if free_standing else dip
         p2_and_kr = rectangle_numbers(height, width, leans, array_elementwise())
-        found = dict(zip(NUMBERS, p2_and_kr, strict=True))
+        columns_of_kind = dict(zip(NUMBERS, p2_and_kr, strict=True))
         if free_standing:
             sine2 = width * width / (width * width + height * height)
-            found["restitution"] = np.maximum(1.0 - 1.5 * sine2, 0.0)
+            columns_of_kind["restitution"] = np.maximum(1.0 - 1.5 * sine2, 0.0)
         is_block = (height > 0.0) & (width > 0.0) & (np.abs(dip) < 90.0)
         return {
             name: np.where(is_block & np.isfinite(values), values, np.nan)
-            for name, values in found.items()
+            for name, values in columns_of_kind.items()
         }
 
 
