@@ -1,6 +1,6 @@
 """Probabilities and joint failures over a ShakeMap grid for a class of blocks.
 
-    python -m benchmarks.shakemap GRID.xml DATABASE [--blocks 20] [--component larger] [--std 0.55] [--times 1]
+    python -m benchmarks.shakemap GRID.xml DATABASE [--blocks 20] [--std 0.55] [--times 1]
 
 Prints the processor time of reading the grid, of answering it, and of drawing how many blocks fail
 together. With --std the logarithms of PGV and PGA have this standard deviation everywhere; 0 takes
