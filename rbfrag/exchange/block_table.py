@@ -53,6 +53,9 @@ SIGMAS = ("p2_sigma", "kr_sigma")
 RECTANGLE = ("height_m", "width_m", "dip_deg")
 """Columns of a rectangle, which are read where those are not all there; the dip may be missing."""
 
+PORTFOLIO = ("count", "loss", "loss_sigma")
+"""Columns of how many like blocks a row is, what a failure costs, and how that scatters."""
+
 _ROWS = 1 << 14
 
 
@@ -158,21 +161,30 @@ def is_of_rectangles(names: Collection[str]) -> bool:
     return not {*NUMBERS} <= {*names} and {"height_m", "width_m"} <= {*names}
 
 
-def rectangle_columns(columns: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    """Return ``p2_1_s2`` and ``kr`` of rectangles backed by a slope; NaN where there is none.
+def rectangle_columns(
+    columns: Mapping[str, Any], *, free_standing: bool = False
+) -> dict[str, NDArray[Any]]:
+    """Return ``p2_1_s2`` and ``kr`` of rectangles, NaN where there is none.
 
     Args:
         columns: ``height_m``, ``width_m`` and, unless the bases are level, ``dip_deg``.
+        free_standing: whether nothing backs them: k_r is then that of the weaker sense, and
+            ``restitution`` is returned too, 1 - 1.5 sin² α (Housner 1963), 0 where that is less.
     """
     height, width, dip = (
         np.asarray(columns.get(name, 0.0), dtype=np.float64) for name in RECTANGLE
     )
     with np.errstate(all="ignore"):
-        p2_and_kr = rectangle_numbers(height, width, dip, array_elementwise())
+        leans = np.abs(dip) if free_standing else dip
+        p2_and_kr = rectangle_numbers(height, width, leans, array_elementwise())
+        found = dict(zip(NUMBERS, p2_and_kr, strict=True))
+        if free_standing:
+            sine2 = width * width / (width * width + height * height)
+            found["restitution"] = np.maximum(1.0 - 1.5 * sine2, 0.0)
         is_block = (height > 0.0) & (width > 0.0) & (np.abs(dip) < 90.0)
         return {
             name: np.where(is_block & np.isfinite(values), values, np.nan)
-            for name, values in zip(NUMBERS, p2_and_kr, strict=True)
+            for name, values in found.items()
         }
 
 
@@ -182,7 +194,8 @@ def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     Args:
         path: file with ``p2_1_s2`` [1/s²] and ``kr``, or ``height_m`` and ``width_m`` (and
             ``dip_deg``), and ``block_id``, ``p2_sigma``, ``kr_sigma``, ``weight``, ``lon`` and
-            ``lat`` [deg] if it has them.
+            ``lat`` [deg] if it has them; a table also ``restitution``, ``site_id``, ``kind``,
+            ``count``, ``loss`` and ``loss_sigma``.
 
     Returns:
         Columns of one length; ``block_id`` are texts, numbers from 1 on where there are none.
@@ -253,8 +266,8 @@ def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
     columns = read_columns(
         path,
         (),
-        optional=(*NUMBERS, *SIGMAS, *RECTANGLE, "lon", "lat", "weight"),
-        texts=("block_id",),
+        optional=(*NUMBERS, *SIGMAS, *RECTANGLE, *PORTFOLIO, "lon", "lat", "weight", "restitution"),
+        texts=("block_id", "site_id", "kind"),
     )
     if is_of_rectangles(columns):
         columns |= rectangle_columns(columns)

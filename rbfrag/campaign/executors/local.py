@@ -14,7 +14,7 @@ from functools import partial
 from multiprocessing.connection import wait as wait_for_end
 from typing import Any, TypeVar
 
-from rbfrag.campaign.executors.dask import connected, run_on_cluster
+from rbfrag.campaign.executors.dask import GO_ON, connected, run_on_cluster
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.solver.integrator.compiled import callbacks, on_compilation
 
@@ -39,7 +39,11 @@ def check_workers(jobs: int | None, scheduler: str | None) -> None:
 
 @contextmanager
 def executor(
-    run_work: Callable[[W], R], jobs: int | None, scheduler: str | None
+    run_work: Callable[[W], R],
+    jobs: int | None,
+    scheduler: str | None,
+    *,
+    after_a_death: str = GO_ON,
 ) -> Iterator[Callable[[Iterator[W], int], Iterator[R]]]:
     """Offer, for a ``with`` block, a function that does work and yields answers in any order.
 
@@ -49,17 +53,18 @@ def executor(
         run_work: does one chunk of work; a function of a module, which workers can find.
         jobs: worker processes; None for one per processor.
         scheduler: address of a Dask scheduler whose workers take their place.
+        after_a_death: what to do next when workers have died.
     """
     if scheduler is None:
         yield lambda work, chunks: run_locally(
             run_work,
             work,
             min(jobs or os.cpu_count() or 1, chunks),
-            after_a_death="what was finished is stored: run the same command again to go on",
+            after_a_death=after_a_death,
         )
         return
     with connected(scheduler) as client:
-        yield lambda work, _: run_on_cluster(client, run_work, work)
+        yield lambda work, _: run_on_cluster(client, run_work, work, after_a_death)
 
 
 def run_locally(
