@@ -192,7 +192,7 @@ def show_prediction(
     answers = document.pop("answers")
     polarities = document.pop("polarities", None)
     warnings = document.pop("warnings")
-    for sentence in (*prediction_in_words(document), *block_in_words(document["kind"], given)):
+    for sentence in (*prediction_in_words(document), *block_in_words(document["method"], given)):
         print(sentence)
     print()
     if verbose:
@@ -245,16 +245,16 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def block_in_words(kind: str, given: Mapping[str, Any]) -> tuple[str, ...]:
+def block_in_words(method: str, given: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what is asked about: the numbers of a block, and how it is taken to stand.
 
     Args:
-        kind: how the block fails.
+        method: the one that the model which answers is fitted by.
         given: what the question gives, by the names of :func:`rbfrag.predict`.
     """
-    from rbfrag.fragility.lookup import block_of
+    from rbfrag.fragility.methods import method_named
 
-    block = block_of(given, kind)
+    block = method_named(method).block
     values = {name: given.get(name) for name in (block.size, block.strength) if name is not None}
     if not all(isinstance(value, (int, float)) for value in values.values()):
         return ()
@@ -288,10 +288,14 @@ def _short(document: Mapping[str, Any]) -> dict[str, object]:
         **{
             name: " to ".join(map(percent, pair)) for name, pair in ends.items() if None not in pair
         },
+        **{name: document[name] for name in _IF_KNOWN if document.get(name)},
         "in domain": document["in_domain"],
         "model": document["model"],
     }
 
+
+_IF_KNOWN = ("median_displacement_m", "unknown_share")
+"""Keys that are shown without --verbose where they apply."""
 
 _SYMBOLS = {"p2": "p²", "ps2": "p_s²", "kr": "k_r", "ky": "k_y", "ks": "k_s"}
 

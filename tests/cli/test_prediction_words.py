@@ -59,14 +59,14 @@ def test_what_cannot_fail_is_said_once() -> None:
 
 
 def test_the_block_is_named_with_how_it_is_taken_to_stand() -> None:
-    numbers, backed = block_in_words("toppling", {"p2": 7.1372, "kr": 0.25, "pgv_m_s": 0.6})
+    numbers, backed = block_in_words("bounded", {"p2": 7.1372, "kr": 0.25, "pgv_m_s": 0.6})
     assert numbers == "The block has p² = 7.14 1/s² and k_r = 0.25."
     assert backed.startswith("The block is taken to be backed by a slope")
-    assert "stand free" in block_in_words("rocking", {"p2": 7.1, "kr": 0.25})[1]
-    assert block_in_words("sliding", {"ky": 0.1, "displacement_m": 0.3}) == (
+    assert "stand free" in block_in_words("overturning", {"p2": 7.1, "kr": 0.25})[1]
+    assert block_in_words("displacement", {"ky": 0.1, "displacement_m": 0.3}) == (
         "The block has k_y = 0.1.",
     )
-    assert block_in_words("toppling", {"p2": [3.0, 4.0], "kr": 0.1}) == ()
+    assert block_in_words("bounded", {"p2": [3.0, 4.0], "kr": 0.1}) == ()
 
 
 @pytest.mark.parametrize(
