@@ -183,7 +183,7 @@ def test_weak_shaking_at_which_nothing_fails_is_not_missed(
     def answer() -> FloatArray:
         return site_probability(
             dict.fromkeys(names, 0.5 * scale), np.array([3.0, 1.0]), np.array([0.1, 0.05]),
-            component=component("larger"), std_ln={name: np.full(30, 0.5) for name in names},
+            component=component("larger"), std_ln=dict.fromkeys(names, np.full(30, 0.5)),
             model=chosen,
         ).probability  # fmt: skip
 
