@@ -148,7 +148,11 @@ class DrawingAnswer(_Document):
 
 
 class ModelListed(_Document):
-    """A stored model: what `rbfrag models list --json` prints."""
+    """A stored model: what `rbfrag models list --json` prints.
+
+    `sensitive_share` is the share of the simulated outcomes behind it that a change of the motion
+    by a millionth changes; null of kinds of which that is not asked.
+    """
 
     name: str
     kind: str
@@ -157,6 +161,7 @@ class ModelListed(_Document):
     is_default: bool
     n: int | None
     events: int | None
+    sensitive_share: float | None
     domain: dict[str, Pair]
     created: str
 

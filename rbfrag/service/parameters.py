@@ -173,7 +173,7 @@ class Shape(Parameters):
 
         return numbers_of_kind(described, kind or TOPPLING_BLOCK.kind)
 
-    def kind_asked(self, kind: str | None) -> str | None:
+    def kind_of_question(self, kind: str | None) -> str | None:
         """Return how the block is asked to fail; None for what its numbers say."""
         described = None if kind is not None else self.described()
         if described is None:

@@ -33,7 +33,7 @@ ROWS_BESIDE = 5000
 
 def answer_one(query: PredictQuery, db: str | None) -> PredictAnswer:
     """Return what `rbfrag predict --json` prints."""
-    kind = query.kind_asked(query.kind)
+    kind = query.kind_of_question(query.kind)
     block, remarks = query.numbers(kind)
     document = prediction_document(
         block
