@@ -10,7 +10,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,7 @@ from rbfrag.exchange.fragility_function import (
 from rbfrag.exchange.hazard_curves import read_hazard_curves
 from rbfrag.exchange.mesh_file import block_from_mesh
 from rbfrag.exchange.nrml import nrml_text, read_nrml
+from rbfrag.exchange.openquake_events import FILES, JobFiles, read_events
 from rbfrag.exchange.pelicun_table import pelicun_text, read_pelicun
 from rbfrag.exchange.shakemap import read_shakemap
 from rbfrag.hazards.curve import hazard_curve
@@ -41,6 +42,7 @@ from rbfrag.motions.recognise import read_motions
 from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.service.settings import read_token
 from rbfrag.solver.block.file import read_block
+from tests.exchange.openquake_job import write_job
 from tests.meshes import box, write_obj
 
 
@@ -219,6 +221,17 @@ def _predict(path: Path) -> object:
     return predict_table(path, out, given={"pgv_m_s": 0.5}, model=None, level=0.95, db=None)
 
 
+@cache
+def _job(what: str) -> tuple[bytes, ...]:
+    with tempfile.TemporaryDirectory() as folder:
+        write_job(Path(folder))
+        return (JobFiles.of(folder).paths()[what].read_bytes(),)
+
+
+def _read_job(path: Path, what: str) -> object:
+    return read_events(JobFiles.of(write_job(path.with_name("job")), {what: path}))
+
+
 READERS: tuple[Reader, ...] = (
     Reader("block TOML", ".toml", lambda: BLOCKS_TOML, read_block),
     Reader("block CSV", ".csv", lambda: BLOCK_CSV, read_block),
@@ -242,6 +255,10 @@ READERS: tuple[Reader, ...] = (
     Reader("mesh OBJ", ".obj", lambda: _meshes(".obj"), block_from_mesh),
     Reader("mesh PLY", ".ply", lambda: _meshes(".ply"), block_from_mesh),
     Reader("mesh STL", ".stl", lambda: _meshes(".stl"), block_from_mesh),
+    *(
+        Reader(f"OpenQuake {what}", ".csv", partial(_job, what), partial(_read_job, what=what))
+        for what in FILES
+    ),
     Reader("database", ".db", _database, _read_database),
     Reader("token", ".txt", lambda: (b"0123456789abcdefABCDEF\n",), lambda f: read_token(str(f))),
 )

@@ -18,10 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+import rbfrag
 from benchmarks.model_choice import clustered_mean, log_losses
 from benchmarks.page import ROOT, replaced
 from benchmarks.shake_table_runs import (
     ALPHA_RAD,
+    P2,
     RESTITUTION,
     SPECIMENS,
     Outcomes,
@@ -35,6 +37,7 @@ from rbfrag.fragility.fit.likelihood import Binomial, most_likely
 from rbfrag.fragility.fit.scores import CLIP
 from rbfrag.fragility.methods import LOGIT
 from rbfrag.solver.integrator.free_rocking import STABLE, TOPPLED
+from rbfrag.solver.models.rocking import Rocking
 
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.intp]
@@ -63,6 +66,8 @@ ANY_RESTITUTION_SIGMA, ANY_EVEN = (0.05, 0.10), (0.0, 0.5, 1.0)
 PGV_PGA, SHARE = "(b) PGV, PGA", "(f) share of simulated overturns"
 FREE = "(f) the same, spread of e and part of even blocks fitted, too"
 WEIGHTED = "(f) the same, all these distributions weighted by their likelihood"
+SHIPPED = "(g) shipped fragility of rocking blocks, best block"
+SHIPPED_OF_HOUSNER = "(g) the same, restitution by Housner"
 LOG_LOSS, BRIER = (0.20, 0.18), (0.06, 0.055)
 """Targets of the share, by specimen."""
 
@@ -212,12 +217,32 @@ def score(p: FloatArray, failed: FloatArray, base: Labels) -> Score:
     )
 
 
-def predictors(trials: Trials, runs: Outcomes, blocks: Candidates) -> dict[str, Predictor]:
+def shipped_fragility(trials: Trials, restitution: Sequence[float | None]) -> Candidates:
+    """Return P by the model that rbfrag ships, for blocks of every angle and given restitutions.
+
+    Settings are those of :func:`distributions`; sigma is NaN, and so is Housner's restitution.
+
+    Args:
+        trials: the tests; PGV and PGA are those of the filtered traces.
+        restitution: None for that of the rectangle.
+    """
+    kr, pgv = np.broadcast_arrays(np.tan(MEDIAN_RAD)[:, None], trials.measured("pgv_m_s"))
+    pga = np.broadcast_to(trials.measured("pga_g"), kr.shape)
+    shaking = {"kr": kr.ravel(), "pgv_m_s": pgv.ravel(), "pga_g": pga.ravel()}
+    p, settings = [], []
+    for e in restitution:
+        given = shaking if e is None else {**shaking, "restitution": e}
+        p.append(rbfrag.predict(kind=Rocking.kind, p2=P2, **given).probability.reshape(kr.shape))
+        settings += [(alpha, np.nan, np.nan if e is None else e) for alpha in MEDIAN_RAD]
+    return Candidates(np.concatenate(p), np.array(settings))
+
+
+def predictors(
+    trials: Trials, runs: Outcomes, blocks: Candidates, shipped: Candidates
+) -> dict[str, Predictor]:
     """Return the predictors by what they read."""
     free, backed = overturned(runs.free), overturned(runs.backed)
     pga, pgv = trials.pga_g, trials.pgv_m_s
-    measured = [np.array([getattr(motion, name) for motion in trials.motions])
-                for name in ("pgv_m_s", "pga_g")]  # fmt: skip
     # leaning forward, backward, or either way
     leaning = np.concatenate([backed[:, 0], backed[:, 1], backed.max(axis=1)], axis=1).T
     backed_blocks = Candidates(leaning, np.empty((len(leaning), 0)))
@@ -227,7 +252,9 @@ def predictors(trials: Trials, runs: Outcomes, blocks: Candidates) -> dict[str, 
     return {
         "(a) PGA": logistic(pga),
         PGV_PGA: logistic(pgv, pga),
-        "(b) the same of the filtered traces": logistic(*measured),
+        "(b) the same of the filtered traces": logistic(
+            trials.measured("pgv_m_s"), trials.measured("pga_g")
+        ),
         "(c) X(p), PGA": logistic(trials.spectrum_m_s(), pga),
         "(d) backed toppling, best block: its verdict": best_of(backed_blocks),
         "(d) the same, P of each verdict fitted": by_verdict(backed_blocks),
@@ -236,6 +263,8 @@ def predictors(trials: Trials, runs: Outcomes, blocks: Candidates) -> dict[str, 
         SHARE: best_of(blocks),
         FREE: best_of(any_blocks),
         WEIGHTED: weighted(any_blocks),
+        SHIPPED: best_of(shipped),
+        SHIPPED_OF_HOUSNER: best_of(shipped_fragility(trials, [None])),
     }
 
 
@@ -298,17 +327,22 @@ def target_table(scores: Sequence[Mapping[str, Score]]) -> tuple[str, bool]:
     return markdown((head, cells)), reached
 
 
-def block_table(blocks: Candidates, failed: FloatArray, fold: Labels) -> str:
-    """Return the distributions that are fitted: to all tests, and their range over the folds."""
-    head = ["specimen", "median alpha [rad]", "sigma of ln alpha", "mean restitution"]
+def block_table(predicted: Mapping[str, Candidates], failed: FloatArray, fold: Labels) -> str:
+    """Return the blocks that are fitted: to all tests, and their range over the folds."""
+    head = ["predictor", "specimen", "median alpha [rad]", "sigma of ln alpha", "mean restitution"]
     cells = []
-    for k, y in enumerate(failed):
-        everywhere = blocks.settings[blocks.best(y, np.ones(y.size, bool))]
-        each = np.array([blocks.settings[blocks.best(y, fold != one)] for one in np.unique(fold)])
-        ranges = zip(everywhere, each.min(axis=0), each.max(axis=0), strict=True)
-        cells.append(
-            [str(k + 1), *(f"{one:.3g} ({low:.3g} to {high:.3g})" for one, low, high in ranges)]
-        )
+    for name, blocks in predicted.items():
+        for k, y in enumerate(failed):
+            best = blocks.settings[blocks.best(y, np.ones(y.size, bool))]
+            each = [blocks.settings[blocks.best(y, fold != one)] for one in np.unique(fold)]
+            ranges = zip(best, np.min(each, axis=0), np.max(each, axis=0), strict=True)
+            cells.append(
+                [name, str(k + 1)]
+                + [
+                    "" if np.isnan(one) else f"{one:.3g} ({low:.3g} to {high:.3g})"
+                    for one, low, high in ranges
+                ]
+            )
     return markdown((head, cells))
 
 
@@ -330,7 +364,8 @@ def study(trials: Trials, runs: Outcomes) -> tuple[str, bool]:
     """Return the tables, and whether the targets are reached."""
     base, fold = trials.base, folds(trials.base, SEED)
     blocks = distributions(overturned(runs.free))
-    all_predictors = predictors(trials, runs, blocks)
+    shipped = shipped_fragility(trials, RESTITUTION.tolist())
+    all_predictors = predictors(trials, runs, blocks, shipped)
     predicted = [
         {name: held_out(one, failed, fold) for name, one in all_predictors.items()}
         for failed in trials.overturned
@@ -340,7 +375,7 @@ def study(trials: Trials, runs: Outcomes) -> tuple[str, bool]:
         for of, failed in zip(predicted, trials.overturned, strict=True)
     ]
     targets, reached = target_table(scores)
-    varied = {name: all_predictors[name] for name in (PGV_PGA, SHARE, FREE, WEIGHTED)}
+    varied = {name: all_predictors[name] for name in (PGV_PGA, SHARE, FREE, WEIGHTED, SHIPPED)}
     shares = " and ".join(f"{100.0 * failed.mean():.1f} %" for failed in trials.overturned)
     decided = np.isin(runs.free, (STABLE, TOPPLED))
     text = [
@@ -355,8 +390,8 @@ def study(trials: Trials, runs: Outcomes) -> tuple[str, bool]:
         targets,
         f"Log loss over {PARTITIONS} other divisions into folds, mean (least to greatest):",
         partition_table(trials, varied),
-        "The distribution of (f) fitted to all tests (range over the fits without a fold):",
-        block_table(blocks, trials.overturned, fold),
+        "Blocks fitted to all tests (range over the fits without a fold):",
+        block_table({SHARE: blocks, SHIPPED: shipped}, trials.overturned, fold),
     ]
     return "\n\n".join(text), reached
 

@@ -81,6 +81,10 @@ class Trials:
         parts += [motion.acceleration_g.tobytes() for motion in self.motions]
         return hashlib.sha256(b"".join(parts)).hexdigest()[:16]
 
+    def measured(self, name: str) -> FloatArray:
+        """Return a measure of each filtered trace by its name, `pgv_m_s` say."""
+        return np.array([getattr(motion, name) for motion in self.motions])
+
     def spectrum_m_s(self) -> FloatArray:
         """Return X(p) of each motion, the greater of both polarities [m/s]."""
         return np.array(

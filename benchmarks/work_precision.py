@@ -8,7 +8,12 @@ from collections.abc import Sequence
 from benchmarks.page import FIGURE, parser, report
 from rbfrag.bench import tables
 from rbfrag.bench.cases import choose_cases, find_records
-from rbfrag.bench.methods import methods, missing_peers
+from rbfrag.bench.methods import (
+    methods,
+    missing_peers,
+    rocking_methods,
+    rocking_reference_run,
+)
 from rbfrag.bench.work_precision import measure
 from rbfrag.plots.work_precision import plot_work_precision
 
@@ -34,17 +39,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     for name in missing_peers():
         print(f"not installed: {name}", file=sys.stderr)
+    rocking = measure(
+        cases, rocking_methods(quick=chosen.quick), judge=rocking_reference_run, seed=chosen.seed
+    )
     if chosen.out is not None:
+        tables.write_csv(rocking, chosen.out / "work-precision-rocking.csv")
         tables.write_csv(rows, chosen.out / "work-precision.csv")
         plot_work_precision(rows, chosen.out / "work-precision.png")
     if chosen.write:
         plot_work_precision(rows, FIGURE)
     about = f"{len(cases)} runs under {records.source}, seed {chosen.seed}."
-    report(
-        "work-precision",
-        f"{tables.markdown(tables.work_precision_table(rows))}\n\n{about}",
-        write=chosen.write,
-    )
+    for name, measured in (("work-precision", rows), ("work-precision-rocking", rocking)):
+        table = tables.markdown(tables.work_precision_table(measured))
+        report(name, f"{table}\n\n{about}", write=chosen.write)
 
 
 if __name__ == "__main__":

@@ -23,6 +23,18 @@ _DOTTED = re.compile(r"(?:^|[\[{,])[^.,=\n\[\]{}#]*(?:\.[^.,=\n\[\]{}#]*){20}", 
 """A key of more than 20 parts; the parser's time grows with the square of their number."""
 
 
+_ARCHIVES = (
+    (b"PK\x03\x04", "zip"), (b"\x1f\x8b", "gzip"), (b"7z\xbc\xaf", "7z"), (b"Rar!", "rar"),
+    (b"BZh", "bzip2"), (b"\xfd7zXZ", "xz"),
+)  # fmt: skip
+"""How packed files begin."""
+
+
+def packed_as(start: bytes) -> str | None:
+    """Return the format of a packed file, of its first bytes; None for another file."""
+    return next((name for magic, name in _ARCHIVES if start.startswith(magic)), None)
+
+
 @contextmanager
 def reading(source: Path, what: str) -> Iterator[None]:
     """Say in words why a file cannot be read.
@@ -32,11 +44,16 @@ def reading(source: Path, what: str) -> Iterator[None]:
         what: what it should hold, for messages: "a hazard curve".
 
     Raises:
-        InputError: there is no such file, or it cannot be read or is not text (UTF-8).
+        InputError: there is no such file, or it cannot be read or is packed or not text (UTF-8).
     """
     try:
         if source.is_dir():
             raise InputError(f"{source} is a folder: name a file with {what} in it")
+        if source.is_file():
+            with source.open("rb") as file:
+                packed = packed_as(file.read(6))
+            if packed is not None:
+                raise InputError(f"{source} is a {packed} file: unpack it, and name {what} in it")
         yield
     except FileNotFoundError:
         raise InputError(f"{source}: no such file; name a file with {what}") from None

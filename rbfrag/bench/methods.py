@@ -16,10 +16,19 @@ from rbfrag.bench.peers import (
     euler,
     solve_ivp_run,
 )
+from rbfrag.bench.reference import rocking_reference
+from rbfrag.bench.rocking_peer import runge_kutta
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
+from rbfrag.solver.models.rocking import free_block
+from rbfrag.solver.respond import block_of_numbers
+from rbfrag.solver.rocking_run import simulate as simulate_rocking
 from rbfrag.solver.toppling_run import OUTCOMES, simulate
 
 UNSPLIT = math.inf
+
+RESTITUTION = 0.85
+"""Of the free-standing blocks. With Housner's the responses of slender ones are chaotic, and an
+error says nothing of the method."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +73,18 @@ def methods(*, quick: bool = False) -> tuple[Method, ...]:
     return tuple(result)
 
 
+def rocking_methods(*, quick: bool = False) -> tuple[Method, ...]:
+    """Return the methods for free-standing blocks."""
+    result = [_rocking(order) for order in (4, 5, 6, ORDER)]
+    result += [_runge_kutta(parts) for parts in ((1, 4) if quick else (1, 4, 16))]
+    return tuple(result)
+
+
+def rocking_reference_run(case: Case) -> Answer:
+    """Run one case with the reference that errors are judged by."""
+    return rocking_reference(case, RESTITUTION)
+
+
 def missing_peers() -> tuple[str, ...]:
     """Return the packages of peers that are not installed here."""
     return () if cvode_is_installed() else (CVODE_INSTALL,)
@@ -76,6 +97,30 @@ def _taylor(order: int, ph_max: float) -> Method:
         f"order {order}",
         lambda case: taylor_run(case, order, ph_max),
         of_use=(order, ph_max) == (ORDER, PH_MAX),
+    )
+
+
+def _rocking(order: int) -> Method:
+    return Method(
+        "rbfrag, rocking",
+        f"order {order}",
+        lambda case: rocking_run(case, order),
+        of_use=order == ORDER,
+    )
+
+
+def rocking_run(case: Case, order: int = ORDER) -> Answer:
+    """Run one case with rbfrag's kernel of free-standing blocks."""
+    block = free_block(block_of_numbers(case.p2, case.kr, {"restitution": RESTITUTION}))
+    run = simulate_rocking(case.excitation, block, order=order)
+    return Answer(OUTCOMES[run.outcome].value, max(run.forward.x, run.backward.x))
+
+
+def _runge_kutta(parts: int) -> Method:
+    return Method(
+        "RK4, rocking",
+        "dt" if parts == 1 else f"dt/{parts}",
+        lambda case: runge_kutta(case, RESTITUTION, parts),
     )
 
 

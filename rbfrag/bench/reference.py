@@ -2,7 +2,8 @@
 
 A Taylor step of degree 16 in numpy's longdouble (64 bits of mantissa on x86), p·h <= 0.25,
 sines and cosines called at every step, roots isolated by bounds of the polynomial on each
-half of the step. It shares no code with rbfrag.solver, only the arrays of the excitation.
+half of the step. It shares no code with rbfrag.solver, only the arrays of the excitation and the
+speed at which a free-standing block comes to rest.
 The truncation of a step is below (p h)^17/17!, some 1e-25; what is left is the rounding of
 longdouble. Where longdouble is no longer than a double (some platforms) some 1e-13 is left.
 """
@@ -15,10 +16,15 @@ import numpy as np
 
 from rbfrag.bench.cases import Case
 from rbfrag.bench.peers import STABLE, TOPPLED, Answer, free_motion
+from rbfrag.bench.rocking_peer import free_rocking
+from rbfrag.solver.rocking_run import REST_SPEED
 
 Real = np.longdouble
 ORDER = 16
 PH_MAX = 0.25
+
+EVEN = 1e-15
+"""Part of an interval that is no step of its own: its end is reached but for rounding."""
 
 
 def reference(case: Case) -> Answer:
@@ -87,6 +93,72 @@ def reference(case: Case) -> Answer:
     if not moving:
         return Answer(STABLE, float(peak))
     return free_motion(theta, rate, p, theta_c, peak)
+
+
+def rocking_reference(case: Case, restitution: float) -> Answer:
+    """Return outcome and peak rotation [rad] of a free-standing rectangle on level ground.
+
+    Args:
+        case: size, strength and excitation.
+        restitution: speed after an impact over that before it.
+    """
+    excited = case.excitation
+    k = [Real(x) for x in excited.k_h]
+    w = [Real(x) for x in excited.w]
+    kr, p = Real(case.kr), np.sqrt(Real(case.p2))
+    theta_c, e = np.arctan(kr), Real(restitution)
+    slowest = Real(REST_SPEED) * p * theta_c
+    rest = Real(0)
+    border = {
+        side: [np.arctan(min(Real(q), rest)) for q in np.minimum.accumulate(side * excited.q[::-1])]
+        for side in (1, -1)
+    }
+    side, theta, rate, peak = 0, rest, rest, rest
+    for i in range(len(k) - 1):
+        h = Real(excited.interval_s[i])
+        da, dw = k[i + 1] - k[i], w[i + 1] - w[i]
+        at, from_rest = rest, False
+        while at < 1 and h > 0:
+            if side == 0:
+                at, side, from_rest = _departure(k[i], da, w[i] * kr, dw * kr, at)
+                if side == 0:
+                    break
+            part = (1 - at) / max(1, math.ceil(float(p * h * (1 - at)) / PH_MAX))
+            u = _coefficients(
+                theta_c - theta, rate * h * part, (p * h * part) ** 2,
+                side * (k[i] + da * at), side * da * part, w[i] + dw * at, dw * part, from_rest,
+            )  # fmt: skip
+            from_rest = False
+            path = [theta, *(u[j] / (j + 1) for j in range(len(u)))]
+            landing = _first_root(path)
+            for turn in _roots(u):
+                if landing is None or turn < landing:
+                    peak = max(peak, _value(path, turn))
+            if landing is None:
+                theta, rate = _value(path, Real(1)), _value(u, Real(1)) / (h * part)
+                at = at + part if at + part < 1 - EVEN else Real(1)
+                continue
+            speed = -e * _value(u, landing) / (h * part)
+            at += part * landing
+            theta = rest
+            side, rate = (-side, speed) if speed >= slowest else (0, rest)
+        if side and rate > 0 and theta_c - theta < border[side][len(k) - 2 - i]:
+            return Answer(TOPPLED, math.nan)
+    if side == 0:
+        return Answer(STABLE, float(peak))
+    return free_rocking(theta, rate, p, theta_c, e, peak)
+
+
+def _departure(a: Real, da: Real, g: Real, dg: Real, at: Real) -> tuple[Real, int, bool]:
+    """Return where a block at rest lifts off, in which sense, and whether k_h just reaches k_r."""
+    first = (Real(1), 0, False)
+    for side in (1, -1):
+        above, slope = side * a - g, side * da - dg
+        if above + slope * at > 0:
+            return at, side, False
+        if above + slope > 0 and -above / slope < first[0]:
+            first = (max(at, -above / slope), side, True)
+    return first
 
 
 def _coefficients(

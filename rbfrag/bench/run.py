@@ -41,6 +41,7 @@ class BenchResult:
         not_installed: packages of peers that were left out.
         seconds: wall time of all measurements [s].
         work_precision: time against error of each method.
+        rocking: the same of free-standing blocks.
         critical_search: searches, and the same runs by others.
         record_length: scaling with the length of the record.
         workers: scaling with combinations and worker processes.
@@ -51,6 +52,7 @@ class BenchResult:
     not_installed: tuple[str, ...]
     seconds: float
     work_precision: tuple[WorkPrecision, ...]
+    rocking: tuple[WorkPrecision, ...]
     critical_search: tuple[SearchTimes, ...]
     record_length: tuple[LengthRow, ...]
     workers: tuple[WorkersRow, ...]
@@ -59,6 +61,7 @@ class BenchResult:
         """Return the measured rows by the name of their table."""
         return {
             "work-precision": self.work_precision,
+            "work-precision-rocking": self.rocking,
             "critical-search": self.critical_search,
             "record-length": self.record_length,
             "workers": self.workers,
@@ -83,7 +86,12 @@ def run_bench(
     about = machine()
     chosen = find_records(records)
     say(f"{size.cases} runs under {chosen.source}, each by every method ...")
-    work_precision = measure(choose_cases(chosen, size.cases), methods.methods(quick=quick))
+    cases = choose_cases(chosen, size.cases)
+    work_precision = measure(cases, methods.methods(quick=quick))
+    say("the same blocks free-standing ...")
+    rocking = measure(
+        cases, methods.rocking_methods(quick=quick), judge=methods.rocking_reference_run
+    )
     say(f"{size.combinations} critical searches ...")
     searches = compare_searches(choose_combinations(chosen, size.combinations))
     say("scaling ...")
@@ -95,6 +103,7 @@ def run_bench(
         not_installed=methods.missing_peers(),
         seconds=time.perf_counter() - started,
         work_precision=work_precision,
+        rocking=rocking,
         critical_search=searches,
         record_length=length,
         workers=by_workers,

@@ -52,6 +52,7 @@ def measure(
     cases: Sequence[Case],
     methods: Sequence[Method],
     *,
+    judge: Callable[[Case], Answer] = reference,
     seed: int = 1,
     on_case: Callable[[int, int], None] | None = None,
 ) -> tuple[WorkPrecision, ...]:
@@ -60,6 +61,7 @@ def measure(
     Args:
         cases: what to run.
         methods: with what; one of them `of_use`, to which times are compared.
+        judge: returns what is right; for another kind than toppling.
         seed: of the order in which the methods take turns on each case.
         on_case: called after each case with (done, total).
     """
@@ -70,7 +72,7 @@ def measure(
     answers: list[list[Answer]] = [[] for _ in methods]
     seconds = np.empty((len(methods), len(cases)))
     for j, case in enumerate(cases):
-        truth.append(reference(case))
+        truth.append(judge(case))
         of_case, seconds[:, j] = timed_in_turns([method.run for method in methods], case, rng)
         for of_method, answer in zip(answers, of_case, strict=True):
             of_method.append(answer)

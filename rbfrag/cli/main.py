@@ -27,6 +27,7 @@ COMMANDS = {
     "fit": "Fit a fragility model to stored critical values or outcomes.",
     "predict": "Print the probability that a block fails.",
     "hazard": "Print the annual rate at which a block topples.",
+    "losses": "Count failures and losses in the earthquakes of an event set.",
     "survival": "Print how likely standing blocks are under a seismic hazard.",
     "shakemap": "Write the probability that blocks topple across a ShakeMap.",
     "export": "Write fragility functions for other tools.",

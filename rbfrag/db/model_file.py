@@ -17,6 +17,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from rbfrag.db.digest import ValueType, row_digests
 from rbfrag.db.sqlite_file import check_sqlite_database, connect_sqlite, explained_sqlite_error
 from rbfrag.errors import DatabaseError, InputError, checked_name
 
@@ -79,7 +80,13 @@ COLUMNS = (
 )
 """The columns that make a model, in the order of :func:`decode_model`."""
 
-_SELECT = f"SELECT {', '.join(COLUMNS)} FROM fragility_model"
+STORED = (*COLUMNS, "digest")
+"""The columns that are read back: with the digest, by which an altered model is refused."""
+
+_SELECT = f"SELECT {', '.join(STORED)} FROM fragility_model"
+
+_TYPES: Mapping[str, ValueType] = {"is_default": "boolean", "form": "integer"}
+"""Types of the columns for the digest; all others are texts."""
 
 
 def encode_model(row: ModelRow) -> dict[str, Any]:
@@ -134,22 +141,25 @@ def encode_model(row: ModelRow) -> dict[str, Any]:
 
 
 def decode_model(values: Sequence[Any]) -> ModelRow:
-    """Return the model of one row, its values in the order of :data:`COLUMNS`.
+    """Return the model of one row, its values in the order of :data:`STORED`.
 
     Raises:
-        DatabaseError: the row does not read as a model.
+        DatabaseError: the row is not what was stored: its digest differs, or it does not read as
+            a model.
     """
-    by_name: Mapping[str, Any] = dict(zip(COLUMNS, values, strict=True))
+    by_name: Mapping[str, Any] = dict(zip(STORED, values, strict=True))
     steps, dependence = by_name["leave_out_steps"], by_name["dependence"]
     try:
+        if _digest_of(by_name) != by_name["digest"]:
+            raise ValueError("its digest differs: a value was altered after it was stored")
         return ModelRow(
             name=by_name["name"],
             term=by_name["term"],
             method=by_name["method"],
-            coefficients={k: float(v) for k, v in json.loads(by_name["coefficients"]).items()},
+            coefficients={k: _finite(v) for k, v in json.loads(by_name["coefficients"]).items()},
             covariance=_numbers(by_name["covariance"]),
             domain={
-                k: (float(low), float(high))
+                k: (_finite(low), _finite(high))
                 for k, (low, high) in json.loads(by_name["domain"]).items()
             },
             data_fingerprint=by_name["data_fingerprint"],
@@ -161,10 +171,18 @@ def decode_model(values: Sequence[Any]) -> ModelRow:
             leave_out_steps=None if steps is None else _numbers(steps),
             dependence=None if dependence is None else dict(json.loads(dependence)),
         )
-    except (ValueError, TypeError, AttributeError) as error:
+    except (ValueError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
         raise DatabaseError(
-            f"model {by_name['name']} is damaged in the database ({error}): fit it again"
+            f"model {by_name['name']} is damaged in the database ({error}): fit it again with "
+            "--replace, or restore the database from a copy"
         ) from error
+
+
+def _digest_of(by_name: Mapping[str, Any]) -> int:
+    names = sorted(COLUMNS)
+    types = [_TYPES.get(name, "text") for name in names]
+    (digest,) = row_digests(types, [[by_name[name]] for name in names])
+    return digest
 
 
 def _lines(numbers: tuple[tuple[float, ...], ...]) -> str:
@@ -172,7 +190,14 @@ def _lines(numbers: tuple[tuple[float, ...], ...]) -> str:
 
 
 def _numbers(lines: str) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(float(v) for v in line) for line in json.loads(lines))
+    return tuple(tuple(_finite(v) for v in line) for line in json.loads(lines))
+
+
+def _finite(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"{number} is not a finite number")
+    return number
 
 
 def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:

@@ -8,7 +8,7 @@ from sqlalchemy import Connection, Select, and_, delete, select
 
 from rbfrag.db.connect import database_label
 from rbfrag.db.insert import insert_row, update_rows, utc_now
-from rbfrag.db.model_file import COLUMNS, ModelRow, decode_model, encode_model, unknown_model
+from rbfrag.db.model_file import STORED, ModelRow, decode_model, encode_model, unknown_model
 from rbfrag.db.schema import fragility_model
 from rbfrag.errors import InputError, UnknownModelError
 
@@ -89,7 +89,7 @@ def _clear_default(connection: Connection, kind: str) -> None:
 
 
 def _model_query() -> Select[Any]:
-    return select(*(fragility_model.c[column] for column in COLUMNS))
+    return select(*(fragility_model.c[column] for column in STORED))
 
 
 def _unknown(connection: Connection, name: str | None) -> UnknownModelError:

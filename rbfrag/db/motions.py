@@ -11,13 +11,24 @@ from datetime import datetime
 from typing import Any
 
 import numpy as np
-from sqlalchemy import Connection, RowMapping, Select, and_, case, delete, exists, or_, select
+from sqlalchemy import (
+    Connection,
+    RowMapping,
+    Select,
+    and_,
+    case,
+    delete,
+    exists,
+    or_,
+    select,
+)
 
 from rbfrag.db import schema
 from rbfrag.db.insert import insert_if_new, storable, update_rows, utc_now
 from rbfrag.db.keys import canonical_json
 from rbfrag.db.rows import EarthquakeInfo, MotionRow
 from rbfrag.db.schema import earthquake, suite, suite_motion
+from rbfrag.db.stored_json import stored_json, stored_number
 from rbfrag.errors import DatabaseError, InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.response_spectrum import PERIODS_S
@@ -35,6 +46,7 @@ _OF_ROWS = (
     "id", "component", "orientation_deg", "is_vertical", "dt_s", "npts", *MEASURES, "source_file",
     "trace_index", "file_format", "processing", "source_sha256", "start_time",
 )  # fmt: skip
+_NUMBERS = ("orientation_deg", "dt_s", "npts", *MEASURES, "trace_index")
 # Sums over some 1e5 samples, in another order on another processor.
 _ROUNDING = 1e-9
 _ID_LIMIT = 2**31  # drivers refuse larger integers in words of their own
@@ -174,11 +186,11 @@ def load_motion(connection: Connection, motion_id: int) -> GroundMotion:
         source_file=row["source_file"],
         trace_index=row["trace_index"],
         file_format=row["file_format"],
-        remarks=tuple(json.loads(row["remarks"])),
+        remarks=tuple(_listed(row, "remarks")),
         is_corrected=_is_corrected(row),
-        is_partial="partial" in json.loads(row["flags"]),
+        is_partial="partial" in _listed(row, "flags"),
         start_time=_time(row["start_time"]),
-        processing_applied=_parameters(row["processing_applied"]),
+        processing_applied=_parameters(row),
         source_sha256="" if row["processing_applied"] is None else row["source_sha256"],
     )
 
@@ -272,17 +284,24 @@ def _measured(motion: GroundMotion) -> dict[str, Any]:
 
 
 def _is_corrected(row: RowMapping) -> bool | None:
-    if "uncorrected" in json.loads(row["flags"]):
+    if "uncorrected" in _listed(row, "flags"):
         return False
-    return True if "filter" in (_parameters(row["processing_applied"]) or {}) else None
+    return True if "filter" in (_parameters(row) or {}) else None
 
 
 def _time(text: str | None) -> datetime | None:
     return None if text is None else datetime.fromisoformat(text)
 
 
-def _parameters(text: str | None) -> dict[str, object] | None:
-    return None if text is None else json.loads(text)
+def _parameters(row: RowMapping) -> dict[str, object] | None:
+    where = f"processing_applied of motion {row['id']}"
+    parameters: dict[str, object] | None = stored_json(row["processing_applied"], dict, where)
+    return parameters
+
+
+def _listed(row: RowMapping, name: str) -> list[Any]:
+    listed: list[Any] = stored_json(row[name], list, f"{name} of motion {row['id']}") or []
+    return listed
 
 
 def _own_name(motion: GroundMotion) -> str:
@@ -352,9 +371,10 @@ def _motion_row(row: RowMapping) -> MotionRow:
     names = ("event_id", "event_guessed", "magnitude", "recording", "station", "sha256", *_OF_ROWS)
     return MotionRow(
         name=label or f"{row['source_file']}#{row['trace_index']}",
-        processing_applied=_parameters(row["processing_applied"]),
-        flags=tuple(json.loads(row["flags"])),
-        **{name: row[name] for name in names},
+        processing_applied=_parameters(row),
+        flags=tuple(_listed(row, "flags")),
+        **{name: row[name] for name in names if name not in _NUMBERS},
+        **{name: stored_number(row[name], f"{name} of motion {row['id']}") for name in _NUMBERS},
     )
 
 

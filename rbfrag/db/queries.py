@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
@@ -24,6 +23,7 @@ from rbfrag.db.schema import (
     simulation,
     suite_motion,
 )
+from rbfrag.db.stored_json import stored_json, stored_number
 from rbfrag.errors import InputError
 from rbfrag.motions.quality import PGD_IN_DOUBT
 from rbfrag.solver.results import NUMERICS_VERSION
@@ -102,7 +102,7 @@ def combination_table(
             and_(suite_motion.c.motion_id == motion.c.id, suite_motion.c.suite_id == suite_id),
         )
     order = (combination.c.search_limit, combination.c.natural_key)
-    settings_of = cache(json.loads)
+    settings_of = cache(lambda text: stored_json(text, dict, "settings of a combination"))
     rows: dict[tuple[Any, ...], Any] = {}
     for row in connection.execute(query.order_by(*order)).mappings():
         settings = settings_of(row["settings"])
@@ -113,7 +113,14 @@ def combination_table(
     kept = sorted(rows.values(), key=lambda row: str(row["natural_key"]))
 
     def floats(name: str) -> Any:
-        return np.array([np.nan if r[name] is None else r[name] for r in kept], dtype=np.float64)
+        try:
+            return np.array(
+                [np.nan if row[name] is None else row[name] for row in kept], dtype=np.float64
+            )
+        except (ValueError, TypeError):
+            for row in kept:
+                stored_number(row[name], f"{name} of combination {row['id']}")
+            raise
 
     def objects(name: str) -> Any:
         column = np.empty(len(kept), dtype=object)
@@ -226,7 +233,8 @@ def database_info(connection: Connection, *, kind: str = "toppling") -> Database
 
 
 def _pgd_in_doubt(row: RowMapping) -> bool:
-    return not PGD_IN_DOUBT.isdisjoint(json.loads(row["flags"]))
+    where = f"flags of motion {row['motion_id']}"
+    return not PGD_IN_DOUBT.isdisjoint(stored_json(row["flags"], list, where))
 
 
 def _combination_query() -> Select[Any]:

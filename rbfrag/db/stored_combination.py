@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from rbfrag.db.schema import (
     vertical,
     with_motions,
 )
+from rbfrag.db.stored_json import stored_json
 from rbfrag.solver.results import OutcomeIntervals, SearchPoints
 
 
@@ -95,9 +95,9 @@ def stored_combination(connection: Connection, natural_key: str) -> StoredCombin
         vertical_motion_id=row["vertical_motion_id"],
         pga_g=row["pga_g"],
         values={column.name: row[column.name] for column in combination.c},
-        settings=json.loads(row["settings"]),
-        block=None if row["block"] is None else json.loads(row["block"]),
-        campaign_settings=json.loads(row["campaign_settings"]),
+        settings=stored_json(row["settings"], dict, f"settings of combination {row['id']}"),
+        block=stored_json(row["block"], dict, f"block of combination {row['id']}"),
+        campaign_settings=stored_json(row["campaign_settings"], dict, "settings of a campaign"),
         points=SearchPoints(
             kr_over_pga=_floats([point.kr_over_pga for point in points]),
             theta_n=_floats([point.theta_n for point in points]),

@@ -143,7 +143,7 @@ def _columns(
         and not {*block.names}.intersection(given)
     )
     columns = (
-        {name: name for name in RECTANGLE}
+        {name: name for name in (*RECTANGLE, *block.options)}
         if rectangles
         else {
             column: name
@@ -198,9 +198,13 @@ def _answer(
 ) -> dict[str, NDArray[Any]]:
     values = {names[column]: numbers(origin, column, part[column], first_line) for column in names}
     if "height_m" in values:
-        numbers_of = rectangle_columns(values)
+        free_standing = model_of_kind(model.kind).free_standing
+        numbers_of = rectangle_columns(values, free_standing=free_standing)
         values = {name: value for name, value in values.items() if name not in RECTANGLE}
-        values |= {BLOCK_COLUMNS[name]: value for name, value in numbers_of.items()}
+        for column, value in numbers_of.items():
+            name = BLOCK_COLUMNS[column]
+            stated = values.get(name, np.nan)
+            values[name] = np.where(np.isnan(stated), value, stated)
     _fill_options(values, model.method.block)
     for name in set(DEVIATIONS).intersection(values):
         values[name] = np.nan_to_num(values[name], nan=0.0, posinf=np.inf)

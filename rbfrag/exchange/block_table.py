@@ -27,6 +27,7 @@ from rbfrag.exchange.points import read_points
 from rbfrag.files import is_number, output_path, reading, written_whole
 from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.described import rectangle_numbers
+from rbfrag.solver.kinds import model_of_kind
 
 SUFFIXES = (".csv", ".parquet")
 """File types of a block table."""
@@ -52,6 +53,9 @@ SIGMAS = ("p2_sigma", "kr_sigma")
 
 RECTANGLE = ("height_m", "width_m", "dip_deg")
 """Columns of a rectangle, which are read where those are not all there; the dip may be missing."""
+
+PORTFOLIO = ("count", "loss", "loss_sigma")
+"""Columns of how many like blocks a row is, what a failure costs, and how that scatters."""
 
 _ROWS = 1 << 14
 
@@ -158,31 +162,45 @@ def is_of_rectangles(names: Collection[str]) -> bool:
     return not {*NUMBERS} <= {*names} and {"height_m", "width_m"} <= {*names}
 
 
-def rectangle_columns(columns: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    """Return ``p2_1_s2`` and ``kr`` of rectangles backed by a slope; NaN where there is none.
+def rectangle_columns(
+    columns: Mapping[str, Any], *, free_standing: bool = False
+) -> dict[str, NDArray[Any]]:
+    """Return ``p2_1_s2`` and ``kr`` of rectangles, NaN where there is none.
 
     Args:
         columns: ``height_m``, ``width_m`` and, unless the bases are level, ``dip_deg``.
+        free_standing: whether nothing backs them: k_r is then that of the weaker sense, and
+            ``restitution`` is returned too, 1 - 1.5 sin² α (Housner 1963), 0 where that is less.
     """
     height, width, dip = (
         np.asarray(columns.get(name, 0.0), dtype=np.float64) for name in RECTANGLE
     )
     with np.errstate(all="ignore"):
-        p2_and_kr = rectangle_numbers(height, width, dip, array_elementwise())
+        leans = np.abs(dip) if free_standing else dip
+        p2_and_kr = rectangle_numbers(height, width, leans, array_elementwise())
+        columns_of_kind = dict(zip(NUMBERS, p2_and_kr, strict=True))
+        if free_standing:
+            sine2 = width * width / (width * width + height * height)
+            columns_of_kind["restitution"] = np.maximum(1.0 - 1.5 * sine2, 0.0)
         is_block = (height > 0.0) & (width > 0.0) & (np.abs(dip) < 90.0)
         return {
             name: np.where(is_block & np.isfinite(values), values, np.nan)
-            for name, values in zip(NUMBERS, p2_and_kr, strict=True)
+            for name, values in columns_of_kind.items()
         }
 
 
-def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+def waiting_blocks(
+    path: str | os.PathLike[str], kind: str | None = None
+) -> dict[str, NDArray[Any]]:
     """Return the blocks of a table (.csv, .parquet) or of GeoJSON points as columns.
 
     Args:
         path: file with ``p2_1_s2`` [1/s²] and ``kr``, or ``height_m`` and ``width_m`` (and
             ``dip_deg``), and ``block_id``, ``p2_sigma``, ``kr_sigma``, ``weight``, ``lon`` and
-            ``lat`` [deg] if it has them.
+            ``lat`` [deg] if it has them; a table also ``restitution``, ``site_id``, ``kind``,
+            ``count``, ``loss`` and ``loss_sigma``.
+        kind: kind of the rows of a table that state none; of a free-standing kind rectangles are
+            not backed by a slope.
 
     Returns:
         Columns of one length; ``block_id`` are texts, numbers from 1 on where there are none.
@@ -193,7 +211,7 @@ def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
             message names it.
         MissingExtraError: a Parquet file without pyarrow.
     """
-    columns = _points(path) if str(path).lower().endswith(GEOJSON) else _rows(path)
+    columns = _points(path) if str(path).lower().endswith(GEOJSON) else _rows(path, kind)
     if columns["kr"].size == 0:
         raise InputError(f"{path}: there is no block in the file")
     for i in range(columns["kr"].size):
@@ -249,15 +267,15 @@ def _numbers(path: str | os.PathLike[str], name: str, values: list[Any]) -> NDAr
     return np.array(values, dtype=np.float64)
 
 
-def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+def _rows(path: str | os.PathLike[str], kind: str | None) -> dict[str, NDArray[Any]]:
     columns = read_columns(
         path,
         (),
-        optional=(*NUMBERS, *SIGMAS, *RECTANGLE, "lon", "lat", "weight"),
-        texts=("block_id",),
+        optional=(*NUMBERS, *SIGMAS, *RECTANGLE, *PORTFOLIO, "lon", "lat", "weight", "restitution"),
+        texts=("block_id", "site_id", "kind"),
     )
     if is_of_rectangles(columns):
-        columns |= rectangle_columns(columns)
+        columns |= _rectangles(columns, kind)
     for name in NUMBERS:
         if name not in columns:
             raise InputError(
@@ -273,3 +291,18 @@ def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
             [str(i + 1) for i in range(columns["kr"].size)], dtype=object
         )
     return columns
+
+
+def _rectangles(columns: Mapping[str, NDArray[Any]], kind: str | None) -> dict[str, NDArray[Any]]:
+    """Return the numbers of rectangles, each by its kind: those of free-standing ones differ."""
+    backed = rectangle_columns(columns)
+    kinds = columns.get("kind", [""] * backed["kr"].size)
+    known = [str(one) or kind for one in kinds]
+    free = np.array([one is not None and model_of_kind(one).free_standing for one in known])
+    if not free.any():
+        return backed
+    free_standing = rectangle_columns(columns, free_standing=True)
+    numbers_of = {name: np.where(free, free_standing[name], backed[name]) for name in NUMBERS}
+    stated = columns.get("restitution", np.full(free.size, np.nan))
+    own = np.where(free & np.isnan(stated), free_standing["restitution"], stated)
+    return {**numbers_of, "restitution": own}

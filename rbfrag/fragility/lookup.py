@@ -175,10 +175,7 @@ def _suited_in(
         raise UnknownModelError(unknown_model(None, [], store.place))
     of_kind = [row for row in store.rows if row.kind == kind]
     if not of_kind:
-        raise UnknownModelError(
-            f"{store.place} holds no {kind} model: make one with  rbfrag simulate --kind {kind}  "
-            f"and  rbfrag fit --kind {kind}"
-        )
+        raise UnknownModelError(f"{store.place} holds no {kind} model: {_how_to_make(kind)}")
     suited = [store.model(row) for row in of_kind if row.term in possible]
     block = suited[0].method.block if suited else block_of_question
     _check_block(kind, block, given, None)
@@ -201,6 +198,15 @@ def _suited_in(
         best.values(),
         key=lambda m: (-m.term.level, not m.row.is_default, possible.index(m.term.name)),
     )
+
+
+def _how_to_make(kind: str) -> str:
+    from rbfrag.solver.kinds import models
+
+    stored = [name for name, model in sorted(models().items()) if model.campaign]
+    if kind in stored:
+        return f"make one with  rbfrag simulate --kind {kind}  and  rbfrag fit --kind {kind}"
+    return f"there are models of {', '.join(stored)}"
 
 
 def _merit(model: FragilityModel) -> tuple[bool, int]:

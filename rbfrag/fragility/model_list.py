@@ -19,6 +19,7 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
             "is_default": row.is_default,
             "n": row.diagnostics.get("n"),
             "events": row.diagnostics.get("events"),
+            "sensitive_share": row.diagnostics.get("sensitive_share"),
             "domain": dict(row.domain),
             "created": row.created,
         }

@@ -21,11 +21,12 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.unknown_outcomes import NOTABLE_SHARE, in_words
 
 if TYPE_CHECKING:
+    import pandas as pd
     from numpy.typing import ArrayLike
 
     from rbfrag.fragility.checks import Finding, Judgement
     from rbfrag.fragility.prediction_array import PredictionArray
-    from rbfrag.motions.ground_motion import GroundMotion
+    from rbfrag.motions.recognise import MotionLike
 
 Model = ModelRow | FragilityModel | str
 Polarity = Literal["forward", "reverse", "both"]
@@ -95,6 +96,19 @@ class Prediction:
         """Return the answer under the keys of the JSON contract."""
         return {**vars(self), "warnings": list(self.warnings)}
 
+    # not Tabular: `rbfrag predict` starts without its module
+    def to_frame(self) -> pd.DataFrame:
+        """Return the answer as a pandas table of one row."""
+        from rbfrag.frames import columns_of, frame_of
+
+        return frame_of(columns_of(self))
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        from rbfrag.frames import html_of
+
+        return html_of(self.to_frame())
+
 
 @dataclass(frozen=True)
 class MotionPrediction(Prediction):
@@ -145,7 +159,7 @@ def predict(
     tm_s: float | None = ...,
     pgd_m: float | None = ...,
     sa_g: Mapping[float, float] | None = ...,
-    motion: GroundMotion | None = ...,
+    motion: MotionLike | None = ...,
     polarity: Polarity = ...,
     model: Model | None = ...,
     level: float = ...,
@@ -181,7 +195,7 @@ def predict(
     tm_s: ArrayLike | None = ...,
     pgd_m: ArrayLike | None = ...,
     sa_g: Mapping[float, ArrayLike] | None = ...,
-    motion: GroundMotion | None = ...,
+    motion: MotionLike | None = ...,
     polarity: Polarity = ...,
     model: Model | None = ...,
     level: float = ...,
@@ -216,7 +230,7 @@ def predict(
     tm_s: ArrayLike | None = None,
     pgd_m: ArrayLike | None = None,
     sa_g: Mapping[float, ArrayLike] | None = None,
-    motion: GroundMotion | None = None,
+    motion: MotionLike | None = None,
     polarity: Polarity = "both",
     model: Model | None = None,
     level: float = 0.95,
@@ -268,7 +282,7 @@ def predict(
         pgd_m: peak ground displacement [m].
         sa_g: spectral accelerations of the horizontal component at 5 % damping [g] by their
             period, 0.3, 1, 2 or 3 s: ``{1.0: 0.4}``.
-        motion: the accelerogram itself, instead of its measures.
+        motion: the accelerogram itself or its file, instead of its measures.
         polarity: ``forward`` or ``reverse`` where it is known how the motion points at the slope;
             ``both`` gives the mean of the two, which stand beside it (motion only).
         model: a model, the name of a stored one, or None for the best one that what is given
@@ -526,7 +540,7 @@ def _answer_with_diagnostics(
 
 def _predict_motion(
     given: Mapping[str, ArrayLike],
-    motion: GroundMotion,
+    motion: MotionLike,
     *,
     kind: str | None,
     rotation_deg: float | None,
@@ -538,7 +552,9 @@ def _predict_motion(
     """Return the probability for one block; arguments as for :func:`predict`."""
     # Kept apart: a motion needs numpy.
     from rbfrag.fragility.prediction_motion import measures_of
+    from rbfrag.motions.recognise import as_motion
 
+    motion = as_motion(motion)
     extra = [name for name in given if name in STATED]
     if extra:
         raise InputError(
@@ -601,7 +617,7 @@ def prediction_document(
     *,
     kind: str | None = None,
     rotation_deg: float | None = None,
-    motion: GroundMotion | None = None,
+    motion: MotionLike | None = None,
     polarity: Polarity = "both",
     model: str | None = None,
     level: float = 0.95,

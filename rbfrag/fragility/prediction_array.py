@@ -18,6 +18,7 @@ from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.methods import Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.fragility.unknown_outcomes import IN_GENERAL, NOTABLE_SHARE
+from rbfrag.frames import Tabular
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T")
@@ -43,8 +44,8 @@ class Reasons:
         return result
 
 
-@dataclass(frozen=True, eq=False)
-class PredictionArray:
+@dataclass(frozen=True, eq=False, repr=False)
+class PredictionArray(Tabular):
     """Probabilities of many blocks or motions; all arrays have the broadcast shape.
 
     Args:
@@ -92,6 +93,10 @@ class PredictionArray:
     def reason(self) -> NDArray[np.object_]:
         """Why an answer is missing, ruled or to be doubted; empty text elsewhere."""
         return self.reasons.array()
+
+    def table_columns(self) -> dict[str, Any]:
+        """Return the columns by name; arrays are flat."""
+        return {**super().table_columns(), "reason": self.reason.ravel()}
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,6 +28,9 @@ REACH = 4.0
 NOTHING = 1e-9
 """Where even the strongest of these has a smaller probability, zero is answered."""
 
+_SILENT = (2.0, 0.0, -2.0)
+"""Scores of the first measure below which is not integrated where nothing fails at one of them."""
+
 _STEP = 0.2
 """Greatest step in ln PGV: fragilities are wider."""
 
@@ -135,15 +138,22 @@ def site_probability(
         alive.append(np.stack([site, block])[:, strongest > NOTHING])
     site, block = np.concatenate(alive, axis=1)
     points, both = median_point, np.ones(1)
+    silent = np.full(site.size, -np.inf)
     if widest > 0.0:
         points, both = _points(k, widest, across=across)
-    each = np.empty((3, site.size))
-    for some in _chunks(np.arange(site.size), _CHUNK // both.size):
-        answer = answers(site[some], block[some], points)
-        for row, values in zip(
-            each, (answer.probability, answer.ci_low, answer.ci_high), strict=True
-        ):
-            row[some] = values @ both
+        for score in _SILENT:  # the highest of these at which nothing fails yet
+            for some in _chunks(np.flatnonzero(silent == -np.inf), _CHUNK // len(strong)):
+                strong[:, 0] = score
+                most = np.nan_to_num(answers(site[some], block[some], strong).ci_high, nan=np.inf)
+                silent[some[most.max(axis=1) <= NOTHING]] = score
+    each = np.zeros((3, site.size))
+    for score in np.unique(silent):
+        above = points[:, 0] > score
+        for some in _chunks(np.flatnonzero(silent == score), _CHUNK // int(above.sum())):
+            answer = answers(site[some], block[some], points[above])
+            each[0, some] = answer.probability @ both[above]
+            each[1, some] = answer.ci_low @ both[above]
+            each[2, some] = answer.ci_high @ both[above]
     probability, low, high = (
         np.bincount(site, row * weights[block], n).astype(np.float64) for row in each
     )

@@ -21,7 +21,7 @@ LONGEST_S = 1e100
 """Beyond this nothing can be integrated."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class GroundMotion:
     """A recorded or analytic ground acceleration, piecewise linear between its samples.
 
@@ -212,6 +212,11 @@ class GroundMotion:
         """A short name for tables and plots."""
         parts = [p for p in (self.event, self.station, self.component) if p]
         return " ".join(parts) or self.source_file or "motion"
+
+    def __repr__(self) -> str:
+        """Return what it is, in one line."""
+        step = "nodes" if self.dt_s is None else f"samples of {self.dt_s:g} s"
+        return f"GroundMotion({self.label!r}, {self.npts} {step}, PGA {self.pga_g:.3g} g)"
 
 
 def _finite_vector(values: ArrayLike, what: str, unit: str) -> FloatArray:

@@ -7,7 +7,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeAlias
 
 from rbfrag.errors import InputError, MotionFileError, UnknownFormatError
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
@@ -34,6 +34,9 @@ from rbfrag.motions.text.file import cut_number, decoded, read_text
 from rbfrag.motions.text.record_file import Field, RecordFile, Trace
 from rbfrag.motions.text.times import first_sample_time
 from rbfrag.motions.units import acceleration_unit, unit_in_g
+
+MotionLike: TypeAlias = GroundMotion | str | os.PathLike[str]
+"""What an argument that is a motion may be: a motion, or ``FILE`` or ``FILE#trace_index``."""
 
 READERS: tuple[ModuleType, ...] = (
     rbfrag_csv,
@@ -266,6 +269,26 @@ def read_motion(
     trouble = f"holds {len(motions)} traces" if index is None else f"has no trace #{index}"
     raise MotionFileError(
         name, f"the file {trouble}: name one of  {listed}  as {name}#0, for example"
+    )
+
+
+def as_motion(given: MotionLike, name: str = "motion") -> GroundMotion:
+    """Return a motion that an argument gives, reading it where a file is named.
+
+    Args:
+        given: a motion, or a file of one as for :func:`read_motion`.
+        name: of the argument, for the message.
+
+    Raises:
+        InputError: something else; the list of :func:`read_motions` is of several motions.
+    """
+    if isinstance(given, GroundMotion):
+        return given
+    if isinstance(given, str | os.PathLike):
+        return read_motion(given)
+    raise InputError(
+        f"{name} is of type {type(given).__name__}: give a GroundMotion, or the path of a file "
+        "(rbfrag.read_motions returns a list, with one motion for each trace)"
     )
 
 

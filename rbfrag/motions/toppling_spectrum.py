@@ -24,6 +24,7 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity, driving_acceleration_g
 from rbfrag.motions.quality import quality_flags
+from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]
@@ -43,15 +44,15 @@ _LARGEST = 1e300
 
 
 @overload
-def toppling_spectrum(motion: GroundMotion, p2: float, polarity: Polarity = ...) -> float: ...
+def toppling_spectrum(motion: MotionLike, p2: float, polarity: Polarity = ...) -> float: ...
 @overload
 def toppling_spectrum(
-    motion: GroundMotion,
+    motion: MotionLike,
     p2: Sequence[float] | Sequence[Sequence[float]] | NDArray[Any],
     polarity: Polarity = ...,
 ) -> FloatArray: ...
 def toppling_spectrum(
-    motion: GroundMotion, p2: ArrayLike, polarity: Polarity = "forward"
+    motion: MotionLike, p2: ArrayLike, polarity: Polarity = "forward"
 ) -> FloatArray | float:
     """Return the toppling spectrum X(p) of a motion [m/s], for blocks of any size.
 
@@ -61,7 +62,7 @@ def toppling_spectrum(
     small blocks g·max(a)/p; it is never above 2 PGV.
 
     Args:
-        motion: horizontal motion, piecewise linear; at rest after its last sample.
+        motion: horizontal motion or its file, piecewise linear; at rest after its last sample.
         p2: frequency parameters p² [1/s²], > 0; a number or an array of any shape.
         polarity: ``forward`` (positive samples drive forward rotation) or ``reverse``.
 
@@ -72,7 +73,7 @@ def toppling_spectrum(
         InputError: a p2 that is not a positive finite number, an unknown polarity, a motion
             too large to compute.
     """
-    sizes = _positive(p2)
+    sizes, motion = _positive(p2), as_motion(motion)
     driving = driving_acceleration_g(motion.acceleration_g, polarity)
     a, h = _without_rest(driving, motion.interval_s)
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):

@@ -148,7 +148,11 @@ class DrawingAnswer(_Document):
 
 
 class ModelListed(_Document):
-    """A stored model: what `rbfrag models list --json` prints."""
+    """A stored model: what `rbfrag models list --json` prints.
+
+    `sensitive_share` is the share of the simulated outcomes behind it that a change of the motion
+    by a millionth changes; null of kinds of which that is not asked.
+    """
 
     name: str
     kind: str
@@ -157,6 +161,7 @@ class ModelListed(_Document):
     is_default: bool
     n: int | None
     events: int | None
+    sensitive_share: float | None
     domain: dict[str, Pair]
     created: str
 
@@ -244,6 +249,7 @@ class SiteRate(_Document):
     annual_rate: float
     ci_low: float
     ci_high: float
+    numerical_error: float
     probability: float
 
 
@@ -253,11 +259,13 @@ class HazardAnswer(_Fitted):
     years: float
     level: float
     imt: str
+    curve_kind: str | None
     warnings: list[str]
     site: str | None = None
     annual_rate: float | None = None
     ci_low: float | None = None
     ci_high: float | None = None
+    numerical_error: float | None = None
     probability: float | None = None
     contributions: list[Contribution] | None = None
     answers: list[SiteRate] | None = None

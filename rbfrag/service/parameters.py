@@ -173,6 +173,15 @@ class Shape(Parameters):
 
         return numbers_of_kind(described, kind or TOPPLING_BLOCK.kind)
 
+    def kind_of_question(self, kind: str | None) -> str | None:
+        """Return how the block is asked to fail; None for what its numbers say."""
+        described = None if kind is not None else self.described()
+        if described is None:
+            return kind
+        from rbfrag.solver.described import kind_of
+
+        return kind_of(described, TOPPLING_BLOCK.kind)
+
     def toppling(self, *names: str) -> tuple[list[float], tuple[str, ...]]:
         """Return some of p2 [1/s²] and k_r, and warnings."""
         values, remarks = self.numbers()

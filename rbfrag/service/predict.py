@@ -33,13 +33,14 @@ ROWS_BESIDE = 5000
 
 def answer_one(query: PredictQuery, db: str | None) -> PredictAnswer:
     """Return what `rbfrag predict --json` prints."""
-    block, remarks = query.numbers(query.kind)
+    kind = query.kind_of_question(query.kind)
+    block, remarks = query.numbers(kind)
     document = prediction_document(
         block
         | query.given(MEASURES)
         | query.given({"displacement": "displacement_m"})
         | query.given(UNCERTAIN),
-        kind=query.kind,
+        kind=kind,
         rotation_deg=query.rotation,
         model=query.model,
         level=query.level,
@@ -80,7 +81,8 @@ def answer_many(given: dict[str, Any], chosen: dict[str, Any], db: str | None) -
     values = dict(given)
     rectangle = {name: values.pop(name) for name in RECTANGLE.values() if name in values}
     if rectangle:
-        values |= _numbers_of_rectangles(rectangle, values)
+        kind = chosen.get("kind")
+        values = _numbers_of_rectangles(rectangle, values, kind) | values
     if values and not any(isinstance(value, list) for value in values.values()):
         # an array of one element, so that single numbers are answered by lists too
         first = next(iter(values))
@@ -110,8 +112,11 @@ def answer_many(given: dict[str, Any], chosen: dict[str, Any], db: str | None) -
     )
 
 
-def _numbers_of_rectangles(columns: dict[str, Any], others: dict[str, Any]) -> dict[str, Any]:
-    from rbfrag.exchange.block_table import rectangle_columns
+def _numbers_of_rectangles(
+    columns: dict[str, Any], others: dict[str, Any], kind: str | None
+) -> dict[str, Any]:
+    from rbfrag.exchange.block_table import BLOCK_COLUMNS, rectangle_columns
+    from rbfrag.solver.kinds import model_of_kind
 
     for name, keyword in RECTANGLE.items():
         if keyword not in columns and name != "dip":
@@ -119,8 +124,9 @@ def _numbers_of_rectangles(columns: dict[str, Any], others: dict[str, Any]) -> d
     for name in NUMBERS:
         if name in others:
             raise InputError(f"{name} does not go with height and width: give one of them")
-    numbers = rectangle_columns(columns)
-    return {"p2": numbers["p2_1_s2"].tolist(), "kr": numbers["kr"].tolist()}
+    free_standing = kind is not None and model_of_kind(kind).free_standing
+    numbers = rectangle_columns(columns, free_standing=free_standing)
+    return {BLOCK_COLUMNS[name]: values.tolist() for name, values in numbers.items()}
 
 
 def _with_null(values: Any) -> list[float | None]:

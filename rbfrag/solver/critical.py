@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from rbfrag.errors import InputError
-from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.kind import Kind
 from rbfrag.solver.kinds import model_of_kind, model_of_mode
@@ -16,7 +16,7 @@ from rbfrag.solver.stability.single import stability
 
 
 def critical(
-    motion: GroundMotion,
+    motion: MotionLike,
     *,
     kind: str | None = None,
     p2: float | None = None,
@@ -26,7 +26,7 @@ def critical(
     phi_back_deg: float | None = None,
     rotation_deg: float | None = None,
     displacement_m: float | None = None,
-    vertical: GroundMotion | None = None,
+    vertical: MotionLike | None = None,
     polarity: Polarity = "forward",
     search_limit: float = SEARCH_LIMIT,
     full_map: bool = False,
@@ -44,7 +44,7 @@ def critical(
     in the contract; a kind refuses those of another.
 
     Args:
-        motion: horizontal ground motion.
+        motion: horizontal ground motion, or its file.
         kind: ``toppling``, ``sliding``, ``slumping`` or ``confined_toppling``; None for the
             model of the block's mode, for toppling with `p2` and sliding with `displacement_m`.
         p2: toppling: frequency parameter p² of the block [1/s²], > 0.
@@ -56,7 +56,7 @@ def critical(
             past recovery.
         displacement_m: sliding: the distance on a level plane [m]; on a base that dips, divide
             yours by cos(φ - β)/cos φ. 0 asks for the strength that first moves.
-        vertical: vertical motion of the same recording, upward positive.
+        vertical: vertical motion of the same recording or its file, upward positive.
         polarity: ``forward`` or ``reverse``.
         search_limit: smallest k/PGA looked at.
         full_map: toppling: map every toppling and safe interval down to the limit, and look for
@@ -87,8 +87,13 @@ def critical(
         "bracket": bracket,
     }
     given = {name: value for name, value in question.items() if value is not None}
-    return kind_of(kind, given).critical(
-        motion, vertical=vertical, polarity=polarity, search_limit=search_limit, **given
+    model = kind_of(kind, given)
+    return model.critical(
+        as_motion(motion),
+        vertical=None if vertical is None else as_motion(vertical, "vertical"),
+        polarity=polarity,
+        search_limit=search_limit,
+        **given,
     )
 
 

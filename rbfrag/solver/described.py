@@ -47,7 +47,7 @@ TAKEN_TO_TOPPLE = (
 
 NOT_BACKED = (
     "no plane backs the block: free-standing, it rocks on both corners and fails at weaker shaking "
-    "than this model says; respond runs it as it stands (docs/theory/rocking.md)"
+    "than this model says; kind rocking answers for it as it stands (docs/theory/rocking.md)"
 )
 
 TAKEN_NOT_TO_SLIP = (
@@ -198,6 +198,22 @@ def rectangle_numbers(
     return p2, yield_coefficient(width_m, height_m, tan_dip, 1.0, functions)
 
 
+def kind_of(described: DescribedBlock, kind: str) -> str:
+    """Return how a block fails that is asked to fail in one way, backed or standing free.
+
+    Args:
+        described: the block.
+        kind: how it fails where a plane backs it.
+    """
+    from rbfrag.solver.kinds import model_of_kind, model_of_mode, stands_free_of
+
+    model = model_of_kind(kind)
+    backed = described.conditions.get("back_fracture", True)
+    if model.mode is None or not stands_free_of(model, backed):
+        return kind
+    return model_of_mode(model.mode, back_fracture=False).kind
+
+
 def numbers_of_kind(
     described: DescribedBlock, kind: str
 ) -> tuple[dict[str, float], tuple[str, ...]]:
@@ -222,9 +238,15 @@ def numbers_of_kind(
     topples = "kr" in model.parameters
     backed = described.conditions.get("back_fracture", True)
     unbacked = (NOT_BACKED,) if stands_free_of(model, backed) else ()
+    if described.only_topples and model.free_standing:
+        beta_rad = math.radians(described.conditions["beta_deg"])
+        values, remarks = model.numbers_of(described.block, beta_rad)
+        return values, (TAKEN_NOT_TO_SLIP, *remarks)
     if described.only_topples and topples:
         return toppling_rectangle(described), (TAKEN_TO_TOPPLE, *unbacked)
     block, conditions = described.on_planes()
+    if model.free_standing:
+        conditions["back_fracture"] = False
     result = stability(block, **conditions)
     yields = f"(yield {result.yield_acceleration:.4g} g"
     if result.mode != model.mode:
@@ -237,6 +259,11 @@ def numbers_of_kind(
             f"{origin}the block is {result.state} in {words_of_mode(result.mode)} {yields}): no "
             "earthquake decides about it"
         )
+    if model.free_standing:
+        if conditions.get("cohesion_pa"):
+            raise InputError(f"{origin}cohesion_pa does not go with {kind}: leave it out")
+        values, remarks = model.numbers_of(block, math.radians(result.beta_deg))
+        return values, (*result.warnings, *remarks)
     if "ps2" in model.parameters:
         for name, nothing in (("cohesion_pa", 0.0), ("back_fracture", True)):
             if conditions.pop(name, nothing) != nothing:

@@ -203,6 +203,18 @@ class Kind:
         """Return a function that says how the block ends under an excitation."""
         raise NotImplementedError
 
+    def numbers_of(self, block: Block, beta_rad: float) -> tuple[dict[str, float], tuple[str, ...]]:
+        """Return what predictions read of a free-standing block, by name, and warnings.
+
+        Args:
+            block: shape and size.
+            beta_rad: dip of its base [rad].
+
+        Raises:
+            InputError: the block does not stand of itself.
+        """
+        raise NotImplementedError
+
     def critical(self, motion: GroundMotion, **options: Any) -> CriticalResult:
         """Return the critical value of one motion.
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.described import NOT_BACKED
 from rbfrag.solver.kind import BlockOnPlanes, Kind, Shaking
@@ -21,7 +22,7 @@ from rbfrag.solver.stability.single import Stability, stability
 
 
 def respond(
-    motion: GroundMotion | Sequence[GroundMotion],
+    motion: MotionLike | Sequence[MotionLike],
     *,
     p2: float | None = None,
     kr: float | None = None,
@@ -33,7 +34,7 @@ def respond(
     back_fracture: bool = True,
     cohesion_pa: float = 0.0,
     density_kg_m3: float | None = None,
-    vertical: GroundMotion | Sequence[GroundMotion | None] | None = None,
+    vertical: MotionLike | Sequence[MotionLike | None] | None = None,
     polarity: Polarity = "forward",
     kind: str | None = None,
     gap_s: float | None = None,
@@ -51,8 +52,8 @@ def respond(
     user states; a kind refuses those of another.
 
     Args:
-        motion: horizontal ground motion, or a list of them: of slides and slumps each finds the
-            block where the one before has left it.
+        motion: horizontal ground motion, or its file; or a list of them: of slides and slumps each
+            finds the block where the one before has left it.
         p2: frequency parameter p² of a toppling or rocking block [1/s²], > 0.
         kr: its rocking acceleration coefficient k_r = tan(critical angle), > 0.
         ky: yield acceleration coefficient tan(φ - β) of a block that slides, whatever its
@@ -168,8 +169,8 @@ def known_by_numbers(
 class _Shaken:
     """What shakes the block, as :func:`respond` was asked."""
 
-    motion: GroundMotion | Sequence[GroundMotion]
-    vertical: GroundMotion | Sequence[GroundMotion | None] | None
+    motion: MotionLike | Sequence[MotionLike]
+    vertical: MotionLike | Sequence[MotionLike | None] | None
     polarity: Polarity
     history: bool
     gap_s: float | None
@@ -186,18 +187,30 @@ class _Shaken:
             shaking = Shaking(motion, vertical, self.polarity, self.history, remarks, start)
             return model.respond(site, shaking)
 
-        if isinstance(self.motion, GroundMotion):
+        if not isinstance(self.motion, list | tuple):
             if self.gap_s is not None:
                 raise InputError("gap_s goes with a list of motions: it is the rest between them")
-            if not (self.vertical is None or isinstance(self.vertical, GroundMotion)):
+            if isinstance(self.vertical, list | tuple):
                 raise InputError("vertical is a list: one motion has one vertical motion")
-            return run(self.motion, self.vertical, self.start)
-        if isinstance(self.vertical, GroundMotion):
+            return run(_one(self.motion), _vertical(self.vertical), self.start)
+        if not (self.vertical is None or isinstance(self.vertical, list | tuple)):
             raise InputError("vertical is one motion: of a list of motions it is a list, too")
-        motions = Motions(tuple(self.motion), tuple(self.vertical or ()), self.gap_s)
+        motions = Motions(
+            [as_motion(each) for each in self.motion],
+            [_vertical(each) for each in self.vertical or ()],
+            self.gap_s,
+        )
         return respond_in_sequence(
             run, motions, carries_state=model.carries_state, start=self.start
         )
+
+
+def _one(given: Any) -> GroundMotion:
+    return as_motion(given)
+
+
+def _vertical(given: Any) -> GroundMotion | None:
+    return None if given is None else as_motion(given, "vertical")
 
 
 def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> BlockOnPlanes:

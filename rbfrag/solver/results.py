@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import POLARITIES as POLARITIES
 from rbfrag.motions.polarity import Polarity as Polarity
 
@@ -167,8 +168,8 @@ class Part:
     response: Response
 
 
-@dataclass(frozen=True, eq=False)
-class Response:
+@dataclass(frozen=True, eq=False, repr=False)
+class Response(Tabular):
     """The answer of one run.
 
     Args:
@@ -285,8 +286,8 @@ def no_intervals() -> OutcomeIntervals:
     return OutcomeIntervals(np.empty(0), np.empty(0), ())
 
 
-@dataclass(frozen=True, eq=False)
-class CriticalResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class CriticalResult(Tabular):
     """The critical block of one motion: the strongest one that it brings down.
 
     For kinds whose record is scaled, k/PGA is the block's yield acceleration over the PGA of the

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import importlib
 import json
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -32,9 +33,16 @@ from rbfrag.bench.cases import (
     find_records,
 )
 from rbfrag.bench.critical_search import compare_searches, search_runs
-from rbfrag.bench.methods import Method, methods, missing_peers, taylor_run
+from rbfrag.bench.methods import (
+    Method,
+    methods,
+    missing_peers,
+    rocking_methods,
+    rocking_reference_run,
+    taylor_run,
+)
 from rbfrag.bench.peers import Answer
-from rbfrag.bench.reference import reference
+from rbfrag.bench.reference import reference, rocking_reference
 from rbfrag.bench.tables import ratio, seconds
 from rbfrag.bench.work_precision import measure
 from rbfrag.cli.main import app
@@ -42,6 +50,8 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.pulses import reversal_pulse
 from tests.solver.reference import integrate
+from tests.solver.rocking_reference import Free
+from tests.solver.rocking_reference import integrate as integrate_rocking
 from tests.synthetic import shaking, write_at2
 
 FILES = 4
@@ -93,6 +103,36 @@ def test_every_method_solves_the_same_problem(records: Records) -> None:
         if row.of_use:
             assert row.error_worst < 1e-12
             assert row.slower == row.slower_least == 1.0
+
+
+def test_the_reference_of_free_blocks_agrees_with_the_independent_integrator(
+    records: Records,
+) -> None:
+    seen = set()
+    for case in choose_cases(records, 8):
+        ours = rocking_reference(case, 0.85)
+        block = Free(
+            c=dict.fromkeys((1, -1), math.atan(case.kr)),
+            p2=dict.fromkeys((1, -1), case.p2),
+            e=dict.fromkeys((1, -1), 0.85),
+        )
+        drive = case.excitation
+        other = integrate_rocking(drive.time_s, drive.k_h, drive.w, block)
+        seen.add(ours.outcome)
+        assert ours.outcome == ("toppled" if other.toppled else "stable")
+        if not other.toppled:
+            assert ours.peak_rad == pytest.approx(max(other.peak.values()), rel=1e-8)
+    assert seen == {"stable", "toppled"}
+
+
+def test_every_method_rocks_the_same_blocks(records: Records) -> None:
+    cases = choose_cases(records, 4)
+    rows = measure(cases, rocking_methods(quick=True), judge=rocking_reference_run)
+    assert [row.setting for row in rows if row.of_use] == ["order 8"]
+    for row in rows:
+        assert row.wrong == 0, row
+        assert row.error_worst is not None
+        assert row.error_worst < (1e-9 if row.of_use else 1e-2)
 
 
 def test_a_wrong_outcome_and_an_error_are_seen(records: Records) -> None:
@@ -171,11 +211,11 @@ def test_command_prints_tables_writes_files_and_json(
     out.mkdir()
     shown = CliRunner().invoke(app, arguments)
     assert shown.exit_code == 0, shown.output
-    for word in ("order 8", "forward Euler", "critical search", "shaking"):
+    for word in ("order 8", "forward Euler", "RK4, rocking", "critical search", "shaking"):
         assert word in shown.stdout
     assert {path.name for path in out.iterdir()} == {
-        "work-precision.csv", "critical-search.csv", "record-length.csv", "workers.csv",
-        "work-precision.svg",
+        "work-precision.csv", "work-precision-rocking.csv", "critical-search.csv",
+        "record-length.csv", "workers.csv", "work-precision.svg",
     }  # fmt: skip
     with (out / "work-precision.csv").open() as file:
         assert {row["cases"] for row in csv.DictReader(file)} == {"2"}
@@ -189,7 +229,11 @@ def test_command_prints_tables_writes_files_and_json(
 @pytest.mark.parametrize(
     ("script", "arguments", "places"),
     [
-        (work_precision.main, ["--cases", "2", "--quick"], ["work-precision"]),
+        (
+            work_precision.main,
+            ["--cases", "2", "--quick"],
+            ["work-precision", "work-precision-rocking"],
+        ),
         (batch_runs.main, ["--combinations", "1"], ["batch-runs"]),
         (critical_search.main, ["--combinations", "1", "--rtol", "1e-5"], ["critical-search"]),
         (
@@ -231,7 +275,8 @@ def test_scripts_run_and_fill_their_places_in_the_page(
 def test_every_place_in_the_page_holds_a_table() -> None:
     text = published()
     for name in (
-        "work-precision", "critical-search", "record-length", "workers", "main-job", "start-up",
+        "work-precision", "work-precision-rocking", "critical-search", "record-length", "workers",
+        "main-job", "start-up",
         "campaign-default", "campaign-memory", "campaign-insert", "campaign-dissertation",
     ):  # fmt: skip
         between = text.split(f"<!-- {name} -->")[1].split("<!-- end -->")[0]

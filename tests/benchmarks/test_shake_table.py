@@ -24,6 +24,7 @@ from benchmarks.shake_table import (
     logistic,
     main,
     score,
+    shipped_fragility,
     weighted,
 )
 from benchmarks.shake_table_runs import ALPHA_RAD, P2, RESTITUTION, overturned, read, run_blocks
@@ -81,6 +82,7 @@ def test_tables_come_out_and_outcomes_are_kept(
         "(d) backed",
         "(e) rocking",
         "(f) share",
+        "(g) shipped",
     ):
         (line,) = [one for one in first.out.splitlines() if one.startswith(f"| {name}")][:1]
         assert line.count("±") == 6
@@ -94,6 +96,23 @@ def test_tables_come_out_and_outcomes_are_kept(
     with pytest.raises(SystemExit):
         main(request)
     assert capsys.readouterr().out == first.out
+
+
+def test_the_shipped_fragility_is_asked_for_each_block(folder: Path) -> None:
+    trials = read(folder)
+    made = shipped_fragility(trials, [0.75, None])
+    number, test = MEDIAN_RAD.size + 7, 5
+    assert made.p.shape == (2 * MEDIAN_RAD.size, len(trials.motions))
+    motion, alpha = trials.motions[test], MEDIAN_RAD[7]
+    for k, e in ((7, 0.75), (number, None)):
+        assert made.settings[k][0] == alpha
+        answer = rbfrag.predict(
+            kind="rocking", p2=P2, kr=math.tan(alpha), restitution=e,
+            pgv_m_s=motion.pgv_m_s, pga_g=motion.pga_g,
+        )  # fmt: skip
+        assert made.p[k, test] == pytest.approx(answer.probability, rel=1e-12)
+    assert made.settings[7][2] == 0.75
+    assert math.isnan(made.settings[number][2])
 
 
 def test_files_are_read_as_they_say(folder: Path, tmp_path: Path) -> None:

@@ -12,9 +12,13 @@ from sqlalchemy import Engine, Text, and_, delete, func, select, update
 from sqlalchemy.exc import IntegrityError
 
 from rbfrag.db import schema
-from rbfrag.db.check.database import ALTERED, check_database, check_digests
+from rbfrag.db.check.database import (
+    ALTERED,
+    NOT_COVERED,
+    check_database,
+    check_digests,
+)
 from rbfrag.db.check.finding import Finding
-from rbfrag.db.digest import NOT_DIGESTED
 from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import insert_row, insert_rows
 from rbfrag.db.keys import response_key
@@ -157,7 +161,7 @@ def test_an_altered_value_is_found(
 ) -> None:
     # by the digest of its row, whatever else there is to compare a value with
     altered = schema.metadata.tables[table]
-    columns = [column for column in altered.c if column.name not in NOT_DIGESTED]
+    columns = [column for column in altered.c if column.name not in NOT_COVERED]
     with filled.begin() as connection:
         _store_map(connection, MAP)
         _store_response(connection)

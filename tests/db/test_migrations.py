@@ -257,6 +257,27 @@ def test_maps_are_no_part_of_keys_any_more(
     again.dispose()
 
 
+def test_outcomes_of_the_fifth_schema_are_not_known_to_be_sensitive(
+    place: str, fill: Callable[..., None]
+) -> None:
+    open_database(place, create=True).dispose()
+    engine = unchecked_engine(Path(place) if "://" not in place else place, foreign_keys=False)
+    with engine.begin() as connection:
+        fill(connection, [1, 2])
+        update_rows(connection, simulation, simulation.c.kr_over_pga > 0.0, {"sensitive": True})
+        config = _config()
+        config.attributes["connection"] = connection
+        command.downgrade(config, "0005")
+        assert "sensitive" not in {c["name"] for c in inspect(connection).get_columns("simulation")}
+    engine.dispose()
+    assert upgrade_database(place) == ("0005", SCHEMA_REVISION)
+    again = open_database(place)
+    with again.connect() as connection:
+        assert check_database(connection) == []
+        assert set(connection.scalars(select(simulation.c.sensitive))) == {None}
+    again.dispose()
+
+
 def test_measures_of_the_fourth_schema_are_computed_where_the_samples_are(
     place: str, make_motion: Callable[..., GroundMotion], model: ModelRow
 ) -> None:

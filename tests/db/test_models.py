@@ -19,8 +19,10 @@ from sqlalchemy import Engine, update
 from rbfrag.db import schema
 from rbfrag.db.check.database import check_database
 from rbfrag.db.engine import opened_database
+from rbfrag.db.insert import table_digests
 from rbfrag.db.model_file import (
     COLUMNS,
+    STORED,
     ModelRow,
     decode_model,
     encode_model,
@@ -145,7 +147,13 @@ def test_any_numbers_survive_the_record(coefficients: dict[str, float], data: An
         diagnostics=data.draw(st.dictionaries(st.text(), st.one_of(finite, st.text(), st.none()))),
     )
     values = encode_model(row)
-    assert decode_model([values[column] for column in COLUMNS]) == row
+    (digest,) = table_digests(schema.fragility_model, list(values), [list(values.values())])
+    assert decode_model([*(values[column] for column in COLUMNS), digest]) == row
+
+
+def test_the_digest_is_of_every_column() -> None:
+    # what is read back is the whole row, but for its number
+    assert {column.name for column in schema.fragility_model.c} - {"id"} == set(STORED)
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
 from rbfrag.exchange import block_table
-from rbfrag.exchange.block_table import read_columns, write_block_table
+from rbfrag.exchange.block_table import read_columns, waiting_blocks, write_block_table
 
 TABLE = {
     "block_id": np.arange(1, 4),
@@ -102,6 +102,7 @@ def test_places_that_cannot_be_written(tmp_path: Path, name: str) -> None:
         ("a.csv", b"p2\n3\n", "no column kr; the columns are p2"),
         ("a.csv", b"", "no column kr; the columns are none"),
         ("a.csv", b"kr\n\xff\n", "not a text file"),
+        ("a.csv", b"PK\x03\x04\x14\0", "is a zip file: unpack it"),
         ("a.parquet", b"kr\n0.1\n", "not a Parquet file"),
         ("a.txt", b"kr\n0.1\n", "ends in .csv or .parquet"),
     ],
@@ -146,3 +147,18 @@ for act in (lambda: table_path("a.parquet"), lambda: read_columns("a.parquet", (
         env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent.parent.parent)},
     )
     assert done.stdout.count("pip install 'rbfrag[parquet]'") == 2, done.stderr
+
+
+def test_rectangles_of_a_free_standing_kind(tmp_path: Path) -> None:
+    """Of these the dip weakens, whichever way it leans, and the restitution is Housner's (1963)."""
+    path = tmp_path / "blocks.csv"
+    path.write_text(
+        "height_m,width_m,dip_deg,kind,restitution\n"
+        "3,0.6,-5,,\n3,0.6,-5,rocking,\n3,0.6,-5,rocking,0.9\n"
+    )
+    columns = waiting_blocks(path)
+    backed, free, _ = columns["kr"].tolist()
+    alpha, dip = np.arctan(0.2), np.radians(5.0)
+    assert (backed, free) == pytest.approx((np.tan(alpha + dip), np.tan(alpha - dip)))
+    assert columns["restitution"][1:] == pytest.approx([1.0 - 1.5 * np.sin(alpha) ** 2, 0.9])
+    assert waiting_blocks(path, "rocking")["kr"][0] == pytest.approx(free)

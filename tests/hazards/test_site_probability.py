@@ -171,3 +171,22 @@ def test_correlations_of_the_residuals() -> None:
     matrix = correlations(ALL)
     assert (matrix == matrix.T).all()
     assert (np.linalg.eigvalsh(matrix) > 0.0).all()
+
+
+@pytest.mark.parametrize("names", [("pgv_m_s",), ALL])
+def test_weak_shaking_at_which_nothing_fails_is_not_missed(
+    model: FragilityModel, measures_db: str, names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chosen = model if names == ("pgv_m_s",) else find_model(None, ("p2", "kr", *names), measures_db)
+    scale = np.geomspace(0.05, 3.0, 30)
+
+    def answer() -> FloatArray:
+        return site_probability(
+            dict.fromkeys(names, 0.5 * scale), np.array([3.0, 1.0]), np.array([0.1, 0.05]),
+            component=component("larger"), std_ln=dict.fromkeys(names, np.full(30, 0.5)),
+            model=chosen,
+        ).probability  # fmt: skip
+
+    some = answer()
+    monkeypatch.setattr(site_module, "_SILENT", ())
+    assert some == pytest.approx(answer(), abs=2e-9)

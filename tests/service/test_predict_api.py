@@ -17,7 +17,7 @@ def printed(capsys, database, values, **more):
     """What `rbfrag predict --json` prints."""
     given = {KEYWORD.get(name, name): value for name, value in values.items()}
     capsys.readouterr()
-    show_prediction(prediction_document(given, **more, db=str(database)), json=True)
+    show_prediction(prediction_document(given, **more, db=str(database)), given, json=True)
     return json.loads(capsys.readouterr().out)
 
 
@@ -131,3 +131,27 @@ def test_uncertain_blocks_are_answered_as_from_python(client, database):
     certain = client.post("/v1/predict", json={"p2": 3.0, "kr": [0.1], "pgv": 0.6}).json()
     assert certain["block_sd"] is None
     assert client.get("/v1/predict", params={**asked, "kr_sigma": -1}).status_code == 422
+
+
+def test_free_standing_blocks_are_answered_as_by_the_command_line(client, database):
+    motion = {"pgv": 0.6, "pga": 0.5}
+    own = rbfrag.predict(
+        7.0, 0.2, kind="rocking", restitution=0.9, pgv_m_s=0.6, pga_g=0.5, db=database
+    )
+    asked = {"p2": 7, "kr": 0.2, "restitution": 0.9, "kind": "rocking", **motion}
+    found = client.get("/v1/predict", params=asked).json()
+    assert (found["kind"], found["failure"]) == ("rocking", "overturning")
+    assert found["probability"] == own.probability
+    many = client.post("/v1/predict", json={**asked, "kr": [0.2, 0.3]}).json()
+    assert many["probability"][0] == pytest.approx(own.probability, rel=1e-12)
+    shape = {"height": 2.0, "width": 0.5, "dip": 3.0, **motion}
+    one = client.get("/v1/predict", params={**shape, "kind": "rocking"}).json()
+    assert any("weaker sense" in text for text in one["warnings"])
+    free = client.get("/v1/predict", params={**shape, "no_back": True}).json()
+    assert free["probability"] == one["probability"]
+    rows = {**shape, "dip": [3.0, -3.0], "kind": "rocking"}
+    both = client.post("/v1/predict", json=rows).json()
+    assert both["probability"] == pytest.approx([one["probability"]] * 2, rel=1e-12)
+    wrong = client.get("/v1/predict", params={**asked, "restitution": 1.2})
+    assert wrong.status_code == 422
+    assert "restitution = 1.2" in wrong.json()["detail"]

@@ -19,10 +19,12 @@ from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.described import DescribedBlock, numbers_of_kind
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.models.rocking import free_block
+from rbfrag.solver.integrator.free_batch import simulate_free
+from rbfrag.solver.models.rocking import SENSITIVITY, changes_with_the_motion, free_block
 from rbfrag.solver.respond import block_of_numbers
 from rbfrag.solver.results import Outcome, Response, ResponseHistory
-from rbfrag.solver.rocking_run import corner_force, rocking_history, simulate
+from rbfrag.solver.rocking_run import MOST_IMPACTS, corner_force, rocking_history, simulate
+from rbfrag.solver.toppling_run import OUTCOMES
 from tests.synthetic import shaking
 
 PALM, COYOTE = "N_Palm_Springs_1986_WWT-180", "Coyote_Lake_1979_G02-050"
@@ -258,6 +260,33 @@ def test_a_block_at_its_border_is_sensitive() -> None:
     assert border.sensitive
     assert any("sensitive" in warning for warning in border.warnings)
     assert not free(motion, 3.0, 2.0 * high, 0.8).sensitive
+
+
+def test_a_batch_gives_each_block_what_its_own_run_gives() -> None:
+    excited = excitation(GroundMotion(0.8 * shaking(5), 0.02))
+    blocks = [
+        free_block(block_of_numbers(p2, kr, {}))
+        for p2 in (30.0, 1.0)
+        for kr in np.geomspace(0.02, 0.6, 12).tolist()
+    ]
+    runs = simulate_free(
+        excited,
+        np.array([(block.toe, block.heel) for block in blocks]),
+        np.array([block.rest_speed for block in blocks]),
+        most_impacts=MOST_IMPACTS,
+        change=SENSITIVITY,
+    )
+    for i, block in enumerate(blocks):
+        alone = simulate(excited, block)
+        outcome = OUTCOMES[alone.outcome]
+        assert runs.outcome[i] == alone.outcome
+        assert runs.sensitive[i] == changes_with_the_motion(excited, block, outcome)
+        if alone.outcome == 0:
+            ratios = (alone.forward.x, alone.backward.x)
+            assert runs.theta_n[i] == max(ratios) / block.toe.theta_c
+        else:
+            assert np.isnan(runs.theta_n[i])
+    assert 0 < (runs.outcome == 1).sum() < len(blocks)
 
 
 def test_a_polygon_answers_as_the_rectangle_it_is() -> None:

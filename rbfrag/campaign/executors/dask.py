@@ -19,6 +19,9 @@ CONNECT_TIMEOUT_S = 10.0
 WORKER_TIMEOUT_S = 60.0
 """How long to wait for the first worker of a scheduler that has none [s]."""
 
+GO_ON = "what was finished is stored: run the same command again to go on"
+"""What to do after workers have died, of work whose results are stored."""
+
 QUEUED_PER_THREAD = 2
 """Motions handed out ahead of each thread of the cluster."""
 
@@ -58,7 +61,10 @@ def connected(address: str) -> Iterator[Any]:
 
 
 def run_on_cluster(
-    client: Any, run_work: Callable[[Work], Results], work: Iterator[Work]
+    client: Any,
+    run_work: Callable[[Work], Results],
+    work: Iterator[Work],
+    after_a_death: str = GO_ON,
 ) -> Iterator[Results]:
     """Yield the answers as they come from a cluster.
 
@@ -70,6 +76,7 @@ def run_on_cluster(
         client: from :func:`connected`.
         run_work: does one chunk of work; a function of a module, which workers can find.
         work: what to do.
+        after_a_death: what to do next when workers have died.
 
     Raises:
         WorkFailedError: workers died again and again, the scheduler was lost, or the workers
@@ -83,9 +90,9 @@ def run_on_cluster(
         for item in work:
             waiting.add(client.submit(run_work, item, pure=False))
             while waiting.count() >= _most_under_way(client):
-                yield from _next_result(waiting, address)
+                yield from _next_result(waiting, address, after_a_death)
         while waiting.count():
-            yield from _next_result(waiting, address)
+            yield from _next_result(waiting, address, after_a_death)
     finally:
         if not waiting.is_empty():
             client.cancel(list(waiting.futures))
@@ -96,7 +103,7 @@ def _most_under_way(client: Any) -> int:
     return max(threads, 1) * (1 + QUEUED_PER_THREAD)
 
 
-def _next_result(waiting: Any, address: str) -> Iterator[Any]:
+def _next_result(waiting: Any, address: str, after_a_death: str) -> Iterator[Any]:
     """Yield the next result, or nothing where its worker died after the work was done.
 
     A result stays on its worker until it is fetched. The scheduler has it computed again, and
@@ -106,10 +113,10 @@ def _next_result(waiting: Any, address: str) -> Iterator[Any]:
     if future.status in ("pending", "lost"):
         waiting.add(future)
     else:
-        yield _result(future, address)
+        yield _result(future, address, after_a_death)
 
 
-def _result(future: Any, address: str) -> Any:
+def _result(future: Any, address: str, after_a_death: str) -> Any:
     if future.status == "finished":
         return future.result()
     if future.status == "error":
@@ -124,8 +131,7 @@ def _result(future: Any, address: str) -> Any:
         if type(error).__name__ != "KilledWorker":
             raise error
     raise WorkFailedError(
-        f"the cluster at {address} was lost, or its workers died again and again; what was "
-        "finished is stored: run the same command again to go on"
+        f"the cluster at {address} was lost, or its workers died again and again; {after_a_death}"
     )
 
 

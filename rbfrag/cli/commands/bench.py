@@ -30,9 +30,10 @@ def bench(
     """Measure speed against error beside general ODE solvers.
 
     Every method runs the same blocks under the same records, in turns, and is compared with
-    an extended-precision reference. Then come the critical search and the scaling with the
-    length of the record and the number of workers. Times are processor times of one thread,
-    those of workers wall times. Peers that are not installed are named and left out.
+    an extended-precision reference: blocks that a slope backs, and free-standing ones. Then
+    come the critical search and the scaling with the length of the record and the number of
+    workers. Times are processor times of one thread, those of workers wall times. Peers that
+    are not installed are named and left out.
     """
     from dataclasses import asdict
 
@@ -64,6 +65,7 @@ def bench(
     print(f"{result.records}; {result.seconds:.0f} s in all")
     for heading, table in (
         ("Time of one run against its error", tables.work_precision_table(result.work_precision)),
+        ("The same of free-standing blocks", tables.work_precision_table(result.rocking)),
         ("Critical search", tables.critical_table(result.critical_search)),
         ("Length of the record", tables.length_table(result.record_length)),
         ("Workers", tables.workers_table(result.workers)),

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from rbfrag.cli.output import check_files, print_json, print_pairs, print_table, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import WAYS, MeshOptions, ShapeOptions
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.errors import InputError
+from rbfrag.solver.stability.modes import ModeName
+
+FREE_STANDING = (
+    "rbfrag predict --kind rocking  with the same options and a measure of the motion (--pgv 0.6) "
+    "says how probable it is that it overturns, rbfrag respond --kind rocking  what a record does"
+)
 
 EXAMPLE = "Example:  rbfrag block --s1 1 --s2 0.6 --gamma 25 --beta 20 --phi 40"
 
@@ -29,7 +37,7 @@ def block(
 
     Angles in degrees, lengths in m, accelerations in g, the size parameter p2 in 1/s2. A block
     that topples is backed by a slope; a free-standing one rocks, and fails at weaker shaking
-    (rbfrag respond --kind rocking).
+    (rbfrag predict --kind rocking, rbfrag respond --kind rocking).
     Of a mesh, which stands free: volume, mass, inertia, and for each azimuth kr, p2 and
     restitution about its contacts with the ground.
     """
@@ -41,8 +49,16 @@ def block(
     described = shape.described(cohesion_pa=cohesion, density_kg_m3=density, kv=kv)
     if described is None:
         raise InputError(f"no block: describe it by {WAYS}, or by --mesh FILE")
+    free = described.conditions.get("back_fracture") is False
+    if free and described.only_topples:
+        raise InputError(
+            f"--phi is missing: the mode of a block depends on it. A rectangle that stands free "
+            f"needs none: {FREE_STANDING}"
+        )
     body, conditions = described.on_planes()
     result = stability(body, **conditions)
+    if free and _rocks(result.mode):
+        result = replace(result, warnings=(*result.warnings, f"it stands free: {FREE_STANDING}"))
     if plot is not None:
         from rbfrag.plots.block import plot_block
 
@@ -60,6 +76,13 @@ def block(
             f"{margin['mode']} if {margin['variable']} changes by {margin['change_deg']:+.6g} deg"
         )
     print_warnings(result.warnings)
+
+
+def _rocks(mode: ModeName) -> bool:
+    """Return whether a block of this mode rocks where nothing backs it."""
+    from rbfrag.solver.kinds import model_of_mode
+
+    return model_of_mode(mode, back_fracture=False).free_standing
 
 
 def _mesh(

@@ -70,12 +70,13 @@ def check(
 ) -> None:
     """Look for damage: the file, references, samples, keys, brackets, maps, and a random sample
     computed again. Exit 1 if any is found."""
-    from rbfrag.db.check.database import check_database
+    from rbfrag.db.check.database import check_database, coverage
     from rbfrag.db.engine import opened_database
 
     again = None
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
         findings = check_database(connection)
+        covered = coverage(connection)
         if sample:
             from rbfrag.campaign.resimulate import resimulate
 
@@ -91,6 +92,7 @@ def check(
                 "sound": not findings,
                 "findings": [asdict(finding) for finding in findings],
                 "resimulated": computed,
+                "covered": covered,
             }
         )
     else:
@@ -107,6 +109,7 @@ def check(
                 print(f"to do: {advice}")
         else:
             print("sound: nothing is wrong with this database")
+        print(covered)
     if findings:
         raise typer.Exit(1)
 

@@ -31,9 +31,10 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
     if json:
         print_json(listed)
         return
+    shown = ("name", "kind", "term", "method", "is_default", "n", "events", "created")
     print_table(
         ("name", "kind", "term", "method", "default", "n", "earthquakes", "fitted"),
-        [tuple(value for name, value in each.items() if name != "domain") for each in listed],
+        [tuple(each[name] for name in shown) for each in listed],
     )
 
 

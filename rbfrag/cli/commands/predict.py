@@ -10,7 +10,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import WAYS, BlockOptions, UncertaintyOptions, option_of
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.errors import InputError
-from rbfrag.solver.described import numbers_of_kind
+from rbfrag.solver.described import kind_of, numbers_of_kind
 
 EXAMPLE = "Example:  rbfrag predict --p2 3 --kr 0.1 --pgv 0.6 --json"
 
@@ -87,7 +87,7 @@ def predict(
     reading: options.Reading,
     table: Table,
     answering: options.Answering,
-    json: options.Json = False,
+    printing: options.Printing,
 ) -> None:
     """Print the probability that a block fails.
 
@@ -121,32 +121,35 @@ def predict(
         if block.beta is not None:
             given["beta_deg"] = block.beta
         summary = predict_table(table.batch, table.out, given=given, kind=failure.kind, **question)
-        _show_summary(summary, json=json)
+        _show_summary(summary, json=printing.json)
         return
     from rbfrag.fragility.predict import prediction_document
 
     remarks: tuple[str, ...] = ()
+    kind = failure.kind
     if known.block_draws is not None:
         from rbfrag.exchange.block_draws import read_draws
 
         draws, question["weights"] = read_draws(known.block_draws)
         given = {**draws, **given}
     else:
-        remarks = _complete(given, block, failure.kind)
+        kind, remarks = _complete(given, block, kind)
     if record.motion is not None:
         from rbfrag.cli.parameters.motion import find_motion
 
         question["motion"] = find_motion(record.motion, db=answering.db, reading=reading)
         question["polarity"] = record.polarity
-    document = prediction_document(given, kind=failure.kind, remarks=remarks, **question)
-    show_prediction(document, json=json)
+    document = prediction_document(given, kind=kind, remarks=remarks, **question)
+    show_prediction(document, given, json=printing.json, verbose=printing.verbose)
 
 
-def _complete(given: dict[str, float], block: BlockOptions, kind: str | None) -> tuple[str, ...]:
+def _complete(
+    given: dict[str, Any], block: BlockOptions, kind: str | None
+) -> tuple[str | None, tuple[str, ...]]:
     """Add what the shape of a block says of it, and refuse a block of which something is missing.
 
     Returns:
-        Warnings about the block.
+        How it fails, and warnings about it.
     """
     from rbfrag.fragility.lookup import block_of
 
@@ -154,13 +157,14 @@ def _complete(given: dict[str, float], block: BlockOptions, kind: str | None) ->
     known_by = block_of(given, kind)
     shape = block.described()
     if shape is not None:
-        values, remarks = numbers_of_kind(shape, known_by.kind if kind is None else kind)
-        if doubled := [name for name in values if name in given]:
+        kind = kind_of(shape, known_by.kind) if kind is None else kind
+        values, remarks = numbers_of_kind(shape, kind)
+        known_by = block_of(values, kind)
+        if doubled := [name for name in known_by.names if name in given and name in values]:
             raise InputError(
                 f"{option_of(doubled[0])} does not go with a shape, which describes the block"
             )
-        given |= values
-        known_by = block_of(given, kind)
+        given |= {name: value for name, value in values.items() if name not in given}
     elif block.beta is not None:
         given["beta_deg"] = block.beta
         known_by = block_of(given, kind)
@@ -170,7 +174,7 @@ def _complete(given: dict[str, float], block: BlockOptions, kind: str | None) ->
             f"{option_of(missing[0])} is missing: a block of kind {known_by.kind} is given by "
             f"{' and '.join(map(option_of, known_by.names))}, or by {WAYS}"
         )
-    return remarks
+    return kind, remarks
 
 
 def _show_summary(summary: dict[str, Any], *, json: bool) -> None:

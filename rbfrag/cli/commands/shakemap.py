@@ -72,7 +72,7 @@ def shakemap(
     target = output_path(out, SUFFIXES, "map")
     check_files(plot=plot)
     component = component_named(meaning.component)
-    class_blocks, is_class, remarks = blocks.toppling_blocks(n=n)
+    class_blocks, _, remarks = blocks.toppling_blocks(n=n)
     shaken = read_shakemap(
         grid, uncertainty=meaning.uncertainty, allow_partial=meaning.allow_partial
     )
@@ -118,13 +118,11 @@ def shakemap(
             "are taken as certain; name uncertainty.xml with --uncertainty"
         )
 
-    if weight is None:  # of a rock mass: one block at each node, of any of its realisations
-        weight = np.full(kr.size, 1.0 / kr.size if is_class else 1.0)
     names = class_blocks.get("site_id") if own else None
     failures = map_failures(
         answer, p2, kr,
         Places.of(lon[on_map], lat[on_map], None if names is None else names[on_map]),
-        weight=weight if weight.size == kr.size else weight[here],
+        weight=None if weight is None else weight[here],
         draws=drawing.draws, seed=drawing.seed,
     )  # fmt: skip
     warnings += failures.warnings

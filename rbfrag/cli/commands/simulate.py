@@ -36,29 +36,37 @@ class Workers:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Blocks:
+    """Which blocks are run, and what counts as their failure; each kind has its own."""
+
+    p2: str | None = option(
+        "Toppling and rocking: frequency parameters p² [1/s²], separated by commas. Default: "
+        "30,10,3,1,0.3,0.1."
+    )
+    restitution_factor: str | None = option(
+        "Rocking: factors on the restitution 1 - 1.5 sin² α of the rectangle. Default: "
+        "1,0.95,0.9,0.8.",
+        metavar="LIST",
+    )
+    rotation: str | None = option(
+        "Slumping: rotations that count as failure [deg], and the word recovery for "
+        "failure past recovery. Default: 2,recovery.",
+        metavar="LIST",
+    )
+    displacement: str | None = option(
+        "Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.",
+        metavar="LIST",
+    )
+
+
 @stacked
 def simulate(
     *,
     workers: Workers,
     suite: options.Suite = None,
     kind: str = option("What the blocks do: toppling, rocking, slumping or sliding.", "toppling"),
-    p2: str | None = option(
-        "Toppling and rocking: frequency parameters p² [1/s²], separated by commas. Default: "
-        "30,10,3,1,0.3,0.1."
-    ),
-    restitution_factor: str | None = option(
-        "Rocking: factors on the restitution 1 - 1.5 sin² α of the rectangle. Default: "
-        "1,0.95,0.9,0.8.",
-        metavar="LIST",
-    ),
-    rotation: str | None = option(
-        "Slumping: rotations that count as failure [deg], and the word recovery for "
-        "failure past recovery. Default: 2,recovery.",
-        metavar="LIST",
-    ),
-    displacement: str | None = option(
-        "Sliding: displacements on a level plane [m]. Default: 0.01,0.05,0.15,0.3.", metavar="LIST"
-    ),
+    blocks: Blocks,
     vertical: str = option(
         "Horizontal motions alone, with the vertical one of their recording, or both.",
         "without",
@@ -93,10 +101,11 @@ def simulate(
     After Ctrl-C, a crash or a kill, the same command goes on where it stopped; what is stored is
     not computed again, and what a stored combination lacks is added.
     """
+    from rbfrag.campaign.interrupt import stopped_by_interrupts
     from rbfrag.campaign.simulate import simulate as run
 
     say_when_compiling()
-    with ProgressBar("simulate", "combinations") as bar:
+    with stopped_by_interrupts() as stopped, ProgressBar("simulate", "combinations") as bar:
 
         def show(progress: CampaignProgress) -> None:
             before = f"{progress.resumed} stored before" if progress.resumed else ""
@@ -106,10 +115,10 @@ def simulate(
             db,
             kind=kind,
             suite=suite,
-            p2=_numbers(p2, "--p2"),
-            rotations_deg=None if rotation is None else _rotations(rotation),
-            displacements_m=_numbers(displacement, "--displacement"),
-            restitution_factors=_numbers(restitution_factor, "--restitution-factor"),
+            p2=_numbers(blocks.p2, "--p2"),
+            rotations_deg=None if blocks.rotation is None else _rotations(blocks.rotation),
+            displacements_m=_numbers(blocks.displacement, "--displacement"),
+            restitution_factors=_numbers(blocks.restitution_factor, "--restitution-factor"),
             vertical=cast("Vertical", vertical),  # any other word is refused
             grid=None if grid is None else _grid(grid),
             store_responses=None if store_responses is None else _blocks(store_responses),
@@ -117,6 +126,7 @@ def simulate(
             jobs=workers.jobs,
             scheduler=workers.scheduler,
             on_progress=show,
+            stopped=stopped,
         )
     report = summary.as_dict()
     if json:

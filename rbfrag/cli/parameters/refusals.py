@@ -79,6 +79,7 @@ CONFLICTS = (
     Conflict(PLANES, TABLES, "the file has the planes", ("hazard", "shakemap", "nrml", "pelicun")),
     Conflict(PLANES[1:], ("--ky",), "the strength follows from --ky and --beta"),
     Conflict((*SHAPE, *FILES, *PLANES[1:], "--motion"), ("--batch",), "the table has the blocks"),
+    Conflict(("--samples", "--seed", "--plot"), ("--expected",), "curves and samples need draws"),
     Conflict(
         ("--motion",),
         MEASURES,
@@ -90,6 +91,10 @@ _NAME_IT = "name the accelerogram, too"
 _MEASURE = "give --pgv, --pga or --sa10, or --pgd and --tm, too"
 
 NEEDS = (
+    Need(
+        ("--ses",), ("--investigation-time",), "--investigation-time", "both say how long it took"
+    ),
+    Need(("--investigation-time",), ("--ses",), "--ses", "both say how long the events took"),
     Need(("--batch",), ("--out",), "--out", "--out FILE names the table of answers"),
     Need(("--out",), ("--batch",), "--batch", "--batch FILE names the table of blocks"),
     Need(

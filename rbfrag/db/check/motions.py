@@ -45,11 +45,11 @@ def _problems(row: Any) -> Iterator[str]:
         try:
             if not isinstance(json.loads(row[column]), list):
                 yield f"its {column} are no JSON list"
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             yield f"its {column} cannot be read: {error}"
     try:
         json.loads(row["processing_applied"] or "{}")
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         yield f"its processing_applied cannot be read: {error}"
     if row["processing_applied"] is None and row["source_sha256"] != row["samples_sha256"]:
         yield "its samples are not those of the file, yet no processing is said to be applied"

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rbfrag.errors import MotionFileError
+from rbfrag.files import packed_as
 
 LARGEST_FILE_BYTES = 512 * 1024**2
 MOST_DIGITS = 12
@@ -51,6 +52,9 @@ def decoded(path: Path, raw: bytes) -> str:
     """Return the text of a file's bytes: byte-order mark removed, newlines as ``\\n``."""
     if not raw.removeprefix(codecs.BOM_UTF8).strip():
         raise MotionFileError(path, "the file is empty: export the record again")
+    packed = packed_as(raw[:6])
+    if packed is not None:
+        raise MotionFileError(path, f"it is a {packed} file: unpack it, and name a record in it")
     if b"\0" in raw:
         raise MotionFileError(
             path, "the file is binary, not text: export the record in one of the text formats"

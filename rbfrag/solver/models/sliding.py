@@ -27,6 +27,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.integrator.one_freedom.equation import (
@@ -170,10 +171,10 @@ def _warnings(site: BlockOnPlanes) -> tuple[str, ...]:
 
 
 def sliding_displacements(
-    motion: GroundMotion,
+    motion: MotionLike,
     ky_over_pga: Sequence[float] = KY_OVER_PGA,
     *,
-    vertical: GroundMotion | None = None,
+    vertical: MotionLike | None = None,
     polarity: Polarity = "forward",
 ) -> FloatArray:
     """Return how far blocks slide down a level plane, downslope only [m].
@@ -182,7 +183,7 @@ def sliding_displacements(
     tan(phi - beta).
 
     Args:
-        motion: horizontal ground motion; its PGA must be above zero.
+        motion: horizontal ground motion or its file; its PGA must be above zero.
         ky_over_pga: strengths over PGA, shape (n,).
         vertical: vertical motion of the same recording, upward positive.
         polarity: ``forward`` or ``reverse``.
@@ -193,7 +194,8 @@ def sliding_displacements(
     Raises:
         InputError: a strength that is not above zero, a motion of no acceleration.
     """
-    excited = excitation(motion, vertical, polarity)
+    up = None if vertical is None else as_motion(vertical, "vertical")
+    excited = excitation(as_motion(motion), up, polarity)
     positive(excited.pga_g, "PGA", "g")
     strengths = [positive(value, "ky_over_pga", "k_y/PGA") for value in ky_over_pga]
     slid = SlidingBlocks(excited, slide_m).points(strengths).displacement_m

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.frames import Tabular
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.arrays import (
     REASONS,
@@ -49,8 +50,8 @@ NOTHING = -1
 _BETA, _PHI, _KV = 5, 6, 7
 
 
-@dataclass(frozen=True, eq=False)
-class StabilityArray:
+@dataclass(frozen=True, eq=False, repr=False)
+class StabilityArray(Tabular):
     """Failure modes and yields of many blocks; all arrays have one shape.
 
     Args:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rbfrag.errors import InputError
+from rbfrag.frames import Tabular
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.formulas import SCALAR, tan_deg
 from rbfrag.solver.block.geometry import Block
@@ -58,8 +59,8 @@ class Cohesion:
     ky_equivalent: float
 
 
-@dataclass(frozen=True)
-class Stability:
+@dataclass(frozen=True, repr=False)
+class Stability(Tabular):
     """How a block fails and at which horizontal acceleration.
 
     Yield acceleration coefficients are in g. The yield of the governing mode and that of sliding

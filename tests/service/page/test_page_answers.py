@@ -241,3 +241,51 @@ def test_a_link_is_text_and_never_markup(open_page):
     expect(page.locator("#model-error")).to_contain_text("<img src=x")
     assert page.locator("main img").count() == 0
     forgive(opened, REFUSED)
+
+
+def test_a_free_standing_block_is_answered_by_its_own_models(open_page, ask):
+    opened = open_page("?p2=3&kr=0.2&pgv=0.6&pga=0.5")
+    page = opened.page
+    backed = probability_shown(page)
+    page.get_by_label("free-standing").check()
+    page.fill("#restitution", "0.9")
+    opened.settled()
+    answer = ask("v1/predict", p2=3, kr=0.2, pgv=0.6, pga=0.5, kind="rocking", restitution=0.9)
+    assert agrees(probability_shown(page), answer["probability"])
+    assert probability_shown(page) != backed
+    expect(page.locator("#answer-title")).to_have_text("Probability of overturning")
+    expect(page.locator("#in-words")).to_contain_text("overturn")
+    expect(page.locator("#about")).to_contain_text("are sensitive")
+    expect(page.get_by_text("It rocks on both corners")).to_be_visible()
+    expect(page.locator("#alpha1")).to_be_hidden()
+    offered = page.locator("#model option").all_text_contents()
+    assert all(name.startswith(("rocking", "the best")) for name in offered)
+    page.get_by_label("backed by a slope").check()
+    opened.settled()
+    assert probability_shown(page) == backed
+    expect(page.locator("#restitution")).to_be_hidden()
+
+
+def test_a_wrong_restitution_is_said_beside_its_field(open_page):
+    opened = open_page("?p2=3&kr=0.2&pgv=0.6&kind=rocking")
+    opened.page.fill("#restitution", "1.5")
+    expect(opened.page.locator("#restitution-error")).to_contain_text("restitution = 1.5")
+    forgive(opened, REFUSED)
+
+
+def test_half_of_a_number_is_not_asked(open_page):
+    opened = open_page()
+    page = opened.page
+    page.focus("#kr")
+    page.keyboard.press("Control+a")
+    for key in "0.08":
+        page.keyboard.press(key)
+        page.wait_for_timeout(400)
+    opened.settled()
+    assert not any("kr=0&" in each or "kr=0.&" in each for each in opened.requests)
+    assert page.locator("#kr-error").text_content() == ""
+    page.keyboard.press("Control+a")
+    page.keyboard.press("0")
+    page.keyboard.press("Tab")  # now it is said that k_r is 0
+    expect(page.locator("#kr-error")).not_to_be_empty()
+    forgive(opened, REFUSED)

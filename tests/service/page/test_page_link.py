@@ -20,6 +20,7 @@ SHOWN = """() => [...document.querySelectorAll('#form input, #form select')]
         {"p2": "8", "kr": "0.2", "pga": "0.7", "tm": "0.4", "level": "0.9"},
         {"pga": "0.5", "tm": "0.4", "pgv": ""},
         {"model": "wls-pgv"},
+        {"kind": "free-standing", "restitution": "0.85", "pga": "0.5"},
     ],
 )
 def test_a_link_shows_the_same_in_another_window(open_page, typed):
@@ -28,6 +29,8 @@ def test_a_link_shows_the_same_in_another_window(open_page, typed):
     for name, text in typed.items():
         if name == "model":
             page.select_option("#model", text)
+        elif name == "kind":
+            page.get_by_label(text).check()
         else:
             page.fill(f"#{name}", text)
     opened.settled()

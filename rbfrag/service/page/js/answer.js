@@ -59,7 +59,18 @@ export function showAnswer(answer) {
     answer.event_low === null
       ? ""
       : ` In one single earthquake ${percent(answer.event_low)} to ${percent(answer.event_high)}.`;
-  speak(`Probability of toppling ${percent(answer.probability)}, ${interval}, ${range}.${event}`);
+  const failure = `Probability of ${answer.failure}`;
+  byId("answer-title").textContent = failure;
+  speak(`${failure} ${percent(answer.probability)}, ${interval}, ${range}.${event}`);
+}
+
+/**
+ * Say something more of the model that has answered.
+ * @param {string} sentence
+ */
+export function sayOfModel(sentence) {
+  const about = byId("about");
+  if (!about.textContent?.includes(sentence)) about.append(sentence);
 }
 
 /**

@@ -9,9 +9,12 @@ import { MEASURES, SPECTRAL } from "./question.js";
  */
 
 const NAMES = [
-  ...["p2", "kr", "alpha1", "alpha3", "r3", "s1", "s2", "gamma", "beta", "phi"],
+  ...["p2", "kr", "restitution", "alpha1", "alpha3", "r3", "s1", "s2", "gamma", "beta", "phi"],
   ...[...MEASURES, "model", "level", "units", "dt", "trace"],
 ];
+
+/** Fields of which no 0 is answered. */
+const ABOVE_ZERO = new Set(["p2", "kr", "restitution", "r3", "s1", "s2", "tm", "level"]);
 
 /** Names of fields as they stand in the service's sentences, with or without their unit. */
 const NAMED = new RegExp(`(?<![\\w.])(${NAMES.join("|")})(?:_m_s|_deg|_g|_s|_m)?(?!\\w)`, "g");
@@ -19,13 +22,14 @@ const NAMED = new RegExp(`(?<![\\w.])(${NAMES.join("|")})(?:_m_s|_deg|_g|_s|_m)?
 /**
  * The form of block, shaking and model.
  * @param {HTMLFormElement} form
- * @param {(question: Question, shapeWas: Shape) => void} changed
+ * @param {(question: Question, shapeWas: Shape, whole: boolean) => void} changed called with whether
+ *   the reader may ask, which half of a number is no reason for
  */
 export function formFields(form, changed) {
   const inputs = () =>
     /** @type {HTMLInputElement[]} */ ([...form.querySelectorAll("input[id], select[id]")]);
-  const shapes = () =>
-    /** @type {NodeListOf<HTMLInputElement>} */ (form.querySelectorAll("input[name=shape]"));
+  const radios = (/** @type {string} */ name) =>
+    /** @type {HTMLInputElement[]} */ ([...form.querySelectorAll(`input[name=${name}]`)]);
   /** @type {Shape} */
   let shape = "numbers";
 
@@ -37,6 +41,7 @@ export function formFields(form, changed) {
         input.type === "checkbox" ? (input.checked ? "true" : "") : input.value.trim(),
       ]),
     );
+    values.kind = radios("kind").find((radio) => radio.checked)?.value ?? "";
     return { shape, values };
   }
 
@@ -51,10 +56,13 @@ export function formFields(form, changed) {
     if (SPECTRAL.some((name) => question.values[name])) {
       byId("spectral").toggleAttribute("open", true);
     }
-    for (const radio of shapes()) radio.checked = radio.value === shape;
-    for (const part of form.querySelectorAll("[data-shape]")) {
+    const { kind } = question.values;
+    for (const radio of radios("shape")) radio.checked = radio.value === shape;
+    for (const radio of radios("kind")) radio.checked = radio.value === kind;
+    for (const part of form.querySelectorAll("[data-shape], [data-kind]")) {
       const own = /** @type {HTMLElement} */ (part);
-      own.hidden = !(own.dataset.shape ?? "").split(" ").includes(shape);
+      const { shape: of = shape, kind: standing = kind } = own.dataset;
+      own.hidden = !(of.split(" ").includes(shape) && standing === kind);
     }
   }
 
@@ -63,9 +71,20 @@ export function formFields(form, changed) {
     const from = /** @type {HTMLInputElement} */ (event.target);
     const was = shape;
     if (from.name === "shape") shape = /** @type {Shape} */ (from.value);
-    changed(read(), was);
+    changed(read(), was, !isHalfTyped(from));
   });
+  form.addEventListener("change", () => changed(read(), shape, true));
   return { read, show };
+}
+
+/**
+ * Whether a field holds the beginning of a number, such as the 0 of 0.08, while it is typed.
+ * @param {HTMLInputElement} input
+ */
+function isHalfTyped(input) {
+  if (document.activeElement !== input || input.inputMode === "") return false;
+  const text = input.value.trim();
+  return /[e+-]$/i.test(text) || (ABOVE_ZERO.has(input.id) && /^\+?(0+\.?0*|\.0*)$/.test(text));
 }
 
 /**

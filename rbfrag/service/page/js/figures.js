@@ -1,5 +1,6 @@
 /** Design chart and fragility curve: what they ask, and whether they answer the present question. */
 
+import { sayOfModel } from "./answer.js";
 import { Refusal } from "./ask.js";
 import { designChart } from "./chart.js";
 import { fragilityCurve } from "./curve.js";
@@ -7,7 +8,7 @@ import { latest } from "./latest.js";
 import { modelNamed } from "./models.js";
 import { fromField, quantity } from "./numbers.js";
 import { byId } from "./page.js";
-import { percent } from "./percent.js";
+import { percent, verbOf } from "./percent.js";
 import { labelOf, planeOf } from "./plane.js";
 import { MEASURES } from "./question.js";
 import { askCurve, askGrid } from "./service.js";
@@ -49,9 +50,9 @@ export function figures(moved, failed) {
 
   const drawGrid = latest(
     async (/** @type {Answered} */ { question, answer, plane: on, present }) => {
-      const held = MEASURES.filter((name) => name !== on.across).map(
-        (name) => question.values[name],
-      );
+      const held = ["restitution", ...MEASURES]
+        .filter((name) => name !== on.across)
+        .map((name) => question.values[name]);
       const key = JSON.stringify([answer.model, on, held]);
       try {
         if (key !== gridShown) chart.showGrid(await askGrid(on, answer.model, question));
@@ -93,6 +94,7 @@ export function figures(moved, failed) {
      */
     async show(question, answer, block, present) {
       const model = await modelNamed(answer.model);
+      if (model?.sensitive_share) sayOfModel(sensitivity(model.sensitive_share));
       plane = planeOf(answer, block, question.values, model?.domain ?? {}, plane);
       const x = fromField(question.values[plane.across]);
       const { kr } = block;
@@ -105,7 +107,7 @@ export function figures(moved, failed) {
       drawCurve({ question, answer, plane, kr, present });
       writeText(byId("chart-caption"), chartCaption(question, answer, plane));
       byId("curve-caption").textContent =
-        `Share of such blocks that topple over ${labelOf(plane.across).name}. Dark band: its ` +
+        `Share of such blocks that ${verbOf(answer)}, against ${labelOf(plane.across).name}. Dark band: its ` +
         `interval, as far as the data tell it.` +
         (answer.event_low === null ? "" : " Light band: the share in one single earthquake.") +
         ` Both ${percent(answer.level)}.`;
@@ -128,9 +130,20 @@ export function figures(moved, failed) {
       this.stale();
       chart.hidePoint();
       curve.showSpot(null);
-      if (!plane) byId("chart-caption").textContent = "Drawn once the block topples.";
+      if (!plane) byId("chart-caption").textContent = "Drawn once the block has an answer.";
     },
   };
+}
+
+/**
+ * What the sensitive outcomes of free-standing blocks mean for an answer.
+ * @param {number} share
+ */
+function sensitivity(share) {
+  return (
+    ` Of the simulated outcomes behind it ${percent(share)} are sensitive: others for a motion ` +
+    "that differs by a millionth."
+  );
 }
 
 /** @type {(question: Question, answer: any, plane: Plane) => string} */
@@ -140,7 +153,7 @@ function chartCaption(question, answer, plane) {
     .map((name) => `${NAMES[name]} = ${quantity(fromField(question.values[name]), UNITS[name])}`);
   const all = [`p² = ${quantity(plane.p2, "1/s²")}`, ...held].join(", ");
   return (
-    `Lines of equal probability of toppling by model ${answer.model}, with ${all} held. ` +
+    `Lines of equal probability of ${answer.failure} by model ${answer.model}, with ${all} held. ` +
     "Hatched: outside the fitted range, where answers are extrapolations."
   );
 }

@@ -7,6 +7,7 @@ import { formFields, nothingWrong, sayWrong } from "./fields.js";
 import { figures } from "./figures.js";
 import { afterPause, latest } from "./latest.js";
 import { addressOf, fromAddress, showAddress } from "./link.js";
+import { offerModelsOf } from "./models.js";
 import { forField, fromField } from "./numbers.js";
 import { byId } from "./page.js";
 import { recordPanel } from "./record_panel.js";
@@ -36,10 +37,15 @@ const askSoon = afterPause(TYPING_MS, () => ask(question));
 
 // --- what the reader does ---
 
-/** @type {(now: Question, shapeWas: string) => void} */
-function fieldsChanged(now, shapeWas) {
+/** @type {(now: Question, shapeWas: string, whole: boolean) => void} */
+function fieldsChanged(now, shapeWas, whole) {
+  const kindWas = question.values.kind;
   question = now;
-  if (now.shape !== shapeWas) {
+  if (now.values.kind !== kindWas) {
+    // numbers are all that a free-standing block is given by, and no model answers for both
+    question = { shape: "numbers", values: { ...now.values, model: "" } };
+    fields.show(question);
+  } else if (now.shape !== shapeWas) {
     if (now.shape === "numbers" && block?.kr > 0) {
       // the same block, as the two numbers that the service gave for its shape
       const numbers = { p2: forField(block.p2), kr: forField(block.kr) };
@@ -50,7 +56,7 @@ function fieldsChanged(now, shapeWas) {
   sheets.stale();
   drawing.upToDate(false);
   busy(true);
-  askSoon();
+  if (whole) askSoon();
 }
 
 /** @type {(across: string, x: number, kr: number | null) => void} */
@@ -91,6 +97,7 @@ function busy(is) {
 /** @param {Question} asked */
 async function answerQuestion(asked) {
   showAddress(addressOf(question, record.shown()));
+  offerModelsOf(asked.values.kind);
   try {
     const [lines, found] = await Promise.all([
       service.askDrawing(asked).catch(notRefused),
@@ -109,7 +116,9 @@ async function answerQuestion(asked) {
     const place = { p2: fromField(two.p2), kr: fromField(two.kr) };
     await sheets.show(asked, answer, place, () => asked === question);
     const size = lines?.rectangle_r3_m * place.p2;
-    record.placeBlock({ p2: place.p2, y: answer.y_m_s }, size);
+    // X(p) bounds what a block does that a slope backs
+    if (asked.values.kind) record.placeBlock(null);
+    else record.placeBlock({ p2: place.p2, y: answer.y_m_s }, size);
     busy(asked !== question);
   } catch (error) {
     failed(error);

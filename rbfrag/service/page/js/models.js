@@ -3,14 +3,25 @@
 import { byId } from "./page.js";
 import { askModels } from "./service.js";
 
-/** The page asks for blocks that topple. */
-const KIND = "toppling";
+/** What a block does that nothing else is said of. */
+const BACKED = "toppling";
 
 /** A model of this term needs the record itself, which /v1/predict is not given here. */
 const NEEDS_RECORD = "xp";
 
 /** @type {any[]} */
 let models = [];
+let kind = BACKED;
+
+/**
+ * Offer the models of another kind.
+ * @param {string} asked its name; empty for blocks that a slope backs
+ */
+export function offerModelsOf(asked) {
+  const before = kind;
+  kind = asked || BACKED;
+  if (kind !== before) offer();
+}
 
 /**
  * The model of a name; the list is asked again where it does not hold it.
@@ -32,7 +43,7 @@ function offer() {
   const chosen = select.value;
   const [best] = select.options;
   const others = models
-    .filter((each) => each.kind === KIND && each.term !== NEEDS_RECORD)
+    .filter((each) => each.kind === kind && each.term !== NEEDS_RECORD)
     .map((each) => new Option(`${each.name}${each.is_default ? " (default)" : ""}`, each.name));
   select.replaceChildren(best, ...others);
   if (chosen && !others.some((each) => each.value === chosen)) {

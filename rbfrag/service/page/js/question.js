@@ -2,7 +2,8 @@
 
 /**
  * @typedef {"numbers" | "angles" | "fractures"} Shape how the block is given
- * @typedef {Record<string, string>} Values texts of the fields by name; no_back is "true" or ""
+ * @typedef {Record<string, string>} Values texts of the fields by name; no_back is "true" or "", kind
+ *   is "" for a block that is backed by a slope, or the name of another
  * @typedef {{shape: Shape, values: Values}} Question
  */
 
@@ -18,6 +19,9 @@ export const MEASURES = ["pgv", "pga", "tm", "pgd", ...SPECTRAL];
 
 export const MODEL_FIELDS = ["model", "level"];
 
+/** Names of what is said of a block that is not backed by a slope. */
+const FREE_FIELDS = ["kind", "restitution"];
+
 /** The same block of some 2.5 m in its three descriptions, and a strong shaking. */
 export const DEFAULTS = {
   p2: "3",
@@ -31,6 +35,8 @@ export const DEFAULTS = {
   beta: "18",
   phi: "38",
   no_back: "",
+  kind: "",
+  restitution: "",
   pgv: "0.6",
   pga: "",
   tm: "",
@@ -56,12 +62,21 @@ export function only(values, names) {
 }
 
 /**
+ * Names of what says how the block stands; none where a slope backs it.
+ * @param {Values} values
+ */
+export function standing(values) {
+  return values.kind ? FREE_FIELDS : [];
+}
+
+/**
  * Everything that is asked, and nothing that is not.
  * @param {Question} question
  * @returns {Values}
  */
 export function asked({ shape, values }) {
-  return only(values, [...BLOCK_FIELDS[shape], ...MEASURES, ...MODEL_FIELDS]);
+  const names = [...BLOCK_FIELDS[shape], ...standing(values), ...MEASURES, ...MODEL_FIELDS];
+  return only(values, names);
 }
 
 /**
@@ -79,6 +94,7 @@ export function fromQuery(query) {
   const has = (/** @type {string[]} */ names) => names.some((name) => query.has(name));
   /** @type {Shape} */
   let shape = "numbers";
+  if (values.kind) return { shape, values };
   if (has(["alpha1", "alpha3", "r3"])) shape = "angles";
   else if (has(["s1", "s2", "gamma"])) shape = "fractures";
   return { shape, values };

@@ -3,7 +3,7 @@
 import { get, post, upload } from "./ask.js";
 import { fromField } from "./numbers.js";
 import { columnsOf, rowsOf, stepsOf } from "./plane.js";
-import { BLOCK_FIELDS, MEASURES, only } from "./question.js";
+import { BLOCK_FIELDS, MEASURES, only, standing } from "./question.js";
 import { sizesFor, spectrumOf } from "./record.js";
 
 /**
@@ -37,7 +37,8 @@ export function askDrawing({ shape, values }) {
  * @param {Question} question
  */
 export function askProbability(block, { values }) {
-  return get("v1/predict", { ...block, ...only(values, [...MEASURES, "model", "level"]) });
+  const names = [...standing(values), ...MEASURES, "model", "level"];
+  return get("v1/predict", { ...block, ...only(values, names) });
 }
 
 /** The version of the service. */
@@ -64,6 +65,7 @@ export async function askGrid(plane, model, { values }) {
   const answer = await post("v1/predict", {
     p2: plane.p2,
     kr,
+    ...standingOf(values),
     ...measuresOf(values),
     [plane.across]: across,
     model,
@@ -84,6 +86,7 @@ export async function askCurve(plane, model, kr, { values }) {
   const answer = await post("v1/predict", {
     p2: plane.p2,
     kr,
+    ...standingOf(values),
     ...measuresOf(values),
     [plane.across]: xs.map(rounded),
     model,
@@ -102,6 +105,12 @@ export async function askCurve(plane, model, kr, { values }) {
 export async function askSpectrum(file, reading, p2) {
   const query = { ...reading, polarity: "both", p2: sizesFor(p2).join(",") };
   return spectrumOf(await upload("v1/spectrum", query, file), file.name);
+}
+
+/** @param {Record<string, string>} values */
+function standingOf(values) {
+  const { kind, restitution } = only(values, standing(values));
+  return restitution ? { kind, restitution: fromField(restitution) } : { kind };
 }
 
 /** @param {Record<string, string>} values */

@@ -1,0 +1,160 @@
+"""What a free-standing block is run by beside rbfrag's kernel: RK4 at fixed steps, compiled.
+
+The usual way to integrate rocking about both corners: impacts at the root of the step's cubic,
+the rest of the step from there, the motion after the record by energy.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.bench.cases import Case
+from rbfrag.bench.peers import STABLE, TOPPLED, Answer, free_motion
+from rbfrag.solver.integrator.compiled import kernel
+from rbfrag.solver.integrator.free_rocking import IMPACTS_THAT_DECIDE
+from rbfrag.solver.integrator.two_corners import PAST_BALANCE
+from rbfrag.solver.rocking_run import REST_SPEED
+
+FloatArray = NDArray[np.float64]
+
+HALVINGS = 52
+"""Of a step, to the rounding of where an impact is in it."""
+
+Real = float | np.longdouble
+
+
+def free_rocking(
+    theta: Real, rate: Real, p: Real, theta_c: Real, restitution: Real, peak: Real
+) -> Answer:
+    """Decide by energy, impact by impact, what becomes of a block once the ground is at rest.
+
+    Args:
+        theta: rotation at the end of the record [rad].
+        rate: rotation rate [rad/s].
+        p: frequency parameter [1/s].
+        theta_c: critical angle of both corners [rad].
+        restitution: speed after an impact over that before it.
+        peak: greatest rotation so far [rad].
+    """
+    answer = free_motion(theta, rate, p, theta_c, peak)
+    for _ in range(IMPACTS_THAT_DECIDE):
+        if answer.outcome == TOPPLED:
+            break
+        height = np.sin((theta_c + theta_c - theta) / 2) * np.sin(theta / 2)
+        # rate² + 2 p² (cos(theta_c - theta) - cos theta_c), without a difference of cosines
+        speed = restitution * np.sqrt(max(rate * rate + 4 * p * p * height, 0 * rate))
+        if speed < REST_SPEED * p * theta_c:
+            break
+        theta, rate = 0 * theta, speed
+        answer = free_motion(theta, rate, p, theta_c, answer.peak_rad)
+    return answer
+
+
+def runge_kutta(case: Case, restitution: float, parts: int) -> Answer:
+    """Run one case with `parts` steps of RK4 per sample interval; no vertical motion."""
+    excited = case.excitation
+    p, theta_c = math.sqrt(case.p2), math.atan(case.kr)
+    topples, side, theta, rate, peak = _march(
+        excited.k_h, float(excited.interval_s[0]), case.kr, case.p2, theta_c, restitution,
+        REST_SPEED * p * theta_c, parts,
+    )  # fmt: skip
+    if topples:
+        return Answer(TOPPLED, math.nan)
+    if side == 0:
+        return Answer(STABLE, peak)
+    return free_rocking(theta, rate, p, theta_c, restitution, peak)
+
+
+@kernel
+def _march(
+    k_h: FloatArray, dt: float, kr: float, p2: float, theta_c: float, e: float, slowest: float,
+    parts: int,
+) -> tuple[bool, int, float, float, float]:  # fmt: skip
+    theta = 0.0
+    rate = 0.0
+    peak = 0.0
+    side = 0
+    for i in range(k_h.size - 1):
+        slope = (k_h[i + 1] - k_h[i]) / dt
+        if side == 0 and abs(k_h[i]) <= kr and abs(k_h[i + 1]) <= kr:
+            continue
+        for j in range(parts):
+            t = j * dt / parts
+            h = dt / parts
+            while h > 1e-12 * dt:
+                if side == 0:
+                    a = k_h[i] + slope * t
+                    b = a + slope * h
+                    if abs(a) > kr:
+                        side = 1 if a > 0.0 else -1
+                    elif abs(b) > kr:
+                        side = 1 if b > 0.0 else -1
+                        wait = (side * kr - a) / slope
+                        t += wait
+                        h -= wait
+                    else:
+                        break
+                theta_end, rate_end = _step(
+                    theta, rate, h, side * (k_h[i] + slope * t), side * slope, p2, theta_c
+                )
+                if rate > 0.0 > rate_end:
+                    top = _hermite(theta, rate, theta_end, rate_end, h, rate / (rate - rate_end))
+                    peak = max(peak, top[0])
+                if theta_end > 0.0:
+                    theta, rate = theta_end, rate_end
+                    if theta > theta_c + PAST_BALANCE:
+                        return True, side, theta, rate, peak
+                    break
+                low, high = 0.0, 1.0
+                for _ in range(HALVINGS):
+                    middle = 0.5 * (low + high)
+                    if _hermite(theta, rate, theta_end, rate_end, h, middle)[0] > 0.0:
+                        low = middle
+                    else:
+                        high = middle
+                speed = -e * _hermite(theta, rate, theta_end, rate_end, h, high)[1]
+                t += high * h
+                h -= high * h
+                theta = 0.0
+                rate = speed
+                side = -side
+                if speed < slowest:
+                    side = 0
+                    rate = 0.0
+    return False, side, theta, rate, peak
+
+
+@kernel
+def _step(
+    theta: float, rate: float, h: float, a: float, slope: float, p2: float, theta_c: float
+) -> tuple[float, float]:
+    middle, end = a + 0.5 * slope * h, a + slope * h
+    x = theta_c - theta
+    k1 = p2 * (a * math.cos(x) - math.sin(x))
+    x = theta_c - (theta + 0.5 * h * rate)
+    k2 = p2 * (middle * math.cos(x) - math.sin(x))
+    x = theta_c - (theta + 0.5 * h * (rate + 0.5 * h * k1))
+    k3 = p2 * (middle * math.cos(x) - math.sin(x))
+    x = theta_c - (theta + h * (rate + 0.5 * h * k2))
+    k4 = p2 * (end * math.cos(x) - math.sin(x))
+    return (
+        theta + h * rate + h * h * (k1 + k2 + k3) / 6.0,
+        rate + h * (k1 + 2.0 * k2 + 2.0 * k3 + k4) / 6.0,
+    )
+
+
+@kernel
+def _hermite(
+    theta: float, rate: float, theta_end: float, rate_end: float, h: float, x: float
+) -> tuple[float, float]:
+    """Rotation and rate at a fraction of a step, by the cubic through both ends."""
+    u0, u1 = h * rate, h * rate_end
+    c2 = 3.0 * (theta_end - theta) - 2.0 * u0 - u1
+    c3 = 2.0 * (theta - theta_end) + u0 + u1
+    return (
+        theta + x * (u0 + x * (c2 + x * c3)),
+        (u0 + x * (2.0 * c2 + x * 3.0 * c3)) / h,
+    )

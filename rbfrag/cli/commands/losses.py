@@ -1,0 +1,209 @@
+"""`rbfrag losses`: how many blocks fail a year by an event set of OpenQuake, and at what loss."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from rbfrag.cli.commands.simulate import Workers
+from rbfrag.cli.output import (
+    ProgressBar,
+    check_files,
+    print_json,
+    print_pairs,
+    print_table,
+    print_warnings,
+)
+from rbfrag.cli.parameters import options
+from rbfrag.cli.parameters.stack import argument, option, stacked
+
+if TYPE_CHECKING:
+    from rbfrag.hazards.event_counts import Part, PartCounts
+    from rbfrag.hazards.losses import LossAnswer
+
+EXAMPLE = "Example:  rbfrag losses FOLDER --blocks blocks.csv --component rotd50 --out events.csv"
+
+MOST_ROWS = 12
+"""Rows of a curve that people are shown; JSON has all."""
+
+AFTER_A_DEATH = "run the same command again"
+"""What to do when a worker process has died: nothing is stored."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Files:
+    """The exports of one job."""
+
+    gmf_data: str | None = option("File of ground motion fields.", metavar="FILE")
+    events: str | None = option("File of all events.", metavar="FILE")
+    sitemesh: str | None = option("File of all sites.", metavar="FILE")
+    realizations: str | None = option("File of the logic tree's weights.", metavar="FILE")
+    ruptures: str | None = option(
+        "File of ruptures, whose first line states how long the events took.", metavar="FILE"
+    )
+
+    def named(self) -> dict[str, str]:
+        """Return the files that are named, by what they hold."""
+        return {name: path for name, path in vars(self).items() if path is not None}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Time:
+    """How long the events took, where no file of ruptures states it."""
+
+    investigation_time: float | None = option(
+        "Years of one stochastic event set, as in job.ini; where no file of ruptures states it."
+    )
+    ses: int | None = option(
+        "Number of event sets of each realization (ses_per_logic_tree_path), likewise."
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sampling:
+    """How the blocks of one event are taken together."""
+
+    samples: int = option("Samples of each event.", 100)
+    expected: bool = option("Expected values alone, without samples and curves.", False)
+    seed: int = option("Seed of the samples.", 0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Meaning:
+    """What shakes the blocks, and how they fail."""
+
+    imt: str = option(
+        "Measures that the models read: PGV, PGA, 'SA(1.0)', or several as PGV,PGA, which the "
+        "engine draws independently.",
+        "PGV",
+    )
+    component: str | None = option(
+        "What the measures mean: single, geometric_mean, rotd50 or larger."
+    )
+    kind: str | None = option(
+        "Kind of failure of rows that state none. Default: toppling, backed by a slope."
+    )
+
+
+@stacked
+def losses(
+    *,
+    folder: str | None = argument(
+        "Folder with one job's exports: gmf-data, events, sitemesh, realizations, ruptures CSV.",
+        None,
+        metavar="[FOLDER]",
+    ),
+    blocks: str = option(
+        "Table of blocks (.csv, .parquet) with p2_1_s2 [1/s²] and kr, or height_m and width_m [m], "
+        "site_id, and if wanted count, weight, loss, loss_sigma, kind.",
+        ...,
+        metavar="FILE",
+    ),
+    files: Files,
+    time: Time,
+    sampling: Sampling,
+    meaning: Meaning,
+    workers: Workers,
+    answering: options.Answering,
+    out: str | None = option("Write the table of events (.csv, .parquet)."),
+    plot: str | None = option("Draw how often numbers of failures are reached (.png, .pdf, .svg)."),
+    json: options.Json = False,
+) -> None:
+    """Count failures and losses in the earthquakes of an event set.
+
+    The event set is that of an OpenQuake job, event-based or scenario. Blocks join it by site_id.
+    Each event counts weight(realization)/(investigation time x event sets) a year; a scenario has
+    no rate, and its answer is given the event. What the blocks of one event do together is drawn
+    by the model's dependence: what the earthquake shares, what a site shares, what each block has.
+    The answer is the same for any number of workers.
+    """
+    from rbfrag.exchange.block_table import write_block_table
+    from rbfrag.exchange.event_losses import losses as answered
+
+    check_files(table=out, plot=plot)
+    with ProgressBar("losses", "events") as bar:
+        answer = answered(
+            folder, blocks, files=files.named(), samples=sampling.samples,
+            expected=sampling.expected, seed=sampling.seed,
+            investigation_time=time.investigation_time, ses=time.ses,
+            imt=meaning.imt.split(","), component=meaning.component, kind=meaning.kind,
+            model=answering.model, level=answering.level, db=answering.db,
+            run=_Workers(workers.jobs, workers.scheduler), on_progress=bar.show,
+        )  # fmt: skip
+    if out is not None:
+        write_block_table(answer.table_columns(), out)
+    if plot is not None:
+        from rbfrag.plots.losses import plot_losses
+
+        plot_losses(answer, plot)
+    if json:
+        print_json(answer.as_dict())
+        return
+    _print(answer)
+
+
+class _Workers:
+    """Does the parts of the work by local processes, or by a cluster."""
+
+    def __init__(self, jobs: int | None, scheduler: str | None) -> None:
+        from rbfrag.campaign.executors.local import check_workers
+
+        check_workers(jobs, scheduler)
+        self._jobs, self._scheduler = jobs, scheduler
+
+    def __call__(self, parts: Iterator[Part], number: int) -> Iterator[PartCounts]:
+        from rbfrag.campaign.executors.local import executor
+        from rbfrag.hazards.event_counts import count_part
+
+        with executor(
+            count_part, self._jobs, self._scheduler, after_a_death=AFTER_A_DEATH
+        ) as execute:
+            yield from execute(parts, number)
+
+
+def _print(answer: LossAnswer) -> None:
+    """Print sentences, the numbers, the curve and the rows of the blocks."""
+    document: dict[str, Any] = answer.as_dict()
+    warnings, rows = document.pop("warnings"), document.pop("blocks")
+    for sentence in _in_words(answer):
+        print(sentence)
+    print()
+    curves = {
+        name: document.pop(name)
+        for name in [*document]
+        if name.startswith(("exceedance", "loss_exceedance"))
+    }
+    for law, bound in document.pop("bounds").items():
+        document |= {f"{name}_{law}": value for name, value in bound.items()}
+    print_pairs({name: value for name, value in document.items() if value is not None})
+    for curve in curves.values():
+        for part in curve.values() if isinstance(curve, dict) else [curve]:
+            if part:
+                print()
+                thin = part[:: math.ceil(len(part) / MOST_ROWS)]
+                print_table(list(part[0]), [list(row.values()) for row in thin])
+    print()
+    print_table(list(rows[0]), [list(row.values()) for row in rows])
+    print_warnings(warnings)
+
+
+def _in_words(answer: LossAnswer) -> Iterator[str]:
+    mean, error = answer.average_annual_failures, answer.error(answer.failures)
+    if answer.events.is_scenario:
+        yield f"{mean:.4g} ± {error:.2g} of {answer.portfolio.size} blocks are expected to fail."
+        if answer.annual_rate_any is not None:
+            yield f"At least one fails with a probability of {100 * answer.annual_rate_any:.3g} %."
+        return
+    yield (
+        f"{mean:.4g} ± {error:.2g} failures a year are expected of {answer.portfolio.size} blocks; "
+        f"the events cover {answer.events.effective_years:.6g} years."
+    )
+    rate = answer.annual_rate_any
+    if rate is not None:
+        often = f"once in {1.0 / rate:.4g} years on average" if rate > 0.0 else "never"
+        yield f"An earthquake fails at least one of them {often}."
+    if answer.average_annual_loss is not None:
+        loss_error = answer.error(answer.loss)
+        yield f"The average annual loss is {answer.average_annual_loss:.4g} ± {loss_error:.2g}."

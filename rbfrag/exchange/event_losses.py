@@ -1,0 +1,101 @@
+"""Failures and losses of a table of blocks by the exports of an OpenQuake job: `losses`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from rbfrag.exchange.block_table import waiting_blocks
+from rbfrag.exchange.openquake_events import JobFiles, read_events
+from rbfrag.fragility.predict import Model
+from rbfrag.hazards.conversions import component as component_named
+from rbfrag.hazards.losses import LossAnswer, Run, event_losses
+from rbfrag.hazards.portfolio import Portfolio
+
+
+def losses(
+    folder: str | PathLike[str] | None = None,
+    blocks: str | PathLike[str] | Mapping[str, Any] = "",
+    *,
+    files: Mapping[str, str | PathLike[str]] | None = None,
+    samples: int = 100,
+    expected: bool = False,
+    seed: int = 0,
+    investigation_time: float | None = None,
+    ses: int | None = None,
+    imt: Sequence[str] = ("PGV",),
+    component: str | None = None,
+    kind: str | None = None,
+    model: Model | None = None,
+    level: float = 0.95,
+    db: str | PathLike[str] | None = None,
+    run: Run | None = None,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> LossAnswer:
+    """Return how many blocks fail a year by an event set of the OpenQuake engine, at what loss.
+
+    Each event counts weight(realization)/(investigation time × number of event sets) a year. What
+    several blocks of one event do together is sampled by the copula that is stored with the model
+    (:func:`rbfrag.hazards.losses.event_losses`). A scenario has no rate: its answer is what is
+    expected and probable given the event.
+
+    Args:
+        folder: folder with the exports of one job (gmf-data, events, sitemesh, realizations and
+            ruptures CSV), or None where `files` names them.
+        blocks: table of blocks (.csv, .parquet), or its columns: ``p2_1_s2`` [1/s²] and ``kr``, or
+            ``height_m`` and ``width_m`` [m], with ``site_id`` (text), and, if there are,
+            ``block_id``, ``kind``, ``count`` (like blocks, each with an azimuth of its own),
+            ``weight`` (what a failure counts, and its loss with it), ``loss`` (in the median) and
+            ``loss_sigma`` (standard deviation of its logarithm), ``p2_sigma``, ``kr_sigma`` and
+            ``restitution``.
+        files: files by what they hold: gmf_data, events, sitemesh, realizations, ruptures.
+        samples: samples of each event.
+        expected: do without samples; then there are no curves of exceedance.
+        seed: of the samples; the answer does not depend on the number of workers.
+        investigation_time: years of one event set, where no file of ruptures states it.
+        ses: number of event sets of each realization, likewise.
+        imt: intensity measures that the models read, as OpenQuake names them. Several are drawn
+            independently by the engine, which a warning tells of.
+        component: what the measures mean: single, geometric_mean, rotd50 or larger; None for
+            single, with a warning. Its scatter is common to the blocks of one site and event.
+        kind: kind of failure of rows that state none.
+        model: as in :func:`rbfrag.predict`.
+        level: confidence level of the intervals.
+        db: as in :func:`rbfrag.predict`.
+        run: does the parts of the work; None for this process.
+        on_progress: called with the numbers of events done and of all.
+
+    Raises:
+        InputError: a file that cannot be used, files of different jobs, a site or event that is
+            unknown, a row that is there twice, or a block that is none; the message names the line.
+        UnknownModelError: no model of that name.
+        DatabaseError: the database cannot be read.
+    """
+    columns = blocks if isinstance(blocks, Mapping) else waiting_blocks(blocks, kind)
+    if "block_id" not in columns:
+        names = [str(i + 1) for i in range(len(columns["kr"]))]
+        columns = {**columns, "block_id": np.array(names, dtype=object)}
+    meaning = component_named("single" if component is None else component)
+    job = JobFiles.of(folder, files)
+    events = read_events(job, imts=imt, investigation_time=investigation_time, ses=ses)
+    portfolio = Portfolio.of(
+        columns, events.site_ids, tuple(events.measures), meaning, kind=kind, model=model, db=db
+    )
+    about = (
+        "the measures are taken as those of single components, which the models are fitted on; "
+        "ground motion models of the engine mostly mean rotd50 or the geometric mean: say which"
+        if component is None
+        else f"the measures are of {meaning.title}; Beyer and Bommer (2006) relate it to one "
+        "component"
+        if meaning.name != "single"
+        else "the measures are of a single component, as the models are"
+    )
+    events = replace(events, warnings=(*events.warnings, about))
+    return event_losses(
+        events, portfolio, samples=0 if expected else samples, seed=seed, level=level, run=run,
+        on_progress=on_progress,
+    )  # fmt: skip

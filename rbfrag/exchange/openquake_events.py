@@ -1,0 +1,544 @@
+"""Event sets and scenarios as the OpenQuake engine exports them: five CSV files of one job."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import re
+import warnings
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.exchange.fragility_function import IntensityType, openquake_type
+from rbfrag.files import reading
+from rbfrag.fragility.measures import SPECTRAL
+from rbfrag.hazards.event_set import Duration, EventSet, IntArray, event_weights
+
+FloatArray = NDArray[np.float64]
+
+FILES = {
+    "gmf_data": re.compile(r"gmf[-_]data.*\.csv"),
+    "events": re.compile(r"events.*\.csv"),
+    "sitemesh": re.compile(r"sitemesh.*\.csv"),
+    "realizations": re.compile(r"realizations.*\.csv"),
+    "ruptures": re.compile(r"ruptures.*\.csv"),
+}
+"""The files of a job by what they hold; of a scenario there is no file of ruptures."""
+
+_EVENT = ("event_id", "eid")
+_REALIZATION = ("rlz_id", "rlzi")
+_SITE_NAME = "custom_site_id"
+_SITE_NUMBER = ("site_id", "sid")
+_MEASURE = re.compile(r"gmv_(.+)")
+_STATED = re.compile(r"(\w+)\s*=\s*(?:'([^']*)'|([^,\s\"']+))")
+_ROWS = 1 << 18
+
+
+def _finite(text: str) -> float:
+    if not math.isfinite(value := float(text)):
+        raise ValueError(text)
+    return value
+
+
+def _whole(text: str) -> int:
+    if not -(2**63) <= (value := int(text)) < 2**63:
+        raise ValueError(text)
+    return value
+
+
+def _some(text: str) -> str:
+    if not text.strip():
+        raise ValueError(text)
+    return text
+
+
+_KINDS: Mapping[type, Callable[[str], object]] = {int: _whole, float: _finite, str: _some}
+_IN_WORDS = {int: "a whole number", float: "a number", str: "a name"}
+
+
+def _next(parts: Any, too_many_cells: type[Warning]) -> Any:
+    """Return the next part of a file, or None; a line with more cells than the first is an error.
+
+    pandas cuts such a line with a warning where it is the first of a part.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", too_many_cells)
+        return next(parts, None)
+
+
+@dataclass(frozen=True)
+class JobFiles:
+    """Where the files of one job are.
+
+    Args:
+        gmf_data: ground motion by event and site.
+        events: all events.
+        sitemesh: all sites.
+        realizations: weights of the logic tree.
+        ruptures: whose first line states how long a realization lasts; None where there is none.
+    """
+
+    gmf_data: Path
+    events: Path
+    sitemesh: Path
+    realizations: Path
+    ruptures: Path | None = None
+
+    @classmethod
+    def of(
+        cls,
+        folder: str | os.PathLike[str] | None = None,
+        named: Mapping[str, str | os.PathLike[str]] | None = None,
+    ) -> JobFiles:
+        """Return the files of a folder, or those that are named.
+
+        Args:
+            folder: folder with the exports of one job.
+            named: files that are named, by the fields of this class; they go before the folder.
+
+        Raises:
+            InputError: a file is missing, or the folder has several that may be meant.
+        """
+        chosen = {name: Path(path) for name, path in (named or {}).items()}
+        if folder is not None:
+            place = Path(folder)
+            if not place.is_dir():
+                raise InputError(
+                    f"{place} is no folder: name the folder with the exports of one OpenQuake job"
+                )
+            present = sorted(path.name for path in place.iterdir())
+            for what, pattern in FILES.items():
+                if what in chosen:
+                    continue
+                fits = [name for name in present if pattern.fullmatch(name)]
+                if len(fits) > 1:
+                    raise InputError(
+                        f"{place} has {' and '.join(fits[:3])}: keep the files of one job in a "
+                        f"folder of their own, or name the file with {_option(what)}"
+                    )
+                if fits:
+                    chosen[what] = place / fits[0]
+        missing = [name for name in FILES if name not in chosen and name != "ruptures"]
+        if missing:
+            where = "" if folder is None else f" in {folder}"
+            raise InputError(
+                f"there is no file of {missing[0].replace('_', '-')}{where}: export it (oq export "
+                f"… -e csv), or name it with {_option(missing[0])}"
+            )
+        return cls(**chosen)
+
+    def paths(self) -> dict[str, Path]:
+        """Return the files by what they hold."""
+        return {name: path for name in FILES if (path := getattr(self, name)) is not None}
+
+
+def _option(name: str) -> str:
+    return "--" + name.replace("_", "-")
+
+
+@dataclass(frozen=True)
+class _Head:
+    """What stands above the data of a file.
+
+    Args:
+        path: the file.
+        stated: what the comment of its first line states, by name.
+        names: names of the columns.
+        lines: number of lines above the data.
+    """
+
+    path: Path
+    stated: Mapping[str, str]
+    names: tuple[str, ...]
+    lines: int
+
+    @classmethod
+    def of(cls, path: Path) -> _Head:
+        stated: dict[str, str] = {}
+        with reading(path, "an export of OpenQuake"), closing(_lines(path)) as lines:
+            for number, row in lines:
+                if row and row[0].lstrip().startswith("#"):
+                    matches = _STATED.finditer(",".join(row))
+                    stated |= {one.group(1): one.group(2) or one.group(3) or "" for one in matches}
+                    continue
+                names = tuple(cell.strip() for cell in row)
+                for name in names:
+                    if names.count(name) > 1:
+                        raise InputError(
+                            f"{path}, line {number}: the column {name!r} is there twice"
+                        )
+                return cls(path, stated, names, number)
+        raise InputError(f"{path}: ends before the names of the columns: export it again")
+
+    def column(self, choices: Sequence[str], *, needed: bool = True) -> str | None:
+        """Return which of some names a column has."""
+        name = next((name for name in choices if name in self.names), None)
+        if name is None and needed:
+            raise InputError(
+                f"{self.path}, line {self.lines}: there is no column {' or '.join(choices)}; the "
+                f"columns are {', '.join(self.names)}"
+            )
+        return name
+
+    def line(self, row: int | np.integer[Any]) -> str:
+        """Return the place of a row of data for messages."""
+        return f"{self.path}, line {self.lines + 1 + int(row)}"
+
+    def read(self, columns: Mapping[str, type]) -> Generator[dict[str, NDArray[Any]]]:
+        """Yield some columns, some hundred thousand rows at a time.
+
+        Args:
+            columns: int, float or str by name.
+
+        Raises:
+            InputError: a cell holds no such thing, or a line lacks cells; the message names it.
+        """
+        import pandas as pd
+
+        dtypes = {int: "int64", float: "float64", str: "str"}
+        kinds = {name: columns.get(name, str) for name in self.names}
+        with reading(self.path, "an export of OpenQuake"):
+            try:
+                with pd.read_csv(
+                    self.path, skiprows=self.lines, header=None, names=list(kinds),
+                    dtype={name: dtypes[kind] for name, kind in kinds.items()}, chunksize=_ROWS,
+                    keep_default_na=False, na_values=[], index_col=False, encoding="utf-8-sig",
+                ) as parts:  # fmt: skip
+                    while (part := _next(parts, pd.errors.ParserWarning)) is not None:
+                        cells = {name: part[name].to_numpy() for name in columns}
+                        for name in cells:
+                            if columns[name] is str:
+                                texts = part[name].fillna("").str.strip()
+                                cells[name] = texts.to_numpy(dtype=object)
+                                if (cells[name] == "").any():
+                                    raise ValueError(f"{name} is missing")
+                        yield cells
+            except pd.errors.EmptyDataError:
+                return
+            except (
+                ValueError,
+                OverflowError,
+                pd.errors.ParserError,
+                pd.errors.ParserWarning,
+            ) as error:
+                raise self._trouble(columns) or InputError(f"{self.path}: {error}") from None
+
+    def whole(self, columns: Mapping[str, type]) -> dict[str, NDArray[Any]]:
+        """Return some columns whole."""
+        with closing(self.read(columns)) as read:
+            parts = list(read)
+        empty = {int: np.int64, float: np.float64, str: object}
+        return {
+            name: np.concatenate([np.empty(0, dtype=empty[kind]), *(part[name] for part in parts)])
+            for name, kind in columns.items()
+        }
+
+    def _trouble(self, columns: Mapping[str, type]) -> InputError | None:
+        """Return the first line that cannot be read in words."""
+        place = {name: self.names.index(name) for name in columns}
+        for number, row in _lines(self.path):
+            where = f"{self.path}, line {number}"
+            if number <= self.lines or not row:
+                continue
+            if len(row) != len(self.names):
+                return InputError(f"{where}: {len(row)} cells under {len(self.names)} columns")
+            for name, kind in columns.items():
+                try:
+                    _KINDS[kind](row[place[name]])
+                except ValueError:
+                    return InputError(
+                        f"{where}: {name} is {row[place[name]]!r}, not {_IN_WORDS[kind]}"
+                    )
+        return None
+
+
+def _lines(path: Path) -> Generator[tuple[int, list[str]]]:
+    """Yield the rows of a file that may be large, each with the number of its last line."""
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        reader = csv.reader(file)
+        try:
+            for row in reader:
+                yield reader.line_num, row
+        except csv.Error as error:
+            raise InputError(f"{path}, line {reader.line_num}: not a CSV file: {error}") from None
+
+
+def read_events(
+    files: JobFiles,
+    *,
+    imts: Sequence[str] = ("PGV",),
+    investigation_time: float | None = None,
+    ses: int | None = None,
+) -> EventSet:
+    """Return the events of one job and how they shook its sites.
+
+    Columns are read by name, the sites joined on their identifiers. PGV stands in cm/s in the
+    files, PGA and spectral accelerations in g.
+
+    Args:
+        files: the files of the job.
+        imts: intensity measures to read, as OpenQuake names them: PGV, PGA, SA(1.0).
+        investigation_time: years of one event set, where no file of ruptures states it.
+        ses: number of event sets of each realization, likewise.
+
+    Raises:
+        InputError: the files are of different jobs, a file lacks a column, a row cannot be used, or
+            nothing states how long the events took; the message names the line.
+    """
+    heads = {name: _Head.of(path) for name, path in files.paths().items()}
+    _refuse_other_jobs(heads)
+    sites = _sites(heads["sitemesh"])
+    weights, remarks = _weights(heads["realizations"])
+    event_id, realization, year = _events(heads["events"], weights)
+    duration = _duration(heads, year, investigation_time, ses)
+    event, site, measures = _shaking(heads["gmf_data"], heads["sitemesh"], sites, event_id, imts)
+    if duration is not None and year.size and int(year.max()) > duration.years * len(weights) + 0.5:
+        remarks.append(
+            f"{files.events}: year {int(year.max())} lies beyond the {duration.years:g} years of "
+            f"each of {len(weights)} realizations: are investigation time and number of event "
+            "sets those of this job?"
+        )
+    return EventSet(
+        event_id=event_id,
+        realization=realization,
+        year=year,
+        weight=event_weights(realization, weights, duration),
+        site_ids=sites,
+        event=event,
+        site=site,
+        measures=measures,
+        duration=duration,
+        realization_weights=weights,
+        warnings=tuple(remarks),
+    )
+
+
+def _refuse_other_jobs(heads: Mapping[str, _Head]) -> None:
+    first = heads["gmf_data"]
+    for head in heads.values():
+        for name in ("checksum", "start_date"):
+            one, other = first.stated.get(name), head.stated.get(name)
+            if one is not None and other is not None and one != other:
+                raise InputError(
+                    f"{head.path}, line 1: {name} is {other}, and that of {first.path.name} is "
+                    f"{one}: these are files of different jobs; name those of one"
+                )
+
+
+def _sites(head: _Head) -> tuple[str, ...]:
+    name = head.column((_SITE_NAME, *_SITE_NUMBER), needed=False)
+    if name is None:  # numbered from 0 on
+        return tuple(str(i) for i in range(head.whole({"lon": float})["lon"].size))
+    ids = head.whole({name: str})[name].tolist()
+    first: dict[str, int] = {}
+    for row, text in enumerate(ids):
+        if text in first:
+            raise InputError(
+                f"{head.line(row)}: the site {text!r} is there twice: name the sites apart"
+            )
+        first[text] = row
+    if not ids:
+        raise InputError(f"{head.path}: there is no site in the file")
+    return tuple(ids)
+
+
+def _weights(head: _Head) -> tuple[dict[int, float], list[str]]:
+    name = str(head.column(_REALIZATION))
+    head.column(("weight",))
+    columns = head.whole({name: int, "weight": float})
+    numbers, values = columns[name].tolist(), columns["weight"]
+    for row, (number, value) in enumerate(zip(numbers, values.tolist(), strict=True)):
+        if not 0.0 <= value < np.inf:
+            raise InputError(f"{head.line(row)}: the weight {value:g} is none: give 0 to 1")
+        if numbers.index(number) != row:
+            raise InputError(f"{head.line(row)}: {name} {number} is there twice")
+    total = float(values.sum())
+    if not 0.0 < total < np.inf:
+        raise InputError(f"{head.path}: the weights of the realizations sum to {total:g}")
+    remarks = []
+    if abs(total - 1.0) > 1e-3:
+        remarks.append(
+            f"{head.path}: the weights of the realizations sum to {total:.4g}; they are divided by "
+            "that"
+        )
+    return dict(zip(numbers, (values / total).tolist(), strict=True)), remarks
+
+
+def _events(head: _Head, weights: Mapping[int, float]) -> tuple[IntArray, IntArray, IntArray]:
+    """Return number, realization and year of every event, by rising number."""
+    names = [str(head.column(choices)) for choices in (_EVENT, _REALIZATION, ("year",))]
+    columns = head.whole(dict.fromkeys(names, int))
+    event_id, realization, year = (columns[name] for name in names)
+    unknown = ~np.isin(realization, list(weights))
+    if unknown.any():
+        row = int(np.flatnonzero(unknown)[0])
+        raise InputError(
+            f"{head.line(row)}: the realization {realization[row]} is not in the file of "
+            "realizations"
+        )
+    if event_id.size == 0:
+        raise InputError(f"{head.path}: there is no event in the file")
+    if event_id.min() < 0:
+        row = int(np.argmin(event_id))
+        raise InputError(f"{head.line(row)}: {names[0]} is {event_id[row]}: give 0 or more")
+    order = np.argsort(event_id, kind="stable")
+    again = order[1:][np.diff(event_id[order]) == 0]
+    if again.size:
+        row = int(again.min())
+        raise InputError(f"{head.line(row)}: the event {event_id[row]} is there twice")
+    return event_id[order], realization[order], year[order]
+
+
+def _duration(
+    heads: Mapping[str, _Head], year: IntArray, investigation_time: float | None, ses: int | None
+) -> Duration | None:
+    """Return how long a realization lasts; None for a scenario, whose year is 0."""
+    given = {"investigation_time": investigation_time, "ses_per_logic_tree_path": ses}
+    known = {name: float(value) for name, value in given.items() if value is not None}
+    ruptures = heads.get("ruptures")
+    if ruptures is None and not year.any():
+        if known:
+            raise InputError(
+                f"{heads['events'].path}: the events are those of a scenario (year 0), which has "
+                "no rate: leave investigation time and number of event sets out"
+            )
+        return None
+    for name in given:
+        text = None if ruptures is None else ruptures.stated.get(name)
+        if text is None or ruptures is None:
+            continue
+        try:
+            value = float(text)
+        except ValueError:
+            raise InputError(f"{ruptures.path}, line 1: {name} = {text!r} is no number") from None
+        if known.setdefault(name, value) != value:
+            raise InputError(
+                f"{ruptures.path}, line 1: {name} is {value:g}, given is {known[name]:g}: leave it "
+                "out"
+            )
+    missing = [name for name in given if name not in known]
+    if missing:
+        where = (
+            "there is no file of ruptures"
+            if ruptures is None
+            else f"{ruptures.path}, line 1 does not state {' and '.join(missing)}"
+        )
+        raise InputError(
+            f"{where}, which states how long the events took; without it no rate can be given: "
+            "name the file with --ruptures, or give --investigation-time and --ses as in job.ini"
+        )
+    sets = known["ses_per_logic_tree_path"]
+    if not math.isfinite(sets) or sets != int(sets):
+        raise InputError(f"ses_per_logic_tree_path = {sets:g} is no whole number")
+    return Duration(known["investigation_time"], int(sets))
+
+
+def _shaking(
+    head: _Head,
+    mesh: _Head,
+    sites: tuple[str, ...],
+    event_id: IntArray,
+    imts: Sequence[str],
+) -> tuple[IntArray, IntArray, dict[str, FloatArray]]:
+    """Return event and site of each row, and its measures, by event and site."""
+    columns = _measure_columns(head, imts)
+    event_name = str(head.column(_EVENT))
+    site_name = str(head.column((_SITE_NAME, *_SITE_NUMBER)))
+    # a number counts the sites from 0 on, unless the mesh names its sites by that very column
+    by_name = site_name == _SITE_NAME or mesh.column((site_name,), needed=False) is not None
+    index = {name if by_name else str(i): i for i, name in enumerate(sites)}
+    parts: dict[str, list[NDArray[Any]]] = {name: [] for name in ("event", "site", *columns)}
+    row = 0
+    kinds = {event_name: int, site_name: str, **{c: float for c, _ in columns.values()}}
+    with closing(head.read(kinds)) as read:
+        for part in read:
+            parts["event"].append(_event_places(head, part[event_name], event_id, row))
+            parts["site"].append(_site_places(head, part[site_name], index, row, mesh))
+            for measure, (column, factor) in columns.items():
+                values = part[column]
+                wrong = ~((values >= 0.0) & (values < np.inf))
+                if wrong.any():
+                    first = int(np.flatnonzero(wrong)[0])
+                    raise InputError(
+                        f"{head.line(row + first)}: {column} is {values[first]:g}: shaking is a "
+                        "number not below zero"
+                    )
+                parts[measure].append(factor * values)
+            row += part[event_name].size
+    whole = {
+        name: np.concatenate([np.empty(0, np.int64 if name in ("event", "site") else float), *some])
+        for name, some in parts.items()
+    }
+    event, site = whole.pop("event"), whole.pop("site")
+    key = event * len(sites) + site
+    order = np.argsort(key, kind="stable")
+    again = order[1:][np.diff(key[order]) == 0]
+    if again.size:
+        line = int(again.min())
+        raise InputError(
+            f"{head.line(line)}: the event {event_id[event[line]]} has a second row for the site "
+            f"{sites[site[line]]!r}: one row an event and site is wanted"
+        )
+    return event[order], site[order], {name: values[order] for name, values in whole.items()}
+
+
+def _measure_columns(head: _Head, imts: Sequence[str]) -> dict[str, tuple[str, float]]:
+    """Return column and factor of each measure, by the name that `predict` has for it."""
+    present: dict[IntensityType, str] = {}
+    for column in head.names:
+        match = _MEASURE.fullmatch(column)
+        if match is not None:
+            try:
+                present[openquake_type(match.group(1), column)] = column
+            except InputError:
+                continue  # another measure than those that models read
+    chosen: dict[str, tuple[str, float]] = {}
+    for imt in imts:
+        kind = openquake_type(imt, "--imt")
+        name = SPECTRAL.get(kind.period_s) if kind.period_s is not None else kind.measure
+        if name is None:
+            periods = ", ".join(f"SA({period:g})" for period in SPECTRAL)
+            raise InputError(f"--imt: no model reads {imt}; of spectral accelerations {periods}")
+        if kind not in present:
+            have = ", ".join(kind.imt for kind in present) or "none"
+            raise InputError(
+                f"{head.path}, line {head.lines}: there is no column gmv_{kind.imt}; the measures "
+                f"are {have}: choose with --imt"
+            )
+        chosen[name] = present[kind], kind.factor
+    return chosen
+
+
+def _event_places(head: _Head, numbers: IntArray, event_id: IntArray, row: int) -> IntArray:
+    """Return which of the events, by rising number, each row is of."""
+    places = np.searchsorted(event_id, numbers)
+    absent = event_id[np.minimum(places, event_id.size - 1)] != numbers
+    if absent.any():
+        first = int(np.flatnonzero(absent)[0])
+        raise InputError(
+            f"{head.line(row + first)}: the event {numbers[first]} is not in the file of events: "
+            "are both of one job?"
+        )
+    return places
+
+
+def _site_places(
+    head: _Head, texts: NDArray[Any], index: Mapping[str, int], row: int, mesh: _Head
+) -> IntArray:
+    """Return which of the sites each row is of."""
+    places = np.fromiter((index.get(text, -1) for text in texts.tolist()), np.int64, texts.size)
+    if (places < 0).any():
+        first = int(np.flatnonzero(places < 0)[0])
+        raise InputError(
+            f"{head.line(row + first)}: the site {texts[first]!r} is not in {mesh.path.name}: are "
+            "both of one job?"
+        )
+    return places

@@ -1,0 +1,617 @@
+"""How many blocks fail a year by an event set, how often any does, and what it costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.frames import Tabular
+from rbfrag.hazards.event_counts import (
+    MOST_IN_CLOSED_FORM,
+    PAIRS_AT_ONCE,
+    Curves,
+    Part,
+    PartCounts,
+    count_part,
+    laws_of,
+)
+from rbfrag.hazards.event_set import EventSet
+from rbfrag.hazards.joint_rate import NO_LAW
+from rbfrag.hazards.portfolio import Portfolio
+from rbfrag.hazards.shaking import NOTABLE
+from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT
+
+FloatArray = NDArray[np.float64]
+Run = Callable[[Iterator[Part], int], Iterator[PartCounts]]
+"""Does the parts of the work, of which the number is given, and yields the results in any order."""
+
+EACH_COUNT_TO = 20
+"""Numbers of failures up to which each is given; beyond them steps of equal ratio."""
+
+_STEPS = 40
+_THIN = 0.05
+_QUANTILES = (0.05, 0.5, 0.95)
+
+
+@dataclass(frozen=True)
+class Exceedance:
+    """How often a number of failures, or a loss, is reached.
+
+    Args:
+        value: the number of failures, or the loss.
+        annual_rate: rate of events that reach it [1/a]; of a scenario its probability.
+        ci_low: lower end of its interval by the counting error of the event set (Fay and Feuer
+            1997).
+        ci_high: upper end.
+        largest_of_year: probability that the largest event of a year reaches it; None of a
+            scenario.
+        sum_of_year: probability that the sum over a year does; None of a scenario.
+        beyond_effective_time: whether it is reached less than once in the time that the event set
+            covers.
+    """
+
+    value: float
+    annual_rate: float
+    ci_low: float
+    ci_high: float
+    largest_of_year: float | None
+    sum_of_year: float | None
+    beyond_effective_time: bool
+
+    @property
+    def return_period_years(self) -> float:
+        """Mean time between two such events [a]."""
+        return 1.0 / self.annual_rate
+
+    def as_dict(self, name: str, *, scenario: bool) -> dict[str, Any]:
+        """Return the numbers under the keys of the JSON contract."""
+        ends = {"ci_low": self.ci_low, "ci_high": self.ci_high}
+        if scenario:
+            return {name: self.value, "probability": self.annual_rate, **ends}
+        return {
+            name: self.value,
+            "annual_rate": self.annual_rate,
+            **ends,
+            "largest_of_year": self.largest_of_year,
+            "sum_of_year": self.sum_of_year,
+            "return_period_years": self.return_period_years,
+            "beyond_effective_time": self.beyond_effective_time,
+        }
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LossAnswer(Tabular):
+    """What an event set, or a scenario, does to a portfolio of blocks.
+
+    Its table is that of the events (`to_frame`).
+
+    Of an event set all rates are per year; of a scenario they are what is expected, or probable,
+    given the event. Errors are standard errors of the counting: another event set as long gives
+    another number.
+
+    Args:
+        events: the event set.
+        portfolio: the blocks.
+        samples: samples of each event; 0 for expected values alone.
+        seed: of the samples.
+        level: confidence level of the intervals.
+        laws: how the blocks of one event fail together; several are bounds.
+        failures: expected failures of each event, shape (n,).
+        loss: expected loss of each event, shape (n,).
+        loss_variance: its variance, shape (laws, n); NaN where it was not computed.
+        any_fails: probability of any failure, shape (laws, n); NaN likewise.
+        bounds: the same under full dependence and independence, shape (2, n).
+        block_rates: rate of each row of the table, its standard error, and its loss, shape
+            (3, rows).
+        exceedance: how often numbers of failures are reached, by law.
+        loss_exceedance: how often losses are.
+        quantiles: of failures and of the loss of a scenario at 5, 50 and 95 %, by law, shape
+            (laws, 2, 3); empty where there are none.
+        warnings: what to know about the answer.
+    """
+
+    events: EventSet
+    portfolio: Portfolio
+    samples: int
+    seed: int
+    level: float
+    laws: tuple[str, ...]
+    failures: FloatArray
+    loss: FloatArray
+    loss_variance: FloatArray
+    any_fails: FloatArray
+    bounds: FloatArray
+    block_rates: FloatArray
+    exceedance: Mapping[str, tuple[Exceedance, ...]]
+    loss_exceedance: Mapping[str, tuple[Exceedance, ...]]
+    quantiles: FloatArray
+    warnings: tuple[str, ...]
+
+    def mean(self, values: FloatArray) -> float:
+        """Return the weighted sum over the events: a rate [1/a], or a mean given the event."""
+        return float(self.events.weight @ values)
+
+    def error(self, values: FloatArray) -> float:
+        """Return the standard error of `mean`: that of a sum over a Poisson number of events."""
+        own = values - self.mean(values) if self.events.is_scenario else values
+        return float(np.sqrt(((self.events.weight * own) ** 2).sum()))
+
+    @property
+    def has_losses(self) -> bool:
+        """Whether the blocks state what a failure costs."""
+        return self.portfolio.loss is not None
+
+    @property
+    def average_annual_failures(self) -> float:
+        """Mean number of failures a year [1/a]; of a scenario, given the event."""
+        return self.mean(self.failures)
+
+    @property
+    def average_annual_loss(self) -> float | None:
+        """Mean loss a year, or given the event; None where no loss is stated."""
+        return self.mean(self.loss) if self.has_losses else None
+
+    @property
+    def annual_rate_any(self) -> float | None:
+        """Rate of events with at least one failure [1/a], or its probability given the event.
+
+        None where only bounds are known.
+        """
+        if len(self.laws) > 1 or np.isnan(self.any_fails).any():
+            return None
+        return self.mean(self.any_fails[0])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract."""
+        events, scenario = self.events, self.events.is_scenario
+        any_rate = self.annual_rate_any
+        any_error = None if any_rate is None else self.error(self.any_fails[0])
+        loss_error = self.error(self.loss) if self.has_losses else None
+        means: dict[str, Any] = {
+            "average_annual_failures": None if scenario else self.average_annual_failures,
+            "average_annual_failures_error": None if scenario else self.error(self.failures),
+            "annual_rate_any": None if scenario else any_rate,
+            "annual_rate_any_error": None if scenario else any_error,
+        }
+        if self.has_losses:
+            means["average_annual_loss"] = None if scenario else self.average_annual_loss
+            means["average_annual_loss_error"] = None if scenario else loss_error
+        if scenario:
+            means |= {
+                "expected_failures": self.average_annual_failures,
+                "expected_failures_error": self.error(self.failures),
+                "probability_any": any_rate,
+                "probability_any_error": any_error,
+            }
+            if self.has_losses:
+                means |= {
+                    "expected_loss": self.average_annual_loss,
+                    "expected_loss_error": loss_error,
+                }
+            means |= self._quantiles()
+        what = "probability_any" if scenario else "annual_rate_any"
+        bounds = {
+            name.replace(" ", "_"): {what: self.mean(values)}
+            for name, values in zip((DEPENDENT, INDEPENDENT), self.bounds, strict=True)
+        }
+        duration = events.duration
+        return {
+            "events": int(events.event_id.size),
+            "events_with_shaking": int(np.unique(events.event).size),
+            "scenario": scenario,
+            **means,
+            "joint_law": self.laws[0] if len(self.laws) == 1 else NO_LAW,
+            "bounds": bounds,
+            **self._exceedance("exceedance", "count", self.exceedance),
+            **(
+                self._exceedance("loss_exceedance", "loss", self.loss_exceedance)
+                if self.has_losses
+                else {}
+            ),
+            "investigation_time": None if duration is None else duration.investigation_time,
+            "ses_per_logic_tree_path": None if duration is None else duration.ses,
+            "realizations": len(events.realization_weights),
+            "effective_years": events.effective_years,
+            "samples": self.samples or None,
+            "seed": self.seed if self.samples else None,
+            "level": self.level,
+            "model": ", ".join(row.name for row in self.portfolio.models),
+            "term": ", ".join(dict.fromkeys(row.term for row in self.portfolio.models)),
+            "kind": ", ".join(dict.fromkeys(row.kind for row in self.portfolio.models)),
+            "measures": list(self.portfolio.measures),
+            "component": self.portfolio.component.name,
+            "blocks": self._blocks(),
+            "warnings": list(self.warnings),
+        }
+
+    def _exceedance(
+        self, key: str, name: str, curves: Mapping[str, tuple[Exceedance, ...]]
+    ) -> dict[str, Any]:
+        """Return the curve that answers; where only bounds are known an empty one and both."""
+        scenario = self.events.is_scenario
+        lists = {
+            law: [one.as_dict(name, scenario=scenario) for one in curve]
+            for law, curve in curves.items()
+        }
+        if len(lists) <= 1:
+            return {key: next(iter(lists.values()), [])}
+        by_law = {law.replace(" ", "_"): rows for law, rows in lists.items()}
+        return {key: [], f"{key}_bounds": by_law}
+
+    def _quantiles(self) -> dict[str, Any]:
+        if not self.quantiles.size:
+            return {}
+        names = ["failures", "loss"] if self.has_losses else ["failures"]
+        result: dict[str, Any] = {}
+        for i, name in enumerate(names):
+            for q, values in zip(_QUANTILES, self.quantiles[:, i].T.tolist(), strict=True):
+                result[f"{name}_p{round(100 * q):02d}"] = values[0] if len(values) == 1 else values
+        return result
+
+    def _blocks(self) -> list[dict[str, Any]]:
+        """Return one row of answers for each row of the table of blocks."""
+        failures, loss = (
+            ("expected_failures", "expected_loss")
+            if self.events.is_scenario
+            else ("average_annual_failures", "average_annual_loss")
+        )
+        names = (self.portfolio.block_ids, self.portfolio.site_ids)
+        return [
+            {
+                "block_id": block, "site_id": site, failures: rate, f"{failures}_error": error,
+                **({loss: cost} if self.has_losses else {}),
+            }
+            for block, site, rate, error, cost in zip(
+                *names, *self.block_rates.tolist(), strict=True
+            )
+        ]  # fmt: skip
+
+    def table_columns(self) -> dict[str, NDArray[Any]]:
+        """Return the table of events, one row each, also of those that shook no site."""
+        events = self.events
+        columns: dict[str, NDArray[Any]] = {
+            "event_id": events.event_id,
+            "rlz_id": events.realization,
+            "year": events.year,
+            "probability" if events.is_scenario else "annual_weight": events.weight,
+            "expected_failures": self.failures,
+        }
+        columns |= self._by_law("probability_any", self.any_fails)
+        if self.has_losses:
+            columns["expected_loss"] = self.loss
+            columns |= self._by_law("loss_variance", self.loss_variance)
+        return columns
+
+    def _by_law(self, name: str, values: FloatArray) -> dict[str, NDArray[Any]]:
+        if len(self.laws) == 1:
+            return {name: values[0]}
+        return {
+            f"{name}_{law.replace(' ', '_')}": own
+            for law, own in zip(self.laws, values, strict=True)
+        }
+
+
+def event_losses(
+    events: EventSet,
+    portfolio: Portfolio,
+    *,
+    samples: int = 100,
+    seed: int = 0,
+    level: float = 0.95,
+    run: Run | None = None,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> LossAnswer:
+    """Return how many blocks fail by an event set, how often any does, and what it costs.
+
+    Means are exact: sums of P over the events. What several blocks do together is sampled, by the
+    copula that is stored with the model: in each event one draw of what the earthquake shares, of
+    what each site shares, and of each block's own (`rbfrag.fragility.joint_sampling`). The stream
+    of random numbers is that of the event, so that the answer does not depend on who computes what.
+
+    Args:
+        events: the event set, or a scenario.
+        portfolio: the blocks at its sites.
+        samples: samples of each event; 0 for expected values alone, with the probability of any
+            failure by the beta-binomial law of the exact mean and variance.
+        seed: of the samples, 0 or more.
+        level: confidence level of intervals.
+        run: does the parts of the work, as worker processes may; None for here.
+        on_progress: called with the numbers of events done and of all.
+
+    Raises:
+        InputError: a number of samples or a seed that is none.
+    """
+    if isinstance(samples, bool) or not 0 <= samples <= 100_000:
+        raise InputError(f"samples = {samples}: give a number from 1 to 100000")
+    if isinstance(seed, bool) or seed < 0:
+        raise InputError(f"seed = {seed}: give a whole number, 0 or more")
+    if not 0.0 < level < 1.0:
+        raise InputError(f"level = {level:g}: give a level above 0 and below 1, such as 0.95")
+    groups = _groups(events, portfolio)
+    ends = _ends(portfolio) if samples else (np.empty(0), np.empty(0))
+    laws = laws_of(portfolio)
+    parts = (
+        Part(number, portfolio, _only(events, group), *ends, samples, seed)
+        for number, group in enumerate(groups)
+    )
+    do: Run = run or (lambda work, _: map(count_part, work))
+    done = 0
+    results: dict[int, PartCounts] = {}
+    for result in do(parts, len(groups)):
+        results[result.number] = result
+        done += groups[result.number].size
+        if on_progress is not None:
+            on_progress(done, sum(group.size for group in groups))
+    return _answer(events, portfolio, laws, ends, groups, results, samples, seed, level)
+
+
+def _groups(events: EventSet, portfolio: Portfolio) -> list[NDArray[np.intp]]:
+    """Return the events that shake a site with blocks, in parts of whole years."""
+    at_site = np.bincount(portfolio.site, minlength=len(events.site_ids))
+    pairs = np.bincount(events.event, at_site[events.site], minlength=events.event_id.size)
+    order = np.lexsort((events.event_id, events.year, events.realization))
+    order = order[pairs[order] > 0]
+    if not order.size:
+        return []
+    year, realization = events.year[order], events.realization[order]
+    new = (np.diff(year) != 0) | (np.diff(realization) != 0) | events.is_scenario
+    starts = np.concatenate([[0], np.flatnonzero(new) + 1])
+    number = (np.cumsum(pairs[order]) - pairs[order])[starts] // PAIRS_AT_ONCE
+    return np.split(order, starts[1:][np.diff(number) > 0])
+
+
+def _only(events: EventSet, group: NDArray[np.intp]) -> EventSet:
+    """Return some of the events with their rows."""
+    place = np.full(events.event_id.size, -1)
+    place[group] = np.arange(group.size)
+    rows = np.flatnonzero(place[events.event] >= 0)
+    return replace(
+        events,
+        event_id=events.event_id[group],
+        realization=events.realization[group],
+        year=events.year[group],
+        weight=events.weight[group],
+        event=place[events.event[rows]],
+        site=events.site[rows],
+        measures={name: values[rows] for name, values in events.measures.items()},
+    )
+
+
+def _ends(portfolio: Portfolio) -> tuple[FloatArray, FloatArray]:
+    """Return the numbers of failures and the losses that curves are given for."""
+    weight = portfolio.weight[portfolio.weight > 0.0]
+    most = float(weight.sum())
+    if not weight.size:
+        counts = np.empty(0)
+    elif (weight == np.rint(weight)).all():
+        first = np.arange(1.0, min(EACH_COUNT_TO, most) + 1.0)
+        more = np.rint(np.geomspace(EACH_COUNT_TO, most, _STEPS)) if most > first[-1] else first
+        counts = np.unique(np.concatenate([first, more]))
+    else:
+        counts = np.unique(np.geomspace(weight.min(), most, _STEPS))
+    loss = portfolio.loss
+    if loss is None or not loss.any():
+        return counts, np.empty(0)
+    sigma = portfolio.loss_sigma
+    high = float((loss * np.exp(3.0 * sigma)).sum())
+    low = float((loss * np.exp(-2.0 * sigma))[loss > 0.0].min())
+    # a step down in the last digits: the whole loss counts as reaching itself
+    return counts, np.geomspace(low, max(high, low), _STEPS if high > low else 1) * (1.0 - 1e-12)
+
+
+def _answer(
+    events: EventSet,
+    portfolio: Portfolio,
+    laws: tuple[str, ...],
+    ends: tuple[FloatArray, FloatArray],
+    groups: Sequence[NDArray[np.intp]],
+    results: Mapping[int, PartCounts],
+    samples: int,
+    seed: int,
+    level: float,
+) -> LossAnswer:
+    n, order = events.event_id.size, [results[i] for i in range(len(groups))]
+
+    def whole(name: str, *shape: int) -> FloatArray:
+        values = np.zeros((*shape, n))
+        for group, part in zip(groups, order, strict=True):
+            values[..., group] = getattr(part, name)
+        return values
+
+    blocks = sum((part.blocks for part in order), np.zeros((3, portfolio.size)))
+    curves = [
+        reduce(Curves.plus, (part[i] for part in pairs), Curves.empty(len(laws), end.size))
+        for i, end in enumerate(ends)
+        for pairs in [[(part.counts, part.losses) for part in order]]
+    ]
+    exceedance, loss_exceedance = (
+        {law: _curve(events, curve, end, i, level) for i, law in enumerate(laws)} if samples else {}
+        for curve, end in zip(curves, ends, strict=True)
+    )
+    any_fails = whole("any_fails", len(laws))
+    return LossAnswer(
+        events=events,
+        portfolio=portfolio,
+        samples=samples,
+        seed=seed,
+        level=level,
+        laws=laws,
+        failures=whole("failures"),
+        loss=whole("loss"),
+        loss_variance=whole("loss_variance", len(laws)),
+        any_fails=any_fails,
+        bounds=whole("bounds", 2),
+        block_rates=_of_rows(events, portfolio, blocks),
+        exceedance=exceedance,
+        loss_exceedance=loss_exceedance,
+        quantiles=_scenario_quantiles(events, groups, order, len(laws), samples),
+        warnings=_warnings(events, portfolio, laws, blocks, any_fails, samples),
+    )
+
+
+def _curve(
+    events: EventSet, curve: Curves, ends: FloatArray, law: int, level: float
+) -> tuple[Exceedance, ...]:
+    """Return the numbers that are reached at all, each with its interval."""
+    widest = float(events.weight.max())
+    effective = events.effective_years
+    rows = []
+    for k, end in enumerate(ends.tolist()):
+        rate, squares = curve.events[:, law, k].tolist()
+        if rate <= 0.0:
+            break
+        low, high = rate_interval(rate, squares, widest, level)
+        largest, total = (float(years[0, law, k]) for years in (curve.largest, curve.sum))
+        rows.append(
+            Exceedance(end, rate, low, min(high, 1.0), None, None, False)
+            if effective is None
+            else Exceedance(end, rate, low, high, largest, total, rate * effective < 1.0)
+        )
+    return tuple(rows)
+
+
+def rate_interval(rate: float, squares: float, widest: float, level: float) -> tuple[float, float]:
+    """Return both ends of the interval of a weighted sum of Poisson counts.
+
+    Fay and Feuer (1997): the gamma interval, which is the exact one (Garwood 1936) where all
+    weights are equal. Confidence intervals for directly standardized rates: a method based on the
+    gamma distribution. Statistics in Medicine 16, 791-801.
+
+    Args:
+        rate: the sum of weights.
+        squares: sum of their squares, the variance.
+        widest: greatest weight that one more count may have.
+        level: confidence level.
+    """
+    from scipy.stats import chi2
+
+    tail = 0.5 * (1.0 - level)
+    low = 0.0
+    if rate > 0.0:
+        low = squares / (2.0 * rate) * float(chi2.ppf(tail, 2.0 * rate * rate / squares))
+    more, wider = rate + widest, squares + widest * widest
+    high = wider / (2.0 * more) * float(chi2.ppf(1.0 - tail, 2.0 * more * more / wider))
+    return low, high
+
+
+def _of_rows(events: EventSet, portfolio: Portfolio, blocks: FloatArray) -> FloatArray:
+    """Return the rate of each row of the table, its error, and its loss.
+
+    Like blocks of one row have one P in each event.
+    """
+    cost = np.zeros(portfolio.size) if portfolio.mean_loss is None else portfolio.mean_loss
+    parts = (portfolio.weight * blocks[0], portfolio.weight * np.sqrt(blocks[1]), cost * blocks[0])
+    rate, error, loss = (
+        np.bincount(portfolio.row, part, minlength=len(portfolio.block_ids)) for part in parts
+    )
+    if events.is_scenario:  # the scatter about the mean, of events that weigh alike
+        error = np.sqrt(np.maximum(error**2 - rate**2 / events.event_id.size, 0.0))
+    return np.stack([rate, error, loss])
+
+
+def _scenario_quantiles(
+    events: EventSet,
+    groups: Sequence[NDArray[np.intp]],
+    parts: Sequence[PartCounts],
+    laws: int,
+    samples: int,
+) -> FloatArray:
+    """Return quantiles of failures and losses over all samples of a scenario."""
+    if not (events.is_scenario and samples):
+        return np.empty(0)
+    drawn = np.zeros((laws, events.event_id.size, 2, samples))
+    for group, part in zip(groups, parts, strict=True):
+        drawn[:, group] = part.quantiles
+    weight = np.repeat(events.weight, samples)
+    result = np.empty((laws, 2, len(_QUANTILES)))
+    for law in range(laws):
+        for what in range(2):
+            values = drawn[law, :, what].ravel()
+            order = np.argsort(values, kind="stable")
+            reached = np.cumsum(weight[order]) / weight.sum()
+            at = [np.searchsorted(reached, q - 1e-12) for q in _QUANTILES]
+            result[law, what] = values[order[at]]
+    return result
+
+
+def _warnings(
+    events: EventSet,
+    portfolio: Portfolio,
+    laws: tuple[str, ...],
+    blocks: FloatArray,
+    any_fails: FloatArray,
+    samples: int,
+) -> tuple[str, ...]:
+    warnings = [*events.warnings, *portfolio.remarks]
+    if len(portfolio.measures) > 1:
+        names = " and ".join(name.partition("_")[0].upper() for name in portfolio.measures)
+        warnings.append(
+            f"the engine draws {names} of one event and site independently given the rupture, and "
+            "pairs them as nature does not: P comes out too low (10 to 50 % with PGV and PGA); PGV "
+            "alone is safer"
+        )
+    if len(laws) > 1:
+        why = (
+            "blocks of several models have no joint law"
+            if len(portfolio.models) > 1
+            else "what the blocks share in one earthquake is not known to this model"
+        )
+        warnings.append(
+            f"{why}: given are bounds, full dependence and independence at the shaking of each site"
+        )
+    elif portfolio.size > 1:
+        warnings.append("the blocks are taken as of unknown azimuth: none shares a side by intent")
+    if np.isnan(any_fails).any():
+        warnings.append(
+            f"events that may fail more than {MOST_IN_CLOSED_FORM} blocks have no probability of "
+            "any failure and no variance without samples: bounds are given"
+        )
+    elif not samples and portfolio.component.scatter > 0.0:
+        warnings.append(
+            "without samples the scatter of the component is taken as each block's own where "
+            "blocks are counted together"
+        )
+    rate, outside = float(blocks[0].sum()), float(blocks[2].sum())
+    if rate > 0.0 and outside > NOTABLE * rate:
+        warnings.append(
+            f"{100.0 * outside / rate:.3g} % of the failures come from blocks and shaking outside "
+            "the ranges that the model was fitted on"
+        )
+    effective = events.effective_years
+    if effective is not None:
+        rare = (blocks[0] > 0.0) & (blocks[0] * effective < 1.0)
+        if rare.any():
+            warnings.append(
+                f"{int(rare.sum())} of {portfolio.size} blocks fail less than once in the "
+                f"{effective:.6g} years that the events cover: their rates are not resolved"
+            )
+    weak = _weakest_at_thin_shaking(events, portfolio)
+    if weak is not None:
+        warnings.append(weak)
+    return tuple(warnings)
+
+
+def _weakest_at_thin_shaking(events: EventSet, portfolio: Portfolio) -> str | None:
+    """Return a warning where blocks fail at shaking that the engine may have left out.
+
+    Its minimum_intensity stands in no file; few rows lie below it.
+    """
+    here = np.isin(events.site, portfolio.site)
+    if not here.any() or events.is_scenario:
+        return None
+    name = portfolio.measures[0]
+    thin = {n: np.full(1, np.quantile(v[here], _THIN)) for n, v in events.measures.items()}
+    p, _ = portfolio.probability(np.arange(portfolio.size), thin, (0.0, 0.0, 0.0))
+    if not p.max() > NOTABLE:
+        return None
+    return (
+        f"at {name} = {thin[name][0]:.3g}, below which the files have few rows, a block already "
+        f"fails with a probability of {p.max():.2g}: if minimum_intensity of the job was not far "
+        "below that, failures are missing from the answer"
+    )

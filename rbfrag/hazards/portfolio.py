@@ -1,0 +1,326 @@
+"""Blocks at the sites of an event set: what fails them, what it costs, what they share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cached_property
+from itertools import product
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.db.model_file import ModelRow
+from rbfrag.errors import InputError
+from rbfrag.fragility.dependence import Dependence
+from rbfrag.fragility.joint import UNKNOWN, Placement
+from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.predict import Model, answer_given
+from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.fragility.uncertain import normal_steps
+from rbfrag.hazards.conversions import Component
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+MOST_BLOCKS = 100_000
+"""Blocks of a portfolio, like ones of a count with them."""
+
+_REACH, _STEP, _FEWEST_POINTS = 5.0, 0.1, 9
+"""How far a logarithm's scatter is integrated, in standard deviations, and in which steps of it."""
+
+_LEVEL = 0.95  # no interval is computed: any level will do
+
+
+@dataclass(frozen=True, eq=False)
+class Portfolio:
+    """n blocks, sorted by their site.
+
+    Args:
+        block_ids: names of the rows of the table that the blocks are of.
+        site_ids: names of the sites of these rows.
+        row: row of the table that each block is of, shape (n,).
+        site: index of each block's site, rising, shape (n,).
+        p2: p² [1/s²], the median, shape (n,).
+        kr: k_r, the median, shape (n,).
+        p2_sigma: standard deviation of ln p², shape (n,).
+        kr_sigma: standard deviation of ln k_r, shape (n,).
+        weight: what a failure counts, shape (n,).
+        loss: what a failure costs in the median, its weight included, shape (n,); None where
+            nothing is stated.
+        loss_sigma: standard deviation of the logarithm of that, shape (n,).
+        options: what else a model may read of a block, by name, shape (n,) each; NaN where it is
+            not stated.
+        model: index of the model that answers for each block, shape (n,).
+        models: the models as stored.
+        measures: what the models read of the shaking.
+        component: what these values mean.
+    """
+
+    block_ids: tuple[str, ...]
+    site_ids: tuple[str, ...]
+    row: IntArray
+    site: IntArray
+    p2: FloatArray
+    kr: FloatArray
+    p2_sigma: FloatArray
+    kr_sigma: FloatArray
+    weight: FloatArray
+    loss: FloatArray | None
+    loss_sigma: FloatArray
+    options: Mapping[str, FloatArray]
+    model: IntArray
+    models: tuple[ModelRow, ...]
+    measures: tuple[str, ...]
+    component: Component
+
+    @classmethod
+    def of(
+        cls,
+        columns: Mapping[str, NDArray[Any]],
+        site_ids: Sequence[str],
+        measures: Sequence[str],
+        component: Component,
+        *,
+        kind: str | None = None,
+        model: Model | None = None,
+        db: str | PathLike[str] | None = None,
+    ) -> Portfolio:
+        """Return the blocks of a table.
+
+        Args:
+            columns: ``block_id``, ``p2_1_s2`` [1/s²] and ``kr`` of each row, and, if there are,
+                ``site_id``, ``kind``, ``count`` (like blocks, each with an azimuth of its own),
+                ``weight`` (what a failure counts), ``loss``, ``loss_sigma``, ``p2_sigma``,
+                ``kr_sigma`` and options of the kind such as ``restitution``.
+            site_ids: names of the sites of the event set.
+            measures: what is known of the shaking, by the names of :func:`rbfrag.predict`.
+            component: what its values mean.
+            kind: kind of failure of rows that state none; None for toppling.
+            model: as in :func:`rbfrag.predict`.
+            db: as in :func:`rbfrag.predict`.
+
+        Raises:
+            InputError: a site that is none of the event set, a count, loss or sigma that is none,
+                or no model that reads the measures.
+        """
+        names = columns["block_id"]
+        n = len(names)
+
+        def numbers(name: str, missing: float) -> FloatArray:
+            values = np.asarray(columns.get(name, np.full(n, missing)), dtype=np.float64)
+            values = np.where(np.isnan(values), missing, values)
+            wrong = ~((values >= 0.0) & (values < np.inf))
+            if wrong.any():
+                i = int(np.flatnonzero(wrong)[0])
+                raise InputError(
+                    f"block {names[i]} has {name} = {values[i]:g}: give a number not below zero"
+                )
+            return values
+
+        sites = _site_indices(columns, site_ids)
+        kinds = _kinds(columns, n, kind)
+        chosen = {
+            one: find_model(model, ("p2", "kr", *measures), db, kind=one or None)
+            for one in dict.fromkeys(kinds)
+        }
+        places = {one: i for i, one in enumerate(chosen)}
+        count, weight = numbers("count", 1.0), numbers("weight", 1.0)
+        wrong = (count != np.rint(count)) | (count < 1.0)
+        if wrong.any():
+            i = int(np.flatnonzero(wrong)[0])
+            raise InputError(
+                f"block {names[i]} has count = {count[i]:g}: give the number of like blocks, a "
+                "whole number from 1 on, or a weight"
+            )
+        if count.sum() > MOST_BLOCKS:
+            raise InputError(
+                f"there are {count.sum():g} blocks, by their counts: at most {MOST_BLOCKS} are "
+                "answered; a weight makes one failure count for many"
+            )
+        row = np.repeat(np.arange(n), count.astype(np.int64))
+        row = row[np.argsort(sites[row], kind="stable")]
+        loss = numbers("loss", 0.0) * weight if "loss" in columns else None
+        reads = {name for one in chosen.values() for name in one.method.block.options}
+        return cls(
+            block_ids=tuple(str(name) for name in names),
+            site_ids=tuple(site_ids[i] for i in sites.tolist()),
+            row=row,
+            site=sites[row],
+            p2=np.asarray(columns["p2_1_s2"], dtype=np.float64)[row],
+            kr=np.asarray(columns["kr"], dtype=np.float64)[row],
+            p2_sigma=numbers("p2_sigma", 0.0)[row],
+            kr_sigma=numbers("kr_sigma", 0.0)[row],
+            weight=weight[row],
+            loss=None if loss is None else loss[row],
+            loss_sigma=numbers("loss_sigma", 0.0)[row],
+            options={
+                name: np.asarray(columns[name], dtype=np.float64)[row]
+                for name in sorted(reads & set(columns))
+            },
+            model=np.array([places[one] for one in kinds], dtype=np.int64)[row],
+            models=tuple(one.row for one in chosen.values()),
+            measures=tuple(dict.fromkeys(n for one in chosen.values() for n in one.term.inputs)),
+            component=component,
+        )
+
+    def __getstate__(self) -> dict[str, Any]:
+        # models read anew travel as rows alone: their formulas cannot
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @property
+    def size(self) -> int:
+        """Number of blocks n, like ones of a count with them."""
+        return self.row.size
+
+    @property
+    def mean_loss(self) -> FloatArray | None:
+        """What a failure costs on average, shape (n,): median · exp(sigma²/2)."""
+        return None if self.loss is None else self.loss * np.exp(0.5 * self.loss_sigma**2)
+
+    @cached_property
+    def dependence(self) -> Dependence | None:
+        """What the failures of one earthquake share; None where that is not known."""
+        return self._answering[0].dependence if len(self.models) == 1 else None
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the models take for granted, each text once."""
+        texts = [
+            text
+            for model in self._answering
+            for text in (
+                model.term.advice,
+                model.method.block.presumes if model.kind == model.method.block.kind else "",
+                *model.notes,
+            )
+        ]
+        return tuple(dict.fromkeys(filter(None, texts)))
+
+    @property
+    def is_uncertain(self) -> bool:
+        """Whether a block's own parameters scatter."""
+        return bool(self.p2_sigma.any() or self.kr_sigma.any())
+
+    def placement(self, some: NDArray[np.intp]) -> Placement:
+        """Return some of the blocks as those of one earthquake, of unknown azimuths."""
+        p = np.sqrt(self.p2[some])
+        ln_y = np.log(self.kr[some] * STANDARD_GRAVITY_M_S2 / p)
+        return Placement.of(np.log(p), ln_y, site=self.site[some], polarity=UNKNOWN)
+
+    def scatter_points(self) -> tuple[FloatArray, FloatArray]:
+        """Return standard normal points of component, ln p² and ln k_r, shape (k, 3), and weights.
+
+        What does not scatter has the one point 0.
+        """
+        scatters = (self.component.scatter, float(self.p2_sigma.max()), float(self.kr_sigma.max()))
+        axes = [normal_steps(_points(scatter), _REACH) for scatter in scatters]
+        grids = np.meshgrid(*(x for x, _ in axes), indexing="ij")
+        weight = np.einsum("i,j,k->ijk", *(w for _, w in axes))
+        return np.stack([grid.ravel() for grid in grids], axis=1), weight.ravel()
+
+    @cached_property
+    def _answering(self) -> tuple[FragilityModel, ...]:
+        return tuple(FragilityModel.from_row(row) for row in self.models)
+
+    @cached_property
+    def _alike(self) -> tuple[tuple[int, tuple[str, ...]], ...]:
+        """Models, and which of their options are stated: blocks that are answered together."""
+        ways = [
+            tuple(name for name, is_stated in zip(self.options, way, strict=True) if is_stated)
+            for way in product((False, True), repeat=len(self.options))
+        ]
+        return tuple(
+            (number, way)
+            for number, model in enumerate(self._answering)
+            for way in ways
+            if set(way) <= set(model.method.block.options)
+        )
+
+    def _states(self, names: Sequence[str]) -> NDArray[np.bool_]:
+        """Return which blocks state these options of their model, and no others, shape (n,)."""
+        exact = np.ones(self.size, dtype=np.bool_)
+        for number, model in enumerate(self._answering):
+            own = self.model == number
+            for name in set(self.options) & set(model.method.block.options):
+                exact[own] &= np.isfinite(self.options[name][own]) == (name in names)
+        return exact
+
+    def probability(
+        self,
+        some: NDArray[np.intp],
+        shaking: Mapping[str, FloatArray],
+        points: tuple[FloatArray | float, FloatArray | float, FloatArray | float],
+    ) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Return P of some blocks, and whether they are in the ranges fitted, shapes (..., m).
+
+        Args:
+            some: indices of m blocks.
+            shaking: values of the measures, by name, of a shape that broadcasts with (..., m).
+            points: standard normal values of the component's scatter, of ln p² and of ln k_r, of
+                shapes that broadcast likewise.
+        """
+        xi, z_p, z_k = points
+        shift = np.exp(self.component.scatter * np.asarray(xi)) / self.component.ratio
+        given: dict[str, Any] = {
+            "p2": self.p2[some] * np.exp(self.p2_sigma[some] * z_p),
+            "kr": self.kr[some] * np.exp(self.kr_sigma[some] * z_k),
+            **{name: shaking[name] * shift for name in self.measures},
+        }
+        shape = np.broadcast_shapes(*(value.shape for value in given.values()))
+        given = {name: np.broadcast_to(value, shape) for name, value in given.items()}
+        p, in_domain = np.empty(shape), np.empty(shape, dtype=np.bool_)
+        for number, stated in self._alike:
+            own = (self.model[some] == number) & self._states(stated)[some]
+            if not own.any():
+                continue
+            model = self._answering[number]
+            part = {name: given[name][..., own] for name in ("p2", "kr", *model.term.inputs)}
+            part |= {name: self.options[name][some][own] for name in stated}
+            answer = answer_given(model, part, _LEVEL, interval=False)
+            assert isinstance(answer, PredictionArray)
+            p[..., own], in_domain[..., own] = answer.probability, answer.in_domain
+        if np.isnan(p).any():
+            block = int(some[np.argwhere(np.isnan(p))[0][-1]])
+            raise InputError(
+                f"block {self.block_ids[self.row[block]]}: model "
+                f"{self.models[self.model[block]].name!r} has no probability for p2 = "
+                f"{self.p2[block]:g} and kr = {self.kr[block]:g}"
+            )
+        return p, in_domain
+
+
+def _points(scatter: float) -> int:
+    """Return how many points the scatter of a logarithm takes."""
+    return max(_FEWEST_POINTS, 2 * math.ceil(_REACH * scatter / _STEP) + 1) if scatter else 1
+
+
+def _site_indices(columns: Mapping[str, Any], site_ids: Sequence[str]) -> IntArray:
+    names = columns["block_id"]
+    if "site_id" not in columns:
+        if len(site_ids) == 1:
+            return np.zeros(len(names), dtype=np.int64)
+        raise InputError(
+            f"the blocks have no column site_id, and there are {len(site_ids)} sites: name the "
+            f"site of each block, such as {', '.join(map(repr, site_ids[:3]))}"
+        )
+    index = {name: i for i, name in enumerate(site_ids)}
+    for block, name in zip(names, columns["site_id"], strict=True):
+        if str(name) not in index:
+            raise InputError(
+                f"block {block} stands at the site {str(name)!r}, which the event set does not "
+                f"have; its sites are {', '.join(map(repr, site_ids[:5]))}"
+                f"{' …' if len(site_ids) > 5 else ''} (identifiers are texts: '0012' is not 12)"
+            )
+    return np.array([index[str(name)] for name in columns["site_id"]], dtype=np.int64)
+
+
+def _kinds(columns: Mapping[str, Any], n: int, kind: str | None) -> list[str]:
+    """Return the kind of each row; empty for what a block is given by."""
+    stated = columns.get("kind", [""] * n)
+    return [str(one or "").strip() or (kind or "") for one in stated]

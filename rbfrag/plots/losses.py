@@ -1,0 +1,96 @@
+"""Figure of how often numbers of failures, and losses, are reached by an event set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rbfrag.errors import InputError
+from rbfrag.hazards.losses import Exceedance, LossAnswer
+from rbfrag.plots.canvas import (
+    BLUE,
+    RED,
+    legend_below,
+    light_grid,
+    new_figure,
+    open_corner,
+    plot_path,
+    save_figure,
+    written_numbers,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_COLOURS = (BLUE, RED)
+_LOWEST = 0.05  # of one event in the effective time
+
+
+def plot_losses(answer: LossAnswer, path: str | PathLike[str]) -> Path:
+    """Draw the curves of exceedance of failures and, where there is one, of the loss.
+
+    Bands are those of the counting error of the event set. Of years, the sum is drawn beside the
+    events; what happens less than once in the time that the events cover is shaded.
+
+    Args:
+        answer: the answer, with samples.
+        path: file to write: .png, .pdf or .svg.
+
+    Raises:
+        InputError: the answer has no curve.
+    """
+    plot_path(path)
+    panels = [("blocks that fail", answer.exceedance)]
+    if answer.has_losses:
+        panels.append(("loss", answer.loss_exceedance))
+    if not any(answer.exceedance.values()):
+        raise InputError("there is no curve to draw: no block fails in a sample, or none was drawn")
+    figure = new_figure(5.2 * len(panels), 4.4)
+    all_axes = figure.subplots(1, len(panels), squeeze=False)[0]
+    for axes, (title, curves) in zip(all_axes, panels, strict=True):
+        _draw(axes, answer, curves)
+        axes.set_xlabel(f"{title}, at least")
+        open_corner(axes)
+    light_grid(*all_axes)
+    scenario = answer.events.is_scenario
+    all_axes[0].set_ylabel("probability given the event" if scenario else "times a year [1/a]")
+    legend_below(figure, 4)
+    return save_figure(figure, path)
+
+
+def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedance]]) -> None:
+    axes.set_yscale("log")
+    drawn = [curve for curve in curves.values() if curve]
+    if drawn and max(one.value for curve in drawn for one in curve) > 30.0:
+        axes.set_xscale("log")
+        written_numbers(axes.xaxis, 1.0)
+    first = not axes.get_subplotspec().colspan.start  # type: ignore[union-attr]
+    several = len(curves) > 1
+    for colour, (law, curve) in zip(_COLOURS, curves.items(), strict=False):
+        if not curve:
+            continue
+        x = [one.value for one in curve]
+        of = f" ({law})" if several else ""
+        low, high = ([getattr(one, end) for one in curve] for end in ("ci_low", "ci_high"))
+        axes.fill_between(x, low, high, color=colour, alpha=0.18, lw=0.0)
+        axes.plot(
+            x, [one.annual_rate for one in curve], "o-", color=colour, ms=3.0, lw=1.5,
+            label=f"events{of}, {100 * answer.level:g} % band" if first else None,
+        )  # fmt: skip
+        sums = [one.sum_of_year for one in curve if one.sum_of_year is not None]
+        if sums:
+            axes.plot(
+                x, sums, "--", color=colour, lw=1.1,
+                label=f"sum of a year{of}, probability" if first else None,
+            )  # fmt: skip
+    effective = answer.events.effective_years
+    if drawn and effective is not None:
+        lowest = 0.3 * min(curve[-1].annual_rate for curve in drawn)
+        highest = 2.0 * max(curve[0].ci_high for curve in drawn)
+        axes.set_ylim(min(max(lowest, _LOWEST / effective), 0.5 / effective), highest)
+        axes.axhspan(
+            axes.get_ylim()[0], 1.0 / effective, color="#dddddd", alpha=0.6, lw=0.0,
+            label=f"less than once in {effective:.6g} years" if first else None,
+        )  # fmt: skip

@@ -1,0 +1,114 @@
+"""Values that no column can have: a finding and one sentence each, and no answer from them."""
+
+from __future__ import annotations
+
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy import Engine
+
+import rbfrag
+from rbfrag.db.check.database import check_database, coverage
+from rbfrag.db.engine import opened_database
+from rbfrag.db.location import reference_file
+from rbfrag.db.model_file import STORED, ModelRow, read_models
+from rbfrag.db.models import model_rows, save_model
+from rbfrag.db.motions import motion_rows
+from rbfrag.db.queries import combination_table
+from rbfrag.db.stored_combination import keys_with_samples, stored_combination
+from rbfrag.errors import DatabaseError, RbfragError
+
+
+def test_what_is_not_covered_is_said(filled: Engine) -> None:
+    with filled.connect() as connection:
+        text = coverage(connection)
+    assert "of 12 tables, each column but id by the digest of its row" in text
+    assert "measures of 3 motions" in text
+    assert "not covered: whole rows that were deleted" in text
+
+
+def _raw(path: Path, *statements: str) -> None:
+    with closing(sqlite3.connect(path)) as raw, raw:
+        raw.execute("PRAGMA ignore_check_constraints = ON")
+        for statement in statements:
+            raw.execute(statement)
+
+
+DAMAGE = {
+    "motion.flags": ("'1 2'", "'{'", "'[' || replace(printf('%5000s', ''), ' ', '[')", "7"),
+    "motion.remarks": ("'[1'", "'{}'"),
+    "motion.processing_applied": ("'['", "'[]'"),
+    "motion.pga_g": ("'strong'", "9e999", "x'00'"),
+    "motion.npts": ("'many'",),
+    "motion.dt_s": ("'short'", "-1"),
+    "motion.is_vertical": ("'up'",),
+    "motion.samples": ("'text'", "x'00'"),
+    "motion.start_time": ("'noon'",),
+    "motion.component": ("cast(x'ff' as text)",),
+    "recording.earthquake_id": ("'first'",),
+    "combination.settings": ("'['", "'[]'", "'7'"),
+    "combination.block": ("'{'",),
+    "combination.warnings": ("'{'", "cast(x'ff' as text)"),
+    "combination.kr_over_pga": ("'x'",),
+    "combination.certified": ("'yes'",),
+    "simulation.theta_n": ("'x'",),
+    "campaign.settings": ("'{'",),
+    "fragility_model.coefficients": ("'{\"slope\": NaN}'", "'[]'", "'7'", "x'ff'"),
+    "fragility_model.covariance": ("'[[1e999]]'", "'{}'"),
+    "fragility_model.domain": ("'{\"pgv_m_s\": 1}'", "'{'"),
+    "fragility_model.diagnostics": ("''", "'[1 2]'"),
+    "fragility_model.form": ("'two'",),
+    "fragility_model.is_default": ("'maybe'",),
+    "fragility_model.leave_out_steps": ("'7'",),
+    "fragility_model.dependence": ("'7'",),
+}
+"""By column, SQL values that no column of its kind can have."""
+
+
+@pytest.mark.parametrize(
+    ("column", "value"), [(column, value) for column in DAMAGE for value in DAMAGE[column]]
+)
+def test_no_value_ends_in_a_traceback(
+    sqlite_file: Path, fill: Any, model: ModelRow, column: str, value: str
+) -> None:
+    table, _, name = column.partition(".")
+    with opened_database(sqlite_file) as engine, engine.begin() as connection:
+        fill(connection, [1, 2])
+        save_model(connection, model)
+    one = "" if table == "simulation" else "WHERE id = 1"
+    _raw(sqlite_file, f"UPDATE {table} SET {name} = {value} {one}")
+    with opened_database(sqlite_file, read_only=True) as engine, engine.connect() as connection:
+        findings = check_database(connection)
+        # the row itself is named, but where SQLite cannot even hand it out
+        expected = "database" if "cast(" in value else table
+        assert expected in {found.table for found in findings}
+        for look in (motion_rows, model_rows, combination_table, stored_combinations):
+            try:
+                look(connection)
+            except RbfragError as error:
+                assert str(error).isprintable()  # noqa: PT017
+
+
+def stored_combinations(connection: Any) -> None:
+    for key in keys_with_samples(connection, numerics_version="2")[:3]:
+        stored_combination(connection, key)
+
+
+@pytest.mark.parametrize("column", [name for name in STORED if name not in ("name", "digest")])
+def test_every_prediction_verifies_its_model(tmp_path: Path, column: str) -> None:
+    shipped = reference_file()
+    assert shipped is not None
+    row = next(row for row in read_models(shipped) if row.is_default and row.kind == "toppling")
+    path = tmp_path / "models.db"
+    with opened_database(path, create=True) as engine, engine.begin() as connection:
+        save_model(connection, row)
+    assert 0.0 < rbfrag.predict(3.0, 0.1, pgv_m_s=0.5, pga_g=0.4, db=path).probability < 1.0
+    altered = {"form": "form + 1", "is_default": "NOT is_default"}.get(column, f"{column} || ' '")
+    _raw(path, f"UPDATE fragility_model SET {column} = {altered}")
+    with pytest.raises(DatabaseError, match=f"model {row.name} is damaged .*its digest differs"):
+        rbfrag.predict(3.0, 0.1, pgv_m_s=0.5, pga_g=0.4, db=path)
+    with opened_database(path, read_only=True) as engine, engine.connect() as connection:
+        assert {found.table for found in check_database(connection)} == {"fragility_model"}
