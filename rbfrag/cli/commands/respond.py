@@ -65,6 +65,9 @@ class Directions(options.Direction):
         "each, in their order.",
         metavar="MOTION",
     )
+    gap: float | None = option(
+        "Rest between two motions [s]. Default: as long as the block takes to come to rest."
+    )
 
     def each(self, count: int) -> list[options.Direction]:
         """Return the direction of each of so many motions."""
@@ -133,16 +136,13 @@ def respond(
         "Response model: toppling, rocking, sliding, slumping or confined_toppling. Default: "
         "that of the block's failure mode; of a block that topples with --no-back, rocking."
     ),
-    gap: float | None = option(
-        "Rest between two motions [s]. Default: as long as the block takes to come to rest."
-    ),
     db: options.Db = None,
     json: options.Json = False,
 ) -> None:
-    """Run one block under one accelerogram, or under several one after another.
+    """Run one block under one accelerogram.
 
-    A block that slides or slumps meets each motion where the one before has left it; one that
-    topples or rocks starts again from rest.
+    Several are run one after another: a block that slides or slumps meets each motion where the
+    one before has left it; one that topples or rocks starts again from rest.
 
     The block is --p2 and --kr (toppling, or with --kind rocking a free-standing one on level
     ground), --ky (sliding), or its shape, from which the failure mode and with it the model follow;
@@ -199,7 +199,7 @@ def respond(
             grounds if several else grounds[0],
             vertical=upwards if several else upwards[0],
             polarity=direction.polarity,
-            gap_s=gap,
+            gap_s=direction.gap,
             two_way=sliding.two_way,
             horizontal=sliding.horizontal,
             restitution=rocking.restitution,
