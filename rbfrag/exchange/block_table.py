@@ -27,6 +27,7 @@ from rbfrag.exchange.points import read_points
 from rbfrag.files import is_number, output_path, reading, written_whole
 from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.described import rectangle_numbers
+from rbfrag.solver.kinds import model_of_kind
 
 SUFFIXES = (".csv", ".parquet")
 """File types of a block table."""
@@ -188,7 +189,9 @@ def rectangle_columns(
         }
 
 
-def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+def waiting_blocks(
+    path: str | os.PathLike[str], kind: str | None = None
+) -> dict[str, NDArray[Any]]:
     """Return the blocks of a table (.csv, .parquet) or of GeoJSON points as columns.
 
     Args:
@@ -196,6 +199,8 @@ def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
             ``dip_deg``), and ``block_id``, ``p2_sigma``, ``kr_sigma``, ``weight``, ``lon`` and
             ``lat`` [deg] if it has them; a table also ``restitution``, ``site_id``, ``kind``,
             ``count``, ``loss`` and ``loss_sigma``.
+        kind: kind of the rows of a table that state none; of a free-standing kind rectangles are
+            not backed by a slope.
 
     Returns:
         Columns of one length; ``block_id`` are texts, numbers from 1 on where there are none.
@@ -206,7 +211,7 @@ def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
             message names it.
         MissingExtraError: a Parquet file without pyarrow.
     """
-    columns = _points(path) if str(path).lower().endswith(GEOJSON) else _rows(path)
+    columns = _points(path) if str(path).lower().endswith(GEOJSON) else _rows(path, kind)
     if columns["kr"].size == 0:
         raise InputError(f"{path}: there is no block in the file")
     for i in range(columns["kr"].size):
@@ -262,7 +267,7 @@ def _numbers(path: str | os.PathLike[str], name: str, values: list[Any]) -> NDAr
     return np.array(values, dtype=np.float64)
 
 
-def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+def _rows(path: str | os.PathLike[str], kind: str | None) -> dict[str, NDArray[Any]]:
     columns = read_columns(
         path,
         (),
@@ -270,7 +275,7 @@ def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
         texts=("block_id", "site_id", "kind"),
     )
     if is_of_rectangles(columns):
-        columns |= rectangle_columns(columns)
+        columns |= _rectangles(columns, kind)
     for name in NUMBERS:
         if name not in columns:
             raise InputError(
@@ -286,3 +291,18 @@ def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
             [str(i + 1) for i in range(columns["kr"].size)], dtype=object
         )
     return columns
+
+
+def _rectangles(columns: Mapping[str, NDArray[Any]], kind: str | None) -> dict[str, NDArray[Any]]:
+    """Return the numbers of rectangles, each by its kind: those of free-standing ones differ."""
+    backed = rectangle_columns(columns)
+    kinds = columns.get("kind", [""] * backed["kr"].size)
+    known = [str(one) or kind for one in kinds]
+    free = np.array([one is not None and model_of_kind(one).free_standing for one in known])
+    if not free.any():
+        return backed
+    free_standing = rectangle_columns(columns, free_standing=True)
+    numbers_of = {name: np.where(free, free_standing[name], backed[name]) for name in NUMBERS}
+    stated = columns.get("restitution", np.full(free.size, np.nan))
+    own = np.where(free & np.isnan(stated), free_standing["restitution"], stated)
+    return {**numbers_of, "restitution": own}
