@@ -188,7 +188,9 @@ def rectangle_columns(
         }
 
 
-def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+def waiting_blocks(
+    path: str | os.PathLike[str], *, free_standing: bool = False
+) -> dict[str, NDArray[Any]]:
     """Return the blocks of a table (.csv, .parquet) or of GeoJSON points as columns.
 
     Args:
@@ -196,6 +198,7 @@ def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
             ``dip_deg``), and ``block_id``, ``p2_sigma``, ``kr_sigma``, ``weight``, ``lon`` and
             ``lat`` [deg] if it has them; a table also ``restitution``, ``site_id``, ``kind``,
             ``count``, ``loss`` and ``loss_sigma``.
+        free_standing: whether nothing backs its rectangles.
 
     Returns:
         Columns of one length; ``block_id`` are texts, numbers from 1 on where there are none.
@@ -207,6 +210,18 @@ def waiting_blocks(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
         MissingExtraError: a Parquet file without pyarrow.
     """
     columns = _points(path) if str(path).lower().endswith(GEOJSON) else _rows(path)
+    if is_of_rectangles(columns):
+        stated = columns.get("restitution", np.full(columns["height_m"].size, np.nan))
+        columns |= rectangle_columns(columns, free_standing=free_standing)
+        if free_standing:
+            own = columns["restitution"]
+            columns["restitution"] = np.where(np.isnan(stated), own, stated)
+    for name in NUMBERS:
+        if name not in columns:
+            raise InputError(
+                f"{path}: there is no column {name}: a table of blocks has p2_1_s2 and kr, or "
+                "height_m and width_m"
+            )
     if columns["kr"].size == 0:
         raise InputError(f"{path}: there is no block in the file")
     for i in range(columns["kr"].size):
@@ -251,7 +266,6 @@ def _points(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
         columns[name] = _numbers(path, name, [p.get(name) for p in properties])
     if rectangles:
         columns["dip_deg"] = _numbers(path, "dip_deg", [p.get("dip_deg", 0.0) for p in properties])
-        columns |= rectangle_columns(columns)
     return columns
 
 
@@ -269,20 +283,11 @@ def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
         optional=(*NUMBERS, *SIGMAS, *RECTANGLE, *PORTFOLIO, "lon", "lat", "weight", "restitution"),
         texts=("block_id", "site_id", "kind"),
     )
-    if is_of_rectangles(columns):
-        columns |= rectangle_columns(columns)
-    for name in NUMBERS:
-        if name not in columns:
-            raise InputError(
-                f"{path}: there is no column {name}: a table of blocks has p2_1_s2 and kr, or "
-                "height_m and width_m"
-            )
     for name in {*SIGMAS} & {*columns}:
         columns[name] = np.nan_to_num(columns[name], nan=0.0, posinf=math.inf)
     if ("lon" in columns) != ("lat" in columns):
         raise InputError(f"{path}: lon and lat go together: give both columns, or neither")
     if "block_id" not in columns:
-        columns["block_id"] = np.array(
-            [str(i + 1) for i in range(columns["kr"].size)], dtype=object
-        )
+        size = next(iter(columns.values())).size if columns else 0
+        columns["block_id"] = np.array([str(i + 1) for i in range(size)], dtype=object)
     return columns
