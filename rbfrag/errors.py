@@ -17,7 +17,8 @@
     ├── ModelError                                                                (exit 2)
     │   ├── UnknownModelError       no fitted model of that name
     │   └── FitError                the data cannot carry the fit; the reason is in the message
-    └── WorkFailedError             part of the work failed; what finished is kept (exit 1)
+    ├── WorkFailedError             part of the work failed; what finished is kept (exit 1)
+    └── StoppedError                stopped on request; what finished is kept       (exit 130)
 
 A message says what was wrong with the offending value, where (file and line), and
 what to do next. It is one paragraph of less than 500 characters meant for a person, without a
@@ -173,6 +174,12 @@ class WorkFailedError(RbfragError):
     """Part of the work failed; what finished is kept."""
 
     exit_status: ClassVar[int] = 1
+
+
+class StoppedError(RbfragError):
+    """Stopped on request; what finished is kept."""
+
+    exit_status: ClassVar[int] = 130
 
 
 def checked_name(name: str, what: str) -> str:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 from sqlalchemy import Engine
 
 from rbfrag.campaign.executors.local import CLUSTER, check_workers, executor
+from rbfrag.campaign.interrupt import Stopped, never
 from rbfrag.campaign.machine import processor_and_compiler
 from rbfrag.campaign.plan import (
     CampaignPlan,
@@ -39,7 +40,7 @@ from rbfrag.db.motions import load_motion
 from rbfrag.db.queries import Vertical
 from rbfrag.db.responses import insert_responses
 from rbfrag.db.spectra import store_spectrum
-from rbfrag.errors import InputError, WorkFailedError
+from rbfrag.errors import InputError, StoppedError, WorkFailedError
 from rbfrag.solver.kind import Case
 from rbfrag.solver.kinds import models
 from rbfrag.solver.quantity import positive
@@ -145,6 +146,7 @@ def simulate(
     jobs: int | None = None,
     scheduler: str | None = None,
     on_progress: Callable[[CampaignProgress], None] | None = None,
+    stopped: Stopped = never,
 ) -> CampaignSummary:
     """Store critical values and outcomes of every motion x vertical x polarity x block.
 
@@ -178,11 +180,13 @@ def simulate(
         jobs: worker processes; None for one per processor, 1 for none (in this process).
         scheduler: address of a Dask scheduler whose workers take the place of local ones.
         on_progress: called after each motion.
+        stopped: asked now and then whether to end after the motions in hand.
 
     Raises:
         InputError: nothing to run, a value that cannot be used, no scheduler at that address.
         DatabaseError: the database cannot be used.
         WorkFailedError: a worker died; what was finished is stored.
+        StoppedError: `stopped` said so; what was finished is stored.
     """
     check_workers(jobs, scheduler)
     blocks = {"p2": p2, "rotations_deg": rotations_deg, "displacements_m": displacements_m,
@@ -197,7 +201,7 @@ def simulate(
         with engine.connect() as connection:
             plan = plan_campaign(connection, kind, cases, suite=suite, vertical=vertical)
             todo = remaining_work(connection, plan, wanted)
-        with executor(run_work, jobs, scheduler if todo.motions else None) as execute:
+        with executor(run_work, jobs, scheduler if todo.motions else None, stopped) as execute:
             settings = {
                 "kind": kind,
                 "suite": suite,
@@ -214,6 +218,8 @@ def simulate(
             run.tell()
             for done in execute(_work(engine, todo, depth), len(todo.motions)):
                 run.take(done)
+            if not run.is_done:
+                raise StoppedError(run.how_far())
             with engine.begin() as connection:
                 finish_campaign(connection, campaign_id)
     return run.summary()
@@ -291,6 +297,15 @@ class _Run:
                 f"value {before.kr_over_pga!r}, the search repeated for its map gives {now.status} "
                 f"and {now.kr_over_pga!r}: look at the database with  rbfrag db check"
             )
+
+    @property
+    def is_done(self) -> bool:
+        """Whether everything asked for is stored."""
+        return self._done == self._total
+
+    def how_far(self) -> str:
+        """Return how far a run is that ends before its end."""
+        return f"stopped: {self._done} of {self._total} stored; the same command goes on"
 
     def tell(self) -> None:
         """Report progress."""

@@ -27,6 +27,7 @@ from rbfrag.exchange.points import read_points
 from rbfrag.files import is_number, output_path, reading, written_whole
 from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.described import rectangle_numbers
+from rbfrag.solver.kinds import model_of_kind
 
 SUFFIXES = (".csv", ".parquet")
 """File types of a block table."""
@@ -189,7 +190,7 @@ def rectangle_columns(
 
 
 def waiting_blocks(
-    path: str | os.PathLike[str], *, free_standing: bool = False
+    path: str | os.PathLike[str], kind: str | None = None
 ) -> dict[str, NDArray[Any]]:
     """Return the blocks of a table (.csv, .parquet) or of GeoJSON points as columns.
 
@@ -198,7 +199,8 @@ def waiting_blocks(
             ``dip_deg``), and ``block_id``, ``p2_sigma``, ``kr_sigma``, ``weight``, ``lon`` and
             ``lat`` [deg] if it has them; a table also ``restitution``, ``site_id``, ``kind``,
             ``count``, ``loss`` and ``loss_sigma``.
-        free_standing: whether nothing backs its rectangles.
+        kind: kind of the rows of a table that state none; of a free-standing kind rectangles are
+            not backed by a slope.
 
     Returns:
         Columns of one length; ``block_id`` are texts, numbers from 1 on where there are none.
@@ -209,19 +211,8 @@ def waiting_blocks(
             message names it.
         MissingExtraError: a Parquet file without pyarrow.
     """
-    columns = _points(path) if str(path).lower().endswith(GEOJSON) else _rows(path)
-    if is_of_rectangles(columns):
-        stated = columns.get("restitution", np.full(columns["height_m"].size, np.nan))
-        columns |= rectangle_columns(columns, free_standing=free_standing)
-        if free_standing:
-            own = columns["restitution"]
-            columns["restitution"] = np.where(np.isnan(stated), own, stated)
-    for name in NUMBERS:
-        if name not in columns:
-            raise InputError(
-                f"{path}: there is no column {name}: a table of blocks has p2_1_s2 and kr, or "
-                "height_m and width_m"
-            )
+    read = _points if str(path).lower().endswith(GEOJSON) else _rows
+    columns = read(path, kind)
     if columns["kr"].size == 0:
         raise InputError(f"{path}: there is no block in the file")
     for i in range(columns["kr"].size):
@@ -247,7 +238,7 @@ def waiting_blocks(
     return columns
 
 
-def _points(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+def _points(path: str | os.PathLike[str], kind: str | None) -> dict[str, NDArray[Any]]:
     points = read_points(path)
     columns: dict[str, NDArray[Any]] = {
         "lon": np.array([lon for lon, _, _ in points]),
@@ -266,6 +257,7 @@ def _points(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
         columns[name] = _numbers(path, name, [p.get(name) for p in properties])
     if rectangles:
         columns["dip_deg"] = _numbers(path, "dip_deg", [p.get("dip_deg", 0.0) for p in properties])
+        columns |= _rectangles(columns, kind)
     return columns
 
 
@@ -276,18 +268,42 @@ def _numbers(path: str | os.PathLike[str], name: str, values: list[Any]) -> NDAr
     return np.array(values, dtype=np.float64)
 
 
-def _rows(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+def _rows(path: str | os.PathLike[str], kind: str | None) -> dict[str, NDArray[Any]]:
     columns = read_columns(
         path,
         (),
         optional=(*NUMBERS, *SIGMAS, *RECTANGLE, *PORTFOLIO, "lon", "lat", "weight", "restitution"),
         texts=("block_id", "site_id", "kind"),
     )
+    if is_of_rectangles(columns):
+        columns |= _rectangles(columns, kind)
+    for name in NUMBERS:
+        if name not in columns:
+            raise InputError(
+                f"{path}: there is no column {name}: a table of blocks has p2_1_s2 and kr, or "
+                "height_m and width_m"
+            )
     for name in {*SIGMAS} & {*columns}:
         columns[name] = np.nan_to_num(columns[name], nan=0.0, posinf=math.inf)
     if ("lon" in columns) != ("lat" in columns):
         raise InputError(f"{path}: lon and lat go together: give both columns, or neither")
     if "block_id" not in columns:
-        size = next(iter(columns.values())).size if columns else 0
-        columns["block_id"] = np.array([str(i + 1) for i in range(size)], dtype=object)
+        columns["block_id"] = np.array(
+            [str(i + 1) for i in range(columns["kr"].size)], dtype=object
+        )
     return columns
+
+
+def _rectangles(columns: Mapping[str, NDArray[Any]], kind: str | None) -> dict[str, NDArray[Any]]:
+    """Return the numbers of rectangles, each by its kind: those of free-standing ones differ."""
+    backed = rectangle_columns(columns)
+    kinds = columns.get("kind", [""] * backed["kr"].size)
+    known = [str(one) or kind for one in kinds]
+    free = np.array([one is not None and model_of_kind(one).free_standing for one in known])
+    if not free.any():
+        return backed
+    free_standing = rectangle_columns(columns, free_standing=True)
+    numbers_of = {name: np.where(free, free_standing[name], backed[name]) for name in NUMBERS}
+    stated = columns.get("restitution", np.full(free.size, np.nan))
+    own = np.where(free & np.isnan(stated), free_standing["restitution"], stated)
+    return {**numbers_of, "restitution": own}

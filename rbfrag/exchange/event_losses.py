@@ -75,7 +75,7 @@ def losses(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    columns = blocks if isinstance(blocks, Mapping) else waiting_blocks(blocks)
+    columns = blocks if isinstance(blocks, Mapping) else waiting_blocks(blocks, kind)
     if "block_id" not in columns:
         names = [str(i + 1) for i in range(len(columns["kr"]))]
         columns = {**columns, "block_id": np.array(names, dtype=object)}

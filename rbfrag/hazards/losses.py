@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.frames import Tabular
 from rbfrag.hazards.event_counts import (
     MOST_IN_CLOSED_FORM,
     PAIRS_AT_ONCE,
@@ -84,9 +85,11 @@ class Exceedance:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class LossAnswer:
+@dataclass(frozen=True, eq=False, repr=False)
+class LossAnswer(Tabular):
     """What an event set, or a scenario, does to a portfolio of blocks.
+
+    Its table is that of the events (`to_frame`).
 
     Of an event set all rates are per year; of a scenario they are what is expected, or probable,
     given the event. Errors are standard errors of the counting: another event set as long gives
@@ -269,7 +272,7 @@ class LossAnswer:
             )
         ]  # fmt: skip
 
-    def event_columns(self) -> dict[str, NDArray[Any]]:
+    def table_columns(self) -> dict[str, NDArray[Any]]:
         """Return the table of events, one row each, also of those that shook no site."""
         events = self.events
         columns: dict[str, NDArray[Any]] = {
@@ -545,7 +548,7 @@ def _warnings(
     any_fails: FloatArray,
     samples: int,
 ) -> tuple[str, ...]:
-    warnings = list(events.warnings)
+    warnings = [*events.warnings, *portfolio.remarks]
     if len(portfolio.measures) > 1:
         names = " and ".join(name.partition("_")[0].upper() for name in portfolio.measures)
         warnings.append(

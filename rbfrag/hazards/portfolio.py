@@ -189,6 +189,20 @@ class Portfolio:
         return self._answering[0].dependence if len(self.models) == 1 else None
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the models take for granted, each text once."""
+        texts = [
+            text
+            for model in self._answering
+            for text in (
+                model.term.advice,
+                model.method.block.presumes if model.kind == model.method.block.kind else "",
+                *model.notes,
+            )
+        ]
+        return tuple(dict.fromkeys(filter(None, texts)))
+
+    @property
     def is_uncertain(self) -> bool:
         """Whether a block's own parameters scatter."""
         return bool(self.p2_sigma.any() or self.kr_sigma.any())

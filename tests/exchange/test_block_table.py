@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
 from rbfrag.exchange import block_table
-from rbfrag.exchange.block_table import read_columns, write_block_table
+from rbfrag.exchange.block_table import read_columns, waiting_blocks, write_block_table
 
 TABLE = {
     "block_id": np.arange(1, 4),
@@ -147,3 +147,18 @@ for act in (lambda: table_path("a.parquet"), lambda: read_columns("a.parquet", (
         env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parent.parent.parent)},
     )
     assert done.stdout.count("pip install 'rbfrag[parquet]'") == 2, done.stderr
+
+
+def test_rectangles_of_a_free_standing_kind(tmp_path: Path) -> None:
+    """Of these the dip weakens, whichever way it leans, and the restitution is Housner's (1963)."""
+    path = tmp_path / "blocks.csv"
+    path.write_text(
+        "height_m,width_m,dip_deg,kind,restitution\n"
+        "3,0.6,-5,,\n3,0.6,-5,rocking,\n3,0.6,-5,rocking,0.9\n"
+    )
+    columns = waiting_blocks(path)
+    backed, free, _ = columns["kr"].tolist()
+    alpha, dip = np.arctan(0.2), np.radians(5.0)
+    assert (backed, free) == pytest.approx((np.tan(alpha + dip), np.tan(alpha - dip)))
+    assert columns["restitution"][1:] == pytest.approx([1.0 - 1.5 * np.sin(alpha) ** 2, 0.9])
+    assert waiting_blocks(path, "rocking")["kr"][0] == pytest.approx(free)

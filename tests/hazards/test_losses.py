@@ -71,7 +71,7 @@ def test_three_realizations_by_hand(job: Path) -> None:
     rates = [row["average_annual_failures"] for row in answer.as_dict()["blocks"]]
     assert rates == pytest.approx([at_0012, at_007, at_z9], rel=1e-9)
     assert answer.average_annual_failures == pytest.approx(at_0012 + at_007 + at_z9, rel=1e-9)
-    of_events = answer.event_columns()
+    of_events = answer.table_columns()
     both = probability(0.4, 0.6) + probability(0.4, 0.4)
     assert of_events["expected_failures"][0] == pytest.approx(both, rel=1e-9)
     assert of_events["expected_failures"][2] == 0.0  # shook nothing
@@ -299,7 +299,7 @@ def test_a_long_list_without_samples_has_bounds(
     monkeypatch.setattr("rbfrag.hazards.event_counts.MOST_IN_CLOSED_FORM", 3)
     answer = answered(one_event(tmp_path), table([0.36] * 4, "Z9", loss=1.0), expected=True)
     assert answer.annual_rate_any is None
-    assert np.isnan(answer.event_columns()["probability_any"][0])
+    assert np.isnan(answer.table_columns()["probability_any"][0])
     assert answer.average_annual_failures == pytest.approx(0.04 * probability(0.36, 0.5))
     assert any("without samples" in text for text in answer.warnings)
 

@@ -15,6 +15,7 @@ from multiprocessing.connection import wait as wait_for_end
 from typing import Any, TypeVar
 
 from rbfrag.campaign.executors.dask import GO_ON, connected, run_on_cluster
+from rbfrag.campaign.interrupt import Stopped, held_back, never
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.solver.integrator.compiled import callbacks, on_compilation
 
@@ -42,6 +43,7 @@ def executor(
     run_work: Callable[[W], R],
     jobs: int | None,
     scheduler: str | None,
+    stopped: Stopped = never,
     *,
     after_a_death: str = GO_ON,
 ) -> Iterator[Callable[[Iterator[W], int], Iterator[R]]]:
@@ -53,6 +55,7 @@ def executor(
         run_work: does one chunk of work; a function of a module, which workers can find.
         jobs: worker processes; None for one per processor.
         scheduler: address of a Dask scheduler whose workers take their place.
+        stopped: says whether to end after the chunks in hand.
         after_a_death: what to do next when workers have died.
     """
     if scheduler is None:
@@ -61,14 +64,28 @@ def executor(
             work,
             min(jobs or os.cpu_count() or 1, chunks),
             after_a_death=after_a_death,
+            stopped=stopped,
         )
         return
     with connected(scheduler) as client:
-        yield lambda work, _: run_on_cluster(client, run_work, work, after_a_death)
+        yield lambda work, _: _until(stopped, run_on_cluster(client, run_work, work, after_a_death))
+
+
+def _until(stopped: Stopped, results: Iterator[R]) -> Iterator[R]:
+    # what the cluster has in hand is cancelled when this ends
+    for result in results:
+        yield result
+        if stopped():
+            return
 
 
 def run_locally(
-    do: Callable[[W], R], work: Iterator[W], workers: int, *, after_a_death: str
+    do: Callable[[W], R],
+    work: Iterator[W],
+    workers: int,
+    *,
+    after_a_death: str,
+    stopped: Stopped = never,
 ) -> Iterator[R]:
     """Yield the answers as they come, from worker processes or, for one worker, from here.
 
@@ -80,9 +97,13 @@ def run_locally(
         work: the chunks.
         workers: number of processes.
         after_a_death: what to do next when a worker process has died.
+        stopped: says whether to end after the chunks in hand.
     """
     if workers <= 1:
-        yield from map(do, work)
+        for item in work:
+            if stopped():
+                return
+            yield do(item)
         return
     # spawn: the same on every system, and no lock or connection is inherited half-way
     context = multiprocessing.get_context("spawn")
@@ -92,13 +113,23 @@ def run_locally(
     running: set[Future[R]] = set()
     try:
         for item in work:
-            running.add(pool.submit(do, item))
+            if stopped():
+                break
+            with held_back():  # the first of these starts the workers
+                running.add(pool.submit(do, item))
             if len(running) >= workers * (1 + QUEUED_PER_WORKER):
                 finished, running = wait(running, return_when=FIRST_COMPLETED)
                 yield from _results(finished)
         while running:
+            if stopped():
+                running = {future for future in running if not future.cancel()}
             finished, running = wait(running, return_when=FIRST_COMPLETED)
             yield from _results(finished)
+    except KeyboardInterrupt:
+        # nobody waits for what is in hand: it is not stored, and computed again
+        for worker in multiprocessing.active_children():
+            worker.kill()
+        raise
     except BrokenProcessPool:
         raise WorkFailedError(
             f"a worker process died (killed, or out of memory); {after_a_death}, with fewer "

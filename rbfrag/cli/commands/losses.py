@@ -133,7 +133,7 @@ def losses(
             run=_Workers(workers.jobs, workers.scheduler), on_progress=bar.show,
         )  # fmt: skip
     if out is not None:
-        write_block_table(answer.event_columns(), out)
+        write_block_table(answer.table_columns(), out)
     if plot is not None:
         from rbfrag.plots.losses import plot_losses
 

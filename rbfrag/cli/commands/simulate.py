@@ -101,10 +101,11 @@ def simulate(
     After Ctrl-C, a crash or a kill, the same command goes on where it stopped; what is stored is
     not computed again, and what a stored combination lacks is added.
     """
+    from rbfrag.campaign.interrupt import stopped_by_interrupts
     from rbfrag.campaign.simulate import simulate as run
 
     say_when_compiling()
-    with ProgressBar("simulate", "combinations") as bar:
+    with stopped_by_interrupts() as stopped, ProgressBar("simulate", "combinations") as bar:
 
         def show(progress: CampaignProgress) -> None:
             before = f"{progress.resumed} stored before" if progress.resumed else ""
@@ -125,6 +126,7 @@ def simulate(
             jobs=workers.jobs,
             scheduler=workers.scheduler,
             on_progress=show,
+            stopped=stopped,
         )
     report = summary.as_dict()
     if json:

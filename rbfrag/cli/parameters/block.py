@@ -219,7 +219,7 @@ class TableOptions(BlockOptions):
         if self.blocks is not None:
             from rbfrag.exchange.block_table import waiting_blocks
 
-            table = waiting_blocks(self.blocks, free_standing=standing.is_free)
+            table = waiting_blocks(self.blocks, standing.kind)
             return TopplingBlocks(standing.completed(table), False, ())
         from rbfrag.solver.quantity import positive
 

@@ -1,0 +1,66 @@
+"""What Ctrl-C does to long work: once, it ends after what is in hand; twice, at once."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+STOPPING = "stopping after the motion in hand; press again to stop now"
+
+INTERRUPTED = 130
+"""Exit status of a program that SIGINT ended: 128 and the signal's number."""
+
+Stopped = Callable[[], bool]
+"""Whether a stop was asked for."""
+
+
+def never() -> bool:
+    """Return False: nothing asks for a stop."""
+    return False
+
+
+@contextmanager
+def stopped_by_interrupts() -> Iterator[Stopped]:
+    """Yield a function that says whether Ctrl-C was pressed within a ``with`` block.
+
+    The first press says so on standard error at once. The second kills the worker processes and
+    ends the program with status 130: a transaction that is open is rolled back by its database.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield never  # only the main thread may handle signals
+        return
+    pressed = threading.Event()
+
+    def press(_signal: int, _frame: Any) -> None:
+        if pressed.is_set():
+            for worker in multiprocessing.active_children():
+                worker.kill()
+            os._exit(INTERRUPTED)
+        pressed.set()
+        # not print: the signal may have come in the midst of one
+        os.write(2, f"\n{STOPPING}\n".encode())
+
+    before = signal.signal(signal.SIGINT, press)
+    try:
+        yield pressed.is_set
+    finally:
+        # a press while the program ends must not change its status
+        signal.signal(signal.SIGINT, signal.SIG_IGN if pressed.is_set() else before)
+
+
+@contextmanager
+def held_back() -> Iterator[None]:
+    """Hold back SIGINT for a ``with`` block; processes that are started in it never get it."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
