@@ -14,7 +14,7 @@ that :func:`rbfrag.hazards.site_probability.site_probability` integrates.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -28,7 +28,7 @@ from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.predict import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.correlations import correlations
-from rbfrag.hazards.site_probability import SiteProbability
+from rbfrag.hazards.site_probability import SiteProbability, described
 from rbfrag.hazards.site_shaking import SiteShaking
 from rbfrag.hazards.spatial_field import SpatialField, correlation_range_km
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -59,7 +59,7 @@ DRAWS, MOST_DRAWS = 100, 10_000
 
 _VALUES = 5_000_000
 _FEWEST, _MOST = 10, 1_000_000
-_VALUES_AT_ONCE = 2_000_000
+_VALUES_AT_ONCE, _RESIDUALS_AT_ONCE = 2_000_000, 12_000_000
 
 
 @dataclass(frozen=True)
@@ -187,6 +187,7 @@ def map_failures(
     places: Places,
     *,
     weight: FloatArray | None = None,
+    restitution: FloatArray | None = None,
     draws: int | None = None,
     seed: int = 0,
     between: float = BETWEEN,
@@ -200,6 +201,7 @@ def map_failures(
         kr: toppling yield acceleration coefficients, shape (m,).
         places: where the sites lie.
         weight: how many blocks each one stands for, shape (m,); None for 1.
+        restitution: that they were answered for, shape (m,); None for their own.
         draws: number of draws, 10 or more; None for 100, and for more where blocks are few.
         seed: of the random numbers.
         between: β, 0 to 1.
@@ -226,12 +228,15 @@ def map_failures(
     generator = np.random.default_rng(seed)
     drawn = {name: np.zeros(draws) for name in laws}
     any_fails = {name: np.zeros(draws, dtype=np.bool_) for name in laws}
-    given = {"p2": p2[block, None], "kr": kr[block, None]}
+    columns = described(answer.shaking.model, p2, kr, restitution)
+    given = {name: values[block, None] for name, values in columns.items()}
     at_once = max(1, _VALUES_AT_ONCE // max(site.size, 1))
-    for start in range(0, draws if site.size else 0, at_once):
-        part = slice(start, min(start + at_once, draws))
-        count = part.stop - start
-        shaken = answer.shaking.shaken(used, residuals.draw(count, generator))
+    start = 0
+    for logs in residuals.in_parts(draws if site.size else 0, at_once, generator):
+        count = logs.shape[1]
+        part = slice(start, start + count)
+        start += count
+        shaken = answer.shaking.shaken(used, logs)
         values = {name: measure[here] for name, measure in shaken.items()}
         prediction = answer_given(
             answer.shaking.model, {**given, **values}, answer.level, interval=False
@@ -306,6 +311,16 @@ class _Residuals:
         self._factor = np.linalg.cholesky(correlations(shaking.names))
         self._field = SpatialField(places.lon, places.lat, range_km) if shaking.integrated else None
         self._group = np.unique(places.group, return_inverse=True)[1]
+
+    def in_parts(
+        self, draws: int, at_once: int, generator: np.random.Generator
+    ) -> Iterator[FloatArray]:
+        """Yield residuals of a few draws at a time; a field costs little more for many draws."""
+        many = max(at_once, _RESIDUALS_AT_ONCE // max(self._deviations.size, 1))
+        for start in range(0, draws, many):
+            logs = self.draw(min(many, draws - start), generator)
+            for first in range(0, logs.shape[1], at_once):
+                yield logs[:, first : first + at_once]
 
     def draw(self, count: int, generator: np.random.Generator) -> FloatArray:
         """Return residuals, shape (sites, count, k)."""
