@@ -46,7 +46,7 @@ class Guard:
         own = scope["path"].startswith("/v1/")
         # HEAD is answered as GET, and its body is left out
         head_alone = own and scope["method"] == "HEAD"
-        asked = {**scope, "method": "GET"} if head_alone else scope
+        as_get = {**scope, "method": "GET"} if head_alone else scope
 
         async def watched(message: Message) -> None:
             nonlocal status, size
@@ -63,7 +63,7 @@ class Guard:
         refusal = self._refusal(scope)
         try:
             if refusal is None:
-                await self._app(asked, receive, watched)
+                await self._app(as_get, receive, watched)
             else:
                 await refusal(scope, receive, watched)
         finally:
