@@ -183,7 +183,7 @@ def test_sampled_frequencies_are_the_probabilities(tmp_path: Path, seed: int) ->
     part = Part(0, answer.portfolio, answer.events, np.empty(0), np.empty(0), draws, seed)
     ((event, shaken),) = event_counts._shaken(part)
     generator = np.random.default_rng(seed)
-    p = event_counts._given_scatter(part, shaken, generator)
+    p = event_counts._probabilities(part, shaken, generator)(draws)
     normals = event_counts.LAWS[answer.laws[0]](answer.portfolio, shaken, draws, generator)
     frequency = (normals <= np.vectorize(_quantile)(p)).mean(axis=0)
     error = np.sqrt(shaken.probability * (1.0 - shaken.probability) / draws)
@@ -323,6 +323,25 @@ def test_measures_that_the_engine_draws_independently_are_warned_of(
     )
     assert answer.failures[0] == pytest.approx(same.probability)
     assert any("independently" in text for text in answer.warnings)
+
+
+def test_more_samples_than_are_drawn_at_once(job: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    blocks = table([0.36, 0.4, 0.3], "0012", kr_sigma=0.2, loss=10.0, loss_sigma=0.3)
+    whole = answered(job, blocks, samples=3000, component="rotd50")
+    monkeypatch.setattr("rbfrag.hazards.event_counts._VALUES_AT_ONCE", 1 << 10)
+    monkeypatch.setattr("rbfrag.hazards.losses.SAMPLES_AT_ONCE", 4000)
+    parts = answered(job, blocks, samples=3000, component="rotd50")
+    assert parts.failures == pytest.approx(whole.failures)
+    assert parts.any_fails == pytest.approx(whole.any_fails, abs=4.0 * math.sqrt(0.5 / 3000))
+    assert parts.loss_variance == pytest.approx(whole.loss_variance, rel=0.2)
+
+
+def test_blocks_that_nothing_shakes(job: Path) -> None:
+    folder = write_job(job.parent / "far", sites=("0012", "007", "Z9", "far"))
+    answer = answered(folder, table([0.3], "far", loss=1.0))
+    assert answer.average_annual_failures == answer.average_annual_loss == 0.0
+    assert answer.annual_rate_any == 0.0
+    assert answer.as_dict()["exceedance"] == []
 
 
 def test_blocks_that_cannot_be_placed(job: Path) -> None:
