@@ -1,6 +1,6 @@
 """Probabilities and joint failures over a ShakeMap grid for a class of blocks.
 
-    python -m benchmarks.shakemap GRID.xml DATABASE [--blocks 20] [--component larger] [--std 0.55]
+    python -m benchmarks.shakemap GRID.xml DATABASE [--blocks 20] [--std 0.55] [--times 1]
 
 Prints the processor time of reading the grid, of answering it, and of drawing how many blocks fail
 together. With --std the logarithms of PGV and PGA have this standard deviation everywhere; 0 takes
@@ -39,6 +39,7 @@ def main() -> None:
     parser.add_argument("--blocks", type=int, default=20)
     parser.add_argument("--component", default="larger")
     parser.add_argument("--std", type=float, default=0.0)
+    parser.add_argument("--times", type=float, default=1.0, help="factor on the map's values")
     parser.add_argument("--draws", type=int, default=DRAWS)
     given = parser.parse_args()
     random = np.random.default_rng(1)
@@ -49,7 +50,7 @@ def main() -> None:
 
     def answer(rows: slice) -> SiteProbability:
         return site_probability(
-            {name: values[rows] for name, values in grid.measures.items()}, p2, kr,
+            {name: given.times * values[rows] for name, values in grid.measures.items()}, p2, kr,
             component=component(given.component), db=given.database,
             std_ln={name: np.full(grid.lon[rows].size, given.std) for name in names},
         )  # fmt: skip

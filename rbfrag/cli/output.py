@@ -169,25 +169,47 @@ class ProgressBar:
         )
 
 
-def show_prediction(document: dict[str, Any], *, json: bool) -> None:
-    """Print what `rbfrag predict` answers for one block."""
+def show_prediction(
+    document: dict[str, Any],
+    given: Mapping[str, Any],
+    *,
+    json: bool,
+    verbose: bool = False,
+) -> None:
+    """Print what `rbfrag predict` answers for one block.
+
+    Args:
+        document: the answer under the keys of the JSON contract.
+        given: block and measures that it was asked for.
+        json: as one JSON document.
+        verbose: every value of every model.
+    """
     if json:
         print_json(document)
         return
+    from rbfrag.fragility.lookup import FROM_REFERENCE
+
     answers = document.pop("answers")
     polarities = document.pop("polarities", None)
     warnings = document.pop("warnings")
-    for sentence in prediction_in_words(document):
+    for sentence in (*prediction_in_words(document), *block_in_words(document["method"], given)):
         print(sentence)
     print()
-    print_pairs({name: value for name, value in document.items() if name not in _LEFT_OUT or value})
+    if verbose:
+        shown = {key: value for key, value in document.items() if key not in _LEFT_OUT or value}
+    else:
+        shown = _short(document)
+        if FROM_REFERENCE in warnings:
+            warnings.remove(FROM_REFERENCE)
+            shown["data"] = "the reference that is shipped with rbfrag"
+    print_pairs(shown)
     if polarities:
         print()
         print_table(
             ("polarity", *_OF_POLARITY),
             [(name, *map(answer.get, _OF_POLARITY)) for name, answer in polarities.items()],
         )
-    if len(answers) > 1:
+    if verbose and len(answers) > 1:
         print()
         columns = ("model", "term", "probability", "ci_low", "ci_high", "in_domain", "recommended")
         print_table(columns, [tuple(answer[name] for name in columns) for answer in answers])
@@ -205,25 +227,77 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     event_low, event_high = document["event_low"], document["event_high"]
     of = next((n for n in (100, 1000) if p * n >= 1.0 and (1.0 - p) * n >= 1.0), 10_000)
     if high == 0.0:
-        return ("P: no such block fails.",)
+        return ("No such block fails.",)
     of_block = document.get("block_sd")
-    return (
-        f"P: of {of} such blocks {_count(p, of)} fail, over all earthquakes and sites with these "
-        "measures.",
-        f"Interval of P ({level}): {_range(low, high, of)} of {of}, as far as the data tell it.",
-        "In one single earthquake: not known."
+    sentences = [
+        f"Of {of} such blocks {_count(p, of)} fail ({_range(low, high, of)} as far as the data "
+        f"tell it, {level}).",
+        "How many in one single earthquake is not known."
         if event_low is None
-        else f"In one single earthquake {_range(event_low, event_high, of)} of {of} such blocks "
-        f"fail ({level}).",
-        *(
-            ()
-            if of_block is None
-            else (
-                "The block is uncertain: among what it may be, P differs with a standard "
-                f"deviation of {of_block:.2g}.",
-            )
-        ),
+        else f"In one single earthquake it is {_range(event_low, event_high, of)} of {of} "
+        f"({level}).",
+    ]
+    if of_block is not None:
+        sentences.append(
+            "The block is uncertain: among what it may be, P differs with a standard deviation of "
+            f"{of_block:.2g}."
+        )
+    return tuple(sentences)
+
+
+def block_in_words(method: str, given: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return what is asked about: the numbers of a block, and how it is taken to stand.
+
+    Args:
+        method: the one that the model which answers is fitted by.
+        given: what the question gives, by the names of :func:`rbfrag.predict`.
+    """
+    from rbfrag.fragility.methods import method_named
+
+    block = method_named(method).block
+    values = {name: given.get(name) for name in (block.size, block.strength) if name is not None}
+    if not all(isinstance(value, (int, float)) for value in values.values()):
+        return ()
+    units = {block.size: " 1/s²"}
+    numbers = " and ".join(
+        f"{_SYMBOLS.get(name, name)} = {value:.3g}{units.get(name, '')}"
+        for name, value in values.items()
     )
+    stands = (f"{block.presumes[:1].upper()}{block.presumes[1:]}.",) if block.presumes else ()
+    return (f"The block has {numbers}.", *stands)
+
+
+def percent(share: float) -> str:
+    """Return a share in percent with two digits."""
+    if 0.0 < share < 5e-5:
+        return "below 0.01 %"
+    if 0.9995 <= share < 1.0:
+        return "above 99.9 %"
+    digits = 0 if share in (0.0, 1.0) or 0.0995 <= share <= 0.995 else 1 if share >= 0.001 else 2
+    return f"{100.0 * share:.{digits}f} %"
+
+
+def _short(document: Mapping[str, Any]) -> dict[str, object]:
+    """Return what is shown without --verbose."""
+    ends = {
+        "interval": (document["ci_low"], document["ci_high"]),
+        "one earthquake": (document["event_low"], document["event_high"]),
+    }
+    return {
+        "probability": percent(document["probability"]),
+        **{
+            name: " to ".join(map(percent, pair)) for name, pair in ends.items() if None not in pair
+        },
+        **{name: document[name] for name in _IF_KNOWN if document.get(name)},
+        "in domain": document["in_domain"],
+        "model": document["model"],
+    }
+
+
+_IF_KNOWN = ("median_displacement_m", "unknown_share")
+"""Keys that are shown without --verbose where they apply."""
+
+_SYMBOLS = {"p2": "p²", "ps2": "p_s²", "kr": "k_r", "ky": "k_y", "ks": "k_s"}
 
 
 def _count(share: float, of: int) -> str:

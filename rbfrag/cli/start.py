@@ -45,6 +45,9 @@ NUMBERS = {
 NAMES = {"--kind": "kind", "--model": "model", "--db": "db"}
 """Options with a text."""
 
+FLAGS = ("json", "verbose")
+"""Options without a value."""
+
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
@@ -68,7 +71,7 @@ def quick_predict(arguments: Sequence[str]) -> int | None:
     options = numbers_and_names(arguments)
     if options is None:
         return None
-    given, names, json = options
+    given, names, flags = options
     stated: dict[str, Any] = {**names}
     for name in ("level", "rotation_deg"):
         if name in given:
@@ -76,7 +79,7 @@ def quick_predict(arguments: Sequence[str]) -> int | None:
     try:
         from rbfrag.fragility.predict import prediction_document
 
-        show_prediction(prediction_document(given, **stated), json=json)
+        show_prediction(prediction_document(given, **stated), given, **flags)
         sys.stdout.flush()
     except RbfragError:
         return None  # the full command refuses it in its words
@@ -91,15 +94,15 @@ def quick_predict(arguments: Sequence[str]) -> int | None:
 
 def numbers_and_names(
     arguments: Sequence[str],
-) -> tuple[dict[str, float], dict[str, str], bool] | None:
-    """Return numbers and texts by name and whether JSON is wanted, or None if there is more."""
+) -> tuple[dict[str, float], dict[str, str], dict[str, bool]] | None:
+    """Return numbers, texts and flags by name, or None if there is more."""
     numbers: dict[str, float] = {}
     names: dict[str, str] = {}
-    json = False
+    flags = dict.fromkeys(FLAGS, False)
     rest = iter(arguments)
     for word in rest:
-        if word == "--json":
-            json = True
+        if word.removeprefix("--") in flags and word.startswith("--"):
+            flags[word.removeprefix("--")] = True
             continue
         option, equals, value = word.partition("=")
         if not equals:
@@ -112,7 +115,7 @@ def numbers_and_names(
             return None
     if not any(block <= set(numbers) for block in BLOCKS):
         return None
-    return numbers, names, json
+    return numbers, names, flags
 
 
 if __name__ == "__main__":

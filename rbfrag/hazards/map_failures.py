@@ -14,7 +14,7 @@ that :func:`rbfrag.hazards.site_probability.site_probability` integrates.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -59,7 +59,7 @@ DRAWS, MOST_DRAWS = 100, 10_000
 
 _VALUES = 5_000_000
 _FEWEST, _MOST = 10, 1_000_000
-_VALUES_AT_ONCE = 2_000_000
+_VALUES_AT_ONCE, _RESIDUALS_AT_ONCE = 2_000_000, 12_000_000
 
 
 @dataclass(frozen=True)
@@ -228,10 +228,12 @@ def map_failures(
     any_fails = {name: np.zeros(draws, dtype=np.bool_) for name in laws}
     given = {"p2": p2[block, None], "kr": kr[block, None]}
     at_once = max(1, _VALUES_AT_ONCE // max(site.size, 1))
-    for start in range(0, draws if site.size else 0, at_once):
-        part = slice(start, min(start + at_once, draws))
-        count = part.stop - start
-        shaken = answer.shaking.shaken(used, residuals.draw(count, generator))
+    start = 0
+    for logs in residuals.in_parts(draws if site.size else 0, at_once, generator):
+        count = logs.shape[1]
+        part = slice(start, start + count)
+        start += count
+        shaken = answer.shaking.shaken(used, logs)
         values = {name: measure[here] for name, measure in shaken.items()}
         prediction = answer_given(
             answer.shaking.model, {**given, **values}, answer.level, interval=False
@@ -306,6 +308,16 @@ class _Residuals:
         self._factor = np.linalg.cholesky(correlations(shaking.names))
         self._field = SpatialField(places.lon, places.lat, range_km) if shaking.integrated else None
         self._group = np.unique(places.group, return_inverse=True)[1]
+
+    def in_parts(
+        self, draws: int, at_once: int, generator: np.random.Generator
+    ) -> Iterator[FloatArray]:
+        """Yield residuals of a few draws at a time; a field costs little more for many draws."""
+        many = max(at_once, _RESIDUALS_AT_ONCE // max(self._deviations.size, 1))
+        for start in range(0, draws, many):
+            logs = self.draw(min(many, draws - start), generator)
+            for first in range(0, logs.shape[1], at_once):
+                yield logs[:, first : first + at_once]
 
     def draw(self, count: int, generator: np.random.Generator) -> FloatArray:
         """Return residuals, shape (sites, count, k)."""

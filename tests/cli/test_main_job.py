@@ -27,7 +27,7 @@ CRITICAL_KEYS = {
     "undecided", "island_width", "kr_over_pga_resolved", "reentrant", "n_runs", "warnings",
 }  # fmt: skip
 PREDICT_KEYS = {
-    "probability", "ci_low", "ci_high", "level", "model", "term", "method", "y_m_s",
+    "probability", "ci_low", "ci_high", "level", "model", "term", "method", "y_m_s", "block_sd",
     "intensity_m_s", "in_domain", "warnings", "pgv_over_pga_s", "answers", "kind", "failure",
     "median_displacement_m", "unknown_share", "event_low", "event_high",
 }  # fmt: skip

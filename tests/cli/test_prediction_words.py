@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from rbfrag.cli.output import prediction_in_words
+from rbfrag.cli.output import block_in_words, percent, prediction_in_words
 
 
 def words(
@@ -19,9 +19,8 @@ def words(
 
 def test_three_statements_in_counts_of_blocks() -> None:
     assert words(0.13, (0.11, 0.152), (0.049, 0.4)) == (
-        "P: of 100 such blocks 13 fail, over all earthquakes and sites with these measures.",
-        "Interval of P (95 %): 11 to 15 of 100, as far as the data tell it.",
-        "In one single earthquake 5 to 40 of 100 such blocks fail (95 %).",
+        "Of 100 such blocks 13 fail (11 to 15 as far as the data tell it, 95 %).",
+        "In one single earthquake it is 5 to 40 of 100 (95 %).",
     )
 
 
@@ -32,22 +31,22 @@ def test_three_statements_in_counts_of_blocks() -> None:
             0.004,
             (0.001, 0.008),
             (0.0001, 0.02),
-            ("of 1000 such blocks 4", "1 to 8", "fewer than 1 to 20"),
+            ("Of 1000 such blocks 4 fail (1 to 8 ", "fewer than 1 to 20"),
         ),
         (
             0.9996,
             (0.99, 1.0),
             (0.9, 1.0),
-            ("of 10000 such blocks 9996", "9900 to 10000", "9000 to 10000"),
+            ("Of 10000 such blocks 9996 fail (9900 to 10000 ", "9000 to 10000"),
         ),
         (
             1e-7,
             (1e-9, 1e-6),
             (0.0, 1e-5),
-            ("blocks fewer than 1 fail", "fewer than 1 of 10000", "0 to fewer than 1"),
+            ("blocks fewer than 1 fail (fewer than 1 as", "0 to fewer than 1"),
         ),
-        (0.5, (0.5, 0.5), (0.5, 0.5), ("50 fail", ": 50 of 100", "earthquake 50 of 100")),
-        (0.5, (0.4, 0.6), (None, None), ("50 fail", "40 to 60", "not known.")),
+        (0.5, (0.5, 0.5), (0.5, 0.5), ("50 fail (50 as", "it is 50 of 100")),
+        (0.5, (0.4, 0.6), (None, None), ("50 fail (40 to 60 as", "not known.")),
     ],
 )
 def test_counts_tell_p_from_0_and_1(p, interval, event, said) -> None:
@@ -56,4 +55,26 @@ def test_counts_tell_p_from_0_and_1(p, interval, event, said) -> None:
 
 
 def test_what_cannot_fail_is_said_once() -> None:
-    assert words(0.0, (0.0, 0.0), (0.0, 0.0)) == ("P: no such block fails.",)
+    assert words(0.0, (0.0, 0.0), (0.0, 0.0)) == ("No such block fails.",)
+
+
+def test_the_block_is_named_with_how_it_is_taken_to_stand() -> None:
+    numbers, backed = block_in_words("bounded", {"p2": 7.1372, "kr": 0.25, "pgv_m_s": 0.6})
+    assert numbers == "The block has p² = 7.14 1/s² and k_r = 0.25."
+    assert backed.startswith("The block is taken to be backed by a slope")
+    assert "stand free" in block_in_words("overturning", {"p2": 7.1, "kr": 0.25})[1]
+    assert block_in_words("displacement", {"ky": 0.1, "displacement_m": 0.3}) == (
+        "The block has k_y = 0.1.",
+    )
+    assert block_in_words("bounded", {"p2": [3.0, 4.0], "kr": 0.1}) == ()
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [
+        (0.0, "0 %"), (1e-9, "below 0.01 %"), (3e-4, "0.03 %"), (0.0123, "1.2 %"),
+        (0.1161, "12 %"), (0.996, "99.6 %"), (0.9999, "above 99.9 %"), (1.0, "100 %"),
+    ],
+)  # fmt: skip
+def test_percent_has_the_digits_of_an_engineer(share: float, said: str) -> None:
+    assert percent(share) == said

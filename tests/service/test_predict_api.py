@@ -17,7 +17,7 @@ def printed(capsys, database, values, **more):
     """What `rbfrag predict --json` prints."""
     given = {KEYWORD.get(name, name): value for name, value in values.items()}
     capsys.readouterr()
-    show_prediction(prediction_document(given, **more, db=str(database)), json=True)
+    show_prediction(prediction_document(given, **more, db=str(database)), given, json=True)
     return json.loads(capsys.readouterr().out)
 
 

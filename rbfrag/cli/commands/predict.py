@@ -87,7 +87,7 @@ def predict(
     reading: options.Reading,
     table: Table,
     answering: options.Answering,
-    json: options.Json = False,
+    printing: options.Printing,
 ) -> None:
     """Print the probability that a block fails.
 
@@ -121,7 +121,7 @@ def predict(
         if block.beta is not None:
             given["beta_deg"] = block.beta
         summary = predict_table(table.batch, table.out, given=given, kind=failure.kind, **question)
-        _show_summary(summary, json=json)
+        _show_summary(summary, json=printing.json)
         return
     from rbfrag.fragility.predict import prediction_document
 
@@ -140,7 +140,7 @@ def predict(
         question["motion"] = find_motion(record.motion, db=answering.db, reading=reading)
         question["polarity"] = record.polarity
     document = prediction_document(given, kind=kind, remarks=remarks, **question)
-    show_prediction(document, json=json)
+    show_prediction(document, given, json=printing.json, verbose=printing.verbose)
 
 
 def _complete(
