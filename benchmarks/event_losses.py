@@ -99,7 +99,8 @@ def main() -> None:
         lines.append(
             [
                 f"{given.rows:,}", str(case.sites), f"{given.rows * BLOCKS // case.sites:,}",
-                case.component, str(case.samples or "none"), f"{failures:.3g}", f"{own:.0f} s", f"{memory:.0f} MB",
+                case.component, str(case.samples or "none"), f"{failures:.3g}", f"{own:.0f} s",
+                f"{memory:.0f} MB",
             ]
         )  # fmt: skip
     headers = [
