@@ -74,6 +74,10 @@ def test_a_class_of_blocks_with_uncertainty(shell: Shell, grid: Path) -> None:
     )  # fmt: skip
     assert told["uncertainty_integrated"]
     assert "probability of toppling" in Path("a.svg").read_text()
+    note = "values of the map taken as certain"
+    assert note not in Path("a.svg").read_text()
+    shell("shakemap", grid, "--p2", "3", "--kr", "0.1", "--out", "b.csv", "--plot", "b.svg")
+    assert note in Path("b.svg").read_text()
     certain, mean = (
         np.genfromtxt(name, delimiter=",", names=True)["probability"]
         for name in ("certain.csv", "a.csv")
