@@ -1,23 +1,17 @@
-"""Hazard curves out of a file, and annual rates as a table.
-
-The files: OpenQuake CSV, USGS NSHM JSON, or two columns.
-"""
+"""Hazard curves out of a file: OpenQuake CSV, USGS NSHM JSON, or two columns."""
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import openquake_type
 from rbfrag.files import csv_rows, is_number, json_document, source_text
-from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import ANSWERED, HazardCurve, hazard_curve, rates_from_probabilities
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -365,40 +359,3 @@ def _years(name: str, where: str) -> float | None:
         f"{where}: column {name!r} does not say whether it is a rate or a probability: "
         + HEADER_HELP
     )
-
-
-def rate_columns(
-    curves: Sequence[HazardCurve], blocks: Mapping[str, Any], answers: Sequence[HazardAnswer]
-) -> dict[str, NDArray[Any]]:
-    """Return the columns of the table of annual rates, one row a site and block.
-
-    Args:
-        curves: the hazard curves, one a site.
-        blocks: ``block_id``, ``p2_1_s2`` and ``kr`` of the blocks.
-        answers: the answers, one a site.
-    """
-    size = len(blocks["block_id"])
-    alone = len(blocks["kr"]) == size  # a class of blocks has no single p² and k_r
-    nothing = float("nan")
-
-    def by_site(values: list[Any], kind: Any) -> NDArray[Any]:
-        return np.repeat(np.array(values, dtype=kind), size)
-
-    def sizes(name: str) -> NDArray[np.float64]:
-        values = np.asarray(blocks[name], dtype=np.float64)
-        return np.tile(values if alone else np.full(size, nothing), len(curves))
-
-    names = ["" if name is None else str(name) for name in blocks["block_id"]]
-    return {
-        "site": by_site([curve.place for curve in curves], object),
-        "lon": by_site([nothing if c.lon is None else c.lon for c in curves], np.float64),
-        "lat": by_site([nothing if c.lat is None else c.lat for c in curves], np.float64),
-        "block_id": np.tile(np.array(names, dtype=object), len(curves)),
-        "p2_1_s2": sizes("p2_1_s2"),
-        "kr": sizes("kr"),
-        "annual_rate": np.concatenate([one.annual_rate for one in answers]),
-        "ci_low": np.concatenate([one.ci_low for one in answers]),
-        "ci_high": np.concatenate([one.ci_high for one in answers]),
-        "probability": np.concatenate([one.probability for one in answers]),
-        "years": np.full(size * len(curves), answers[0].years),
-    }

@@ -7,7 +7,7 @@ space evenly: means converge faster, and repeated scrambles give the error of a 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -133,37 +133,42 @@ def _parts(law: Dependence, blocks: Placement) -> Iterator[_Part]:
         shaken = everyone[blocks.earthquake == earthquake]
         sites = np.unique(blocks.site[shaken])
         single = sites.size == 1  # what the earthquake and what the site shares then is one field
-        yield from _part(
-            blocks, 0, shaken, None, law.rho_e + (law.rho_s if single else 0.0), law.l_e
-        )
+        share = law.rho_e + (law.rho_s if single else 0.0)
+        yield from _part(blocks, 0, shaken, [np.zeros_like(shaken)], share, law.l_e)
         for site in sites:
             here = shaken[blocks.site[shaken] == site]
             if not single:
-                yield from _part(blocks, 0, here, None, law.rho_s, law.l_e)
-            drawn = blocks.drawn[here]
-            known = blocks.component[here]
-            names = range(COMPONENTS) if drawn.any() else np.unique(known)
-            for number, name in enumerate(names):
-                own = here[drawn | (known == name)]
-                slot = np.where(blocks.drawn[own], number, 0)
-                for kind, share, length in ((1, law.rho_v, law.l_v), (2, law.rho_o, law.l_o)):
-                    yield from _part(blocks, kind, own, slot, share, length, law.l_y)
+                yield from _part(blocks, 0, here, [np.zeros_like(here)], law.rho_s, law.l_e)
+            yield from _of_components(law, blocks, here)
+
+
+def _of_components(law: Dependence, blocks: Placement, here: Indices) -> Iterator[_Part]:
+    """Yield what the components of a site add; blocks of unknown azimuth are of both."""
+    drawn, known = blocks.drawn[here], blocks.component[here]
+    slots: dict[bytes, tuple[Indices, list[Indices]]] = {}
+    for number, name in enumerate(range(COMPONENTS) if drawn.any() else np.unique(known)):
+        own = here[drawn | (known == name)]
+        slot = np.where(blocks.drawn[own], number, 0)
+        slots.setdefault(own.tobytes(), (own, []))[1].append(slot)
+    for own, several in slots.values():
+        for kind, share, length in ((1, law.rho_v, law.l_v), (2, law.rho_o, law.l_o)):
+            yield from _part(blocks, kind, own, several, share, length, law.l_y)
 
 
 def _part(
     blocks: Placement,
     kind: int,
     member: Indices,
-    slot: Indices | None,
+    slots: Sequence[Indices],
     share: float,
     length: float,
     length_y: float = np.inf,
 ) -> Iterator[_Part]:
+    """Yield independent fields of one law, one for each of some rows of slots."""
     if share > 0.0 and member.size:
-        loading = np.sqrt(share) * _loading(
-            blocks.l[member] / length, blocks.ln_y[member] / length_y
-        )
-        yield _Part(kind, member, np.zeros_like(member) if slot is None else slot, loading)
+        x, y = blocks.l[member] / length, blocks.ln_y[member] / length_y
+        loading = np.sqrt(share) * _loading(x, y)
+        yield from (_Part(kind, member, slot, loading) for slot in slots)
 
 
 def _loading(x: FloatArray, y: FloatArray) -> FloatArray:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -11,20 +10,61 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import Model, answer_given
-from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.fragility.predict import Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import checked_years, failure_rate, probability_in
+from rbfrag.hazards.branches import (
+    checked_weights,
+    curve_name,
+    quantile_warning,
+    refuse_unlike,
+    weighted_quantiles,
+)
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.joint_rate import JointRate
+from rbfrag.hazards.joint_rate import MOST_JOINT, USUAL_COUNTS, JointRate
+from rbfrag.hazards.joint_thresholds import JointThresholds
+from rbfrag.hazards.model_blocks import BlockTable, ModelBlocks
 from rbfrag.hazards.shaking import NOTABLE, Shaking, warn_of_ends
-from rbfrag.hazards.standing_blocks import ModelBlocks
 
 FloatArray = NDArray[np.float64]
 
-_CHUNK = 512
+QUANTILES = (0.05, 0.16, 0.5, 0.84, 0.95)
+"""Quantiles of the rates over the branches of a logic tree."""
+
+NUMERICAL_AIM = 1e-3
+"""Relative error of quadrature of a block's rate above which a warning tells of it."""
+
+_CHUNK = MOST_JOINT
+
+
+@dataclass(frozen=True, eq=False)
+class BranchRate:
+    """What one hazard curve of several says.
+
+    Args:
+        name: the branch or statistic that the curve is of, or where it comes from.
+        weight: its weight; None for a curve that is no branch.
+        annual_rate: rates of the blocks [1/a], shape (m,).
+        annual_rate_any: rate of earthquakes with at least one failure [1/a]; None where only its
+            bounds are known.
+    """
+
+    name: str
+    weight: float | None
+    annual_rate: FloatArray
+    annual_rate_any: float | None
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the numbers under the keys of the JSON contract."""
+        return {
+            "name": self.name,
+            "weight": self.weight,
+            "annual_rate_any": self.annual_rate_any,
+            "expected_failures_per_year": float(self.annual_rate.sum()),
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,6 +76,7 @@ class HazardAnswer(Tabular):
             cannot be used.
         ci_low: lower end of the interval from the uncertain parameters of the model.
         ci_high: upper end of it.
+        numerical_error: how far quadrature may be off, relative to the rates, shape (m,).
         probability: probability of at least one failure in `years`, shape (m,).
         years: the period [a].
         level: confidence level of the interval.
@@ -48,12 +89,18 @@ class HazardAnswer(Tabular):
         above_at_most: the same at most.
         measure: measure of `edges`: ``pga_g``, ``pgv_m_s`` or ``sa_g``.
         joint: earthquakes with at least one failure among several blocks; None for one block.
+        curve_kind: what of a logic tree the curve is (mean, quantile-0.84, rlz-001), the weighted
+            branches, or None where that is not stated.
+        branches: what each of several curves says; empty for one.
+        quantiles: quantiles of the rates over branches with weights, by their probability,
+            `annual_rate` of shape (m,), and `annual_rate_any`; empty without weights.
         warnings: what to know about the answer.
     """
 
     annual_rate: FloatArray
     ci_low: FloatArray
     ci_high: FloatArray
+    numerical_error: FloatArray
     probability: FloatArray
     years: float
     level: float
@@ -66,6 +113,9 @@ class HazardAnswer(Tabular):
     above_at_most: FloatArray
     measure: str
     joint: JointRate | None
+    curve_kind: str | None
+    branches: tuple[BranchRate, ...]
+    quantiles: Mapping[float, Mapping[str, Any]]
     warnings: tuple[str, ...]
 
     @property
@@ -83,10 +133,12 @@ class HazardAnswer(Tabular):
 
 
 def hazard(
-    curve: HazardCurve,
+    curve: HazardCurve | Sequence[HazardCurve],
     p2: ArrayLike,
     kr: ArrayLike,
     *,
+    weights: Sequence[float | None] | None = None,
+    at_least: Sequence[int] | None = None,
     convert: str | None = None,
     convert_sigma: float | None = None,
     component: str | None = None,
@@ -107,11 +159,18 @@ def hazard(
     Several blocks stand at one site and share its earthquakes: their rates add up to the failures
     expected a year, and `joint` has the rate of earthquakes in which any of them fails.
 
+    Several curves are branches of one logic tree with `weights`: rates and probabilities are the
+    weighted means, `quantiles` their distribution. Without weights the first curve answers.
+
     Args:
         curve: hazard curve of PGV, PGA or a spectral acceleration at 0.3, 1, 2 or 3 s, or of one
-            that `convert` is for.
+            that `convert` is for; or several curves of one site and measure.
         p2: frequency parameters p² [1/s²], scalar or shape (m,).
         kr: toppling yield acceleration coefficients, scalar or shape (m,).
+        weights: weight of each curve as a branch of a logic tree, None for one that is no branch;
+            they sum to 1.
+        at_least: numbers of failures in one earthquake whose rates are wanted, from 1 to m; None
+            for usual ones.
         convert: name of a published conversion from spectral acceleration to PGV, whose scatter
             is integrated.
         convert_sigma: standard deviation of ln PGV about the conversion; None for that of the
@@ -126,119 +185,250 @@ def hazard(
             from it: one rate, by the mean of their fragilities.
 
     Raises:
-        InputError: no model reads the curve's measure, or a value that cannot be used.
+        InputError: no model reads the curve's measure, curves of several measures or sites, weights
+            that do not add up to 1, or a value that cannot be used.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
+    curves = [curve] if isinstance(curve, HazardCurve) else list(curve)
+    refuse_unlike(curves)
+    weight = checked_weights(weights, len(curves))
     p2s, krs = (np.ravel(values) for values in np.broadcast_arrays(p2, kr))
     checked_years(years)
-    reading = Shaking.of(curve, convert=convert, convert_sigma=convert_sigma, component=component)
-    name, shift, weight = reading.name, reading.shift, reading.weight
+    counts = _checked_counts(at_least, p2s.size)
+    reading = Shaking.of(
+        curves[0], convert=convert, convert_sigma=convert_sigma, component=component
+    )
+    chosen = find_model(model, ("p2", "kr", reading.name), db)
     warnings = list(reading.warnings)
-    chosen = find_model(model, ("p2", "kr", name), db)
+    for one in curves:
+        warnings.extend(one.warnings)
+        warnings.extend(quantile_warning(one, "a rate"))
     if chosen.term.advice:
         warnings.append(chosen.term.advice)
-    parts = []
-    for start in range(0, 0 if one_class else p2s.size, _CHUNK):
-        some = slice(start, start + _CHUNK)
-
-        def bands(levels: FloatArray, some: slice = some) -> FloatArray:
-            """Return P and the two ends of its interval for blocks x levels, stacked."""
-            shaking = {name: (levels[:, None] * shift).reshape(1, -1)}
-            answer = _predicted(p2s[some, None], krs[some, None], shaking, chosen, level)
-            stacked = np.concatenate([answer.probability, answer.ci_low, answer.ci_high])
-            averaged: FloatArray = stacked.reshape(-1, levels.size, shift.size) @ weight
-            return averaged
-
-        parts.append((p2s[some].size, failure_rate(curve, bands)))
-    if one_class:
-        mean = _mean_bands(curve, p2s, krs, name, shift, chosen, level)
-        parts.append((1, failure_rate(curve, lambda levels: mean(levels) @ weight)))
-
-    def joined(name: str, row: int = 0) -> FloatArray:
-        """Return one value of all blocks; of the rates, the rows are P and its two ends."""
-        values = [getattr(part, name)[row * m : (row + 1) * m] for m, part in parts]
-        return np.concatenate(values)
-
-    rate, low, high = (joined("annual_rate", row) for row in range(3))
-    contribution, below = joined("contribution"), joined("below")
-    above, above_at_most = joined("above"), joined("above_at_most")
-    warn_of_ends(curve, rate, above, above_at_most, below, warnings)
-    edges = parts[0][1].edges
-    shaking = {name: reading.median * np.sqrt(edges[None, 1:] * edges[None, :-1])}
-    outside = ~_predicted(p2s[:, None], krs[:, None], shaking, chosen, level).in_domain
-    if one_class:
-        outside = outside.mean(axis=0, keepdims=True)
-    part = (outside * contribution).sum(axis=1) / np.maximum(rate, np.finfo(np.float64).tiny)
-    if (part > NOTABLE).any():
+    site = _Site.of(p2s, krs, reading, chosen, level, curves, counts, one_class=one_class)
+    each = [site.under(one, years) for one in curves]
+    parts = (
+        each[:1]
+        if weight is None
+        else [part for part, w in zip(each, weight, strict=True) if not np.isnan(w)]
+    )
+    shares = np.ones(1) if weight is None else weight[~np.isnan(weight)]
+    for part in parts:
+        warnings.extend(part.warnings)
+    mean = {name: _mean(parts, shares, name) for name in _RATES}
+    probability = sum(
+        w * probability_in(years, part.annual_rate) for w, part in zip(shares, parts, strict=True)
+    )
+    widest = max(parts, key=lambda part: part.edges.size)
+    contribution = _contribution(parts, shares, widest.edges)
+    warnings.extend(site.domain_warnings(widest.edges, contribution, mean["annual_rate"]))
+    joints = [part.joint for part in parts if part.joint is not None]
+    if joints:
         warnings.append(
-            f"up to {100.0 * float(part.max()):.3g} % of the rate comes from blocks and shaking "
-            "outside the ranges that the model was fitted on"
+            f"annual_rate_any: all {p2s.size} blocks are taken as those of one site, of unknown "
+            "azimuth"
         )
-    joint = None
-    if p2s.size > 1 and not one_class:
-        blocks = ModelBlocks.certain(p2s, krs, shaking=reading, model=chosen, level=level)
-        joint = JointRate.of(blocks, curve, years)
-        warnings.extend(joint.warnings)
+    if joints and site.thresholds is None:
+        why = (
+            "what the blocks share in one earthquake is not known to this model"
+            if chosen.dependence is None
+            else f"what more than {MOST_JOINT} blocks share in one earthquake is not computed"
+        )
+        warnings.append(
+            f"{why}: bounds has annual_rate_any under full dependence and if they fail "
+            "independently"
+        )
+    if float(mean["numerical_error"].max(initial=0.0)) > NUMERICAL_AIM:
+        warnings.append(
+            f"quadrature of a rate may be off by {100.0 * float(mean['numerical_error'].max()):.2g}"
+            " %: its P changes abruptly between levels of the curve"
+        )
     return HazardAnswer(
-        annual_rate=rate,
-        ci_low=low,
-        ci_high=high,
-        probability=probability_in(years, rate),
+        **mean,
+        probability=np.asarray(probability),
         years=years,
         level=level,
         model=chosen.name,
         term=chosen.term.name,
         method=chosen.row.method,
-        edges=edges,
+        edges=widest.edges,
         contribution=contribution,
-        above=above,
-        above_at_most=above_at_most,
-        measure=curve.measure,
-        joint=joint,
-        warnings=tuple(warnings),
+        measure=curves[0].measure,
+        joint=JointRate.mean(joints, shares) if joints else None,
+        curve_kind="weighted branches" if weight is not None else curves[0].statistic or None,
+        branches=_branches(curves, each, weight),
+        quantiles=_quantiles(parts, shares) if weight is not None else {},
+        warnings=tuple(dict.fromkeys(warnings)),
     )
 
 
-def _mean_bands(
-    curve: HazardCurve,
-    p2: FloatArray,
-    kr: FloatArray,
-    name: str,
-    shift: FloatArray,
-    model: FragilityModel,
-    level: float,
-) -> Callable[[FloatArray], FloatArray]:
-    """Return a function for P and its two ends, (3, levels, shifts), meaned over the blocks.
+_RATES = ("annual_rate", "ci_low", "ci_high", "numerical_error", "above", "above_at_most")
 
-    The means are tabled on steps of 1 % and interpolated by monotone cubics: a mean over blocks
-    is smooth, and thousands of blocks at every node of the integral would take minutes.
+
+@dataclass(frozen=True, eq=False)
+class _Rates:
+    """What one curve says of the blocks of its site; attributes as those of `HazardAnswer`."""
+
+    annual_rate: FloatArray
+    ci_low: FloatArray
+    ci_high: FloatArray
+    numerical_error: FloatArray
+    above: FloatArray
+    above_at_most: FloatArray
+    edges: FloatArray
+    contribution: FloatArray
+    joint: JointRate | None
+    warnings: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class _Site:
+    """The blocks of a site, tabled for the curves of it.
+
+    Args:
+        blocks: the blocks in parts.
+        tables: P and both ends by bands x blocks of each part; of a class the mean of all blocks.
+        any_of: P that any fails under full dependence and if independent, laws in rows; None for
+            one block or a class.
+        thresholds: levels at which blocks fail by the model's copula; None where it is not known.
     """
-    from scipy.interpolate import PchipInterpolator
 
-    end = curve.levels[-1] if curve.end_level is None else curve.end_level
-    low, high = math.log(curve.levels[0] * shift.min()), math.log(end * shift.max())
-    u = np.linspace(low, high, max(64, math.ceil((high - low) / 0.01)))
-    total = np.zeros((3, u.size))
-    for start in range(0, p2.size, _CHUNK):
-        some = slice(start, start + _CHUNK)
-        shaking = {name: np.exp(u)[None, :]}
-        answer = _predicted(p2[some, None], kr[some, None], shaking, model, level)
-        bands_of = (answer.probability, answer.ci_low, answer.ci_high)
-        total += np.array([values.sum(axis=0) for values in bands_of])
-    total[total < 1e-100] = 0.0  # the cubics divide by differences
-    smooth = PchipInterpolator(u, total / p2.size, axis=1)
+    blocks: list[ModelBlocks]
+    tables: list[BlockTable]
+    any_of: BlockTable | None
+    thresholds: JointThresholds | None
 
-    def bands(levels: FloatArray) -> FloatArray:
-        x = np.clip(np.log(levels[:, None] * shift), low, high)
-        return np.asarray(smooth(x), dtype=np.float64)
+    @classmethod
+    def of(
+        cls,
+        p2: FloatArray,
+        kr: FloatArray,
+        reading: Shaking,
+        model: FragilityModel,
+        level: float,
+        curves: list[HazardCurve],
+        counts: Sequence[int],
+        *,
+        one_class: bool,
+    ) -> _Site:
+        """Return the blocks; arguments as those of `hazard`."""
+        starts = [0] if one_class else range(0, p2.size, _CHUNK)
+        length = p2.size if one_class else _CHUNK
+        blocks = [
+            ModelBlocks.certain(
+                p2[i : i + length], kr[i : i + length], shaking=reading, model=model, level=level
+            )
+            for i in starts
+        ]
+        tables = [some.tabled(curves, mean=one_class) for some in blocks]
+        if one_class or p2.size < 2:
+            return cls(blocks, tables, None, None)
+        size = tables[0].values.shape[-1]
+        greatest, none = np.zeros((1, 1, size)), np.ones((1, 1, size))
+        for table in tables:
+            p = table.values[:, :1]
+            greatest = np.maximum(greatest, p.max(axis=2))
+            none = none * (1.0 - p).prod(axis=2)
+        first = tables[0]
+        any_of = BlockTable(first.low, first.step, np.stack([greatest, 1.0 - none]))
+        thresholds = None
+        if model.dependence is not None and p2.size <= MOST_JOINT:
+            thresholds = JointThresholds.of(first, blocks[0].placement(), model.dependence, counts)
+        return cls(blocks, tables, any_of, thresholds)
 
-    return bands
+    def under(self, curve: HazardCurve, years: float) -> _Rates:
+        """Return the rates under a curve."""
+        failures = [failure_rate(curve, table.fine, table.coarse) for table in self.tables]
+
+        def joined(name: str, row: int = 0) -> FloatArray:
+            """Return one value of all blocks; of the rates, the rows are P and its two ends."""
+            parts = (getattr(one, name) for one in failures)
+            return np.concatenate([part.reshape(3, -1, *part.shape[1:])[row] for part in parts])
+
+        rate, low, high = (joined("annual_rate", row) for row in range(3))
+        warnings: list[str] = []
+        warn_of_ends(
+            curve, rate, joined("above"), joined("above_at_most"), joined("below"), warnings
+        )
+        edges, contribution = failures[0].edges, joined("contribution")
+        joint = None
+        if self.any_of is not None:
+            any_bounds = failure_rate(curve, self.any_of.fine, self.any_of.coarse)
+            joint = JointRate.of(any_bounds, rate, self.thresholds, curve, years)
+            warnings.extend(joint.warnings)
+        return _Rates(
+            rate, low, high, joined("numerical_error"), joined("above"), joined("above_at_most"),
+            edges, contribution, joint, warnings,
+        )  # fmt: skip
+
+    def domain_warnings(
+        self, edges: FloatArray, contribution: FloatArray, rate: FloatArray
+    ) -> Iterator[str]:
+        """Yield what is to be said of rates that come from outside the model's domain."""
+        middle = np.sqrt(edges[1:] * edges[:-1])
+        outside = np.concatenate([some.outside(middle) for some in self.blocks])
+        if contribution.shape[0] == 1:  # a class
+            outside = outside.mean(axis=0, keepdims=True)
+        part = (outside * contribution).sum(axis=1) / np.maximum(rate, np.finfo(np.float64).tiny)
+        if (part > NOTABLE).any():
+            yield (
+                f"up to {100.0 * float(part.max()):.3g} % of the rate comes from blocks and "
+                "shaking outside the ranges that the model was fitted on"
+            )
 
 
-def _predicted(
-    p2: FloatArray, kr: FloatArray, shaking: dict[str, Any], model: FragilityModel, level: float
-) -> PredictionArray:
-    answer = answer_given(model, {"p2": p2, "kr": kr, **shaking}, level)
-    assert isinstance(answer, PredictionArray)
-    return answer
+def _checked_counts(at_least: Sequence[int] | None, n: int) -> list[int]:
+    if at_least is None:
+        return [count for count in USUAL_COUNTS if count <= n]
+    for count in at_least:
+        if isinstance(count, bool) or not 1 <= count <= n:
+            raise InputError(f"at least {count} failures of {n} blocks: give numbers from 1 to {n}")
+    return [1, *at_least]
+
+
+def _mean(parts: Sequence[_Rates], shares: FloatArray, name: str) -> FloatArray:
+    values = (getattr(part, name) for part in parts)
+    return np.asarray(sum(w * value for w, value in zip(shares, values, strict=True)))
+
+
+def _contribution(parts: Sequence[_Rates], shares: FloatArray, edges: FloatArray) -> FloatArray:
+    """Return the mean contribution between the edges of one of the branches."""
+    total = np.zeros((parts[0].contribution.shape[0], edges.size - 1))
+    for w, part in zip(shares, parts, strict=True):
+        if part.edges.size == edges.size:
+            total += w * part.contribution
+            continue
+        below = np.concatenate([np.zeros((total.shape[0], 1)), part.contribution.cumsum(axis=1)], 1)
+        for row, one in enumerate(below):
+            total[row] += w * np.diff(np.interp(np.log(edges), np.log(part.edges), one))
+    return total
+
+
+def _branches(
+    curves: Sequence[HazardCurve], each: Sequence[_Rates], weight: FloatArray | None
+) -> tuple[BranchRate, ...]:
+    if len(curves) == 1:
+        return ()
+    return tuple(
+        BranchRate(
+            curve_name(curve),
+            None if weight is None or np.isnan(weight[i]) else float(weight[i]),
+            rates.annual_rate,
+            float(rates.annual_rate[0]) if rates.joint is None else rates.joint.annual_rate_any,
+        )
+        for i, (curve, rates) in enumerate(zip(curves, each, strict=True))
+    )
+
+
+def _quantiles(parts: Sequence[_Rates], shares: FloatArray) -> dict[float, dict[str, Any]]:
+    rates = weighted_quantiles(np.stack([part.annual_rate for part in parts]), shares, QUANTILES)
+    result: dict[float, dict[str, Any]] = {
+        q: {"annual_rate": row} for q, row in zip(QUANTILES, rates, strict=True)
+    }
+    any_rates = [None if part.joint is None else part.joint.annual_rate_any for part in parts]
+    if all(one is not None for one in any_rates):
+        of_any = weighted_quantiles(np.array(any_rates, dtype=np.float64), shares, QUANTILES)
+        for q, value in zip(QUANTILES, of_any.tolist(), strict=True):
+            result[q]["annual_rate_any"] = value
+    return result

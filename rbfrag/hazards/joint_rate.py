@@ -1,40 +1,59 @@
-"""How often per year an earthquake fails any of several blocks of one site."""
+"""How often per year an earthquake fails any, or k or more, of several blocks of one site."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from rbfrag.hazards.annual_rate import probability_in
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.hazards.annual_rate import FailureRate, probability_in
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.hazards.standing_blocks import (
-    COARSE_STEP,
-    COPULA,
-    DEPENDENT,
-    INDEPENDENT,
-    ModelBlocks,
-    StandingBlocks,
-)
+from rbfrag.hazards.joint_thresholds import JointThresholds
+from rbfrag.hazards.shaking import warn_of_ends
+from rbfrag.hazards.standing_blocks import COPULA, DEPENDENT, INDEPENDENT
+
+FloatArray = NDArray[np.float64]
 
 NO_LAW = "bounds"
 """Joint law where only bounds are known."""
 
+MOST_JOINT = 4096
+"""Most blocks that the dependence is taken for."""
 
-MOST_JOINT = 100
-"""Most blocks that the dependence is taken for; its cost grows as the square (100 take 10 s)."""
+USUAL_COUNTS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
+"""Numbers of failures whose rates are given where none are asked for."""
 
-_AT_ONCE = 512
+
+@dataclass(frozen=True, eq=False)
+class CountRate:
+    """Earthquakes in which so many blocks fail.
+
+    Args:
+        count: number of failures.
+        annual_rate: annual rate of earthquakes with as many or more [1/a].
+        numerical_error: standard error of the rate as a quadrature, relative to it.
+        probability: probability of at least one such earthquake in the period.
+    """
+
+    count: int
+    annual_rate: float
+    numerical_error: float
+    probability: float
 
 
 @dataclass(frozen=True, eq=False)
 class JointRate:
-    """Earthquakes with at least one failure among several blocks of one site.
+    """Earthquakes that fail several blocks of one site.
 
     Args:
-        annual_rate_any: annual rate of such earthquakes [1/a]; None where only its bounds
-            are known.
+        annual_rate_any: annual rate of earthquakes with at least one failure [1/a]; None where
+            only its bounds are known.
         annual_rate_any_ci: both ends of its interval from the parameters of the fragility.
         probability_any: probability of at least one such earthquake in the period.
+        at_least: the same for numbers of failures; empty where only bounds are known.
         joint_law: how the blocks of one earthquake fail together.
         bounds: the rate and the probability under full dependence, where the block of the greatest
             P fails first, and if blocks fail independently at each level of the shaking.
@@ -44,56 +63,107 @@ class JointRate:
     annual_rate_any: float | None
     annual_rate_any_ci: tuple[float, float] | None
     probability_any: float | None
+    at_least: tuple[CountRate, ...]
     joint_law: str
     bounds: Mapping[str, Mapping[str, float]]
     warnings: tuple[str, ...]
 
     @classmethod
-    def of(cls, blocks: ModelBlocks, curve: HazardCurve, years: float) -> JointRate:
+    def of(
+        cls,
+        any_bounds: FailureRate,
+        block_rates: FloatArray,
+        thresholds: JointThresholds | None,
+        curve: HazardCurve,
+        years: float,
+    ) -> JointRate:
         """Return the integral of P(any fails | x) over -dλ, by the model's stored dependence.
 
         Earthquakes are the Poisson process, not failures: the probability in T years is
         1 - exp(-λ_any T).
 
         Args:
-            blocks: two or more blocks whose parameters are known.
+            any_bounds: rates at which any fails under full dependence and if independent.
+            block_rates: rates of the single blocks [1/a], shape (n,).
+            thresholds: levels at which blocks fail by the model's copula; None where it is not
+                known.
             curve: hazard curve of their site.
             years: period T [a].
         """
-        count = blocks.p2.shape[1]
-        standing = (
-            StandingBlocks.of_blocks(blocks, [curve], COARSE_STEP)
-            if count <= MOST_JOINT
-            else StandingBlocks.of_parts(blocks.parts(_AT_ONCE), [curve])
-        )
-        any_rate = standing.rate(curve)
-        rates = dict(zip(standing.laws, any_rate.annual_rate[:, 0], strict=True))
+        ends: list[str] = []
+        warn_of_ends(
+            curve, any_bounds.annual_rate[1:], any_bounds.above[1:], any_bounds.above_at_most[1:],
+            any_bounds.below[1:], ends,
+        )  # fmt: skip
+        rates = any_bounds.annual_rate
         bounds = {
             name.replace(" ", "_"): {
-                "annual_rate_any": float(rates[name][0]),
-                "probability_any": float(probability_in(years, rates[name][0])),
+                "annual_rate_any": float(rate),
+                "probability_any": float(probability_in(years, rate)),
             }
-            for name in (DEPENDENT, INDEPENDENT)
+            for name, rate in zip((DEPENDENT, INDEPENDENT), rates, strict=True)
         }
-        ends = [f"annual_rate_any: {text}" for text in any_rate.warnings]
-        here = f"all {count} blocks are taken as those of one site"
-        if COPULA not in rates:
-            why = (
-                "what the blocks share in one earthquake is not known to this model"
-                if blocks.model.dependence is None
-                else f"what more than {MOST_JOINT} blocks share in one earthquake is not computed"
+        here = tuple(f"annual_rate_any: {text}" for text in ends)
+        if thresholds is None:
+            return cls(None, None, None, (), NO_LAW, bounds, here)
+        rates_at, errors = thresholds.rates(curve, block_rates)
+        tiny = np.finfo(np.float64).tiny
+        at_least = tuple(
+            CountRate(
+                count, float(rate), float(error / max(rate, tiny)),
+                float(probability_in(years, rate)),
             )
-            text = f"{here}; {why}: bounds has annual_rate_any under full dependence and if they "
-            warnings = (f"{text}fail independently", *ends)
-            return cls(None, None, None, NO_LAW, bounds, warnings)
-        rate, low, high = rates[COPULA]
+            for count, rate, error in zip(
+                thresholds.counts, rates_at[:, 0, 0], errors, strict=True
+            )
+        )  # fmt: skip
+        first = at_least[0]
         return cls(
-            annual_rate_any=float(rate),
-            annual_rate_any_ci=(float(low), float(high)),
-            probability_any=float(probability_in(years, rate)),
+            annual_rate_any=first.annual_rate,
+            annual_rate_any_ci=(float(rates_at[0, 0, 1]), float(rates_at[0, 0, 2])),
+            probability_any=first.probability,
+            at_least=at_least,
             joint_law=COPULA,
             bounds=bounds,
-            warnings=(f"annual_rate_any: {here}, of unknown azimuth", *ends),
+            warnings=here,
+        )
+
+    @classmethod
+    def mean(cls, parts: Sequence[JointRate], weights: FloatArray) -> JointRate:
+        """Return the weighted mean over branches of a logic tree; all know the law, or none."""
+
+        def meant(values: Iterable[Any]) -> float:
+            return float(sum(w * value for w, value in zip(weights, values, strict=True)))
+
+        bounds = {
+            law: {name: meant(part.bounds[law][name] for part in parts) for name in numbers}
+            for law, numbers in parts[0].bounds.items()
+        }
+        warnings = tuple(dict.fromkeys(text for part in parts for text in part.warnings))
+        if parts[0].joint_law == NO_LAW:
+            return cls(None, None, None, (), NO_LAW, bounds, warnings)
+        at_least = tuple(
+            CountRate(
+                first.count,
+                *(
+                    meant(getattr(part.at_least[i], name) for part in parts)
+                    for name in ("annual_rate", "numerical_error", "probability")
+                ),
+            )
+            for i, first in enumerate(parts[0].at_least)
+        )
+        low, high = (
+            meant(part.annual_rate_any_ci[i] for part in parts if part.annual_rate_any_ci)
+            for i in (0, 1)
+        )
+        return cls(
+            annual_rate_any=at_least[0].annual_rate,
+            annual_rate_any_ci=(low, high),
+            probability_any=at_least[0].probability,
+            at_least=at_least,
+            joint_law=parts[0].joint_law,
+            bounds=bounds,
+            warnings=warnings,
         )
 
     def as_dict(self) -> dict[str, object]:
@@ -103,6 +173,7 @@ class JointRate:
             "annual_rate_any": self.annual_rate_any,
             "annual_rate_any_ci": None if ends is None else list(ends),
             "probability_any": self.probability_any,
+            "annual_rate_at_least": [dict(vars(one)) for one in self.at_least] or None,
             "joint_law": self.joint_law,
             "bounds": {name: dict(values) for name, values in self.bounds.items()},
         }

@@ -11,7 +11,7 @@ from rbfrag.hazards.curve import HazardCurve
 
 def as_dict(
     curves: Sequence[HazardCurve],
-    names: Sequence[str | None],
+    names: Sequence[Sequence[str | None]],
     answers: Sequence[HazardAnswer],
     remarks: Sequence[str] = (),
 ) -> dict[str, Any]:
@@ -19,6 +19,12 @@ def as_dict(
 
     One block at one site is an object with its contributions; at several sites a list in it.
     Several blocks are a list in it beside what they do in common, at several sites a list of that.
+
+    Args:
+        curves: a curve of each site.
+        names: identifiers of the blocks of each site.
+        answers: the answers, one a site.
+        remarks: warnings that go before those of the answers.
     """
     rows = [
         {
@@ -27,28 +33,32 @@ def as_dict(
             "annual_rate": float(rates.annual_rate[i]),
             "ci_low": float(rates.ci_low[i]),
             "ci_high": float(rates.ci_high[i]),
+            "numerical_error": float(rates.numerical_error[i]),
             "probability": float(rates.probability[i]),
+            **_quantiles(rates, i),
         }
-        for curve, rates in zip(curves, answers, strict=True)
-        for i, name in enumerate(names)
+        for curve, own, rates in zip(curves, names, answers, strict=True)
+        for i, name in enumerate(own)
     ]
+    first = answers[0]
     shared = {
-        "years": answers[0].years,
-        "level": answers[0].level,
-        "model": answers[0].model,
-        "term": answers[0].term,
-        "method": answers[0].method,
+        "years": first.years,
+        "level": first.level,
+        "model": first.model,
+        "term": first.term,
+        "method": first.method,
         "imt": curves[0].imt,
+        "curve_kind": first.curve_kind,
     }
     warnings = [*remarks, *dict.fromkeys(word for each in answers for word in each.warnings)]
-    if answers[0].joint is not None:
+    if any(len(own) > 1 for own in names):
         sites = [_of_site(curve, one) for curve, one in zip(curves, answers, strict=True)]
         common = sites[0] if len(sites) == 1 else {"sites": sites}
         return {**common, **shared, "blocks": rows, "warnings": warnings}
+    branches = {"branches": [one.as_dict() for one in first.branches]} if first.branches else {}
     if len(rows) > 1:
         return {**shared, "answers": rows, "warnings": warnings}
     del rows[0]["block_id"]
-    first = answers[0]
     contributions = [
         {"from": low, "to": high, "annual_rate": part}
         for low, high, part in zip(
@@ -56,14 +66,33 @@ def as_dict(
             strict=True,
         )
     ]  # fmt: skip
-    return {**rows[0], **shared, "contributions": contributions, "warnings": warnings}
+    return {
+        **rows[0], **shared, **branches, "contributions": contributions, "warnings": warnings,
+    }  # fmt: skip
+
+
+def _quantiles(answer: HazardAnswer, i: int) -> dict[str, float]:
+    """Return the quantiles of a block's rate over the branches of a logic tree."""
+    return {
+        f"annual_rate_p{round(100.0 * q):02d}": float(rates["annual_rate"][i])
+        for q, rates in answer.quantiles.items()
+    }
 
 
 def _of_site(curve: HazardCurve, answer: HazardAnswer) -> dict[str, Any]:
-    """Return what several blocks of one site do in common."""
-    assert answer.joint is not None
-    return {
-        "site": curve.place or None,
-        **answer.joint.as_dict(),
-        "expected_failures_per_year": answer.expected_failures_per_year,
+    """Return what the blocks of one site do in common."""
+    rate = answer.annual_rate_any
+    common: dict[str, Any] = {"site": curve.place or None}
+    if answer.joint is None:
+        common |= {"annual_rate_any": rate, "probability_any": float(answer.probability[0])}
+    else:
+        common |= answer.joint.as_dict()
+    common["expected_failures_per_year"] = answer.expected_failures_per_year
+    common |= {
+        f"annual_rate_any_p{round(100.0 * q):02d}": rates["annual_rate_any"]
+        for q, rates in answer.quantiles.items()
+        if "annual_rate_any" in rates
     }
+    if answer.branches:
+        common["branches"] = [one.as_dict() for one in answer.branches]
+    return common

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
@@ -15,24 +14,22 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.predict import Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import Fragility
+from rbfrag.hazards.branches import (
+    checked_weights,
+    curve_name,
+    quantile_warning,
+    refuse_unlike,
+)
 from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.model_blocks import ModelBlocks
 from rbfrag.hazards.shaking import NOTABLE, Shaking
 from rbfrag.hazards.standing import Age, Standing, weights_given_standing
-from rbfrag.hazards.standing_blocks import (
-    DEPENDENT,
-    INDEPENDENT,
-    AnyRate,
-    ModelBlocks,
-    StandingBlocks,
-)
+from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT, AnyRate, StandingBlocks
 
 FloatArray = NDArray[np.float64]
 
 DRAWS = 128
 """Draws of the blocks' parameters where several uncertain blocks are given."""
-
-_ADDS_UP = 2e-3
-"""How far weights may add up to something else than 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,8 +195,8 @@ def survival(
         DatabaseError: the database cannot be read.
     """
     each = [curves] if isinstance(curves, HazardCurve) else list(curves)
-    _refuse_unlike(each)
-    weight = _checked_weights(weights, len(each))
+    refuse_unlike(each)
+    weight = checked_weights(weights, len(each))
     age = Age.of(age_years, age_sd_years)
     known: ModelBlocks | None = None
     if fragility is None:
@@ -232,7 +229,7 @@ def survival(
         age_years=float(age_years),
         age_sd_years=float(age_sd_years),
         blocks=blocks.count,
-        hazard=_name(each[0]) if weight is None else "the weighted branches",
+        hazard=curve_name(each[0]) if weight is None else "the weighted branches",
         joint_law=blocks.laws[0],
         bounds={name.replace(" ", "_"): _numbers(result.whole(law)) for name, law in places.items()}
         or None,
@@ -296,7 +293,7 @@ class _Survival:
                 before[i], after[i] = float(self.weight[i]), float(given[i])
         return tuple(
             BranchSurvival(
-                name=_name(curve),
+                name=curve_name(curve),
                 weight=before[i],
                 weight_given_standing=after[i],
                 annual_rate_any=self.rates[i].mean,
@@ -312,11 +309,7 @@ def _warnings(
 ) -> Iterator[str]:
     for curve in curves:
         yield from curve.warnings
-        if curve.statistic.startswith("quantile"):
-            yield (
-                f"{curve.statistic} is the hazard of no single model, and survival under it no "
-                "quantile of survival: branches with their weights say more"
-            )
+        yield from quantile_warning(curve, "survival")
     if blocks.of_model is not None:
         yield from blocks.of_model.warnings
     for rate in rates:
@@ -334,48 +327,9 @@ def _warnings(
         )
 
 
-def _name(curve: HazardCurve) -> str:
-    return curve.statistic or curve.source
-
-
 def _numbers(standing: Standing) -> dict[str, Any]:
     return {
         "probability_standing": standing.probability,
         "factor_5_percent": standing.factor(0.05),
         "factor_50_percent": standing.factor(0.5),
     }
-
-
-def _refuse_unlike(curves: list[HazardCurve]) -> None:
-    if not curves:
-        raise InputError("there is no hazard curve: give one or more")
-    measures = list(dict.fromkeys(curve.imt for curve in curves))
-    if len(measures) > 1:
-        raise InputError(
-            f"the curves are of {', '.join(measures)}: give curves of one measure, or choose it "
-            "with --imt"
-        )
-    places = list(dict.fromkeys(curve.place for curve in curves if curve.place))
-    if len(places) > 1:
-        raise InputError(
-            f"the curves are of {len(places)} sites ({places[0]}; {places[1]}; …): the blocks "
-            "stand at one: choose it with --site"
-        )
-
-
-def _checked_weights(weights: Sequence[float | None] | None, n: int) -> FloatArray | None:
-    """Return weights that sum to 1, NaN for curves without; None where none is given."""
-    if weights is None or all(one is None for one in weights):
-        return None
-    if len(weights) != n:
-        raise InputError(f"{len(weights)} weights for {n} curves: give one for each")
-    values = np.array([math.nan if one is None else one for one in weights], dtype=np.float64)
-    given = values[~np.isnan(values)]
-    if not ((given >= 0.0) & (given <= 1.0)).all():
-        raise InputError(f"weights {', '.join(f'{one:g}' for one in given)}: each is from 0 to 1")
-    if abs(given.sum() - 1.0) > _ADDS_UP:
-        raise InputError(
-            f"the weights of {given.size} branches add up to {given.sum():.6g}, not 1: give the "
-            "curves and weights of all branches"
-        )
-    return np.asarray(values / given.sum())

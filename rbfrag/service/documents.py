@@ -249,6 +249,7 @@ class SiteRate(_Document):
     annual_rate: float
     ci_low: float
     ci_high: float
+    numerical_error: float
     probability: float
 
 
@@ -258,11 +259,13 @@ class HazardAnswer(_Fitted):
     years: float
     level: float
     imt: str
+    curve_kind: str | None
     warnings: list[str]
     site: str | None = None
     annual_rate: float | None = None
     ci_low: float | None = None
     ci_high: float | None = None
+    numerical_error: float | None = None
     probability: float | None = None
     contributions: list[Contribution] | None = None
     answers: list[SiteRate] | None = None

@@ -153,7 +153,7 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
         include={"years", "level", "convert", "convert_sigma", "component", "model"}
     )
     rates = [answer(curve, p2, kr, **chosen, db=db) for curve in curves]
-    return json_text(as_dict(curves, [None], rates, remarks))
+    return json_text(as_dict(curves, [[None]] * len(curves), rates, remarks))
 
 
 def _motion(body: bytes, query: Reading) -> GroundMotion:

@@ -68,9 +68,9 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     found = shell.json("hazard", curve, "--blocks", "blocks.csv", "--years", "100")
     assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
     assert set(found) == {
-        "site", "annual_rate_any", "annual_rate_any_ci", "probability_any", "joint_law", "bounds",
-        "expected_failures_per_year", "years", "level", "model", "term", "method", "imt", "blocks",
-        "warnings",
+        "site", "annual_rate_any", "annual_rate_any_ci", "probability_any", "annual_rate_at_least",
+        "joint_law", "bounds", "expected_failures_per_year", "years", "level", "model", "term",
+        "method", "imt", "curve_kind", "blocks", "warnings",
     }  # fmt: skip
     each = [row["annual_rate"] for row in found["blocks"]]
     assert found["expected_failures_per_year"] == pytest.approx(sum(each), rel=1e-12)
@@ -81,6 +81,72 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     printed = shell("hazard", curve, "--blocks", "blocks.csv", "--years", "100").stdout
     assert f"once in {1 / found['annual_rate_any']:.4g} years on average" in printed
     assert f"{found['expected_failures_per_year']:.4g} failures a year are expected" in printed
+
+
+def test_numbers_of_failures_that_are_asked_for(shell: Shell, curve: Path) -> None:
+    rows = "".join(f"b{i},3,{0.1 + 0.01 * i}\n" for i in range(6))
+    Path("blocks.csv").write_text("block_id,p2_1_s2,kr\n" + rows)
+    found = shell.json("hazard", curve, "--blocks", "blocks.csv", "--at-least", "3,6")
+    counts = {row["count"]: row["annual_rate"] for row in found["annual_rate_at_least"]}
+    assert list(counts) == [1, 3, 6]
+    assert counts[1] == found["annual_rate_any"] > counts[3] > counts[6] > 0.0
+    told = shell("hazard", curve, "--blocks", "blocks.csv", "--at-least", "7", expect=2).stderr
+    assert "at least 7 failures of 6 blocks" in told
+    told = shell("hazard", curve, "--blocks", "blocks.csv", "--at-least", "x", expect=2).stderr
+    assert "give whole numbers with commas" in told
+
+
+@pytest.fixture
+def logic_tree(formats_dir: Path) -> Path:
+    return formats_dir / "openquake_classical_logic_tree" / "three_realizations"
+
+
+def test_blocks_stand_at_sites_by_their_id(shell: Shell, curve: Path, logic_tree: Path) -> None:
+    mean = logic_tree / "hazard_curve-mean-PGV_7.csv"
+    head = "block_id,p2_1_s2,kr,site_id\n"
+    Path("blocks.csv").write_text(head + "A,3,0.1,SLIDE-A\nB,10,0.2,0012\nC,3,0.2,0012\n")
+    found = shell.json("hazard", mean, "--blocks", "blocks.csv", "--component", "rotd50",
+                       "--out", "rates.csv")  # fmt: skip
+    assert [(row["site"], row["block_id"]) for row in found["blocks"]] == [
+        ("SLIDE-A", "A"), ("0012", "B"), ("0012", "C"),
+    ]  # fmt: skip
+    assert [one["site"] for one in found["sites"]] == ["SLIDE-A", "0012"]
+    alone = shell.json("hazard", mean, "--site", "SLIDE-A", "--p2", "3", "--kr", "0.1",
+                       "--component", "rotd50")  # fmt: skip
+    assert found["sites"][0]["annual_rate_any"] == pytest.approx(alone["annual_rate"], rel=1e-9)
+    assert any("rbfrag losses" in text for text in found["warnings"])
+    with Path("rates.csv").open() as file:
+        assert [row["site"] for row in csv.DictReader(file)] == ["SLIDE-A", "0012", "0012"]
+    only = shell.json("hazard", mean, "--blocks", "blocks.csv", "--site", "0012")
+    assert [row["block_id"] for row in only["blocks"]] == ["B", "C"]
+    Path("blocks.csv").write_text(head + "A,3,0.1,12\n")
+    told = shell("hazard", mean, "--blocks", "blocks.csv", expect=2).stderr
+    assert "stands at site '12', of which there is no curve" in told
+    unnamed = shell.json("hazard", curve, "--blocks", "blocks.csv")
+    assert any("site_id of the blocks is not used" in text for text in unnamed["warnings"])
+
+
+def test_branches_with_openquakes_weights(shell: Shell, curve: Path, logic_tree: Path) -> None:
+    branches = sorted(logic_tree.glob("hazard_curve-rlz-*-PGV_7.csv"))
+    asked = ("--site", "RIDGE_2", "--p2", "3", "--kr", "0.1", "--component", "rotd50")
+    found = shell.json("hazard", *branches, *asked, "--weights",
+                       logic_tree / "realizations_7.csv")  # fmt: skip
+    each = [shell.json("hazard", one, *asked)["annual_rate"] for one in branches]
+    assert found["annual_rate"] == pytest.approx(np.dot((0.5, 0.3, 0.2), each), rel=1e-6)
+    assert found["annual_rate_p05"] == min(each)
+    assert found["annual_rate_p95"] == max(each)
+    assert found["curve_kind"] == "weighted branches"
+    assert [row["weight"] for row in found["branches"]] == pytest.approx([0.5, 0.3, 0.2])
+    # the engine's mean curve is that of the branches
+    mean = shell.json("hazard", logic_tree / "hazard_curve-mean-PGV_7.csv", *asked)
+    assert mean["curve_kind"] == "mean"
+    assert found["annual_rate"] == pytest.approx(mean["annual_rate"], rel=2e-3)
+    middle = shell.json("hazard", logic_tree / "quantile_curve-0.5-PGV_7.csv", *asked)
+    assert any("quantile-0.5 is the hazard of no single model" in w for w in middle["warnings"])
+    printed = shell("hazard", *branches, *asked, "--weights", "0.5,0.3,0.2").stdout
+    assert "rlz-002" in printed
+    other = shell("hazard", branches[0], curve, *asked[2:], expect=2).stderr
+    assert "give curves of the same sites" in other
 
 
 def test_a_rock_mass_is_one_class(shell: Shell, curve: Path) -> None:

@@ -12,8 +12,9 @@ import pytest
 
 import rbfrag
 from rbfrag.db.engine import opened_database
+from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
-from tests.cli.conftest import Shell
+from tests.cli.conftest import Refuses, Shell
 from tests.exchange.test_shakemap_grid import GRID, UNCERTAINTY
 from tests.fragility.conftest import model_row
 
@@ -148,3 +149,25 @@ def test_a_model_that_does_not_know_what_blocks_share(shell: Shell, grid: Path) 
     assert told["probability_any"] is None
     ends = [told["bounds"][law]["probability_any"] for law in ("fully_dependent", "independent")]
     assert 0.0 < ends[0] < ends[1] + 0.01  # 10,000 draws
+
+
+def test_free_standing_blocks_with_their_restitution(
+    shell: Shell, refuses: Refuses, grid: Path
+) -> None:
+    Path("b.csv").write_text("p2_1_s2,kr,lon,lat,restitution\n3,0.1,20,41,\n3,0.1,20,41,0.8\n")
+    free = ("--kind", "rocking", "--db", REFERENCE, *SINGLE)
+    shell("shakemap", grid, "--blocks", "b.csv", "--out", "a.csv", *free)
+    with Path("a.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    for row, e in zip(rows, (None, 0.8), strict=True):
+        own = rbfrag.predict(
+            3.0, 0.1, kind="rocking", restitution=e, pgv_m_s=0.6, pga_g=0.4, db=REFERENCE
+        )
+        assert float(row["probability"]) == pytest.approx(own.probability, rel=1e-9)
+    one = ("--p2", "3", "--kr", "0.1", "--restitution", "0.8", "--out", "b.geojson")
+    told = shell.json("shakemap", grid, *one, *free)
+    first = json.loads(Path("b.geojson").read_text())["features"][0]["properties"]
+    assert first["probability"] == pytest.approx(float(rows[1]["probability"]), rel=1e-9)
+    assert told["model"] == "rocking-pgv_pga"
+    message = refuses("shakemap", grid, *one, *SINGLE)
+    assert "--restitution goes with blocks that stand free" in message

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.special import ndtri
 
+from rbfrag.errors import InputError
+from rbfrag.fragility.dependence import Dependence
+from rbfrag.fragility.joint import Placement
+from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.predict import predict
-from rbfrag.hazards import joint_rate
+from rbfrag.hazards import answer as module
 from rbfrag.hazards.annual_rate import failure_rate
 from rbfrag.hazards.answer import HazardAnswer, hazard
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
 from rbfrag.hazards.report import as_dict
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from tests.fragility.conftest import SHARED, model_row
 
 SHARES = ("rho_e", "rho_s", "rho_v", "rho_o")
@@ -88,21 +95,109 @@ def test_without_an_estimate_both_bounds_are_given() -> None:
 def test_many_blocks_have_the_bounds_of_few(monkeypatch: pytest.MonkeyPatch) -> None:
     p2, kr = np.linspace(1.0, 10.0, 5), np.linspace(0.1, 0.2, 5)
     few = answered(p2, kr, SHARED)
-    monkeypatch.setattr(joint_rate, "MOST_JOINT", 4)
-    monkeypatch.setattr(joint_rate, "_AT_ONCE", 2)
+    monkeypatch.setattr(module, "MOST_JOINT", 4)
+    monkeypatch.setattr(module, "_CHUNK", 2)
     many = answered(p2, kr, SHARED)
     assert few.annual_rate_any is not None
     assert many.annual_rate_any is None
+    np.testing.assert_allclose(many.annual_rate, few.annual_rate, rtol=1e-12)
     for law in ("fully_dependent", "independent"):
         assert bound(many, law) == pytest.approx(bound(few, law), rel=1e-9)
     assert any("more than 4 blocks" in text for text in many.warnings)
+
+
+def at_least(answer: HazardAnswer) -> dict[int, float]:
+    assert answer.joint is not None
+    return {one.count: one.annual_rate for one in answer.joint.at_least}
+
+
+def test_rates_of_k_or_more() -> None:
+    # blocks that fail together fail by their strength: k or more at the rate of the k-th
+    kr = np.array([0.3, 0.1, 0.2])
+    found = answered(np.full(3, 3.0), kr, TOGETHER, at_least=[2, 3])
+    each = np.sort(found.annual_rate)[::-1]
+    assert list(at_least(found).values()) == pytest.approx(each.tolist(), rel=2e-3)
+    # what k blocks or more fail adds up to the failures expected
+    some = answered(np.linspace(1.0, 9.0, 6), np.linspace(0.1, 0.2, 6), SHARED,
+                    at_least=range(1, 7))  # fmt: skip
+    rates = list(at_least(some).values())
+    assert sum(rates) == pytest.approx(some.expected_failures_per_year, rel=5e-3)
+    assert all(more >= fewer for more, fewer in pairwise(rates))
+    with pytest.raises(InputError, match="at least 4 failures of 3 blocks"):
+        answered(np.full(3, 3.0), kr, TOGETHER, at_least=[4])
+
+
+def test_joint_rates_are_those_of_samples() -> None:
+    random = np.random.default_rng(3)
+    p2, kr = random.uniform(1.0, 15.0, 24), random.uniform(0.08, 0.3, 24)
+    curve = power_law()
+    found = answered(p2, kr, SHARED)
+    p = np.sqrt(p2)
+    blocks = Placement.of(np.log(p), np.log(kr * STANDARD_GRAVITY_M_S2 / p), polarity=0)
+    sampler = JointSampler(Dependence(**SHARED), blocks)
+    z = np.concatenate([sampler.normals(4000, random) for _ in range(8)])
+    x = np.geomspace(0.01, 10.0, 120)
+    model = model_row(dependence=SHARED)
+    shaken = [
+        predict(a, b, pgv_m_s=x, model=model).probability for a, b in zip(p2, kr, strict=True)
+    ]
+    mass = -np.diff(curve.rate_at(x))
+    for k in (1, 2, 5):
+        share = np.array(
+            [((z <= ndtri(p_at)).sum(axis=1) >= k).mean() for p_at in np.array(shaken).T]
+        )
+        brute = float(mass @ (0.5 * (share[1:] + share[:-1])) + curve.annual_rate[-1] * share[-1])
+        assert at_least(found)[k] == pytest.approx(brute, rel=0.02)
+    assert found.joint is not None
+    assert found.joint.at_least[0].numerical_error < 3e-3
+    assert found.numerical_error.max() < 1e-3
+
+
+def test_branches_of_a_logic_tree() -> None:
+    x = np.geomspace(0.01, 10.0, 20)
+    curves = [
+        hazard_curve("pgv_m_s", x, k * x**-2.0, statistic=f"rlz-{i:03d}")
+        for i, k in enumerate((1e-3, 2e-3, 4e-3))
+    ]
+    row = model_row(dependence=SHARED)
+    asked: dict[str, Any] = {"component": "single", "model": row}
+    each = [hazard(one, [3.0, 5.0], [0.1, 0.2], **asked) for one in curves]
+    found = hazard(curves, [3.0, 5.0], [0.1, 0.2], weights=[0.5, 0.3, 0.2], **asked)
+    mean = sum(w * one.annual_rate for w, one in zip((0.5, 0.3, 0.2), each, strict=True))
+    np.testing.assert_allclose(found.annual_rate, mean, rtol=1e-12)
+    chance = sum(w * one.probability for w, one in zip((0.5, 0.3, 0.2), each, strict=True))
+    np.testing.assert_allclose(found.probability, chance, rtol=1e-12)
+    assert found.contribution.sum() + found.above.sum() == pytest.approx(found.annual_rate.sum())
+    assert found.curve_kind == "weighted branches"
+    # rates of half of the weight are those of the first branch
+    np.testing.assert_allclose(found.quantiles[0.5]["annual_rate"], each[0].annual_rate)
+    np.testing.assert_allclose(found.quantiles[0.95]["annual_rate"], each[2].annual_rate)
+    assert [one.weight for one in found.branches] == [0.5, 0.3, 0.2]
+    assert found.branches[1].annual_rate_any == each[1].annual_rate_any
+    assert found.annual_rate_any == pytest.approx(
+        sum(w * (one.annual_rate_any or 0.0) for w, one in zip((0.5, 0.3, 0.2), each, strict=True))
+    )
+    first = hazard(curves, [3.0, 5.0], [0.1, 0.2], **asked)
+    assert (first.curve_kind, first.annual_rate.tolist()) == (
+        "rlz-000",
+        each[0].annual_rate.tolist(),
+    )
+    assert first.quantiles == {}
+
+
+def test_a_quantile_curve_is_warned_of() -> None:
+    x = np.geomspace(0.01, 10.0, 20)
+    curve = hazard_curve("pgv_m_s", x, 1e-3 * x**-2.0, statistic="quantile-0.84")
+    found = hazard(curve, 3.0, 0.1, model=model_row(), component="single")
+    assert found.curve_kind == "quantile-0.84"
+    assert any("quantile-0.84 is the hazard of no single model" in text for text in found.warnings)
 
 
 def test_keys_of_several_sites() -> None:
     curves = [power_law("A"), power_law("B")]
     row = model_row(dependence=SHARED)
     answers = [hazard(c, [3.0, 3.0], [0.1, 0.2], component="single", model=row) for c in curves]
-    found = as_dict(curves, ["x", "y"], answers)
+    found = as_dict(curves, [["x", "y"]] * 2, answers)
     assert [(row["site"], row["block_id"]) for row in found["blocks"]] == [
         ("A", "x"), ("A", "y"), ("B", "x"), ("B", "y"),
     ]  # fmt: skip

@@ -37,18 +37,46 @@ class CurveOptions:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class RateOptions:
+    """Which rates are asked for."""
+
+    years: float = option("Period of the probability [years].", 50.0)
+    weights: str | None = option(
+        "Weights of the branches: 0.5,0.3,0.2 in the order of the curves, or OpenQuake's file of "
+        "realizations."
+    )
+    at_least: str | None = option(
+        "Numbers of failures in one earthquake whose rates are wanted, as 1,5,20. "
+        "Default: 1, 2, 5, 10, …",
+        metavar="K,K",
+    )
+
+    def counts(self) -> list[int] | None:
+        """Return the numbers of failures."""
+        if self.at_least is None:
+            return None
+        try:
+            return [int(part) for part in self.at_least.split(",")]
+        except ValueError:
+            raise InputError(
+                f"--at-least {self.at_least!r}: give whole numbers with commas, as 1,5,20"
+            ) from None
+
+
 @stacked
 def hazard(
     *,
-    curve: str = argument(
+    curve: list[str] = argument(
         "Hazard curve: OpenQuake CSV, USGS NSHM JSON, or CSV of two columns whose header "
-        "names their units (pgv_m_s,annual_rate).",
-        metavar="CURVE",
+        "names their units (pgv_m_s,annual_rate); several are branches or statistics of one "
+        "logic tree.",
+        metavar="CURVE...",
     ),
     blocks: BlocksOptions,
     meaning: CurveOptions,
     answering: options.Answering,
-    years: float = option("Period of the probability [years].", 50.0),
+    wanted: RateOptions,
     out: str | None = option("Write one row a block and site (.csv, .parquet)."),
     plot: str | None = option(
         "Draw which shaking the rate of one block comes from (.png, .pdf, .svg)."
@@ -58,52 +86,64 @@ def hazard(
     """Print the annual rate at which a block topples.
 
     The fragility is integrated over the hazard curve, and the probability in a period of years
-    follows. Several blocks of --blocks stand at one site: beside their rates it gives how often an
-    earthquake fails at least one of them, by what the model knows of blocks that share the shaking.
-    Curves of PGV, PGA and SA at 0.3, 1, 2 and 3 s are answered, each by a model of that very
-    measure; another needs --convert. The block is backed by a slope; a free-standing one
-    fails at weaker shaking.
+    follows. Blocks of --blocks stand at the curves' sites by site_id, else all at one: beside their
+    rates it gives how often an earthquake fails at least one of them, or more, by what the model
+    knows of blocks that share the shaking. Curves of PGV, PGA and SA at 0.3, 1, 2 and 3 s are
+    answered, each by a model of that very measure; another needs --convert. With --weights curves
+    are branches of a logic tree: the mean of the rates, and how they are distributed. The block is
+    backed by a slope; a free-standing one fails at weaker shaking.
     """
     from rbfrag.exchange.block_table import write_block_table
+    from rbfrag.exchange.branch_weights import stated_weights
     from rbfrag.exchange.hazard_curves import read_hazard_curves, suited_curves
+    from rbfrag.exchange.site_rates import blocks_at_sites, rate_columns
     from rbfrag.hazards.answer import hazard as answer
     from rbfrag.hazards.conversions import velocity_conversion
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot)
     table, is_class, remarks = blocks.toppling_blocks()
-    names = list(table["block_id"])
-    curves = suited_curves(
-        read_hazard_curves(curve, imt=meaning.imt, site=meaning.site),
-        converted_period_s=None
-        if meaning.convert is None
-        else velocity_conversion(meaning.convert).period_s,
-    )
-    if plot is not None and (len(curves) > 1 or len(names) > 1):
+    period = None if meaning.convert is None else velocity_conversion(meaning.convert).period_s
+    files = [
+        suited_curves(
+            read_hazard_curves(path, imt=meaning.imt, site=meaning.site), converted_period_s=period
+        )
+        for path in curve
+    ]
+    sites, joined = blocks_at_sites(files, table, site_chosen=meaning.site is not None)
+    if plot is not None and (len(sites) > 1 or len(sites[0].names) > 1):
         raise InputError(
             "--plot draws one block at one site: choose them with --site, --p2 and --kr"
         )
     answers = [
         answer(
-            one, table["p2_1_s2"], table["kr"], convert=meaning.convert,
-            convert_sigma=meaning.convert_sigma, component=meaning.component, years=years,
-            model=answering.model, level=answering.level, db=answering.db, one_class=is_class,
+            one.curves, one.columns["p2_1_s2"], one.columns["kr"],
+            weights=None if wanted.weights is None else stated_weights(wanted.weights, one.curves),
+            at_least=wanted.counts(), convert=meaning.convert, convert_sigma=meaning.convert_sigma,
+            component=meaning.component, years=wanted.years, model=answering.model,
+            level=answering.level, db=answering.db, one_class=is_class,
         )
-        for one in curves
+        for one in sites
     ]  # fmt: skip
     if out is not None:
-        from rbfrag.exchange.hazard_curves import rate_columns
-
-        write_block_table(rate_columns(curves, table, answers), out)
+        write_block_table(rate_columns(sites, answers), out)
+    first = [one.curves[0] for one in sites]
     if plot is not None:
         from rbfrag.plots.hazard import plot_contribution
 
-        plot_contribution(curves[0], answers[0], plot)
-    document = as_dict(curves, names, answers, remarks)
+        plot_contribution(first[0], answers[0], plot)
+    document = as_dict(first, [one.names for one in sites], answers, (*remarks, *joined))
     if json:
         print_json(document)
         return
+    _print(document, answers, first)
+
+
+def _print(
+    document: dict[str, Any], answers: list[HazardAnswer], curves: list[HazardCurve]
+) -> None:
     warnings = document.pop("warnings")
+    branches = document.pop("branches", None)
     rows = document.pop("blocks", None) or document.pop("answers", None)
     if rows is not None:
         for one, curve_of in zip(answers, curves, strict=True):
@@ -112,9 +152,12 @@ def hazard(
         document.pop("sites", None)
         for law, bound in document.pop("bounds", {}).items():
             document |= {f"{name}_{law}": value for name, value in bound.items()}
+        counts = document.pop("annual_rate_at_least", None)
         print_pairs(document)
-        print()
-        print_table(list(rows[0]), [list(row.values()) for row in rows])
+        for some in (counts, branches, rows):
+            if some:
+                print()
+                print_table(list(some[0]), [list(row.values()) for row in some])
     else:
         del document["contributions"]
         print_pairs(document)
@@ -122,6 +165,9 @@ def hazard(
             print(f"once in {1.0 / document['annual_rate']:.4g} years on average")
             print()
             print_table(["from", "to", "share_%"], _shares(answers[0], curves[0]))
+        if branches:
+            print()
+            print_table(list(branches[0]), [list(row.values()) for row in branches])
     print_warnings(warnings)
 
 
@@ -152,9 +198,12 @@ def _in_common(answer: HazardAnswer, curve: HazardCurve) -> str:
 
 def _shares(answer: Any, curve: Any) -> list[list[object]]:
     """Return which shaking the rate comes from, between the levels of the curve."""
+    import numpy as np
+
     unit = {"pgv_m_s": "m/s"}.get(answer.measure, "g")
     levels, imt = curve.levels, curve.imt
-    parts = answer.contribution[0].reshape(levels.size - 1, -1).sum(axis=1) / answer.annual_rate[0]
+    below = np.concatenate([[0.0], answer.contribution[0].cumsum()]) / answer.annual_rate[0]
+    parts = np.diff(np.interp(np.log(levels), np.log(answer.edges), below))
     rows: list[list[object]] = [
         [f"{imt} {low:.3g}", f"{high:.3g} {unit}", round(100.0 * share, 1)]
         for low, high, share in zip(levels[:-1], levels[1:], parts.tolist(), strict=True)

@@ -1,0 +1,148 @@
+"""Which blocks stand at which sites of hazard curves, and annual rates as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.hazards.answer import HazardAnswer
+from rbfrag.hazards.curve import HazardCurve
+
+
+@dataclass(frozen=True, eq=False)
+class SiteBlocks:
+    """The curves of one site and the blocks that stand there.
+
+    Args:
+        curves: curves of one measure, one from each file.
+        columns: ``block_id``, ``p2_1_s2`` and ``kr`` of the blocks.
+    """
+
+    curves: tuple[HazardCurve, ...]
+    columns: Mapping[str, Any]
+
+    @property
+    def names(self) -> list[str | None]:
+        """Identifiers of the blocks."""
+        return list(self.columns["block_id"])
+
+
+def blocks_at_sites(
+    files: Sequence[Sequence[HazardCurve]],
+    columns: Mapping[str, Any],
+    *,
+    site_chosen: bool = False,
+) -> tuple[list[SiteBlocks], tuple[str, ...]]:
+    """Return the sites with their curves and blocks, and what is to be said of it.
+
+    Blocks are joined by ``site_id`` where the table has it and the curves name their sites;
+    otherwise all blocks are taken at each site.
+
+    Args:
+        files: curves of each file, of one measure, one a site.
+        columns: columns of the blocks.
+        site_chosen: one site of several was asked for: blocks of others are left out.
+
+    Raises:
+        InputError: files of other sites, or a block of a site that has no curve.
+    """
+    by_site: dict[tuple[Any, ...], list[HazardCurve]] = {}
+    for curves in files:
+        for curve in curves:
+            by_site.setdefault(_key(curve), []).append(curve)
+    for curves in by_site.values():
+        if len(curves) != len(files):
+            raise InputError(
+                f"site {curves[0].place or 'without a name'} is in {len(curves)} of {len(files)} "
+                "files: give curves of the same sites"
+            )
+    wanted = columns.get("site_id")
+    have = [curves[0].site for curves in by_site.values()]
+    has_ids = wanted is not None and any(wanted)
+    if wanted is None or not has_ids or not all(have):
+        everywhere = [SiteBlocks(tuple(curves), columns) for curves in by_site.values()]
+        return everywhere, _not_joined(has_ids, have, len(columns["block_id"]))
+    known = set(have)
+    missing = [i for i, name in enumerate(wanted) if name not in known]
+    if missing and not site_chosen:
+        raise InputError(
+            f"block {columns['block_id'][missing[0]]} stands at site "
+            f"{str(wanted[missing[0]])!r}, of which there is no curve; there are {', '.join(have)}"
+        )
+    sites = []
+    for curves in by_site.values():
+        own = np.flatnonzero(wanted == curves[0].site)
+        if own.size:
+            here = {name: np.asarray(values)[own] for name, values in columns.items()}
+            sites.append(SiteBlocks(tuple(curves), here))
+    if not sites:
+        raise InputError(f"no block stands at site {', '.join(have)}")
+    remarks = ["blocks stand at the sites of the curves by their site_id"]
+    if missing:
+        remarks.append(f"{len(missing)} blocks of other sites are left out")
+    if len(sites) > 1:
+        remarks.append(
+            "rates of several sites do not make a rate of all of them: curves do not tell which "
+            "earthquakes shake both; use  rbfrag losses  on an event set"
+        )
+    return sites, tuple(remarks)
+
+
+def _key(curve: HazardCurve) -> tuple[Any, ...]:
+    if curve.site or curve.lon is None or curve.lat is None:
+        return (curve.site,)
+    return (round(curve.lon, 3), round(curve.lat, 3))  # the last digits differ between files
+
+
+def _not_joined(has_ids: bool, sites: Sequence[str], blocks: int) -> tuple[str, ...]:
+    if has_ids:
+        return ("the curves do not name their sites: site_id of the blocks is not used",)
+    if blocks > 1 and len(sites) > 1:
+        return (
+            "the blocks have no site_id: all of them are taken at each of the sites of the curves",
+        )
+    return ()
+
+
+def rate_columns(
+    sites: Sequence[SiteBlocks], answers: Sequence[HazardAnswer]
+) -> dict[str, NDArray[Any]]:
+    """Return the columns of the table of annual rates, one row a site and block.
+
+    Args:
+        sites: the sites.
+        answers: the answers, one a site.
+    """
+    nothing = float("nan")
+    parts: dict[str, list[NDArray[Any]]] = {}
+    for site, answer in zip(sites, answers, strict=True):
+        size, curve = len(site.names), site.curves[0]
+        alone = len(site.columns["kr"]) == size  # a class of blocks has no single p² and k_r
+        names = ["" if name is None else str(name) for name in site.names]
+        own: dict[str, Any] = {
+            "site": np.array([curve.place] * size, dtype=object),
+            "lon": nothing if curve.lon is None else curve.lon,
+            "lat": nothing if curve.lat is None else curve.lat,
+            "block_id": np.array(names, dtype=object),
+            "p2_1_s2": site.columns["p2_1_s2"] if alone else nothing,
+            "kr": site.columns["kr"] if alone else nothing,
+            "annual_rate": answer.annual_rate,
+            "ci_low": answer.ci_low,
+            "ci_high": answer.ci_high,
+            "numerical_error": answer.numerical_error,
+            "probability": answer.probability,
+            "years": answer.years,
+        }
+        for q, rates in answer.quantiles.items():
+            own[f"annual_rate_p{round(100.0 * q):02d}"] = rates["annual_rate"]
+        for name, values in own.items():
+            kind = object if name in ("site", "block_id") else np.float64
+            parts.setdefault(name, []).append(
+                np.broadcast_to(np.asarray(values, dtype=kind), (size,))
+            )
+    return {name: np.concatenate(values) for name, values in parts.items()}
