@@ -133,6 +133,10 @@ def test_how_many_fail_together(shell: Shell, grid: Path) -> None:
     assert any("correlated over 25.7 km (Jayaram and Baker 2009)" in t for t in told["warnings"])
     again = shell.json("shakemap", grid, *block, "uncertainty.xml", "--seed", "1", "--draws", "200")
     assert (again["draws"], again["seed"]) == (200, 1)
+    Path("s.csv").write_text("p2_1_s2,kr,kr_sigma\n3,0.1,0.3\n")
+    medians = shell.json("shakemap", grid, "--blocks", "s.csv", *block[4:], "uncertainty.xml")
+    assert medians["expected_failures"] == told["expected_failures"]
+    assert any("kr_sigma of the blocks are not integrated" in t for t in medians["warnings"])
     # the 6 nodes hold every one of three blocks, two of the second
     Path("b.csv").write_text("p2_1_s2,kr,weight\n3,0.1,1\n3,0.1,2\n")
     more = shell.json("shakemap", grid, "--blocks", "b.csv", *block[4:], "uncertainty.xml")
