@@ -581,8 +581,8 @@ def _warnings(
         names = " and ".join(name.partition("_")[0].upper() for name in portfolio.measures)
         warnings.append(
             f"the engine draws {names} of one event and site independently given the rupture, and "
-            "pairs them as nature does not: P of PGV and PGA comes out 10 to 50 % too low; PGV alone "
-            "is safer"
+            "pairs them as nature does not: P of PGV and PGA comes out 10 to 50 % too low; PGV "
+            "alone is safer"
         )
     if len(laws) > 1:
         why = (
