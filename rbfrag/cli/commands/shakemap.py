@@ -7,7 +7,7 @@ from typing import Any
 
 from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions
+from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 
@@ -78,7 +78,7 @@ def shakemap(
     shaken = read_shakemap(
         grid, uncertainty=meaning.uncertainty, allow_partial=meaning.allow_partial
     )
-    warnings = [*remarks, *shaken.warnings]
+    warnings = [*remarks, *taken_as_medians(class_blocks), *shaken.warnings]
     own = "lon" in class_blocks
     if own:
         lon, lat = class_blocks["lon"], class_blocks["lat"]
