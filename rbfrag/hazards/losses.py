@@ -15,6 +15,7 @@ from rbfrag.frames import Tabular
 from rbfrag.hazards.event_counts import (
     MOST_IN_CLOSED_FORM,
     PAIRS_AT_ONCE,
+    SAMPLES_AT_ONCE,
     Curves,
     Part,
     PartCounts,
@@ -35,6 +36,7 @@ EACH_COUNT_TO = 20
 """Numbers of failures up to which each is given; beyond them steps of equal ratio."""
 
 _STEPS = 40
+_REACHED = 1.0 - 1e-12  # a sum counts as reaching itself
 _THIN = 0.05
 _QUANTILES = (0.05, 0.5, 0.95)
 
@@ -333,7 +335,7 @@ def event_losses(
         raise InputError(f"seed = {seed}: give a whole number, 0 or more")
     if not 0.0 < level < 1.0:
         raise InputError(f"level = {level:g}: give a level above 0 and below 1, such as 0.95")
-    groups = _groups(events, portfolio)
+    groups = _groups(events, portfolio, samples)
     ends = _ends(portfolio) if samples else (np.empty(0), np.empty(0))
     laws = laws_of(portfolio)
     parts = (
@@ -351,7 +353,7 @@ def event_losses(
     return _answer(events, portfolio, laws, ends, groups, results, samples, seed, level)
 
 
-def _groups(events: EventSet, portfolio: Portfolio) -> list[NDArray[np.intp]]:
+def _groups(events: EventSet, portfolio: Portfolio, samples: int) -> list[NDArray[np.intp]]:
     """Return the events that shake a site with blocks, in parts of whole years."""
     at_site = np.bincount(portfolio.site, minlength=len(events.site_ids))
     pairs = np.bincount(events.event, at_site[events.site], minlength=events.event_id.size)
@@ -362,7 +364,9 @@ def _groups(events: EventSet, portfolio: Portfolio) -> list[NDArray[np.intp]]:
     year, realization = events.year[order], events.realization[order]
     new = (np.diff(year) != 0) | (np.diff(realization) != 0) | events.is_scenario
     starts = np.concatenate([[0], np.flatnonzero(new) + 1])
-    number = (np.cumsum(pairs[order]) - pairs[order])[starts] // PAIRS_AT_ONCE
+    # what an event costs, in parts of the work
+    cost = pairs[order] / PAIRS_AT_ONCE + samples / SAMPLES_AT_ONCE
+    number = np.floor((np.cumsum(cost) - cost)[starts])
     return np.split(order, starts[1:][np.diff(number) > 0])
 
 
@@ -394,15 +398,14 @@ def _ends(portfolio: Portfolio) -> tuple[FloatArray, FloatArray]:
         more = np.rint(np.geomspace(EACH_COUNT_TO, most, _STEPS)) if most > first[-1] else first
         counts = np.unique(np.concatenate([first, more]))
     else:
-        counts = np.unique(np.geomspace(weight.min(), most, _STEPS))
+        counts = np.unique(np.geomspace(weight.min(), most, _STEPS)) * _REACHED
     loss = portfolio.loss
     if loss is None or not loss.any():
         return counts, np.empty(0)
     sigma = portfolio.loss_sigma
     high = float((loss * np.exp(3.0 * sigma)).sum())
     low = float((loss * np.exp(-2.0 * sigma))[loss > 0.0].min())
-    # a step down in the last digits: the whole loss counts as reaching itself
-    return counts, np.geomspace(low, max(high, low), _STEPS if high > low else 1) * (1.0 - 1e-12)
+    return counts, np.geomspace(low, max(high, low), _STEPS if high > low else 1) * _REACHED
 
 
 def _answer(
