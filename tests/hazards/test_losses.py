@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.special import ndtr
-from scipy.stats import binom, chi2
+from scipy.stats import binom, binomtest, chi2
 
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
@@ -19,12 +19,13 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.event_losses import losses
 from rbfrag.exchange.hazard_curves import read_hazard_curves
 from rbfrag.exchange.openquake_events import JobFiles, read_events
+from rbfrag.fragility.joint_law import JointFailures
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.predict import predict
 from rbfrag.hazards import event_counts
 from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.event_counts import Part, count_part
-from rbfrag.hazards.losses import LossAnswer, rate_interval
+from rbfrag.hazards.losses import LossAnswer, rate_interval, share_interval
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from tests.exchange.openquake_job import write_job
 from tests.fragility.conftest import SHARED, model_row
@@ -263,6 +264,17 @@ def test_closed_form_is_near_the_samples(tmp_path: Path) -> None:
     assert exact.failures == pytest.approx(sampled.failures)
     assert exact.loss_variance[0, 0] == pytest.approx(sampled.loss_variance[0, 0], rel=0.03)
     assert exact.any_fails[0, 0] == pytest.approx(sampled.any_fails[0, 0], abs=0.05)
+    # the same law by quadrature, without a sampler
+    everything = np.arange(sampled.portfolio.size)
+    pgv = np.where(sampled.portfolio.site == 2, 0.5, 0.45)
+    p = probability(sampled.portfolio.kr * STANDARD_GRAVITY_M_S2 / 2.0, pgv)
+    law = sampled.portfolio.dependence
+    assert law is not None
+    joint = JointFailures.of(p, sampled.portfolio.placement(everything), law)
+    curve = sampled.exceedance["the model's copula"]
+    for count in (1, 3, 6):
+        share = 100.0 * curve[count - 1].annual_rate
+        assert share == pytest.approx(joint.at_least(count), abs=4.0 * 0.5 / 200.0 + 1e-3)
     assert exact.exceedance == {}
 
 
@@ -363,6 +375,16 @@ def test_interval_of_equal_weights_is_the_exact_one() -> None:
     low, high = rate_interval(n * weight, n * weight**2, weight, 0.95)
     assert low == pytest.approx(weight * chi2.ppf(0.025, 2 * n) / 2)
     assert high == pytest.approx(weight * chi2.ppf(0.975, 2 * n + 2) / 2)
+
+
+def test_interval_of_a_share_is_wilsons() -> None:
+    """Where each of n realisations reaches a number or does not, and 3 of 20 do."""
+    low, high = share_interval(0.15, 0.15 * 0.85 / 20, 1 / 20, 0.95)
+    same = binomtest(3, 20).proportion_ci(0.95, method="wilson")
+    assert (low, high) == pytest.approx((same.low, same.high))
+    low, high = share_interval(1.0, 0.0, 1 / 20, 0.95)
+    same = binomtest(20, 20).proportion_ci(0.95, method="wilson")
+    assert (low, high) == pytest.approx((same.low, same.high))
 
 
 def test_minimum_intensity_above_the_weakest_block_is_warned_of(tmp_path: Path) -> None:
