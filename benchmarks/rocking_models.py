@@ -3,9 +3,9 @@
 Fits them to the rocking campaign of --db FILE, or to one that is made of --records (a folder with
 MANIFEST.csv), and prints what each scores on earthquakes that it has not seen, beside what is
 asked: log loss, Brier score, calibration slope over all and by block size. T0, T1 and T2 are the
-forms of two, three and five terms that the shipped ones are compared with; T1 is of blocks with
-Housner's restitution alone. With --write the tables go into docs/theory/rocking.md. The exit status
-is 1 where anything is missed.
+forms of two, three and five terms, without the factor of size, that the shipped ones are compared
+with; T1 is of blocks with Housner's restitution alone. With --write the tables go into
+docs/theory/rocking.md. The exit status is 1 where anything is missed.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ SLOPE, SLOPE_OF_SIZE = (0.95, 1.05), (0.75, 1.25)
 
 
 def _first_terms(count: int) -> Form:
-    """Return the shipped form on PGV and PGA with its first terms alone."""
+    """Return the first terms of the shipped form on PGV and PGA, without its factor of size."""
     whole = SHIPPED.forms["pgv_pga"]
 
     def formula(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
         eta = whole.formula([*b, *[0.0] * (len(whole.parameters) - count)], v, ns)
         return Eta(eta.eta, eta.slopes[:count])
 
-    return replace(whole, parameters=whole.parameters[:count], formula=formula)
+    return replace(whole, parameters=whole.parameters[:count], formula=formula, size_factor=None)
 
 
 def _velocity_alone(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:

@@ -230,8 +230,8 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
         return ("No such block fails.",)
     of_block = document.get("block_sd")
     sentences = [
-        f"Of {of} such blocks {_count(p, of)} fail ({_range(low, high, of)} as far as the data "
-        f"tell it, {level}).",
+        f"Of {of} such blocks {_count(p, of)} fail{'s' * (_count(p, of) == '1')} "
+        f"({_range(low, high, of)} as far as the data tell it, {level}).",
         "How many in one single earthquake is not known."
         if event_low is None
         else f"In one single earthquake it is {_range(event_low, event_high, of)} of {of} "

@@ -51,8 +51,14 @@ FLAGS = ("json", "verbose")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
+ONE_THREAD = "OPENBLAS_NUM_THREADS"
+"""Threads of linear algebra, read where numpy is loaded. The matrices here are too narrow to be
+shared, and threads that wait for one another on a busy machine spin (docs/performance.md)."""
+
+
 def run() -> None:
     """Entry point of the console script."""
+    os.environ.setdefault(ONE_THREAD, "1")
     if sys.argv[1:2] == ["predict"]:
         status = quick_predict(sys.argv[2:])
         if status is not None:

@@ -31,7 +31,7 @@ from rbfrag.exchange.block_table import (
 from rbfrag.files import reading, written_whole
 from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.measures import STATED
-from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, arrays, methods
+from rbfrag.fragility.methods import TOPPLING_BLOCK, methods
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
@@ -168,17 +168,6 @@ def _columns(
     return present
 
 
-def _fill_options(values: dict[str, FloatArray], block: BlockParameters) -> None:
-    """Put what a block has of itself where the cell of an option is empty."""
-    for name in block.options:
-        if block.adjust is not None and name in values and np.isnan(values[name]).any():
-            own: dict[str, Any] = {n: value for n, value in values.items() if n != name}
-            with np.errstate(all="ignore"):
-                block.adjust(own, arrays())
-            if name in own:
-                values[name] = np.where(np.isnan(values[name]), own[name], values[name])
-
-
 def _known_names(names: Mapping[str, str]) -> list[str]:
     """Return what is known of blocks and motions, rectangles by their numbers."""
     if "height_m" not in names:
@@ -205,7 +194,7 @@ def _answer(
             name = BLOCK_COLUMNS[column]
             stated = values.get(name, np.nan)
             values[name] = np.where(np.isnan(stated), value, stated)
-    _fill_options(values, model.method.block)
+    values = model.method.block.filled(values)
     for name in set(DEVIATIONS).intersection(values):
         values[name] = np.nan_to_num(values[name], nan=0.0, posinf=np.inf)
     predicted = answer_given(model, {**values, **given}, level)

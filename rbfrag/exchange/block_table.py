@@ -211,7 +211,8 @@ def waiting_blocks(
             message names it.
         MissingExtraError: a Parquet file without pyarrow.
     """
-    columns = _points(path) if str(path).lower().endswith(GEOJSON) else _rows(path, kind)
+    read = _points if str(path).lower().endswith(GEOJSON) else _rows
+    columns = read(path, kind)
     if columns["kr"].size == 0:
         raise InputError(f"{path}: there is no block in the file")
     for i in range(columns["kr"].size):
@@ -237,7 +238,7 @@ def waiting_blocks(
     return columns
 
 
-def _points(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
+def _points(path: str | os.PathLike[str], kind: str | None) -> dict[str, NDArray[Any]]:
     points = read_points(path)
     columns: dict[str, NDArray[Any]] = {
         "lon": np.array([lon for lon, _, _ in points]),
@@ -256,7 +257,7 @@ def _points(path: str | os.PathLike[str]) -> dict[str, NDArray[Any]]:
         columns[name] = _numbers(path, name, [p.get(name) for p in properties])
     if rectangles:
         columns["dip_deg"] = _numbers(path, "dip_deg", [p.get("dip_deg", 0.0) for p in properties])
-        columns |= rectangle_columns(columns)
+        columns |= _rectangles(columns, kind)
     return columns
 
 

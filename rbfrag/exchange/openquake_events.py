@@ -336,6 +336,7 @@ def _refuse_other_jobs(heads: Mapping[str, _Head]) -> None:
 def _sites(head: _Head) -> tuple[str, ...]:
     name = head.column((_SITE_NAME, *_SITE_NUMBER), needed=False)
     if name is None:  # numbered from 0 on
+        head.column((_SITE_NAME, *_SITE_NUMBER, "lon"))
         return tuple(str(i) for i in range(head.whole({"lon": float})["lon"].size))
     ids = head.whole({name: str})[name].tolist()
     first: dict[str, int] = {}
@@ -404,7 +405,7 @@ def _duration(
     given = {"investigation_time": investigation_time, "ses_per_logic_tree_path": ses}
     known = {name: float(value) for name, value in given.items() if value is not None}
     ruptures = heads.get("ruptures")
-    if ruptures is None and not year.any():
+    if not year.any() and (ruptures is None or not given.keys() & ruptures.stated.keys()):
         if known:
             raise InputError(
                 f"{heads['events'].path}: the events are those of a scenario (year 0), which has "

@@ -38,7 +38,7 @@ NUMERICAL_AIM = 1e-3
 """Relative error of quadrature of a block's rate above which a warning tells of it."""
 
 NEVER = 1e-9
-"""Annual rate below which no such warning is given: some of these come from the last level alone."""
+"""Annual rate below which no such warning is given: such rates come from the last level alone."""
 
 _CHUNK = MOST_JOINT
 

@@ -21,8 +21,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Indices = NDArray[np.intp]
 
-PAIRS_AT_ONCE = 1 << 16
-"""Blocks times rows of shaking of one part of the work."""
+PAIRS_AT_ONCE, SAMPLES_AT_ONCE = 1 << 16, 1 << 22
+"""Blocks times rows of shaking, and samples of all events, of one part of the work."""
 
 NOTHING = 1e-12
 """Smaller probabilities are zero."""
@@ -271,38 +271,50 @@ def _sampled(part: Part, event: int, shaken: Shaken, normals: Normals) -> tuple[
     portfolio, draws, own = part.portfolio, part.samples, shaken.block
     number = int(part.events.event_id[event])
     generator = np.random.default_rng([part.seed, _OF_EVENTS, number])
-    p = shaken.probability
-    if portfolio.component.scatter > 0.0 or portfolio.is_uncertain:
-        p = _given_scatter(part, shaken, generator)
-    fails = normals(portfolio, shaken, draws, generator) <= ndtri(p)
-    result = np.zeros((2, draws))
-    result[0] = fails @ portfolio.weight[own]
-    if portfolio.loss is not None:
-        if portfolio.loss_sigma[own].any():
+    probability = _probabilities(part, shaken, generator)
+    counted, result, with_any = portfolio.weight[own] > 0.0, np.zeros((2, draws)), 0
+    at_once = max(1, _VALUES_AT_ONCE // own.size)
+    for start in range(0, draws, at_once):
+        some = slice(start, min(start + at_once, draws))
+        k = some.stop - start
+        p = probability(k)
+        fails = normals(portfolio, shaken, k, generator) <= ndtri(p)
+        with_any += int(fails[:, counted].any(axis=1).sum())
+        result[0, some] = fails @ portfolio.weight[own]
+        if portfolio.loss is not None:
             sample, block = np.nonzero(fails)
-            z = generator.standard_normal(sample.size)
-            cost = portfolio.loss[own[block]] * np.exp(portfolio.loss_sigma[own[block]] * z)
-            result[1] = np.bincount(sample, cost, minlength=draws)
-        else:
-            result[1] = fails @ portfolio.loss[own]
-    return result, float(fails[:, portfolio.weight[own] > 0.0].any(axis=1).mean())
+            sigma = portfolio.loss_sigma[own[block]]
+            z = generator.standard_normal(sample.size) if sigma.any() else 0.0
+            cost = portfolio.loss[own[block]] * np.exp(sigma * z)
+            result[1, some] = np.bincount(sample, cost, minlength=k)
+    return result, with_any / draws
 
 
-def _given_scatter(part: Part, shaken: Shaken, generator: np.random.Generator) -> FloatArray:
-    """Return P of the blocks in each sample, shape (samples, m).
+def _probabilities(
+    part: Part, shaken: Shaken, generator: np.random.Generator
+) -> Callable[[int], FloatArray]:
+    """Return a function for P of the blocks in the next samples, of a shape that broadcasts.
 
     The component's scatter is that of the event at the site. A block's own parameters are those of
     its sample in every event.
     """
-    portfolio, draws, own = part.portfolio, part.samples, shaken.block
+    portfolio, own = part.portfolio, shaken.block
+    if not (portfolio.component.scatter > 0.0 or portfolio.is_uncertain):
+        return lambda _: shaken.probability
     sites, site = np.unique(portfolio.site[own], return_inverse=True)
-    xi = generator.standard_normal((draws, sites.size))[:, site]
-    z = np.zeros((own.size, 2, draws))
-    if portfolio.is_uncertain:
-        for i, block in enumerate(own.tolist()):
-            z[i] = np.random.default_rng([part.seed, _OF_BLOCKS, block]).standard_normal((2, draws))
     shaking = {name: part.events.measures[name][shaken.row] for name in portfolio.measures}
-    return portfolio.probability(own, shaking, (xi, z[:, 0].T, z[:, 1].T))[0]
+    streams = [
+        [np.random.default_rng([part.seed, _OF_BLOCKS, block, i]) for block in own.tolist()]
+        for i in range(2 if portfolio.is_uncertain else 0)
+    ]
+
+    def next_samples(k: int) -> FloatArray:
+        xi = generator.standard_normal((k, sites.size))[:, site]
+        z = [np.stack([one.standard_normal(k) for one in each], axis=1) for each in streams]
+        z_p, z_k = z or (np.zeros(1), np.zeros(1))
+        return portfolio.probability(own, shaking, (xi, z_p, z_k))[0]
+
+    return next_samples
 
 
 def _curves(events: EventSet, drawn: FloatArray, ends: FloatArray) -> Curves:

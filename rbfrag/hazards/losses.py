@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -11,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.dependence import normal_quantile
 from rbfrag.frames import Tabular
 from rbfrag.hazards.event_counts import (
     MOST_IN_CLOSED_FORM,
     PAIRS_AT_ONCE,
+    SAMPLES_AT_ONCE,
     Curves,
     Part,
     PartCounts,
@@ -35,6 +38,7 @@ EACH_COUNT_TO = 20
 """Numbers of failures up to which each is given; beyond them steps of equal ratio."""
 
 _STEPS = 40
+_REACHED = 1.0 - 1e-12  # a sum counts as reaching itself
 _THIN = 0.05
 _QUANTILES = (0.05, 0.5, 0.95)
 
@@ -46,8 +50,8 @@ class Exceedance:
     Args:
         value: the number of failures, or the loss.
         annual_rate: rate of events that reach it [1/a]; of a scenario its probability.
-        ci_low: lower end of its interval by the counting error of the event set (Fay and Feuer
-            1997).
+        ci_low: lower end of its interval by the counting error of the event set (`rate_interval`,
+            of a scenario `share_interval`).
         ci_high: upper end.
         largest_of_year: probability that the largest event of a year reaches it; None of a
             scenario.
@@ -333,7 +337,7 @@ def event_losses(
         raise InputError(f"seed = {seed}: give a whole number, 0 or more")
     if not 0.0 < level < 1.0:
         raise InputError(f"level = {level:g}: give a level above 0 and below 1, such as 0.95")
-    groups = _groups(events, portfolio)
+    groups = _groups(events, portfolio, samples)
     ends = _ends(portfolio) if samples else (np.empty(0), np.empty(0))
     laws = laws_of(portfolio)
     parts = (
@@ -351,7 +355,7 @@ def event_losses(
     return _answer(events, portfolio, laws, ends, groups, results, samples, seed, level)
 
 
-def _groups(events: EventSet, portfolio: Portfolio) -> list[NDArray[np.intp]]:
+def _groups(events: EventSet, portfolio: Portfolio, samples: int) -> list[NDArray[np.intp]]:
     """Return the events that shake a site with blocks, in parts of whole years."""
     at_site = np.bincount(portfolio.site, minlength=len(events.site_ids))
     pairs = np.bincount(events.event, at_site[events.site], minlength=events.event_id.size)
@@ -362,7 +366,9 @@ def _groups(events: EventSet, portfolio: Portfolio) -> list[NDArray[np.intp]]:
     year, realization = events.year[order], events.realization[order]
     new = (np.diff(year) != 0) | (np.diff(realization) != 0) | events.is_scenario
     starts = np.concatenate([[0], np.flatnonzero(new) + 1])
-    number = (np.cumsum(pairs[order]) - pairs[order])[starts] // PAIRS_AT_ONCE
+    # what an event costs, in parts of the work
+    cost = pairs[order] / PAIRS_AT_ONCE + samples / SAMPLES_AT_ONCE
+    number = np.floor((np.cumsum(cost) - cost)[starts])
     return np.split(order, starts[1:][np.diff(number) > 0])
 
 
@@ -394,15 +400,14 @@ def _ends(portfolio: Portfolio) -> tuple[FloatArray, FloatArray]:
         more = np.rint(np.geomspace(EACH_COUNT_TO, most, _STEPS)) if most > first[-1] else first
         counts = np.unique(np.concatenate([first, more]))
     else:
-        counts = np.unique(np.geomspace(weight.min(), most, _STEPS))
+        counts = np.unique(np.geomspace(weight.min(), most, _STEPS)) * _REACHED
     loss = portfolio.loss
     if loss is None or not loss.any():
         return counts, np.empty(0)
     sigma = portfolio.loss_sigma
     high = float((loss * np.exp(3.0 * sigma)).sum())
     low = float((loss * np.exp(-2.0 * sigma))[loss > 0.0].min())
-    # a step down in the last digits: the whole loss counts as reaching itself
-    return counts, np.geomspace(low, max(high, low), _STEPS if high > low else 1) * (1.0 - 1e-12)
+    return counts, np.geomspace(low, max(high, low), _STEPS if high > low else 1) * _REACHED
 
 
 def _answer(
@@ -460,19 +465,19 @@ def _curve(
 ) -> tuple[Exceedance, ...]:
     """Return the numbers that are reached at all, each with its interval."""
     widest = float(events.weight.max())
-    effective = events.effective_years
+    effective, alike = events.effective_years, float((events.weight**2).sum())
     rows = []
     for k, end in enumerate(ends.tolist()):
         rate, squares = curve.events[:, law, k].tolist()
         if rate <= 0.0:
             break
+        if effective is None:
+            ends_of_share = share_interval(rate, squares - rate * rate * alike, alike, level)
+            rows.append(Exceedance(end, rate, *ends_of_share, None, None, False))
+            continue
         low, high = rate_interval(rate, squares, widest, level)
         largest, total = (float(years[0, law, k]) for years in (curve.largest, curve.sum))
-        rows.append(
-            Exceedance(end, rate, low, min(high, 1.0), None, None, False)
-            if effective is None
-            else Exceedance(end, rate, low, high, largest, total, rate * effective < 1.0)
-        )
+        rows.append(Exceedance(end, rate, low, high, largest, total, rate * effective < 1.0))
     return tuple(rows)
 
 
@@ -498,6 +503,29 @@ def rate_interval(rate: float, squares: float, widest: float, level: float) -> t
     more, wider = rate + widest, squares + widest * widest
     high = wider / (2.0 * more) * float(chi2.ppf(1.0 - tail, 2.0 * more * more / wider))
     return low, high
+
+
+def share_interval(
+    share: float, variance: float, least: float, level: float
+) -> tuple[float, float]:
+    """Return both ends of the interval of a mean probability over realisations.
+
+    Wilson (1927), with as many realisations as give the variance. Probable inference, the law of
+    succession, and statistical inference. Journal of the American Statistical Association 22(158),
+    209-212.
+
+    Args:
+        share: the mean.
+        variance: its variance.
+        least: sum of the squared weights of the realisations, one over their number.
+        level: confidence level.
+    """
+    z = -normal_quantile(0.5 - 0.5 * level)
+    alone = share * (1.0 - share)
+    n = alone / variance if variance > 1e-12 * alone > 0.0 else 1.0 / least
+    middle, width = share + 0.5 * z * z / n, z * math.sqrt(alone / n + 0.25 * (z / n) ** 2)
+    low, high = ((middle + side * width) / (1.0 + z * z / n) for side in (-1.0, 1.0))
+    return max(low, 0.0), min(high, 1.0)
 
 
 def _of_rows(events: EventSet, portfolio: Portfolio, blocks: FloatArray) -> FloatArray:
@@ -553,7 +581,7 @@ def _warnings(
         names = " and ".join(name.partition("_")[0].upper() for name in portfolio.measures)
         warnings.append(
             f"the engine draws {names} of one event and site independently given the rupture, and "
-            "pairs them as nature does not: P comes out too low (10 to 50 % with PGV and PGA); PGV "
+            "pairs them as nature does not: P of PGV and PGA comes out 10 to 50 % too low; PGV "
             "alone is safer"
         )
     if len(laws) > 1:

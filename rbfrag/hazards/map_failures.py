@@ -28,7 +28,7 @@ from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.predict import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.correlations import correlations
-from rbfrag.hazards.site_probability import SiteProbability
+from rbfrag.hazards.site_probability import SiteProbability, described
 from rbfrag.hazards.site_shaking import SiteShaking
 from rbfrag.hazards.spatial_field import SpatialField, correlation_range_km
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -187,6 +187,7 @@ def map_failures(
     places: Places,
     *,
     weight: FloatArray | None = None,
+    restitution: FloatArray | None = None,
     draws: int | None = None,
     seed: int = 0,
     between: float = BETWEEN,
@@ -200,6 +201,7 @@ def map_failures(
         kr: toppling yield acceleration coefficients, shape (m,).
         places: where the sites lie.
         weight: how many blocks each one stands for, shape (m,); None for 1.
+        restitution: that they were answered for, shape (m,); None for their own.
         draws: number of draws, 10 or more; None for 100, and for more where blocks are few.
         seed: of the random numbers.
         between: β, 0 to 1.
@@ -226,7 +228,8 @@ def map_failures(
     generator = np.random.default_rng(seed)
     drawn = {name: np.zeros(draws) for name in laws}
     any_fails = {name: np.zeros(draws, dtype=np.bool_) for name in laws}
-    given = {"p2": p2[block, None], "kr": kr[block, None]}
+    columns = described(answer.shaking.model, p2, kr, restitution)
+    given = {name: values[block, None] for name, values in columns.items()}
     at_once = max(1, _VALUES_AT_ONCE // max(site.size, 1))
     start = 0
     for logs in residuals.in_parts(draws if site.size else 0, at_once, generator):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rbfrag.fragility.joint import event_ranges
 from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.uncertain import normal_steps
@@ -72,6 +73,14 @@ class SiteProbability:
     each: FloatArray
 
 
+def described(
+    model: FragilityModel, p2: FloatArray, kr: FloatArray, restitution: FloatArray | None
+) -> dict[str, FloatArray]:
+    """Return blocks by the names of their values, an empty restitution filled with their own."""
+    known = {} if restitution is None else {"restitution": restitution}
+    return model.method.block.filled({"p2": p2, "kr": kr, **known})
+
+
 def site_probability(
     measures: Mapping[str, FloatArray],
     p2: FloatArray,
@@ -81,6 +90,8 @@ def site_probability(
     weight: FloatArray | None = None,
     own_block: bool = False,
     std_ln: Mapping[str, FloatArray] | None = None,
+    kind: str | None = None,
+    restitution: FloatArray | None = None,
     model: Model | None = None,
     level: float = 0.95,
     db: str | PathLike[str] | None = None,
@@ -102,13 +113,16 @@ def site_probability(
         own_block: every site has its own block; otherwise all blocks stand at every site.
         std_ln: standard deviations of the measures' logarithms by name, shape (n,); where one that
             the model reads is missing all values are taken as certain, but PGA beside PGV alone.
+        kind: as in :func:`rbfrag.predict`.
+        restitution: of blocks that rock, shaped as `p2`; NaN for what angular momentum leaves.
         model: as in :func:`rbfrag.predict`.
         level: confidence level.
         db: as in :func:`rbfrag.predict`.
     """
     shaking = SiteShaking.of(
-        measures, component, std_ln or {}, find_model(model, ("p2", "kr", *measures), db)
+        measures, component, std_ln or {}, find_model(model, ("p2", "kr", *measures), db, kind=kind)
     )
+    columns = described(shaking.model, p2, kr, restitution)
     chosen, n = shaking.model, shaking.median.shape[0]
     weights = np.full(p2.size, 1.0) if weight is None else weight
     weights = np.ones(n) if own_block else weights / weights.sum()
@@ -118,8 +132,8 @@ def site_probability(
 
     def answers(site: Indices, block: Indices, points: FloatArray) -> PredictionArray:
         """Return answers for pairs of site and block at normal scores, shape (pairs, points)."""
-        given = {"p2": p2[block, None], "kr": kr[block, None], **shaking.at(site, points)}
-        answer = answer_given(chosen, given, level)
+        own = {name: values[block, None] for name, values in columns.items()}
+        answer = answer_given(chosen, {**own, **shaking.at(site, points)}, level)
         assert isinstance(answer, PredictionArray)
         return answer
 

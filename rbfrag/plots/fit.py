@@ -76,6 +76,11 @@ def plot_fit(
             f"model {model.name} is of blocks known by {' and '.join(block.names)}: the figure is "
             f"that of blocks known by {' and '.join(TOPPLING_BLOCK.names)}"
         )
+    if table.status.size and (table.status == "not_searched").all():
+        raise InputError(
+            f"blocks of kind {model.kind} have no critical values, which the figure is of: use  "
+            "rbfrag plot calibration"
+        )
     alone = not depends_on_size(model)
     spectrum = np.full(table.p2.shape, np.nan) if xp_m_s is None else xp_m_s
     x = (

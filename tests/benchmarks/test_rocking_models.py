@@ -17,7 +17,8 @@ def test_the_first_terms_are_the_shipped_form_with_zeros() -> None:
     b = [5.0, -2.0, 4.0, -8.0, -1.0]
     for study, count in ((STUDIES[1], 3), (STUDIES[2], 5)):
         short = study.form.eta(b[:count], values, SINGLE)
-        full = whole.eta([*b[:count], *[0.0] * (7 - count)], values, SINGLE)
+        full, h = whole.unscaled([*b[:count], *[0.0] * (5 - count)], values, SINGLE)
+        assert h != 1.0
         assert short.eta == full.eta
         assert short.slopes == full.slopes[:count]
         assert study.form.parameters == whole.parameters[:count]

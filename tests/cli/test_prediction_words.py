@@ -45,6 +45,7 @@ def test_three_statements_in_counts_of_blocks() -> None:
             (0.0, 1e-5),
             ("blocks fewer than 1 fail (fewer than 1 as", "0 to fewer than 1"),
         ),
+        (0.0101, (0.01, 0.02), (0.01, 0.01), ("blocks 1 fails (1 to 2 as", "it is 1 of 100")),
         (0.5, (0.5, 0.5), (0.5, 0.5), ("50 fail (50 as", "it is 50 of 100")),
         (0.5, (0.4, 0.6), (None, None), ("50 fail (40 to 60 as", "not known.")),
     ],

@@ -8,7 +8,7 @@ import pytest
 import typer
 
 from rbfrag.cli.main import app
-from rbfrag.cli.start import NAMES, NUMBERS, numbers_and_names, quick_predict
+from rbfrag.cli.start import NAMES, NUMBERS, ONE_THREAD, numbers_and_names, quick_predict
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from tests.cli.conftest import Shell
@@ -117,3 +117,23 @@ def test_a_question_of_numbers_loads_few_modules_and_no_library(tmp_path):
     assert lines[0].startswith("Of 100 such blocks")
     assert lines[-2] == "[]"
     assert len(lines[-1].split()) <= 19  # the digest of the model's row is one of them
+
+
+@pytest.mark.parametrize(("stated", "used"), [(None, "1"), ("2", "2")])
+def test_linear_algebra_has_one_thread_unless_more_are_asked_for(
+    stated: str | None, used: str
+) -> None:
+    code = (
+        "import os, sys\n"
+        "from rbfrag.cli import start\n"
+        "assert 'numpy' not in sys.modules\n"
+        "sys.argv[1:] = ['--version']\n"
+        "try:\n    start.run()\n"
+        "except SystemExit:\n    print(os.environ[start.ONE_THREAD])\n"
+    )
+    env = {name: value for name, value in os.environ.items() if name != ONE_THREAD}
+    env |= {} if stated is None else {ONE_THREAD: stated}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split()[-1] == used

@@ -12,8 +12,9 @@ import pytest
 
 import rbfrag
 from rbfrag.db.engine import opened_database
+from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
-from tests.cli.conftest import Shell
+from tests.cli.conftest import Refuses, Shell
 from tests.exchange.test_shakemap_grid import GRID, UNCERTAINTY
 from tests.fragility.conftest import model_row
 
@@ -74,6 +75,10 @@ def test_a_class_of_blocks_with_uncertainty(shell: Shell, grid: Path) -> None:
     )  # fmt: skip
     assert told["uncertainty_integrated"]
     assert "probability of toppling" in Path("a.svg").read_text()
+    note = "values of the map taken as certain"
+    assert note not in Path("a.svg").read_text()
+    shell("shakemap", grid, "--p2", "3", "--kr", "0.1", "--out", "b.csv", "--plot", "b.svg")
+    assert note in Path("b.svg").read_text()
     certain, mean = (
         np.genfromtxt(name, delimiter=",", names=True)["probability"]
         for name in ("certain.csv", "a.csv")
@@ -128,6 +133,10 @@ def test_how_many_fail_together(shell: Shell, grid: Path) -> None:
     assert any("correlated over 25.7 km (Jayaram and Baker 2009)" in t for t in told["warnings"])
     again = shell.json("shakemap", grid, *block, "uncertainty.xml", "--seed", "1", "--draws", "200")
     assert (again["draws"], again["seed"]) == (200, 1)
+    Path("s.csv").write_text("p2_1_s2,kr,kr_sigma\n3,0.1,0.3\n")
+    medians = shell.json("shakemap", grid, "--blocks", "s.csv", *block[4:], "uncertainty.xml")
+    assert medians["expected_failures"] == told["expected_failures"]
+    assert any("kr_sigma of the blocks are not integrated" in t for t in medians["warnings"])
     # the 6 nodes hold every one of three blocks, two of the second
     Path("b.csv").write_text("p2_1_s2,kr,weight\n3,0.1,1\n3,0.1,2\n")
     more = shell.json("shakemap", grid, "--blocks", "b.csv", *block[4:], "uncertainty.xml")
@@ -144,3 +153,25 @@ def test_a_model_that_does_not_know_what_blocks_share(shell: Shell, grid: Path) 
     assert told["probability_any"] is None
     ends = [told["bounds"][law]["probability_any"] for law in ("fully_dependent", "independent")]
     assert 0.0 < ends[0] < ends[1] + 0.01  # 10,000 draws
+
+
+def test_free_standing_blocks_with_their_restitution(
+    shell: Shell, refuses: Refuses, grid: Path
+) -> None:
+    Path("b.csv").write_text("p2_1_s2,kr,lon,lat,restitution\n3,0.1,20,41,\n3,0.1,20,41,0.8\n")
+    free = ("--kind", "rocking", "--db", REFERENCE, *SINGLE)
+    shell("shakemap", grid, "--blocks", "b.csv", "--out", "a.csv", *free)
+    with Path("a.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    for row, e in zip(rows, (None, 0.8), strict=True):
+        own = rbfrag.predict(
+            3.0, 0.1, kind="rocking", restitution=e, pgv_m_s=0.6, pga_g=0.4, db=REFERENCE
+        )
+        assert float(row["probability"]) == pytest.approx(own.probability, rel=1e-9)
+    one = ("--p2", "3", "--kr", "0.1", "--restitution", "0.8", "--out", "b.geojson")
+    told = shell.json("shakemap", grid, *one, *free)
+    first = json.loads(Path("b.geojson").read_text())["features"][0]["properties"]
+    assert first["probability"] == pytest.approx(float(rows[1]["probability"]), rel=1e-9)
+    assert told["model"] == "rocking-pgv_pga"
+    message = refuses("shakemap", grid, *one, *SINGLE)
+    assert "--restitution goes with blocks that stand free" in message

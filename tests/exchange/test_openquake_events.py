@@ -148,6 +148,7 @@ def test_years_beyond_the_stated_time_are_warned_of(tmp_path: Path) -> None:
         ("events", "2026-01", "2026-02", r"events_5\.csv, line 1: start_date .*different jobs"),
         ("events", "3,1073741827,1", "3,1073741827,7", r"line 6: the realization 7 is not in"),
         ("events", "1,1073741825", "0,1073741825", r"line 4: the event 0 is there twice"),
+        ("sitemesh", "custom_site_id,lon", "site,longitude", r"no column custom_site_id or .* lon"),
         ("sitemesh", "007,", "0012,", r"line 4: the site '0012' is there twice"),
         ("realizations", "1,A~A", "0,A~A", r"line 4: rlz_id 0 is there twice"),
         ("realizations", "3.0000000e-01", "-0.3", r"line 4: the weight -0.3"),

@@ -53,6 +53,15 @@ def test_known_parameters_are_found_again(columns: dict[str, Any]) -> None:
     assert law["l_y"] == pytest.approx(0.5, rel=0.3)
 
 
+def test_blocks_run_in_one_polarity_do_not_know_the_side_they_face(columns: dict[str, Any]) -> None:
+    one_side = columns["polarity"] > 0
+    part = {name: value[one_side] for name, value in columns.items()}
+    found = PairTables.of(**part).likeliest()
+    assert found.rho_o == 0.0
+    assert found.rho_e == pytest.approx(TRUE.rho_e, abs=0.1)
+    assert found.rho_v == pytest.approx(TRUE.rho_v + TRUE.rho_o, abs=0.15)
+
+
 def test_a_seed_gives_the_same_estimate(
     columns: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,8 +18,8 @@ from rbfrag.fragility.predict import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 
 G = 9.80665
-T2 = (7.377, -1.818, 4.575, -8.514, -1.102, 0.0, 0.0)
-"""Coefficients of the five-term model of (p, k_r, e, PGV, PGA)."""
+T2 = (7.377, -1.818, 4.575, -8.514, -1.102)
+"""Coefficients of the model of (p, k_r, e, PGV, PGA), near those that are fitted."""
 
 
 def stored(term: str, b: tuple[float, ...], **changes: Any) -> FragilityModel:
@@ -48,7 +48,8 @@ def five_terms(p2: float, kr: float, e: float, pgv: float, pga: float) -> float:
     log_odds = math.log(kr / (pga - kr))
     z, s = math.sqrt(p2) * pgv / (pga * G), math.sqrt(1.0 - e)
     eta = 7.377 - 1.818 * log_odds + 4.575 * math.log(z) - 8.514 * s - 1.102 * s * log_odds
-    return 1.0 / (1.0 + math.exp(-eta))
+    l = math.log(math.sqrt(p2))  # noqa: E741  as in the formula
+    return 1.0 / (1.0 + math.exp(-eta * math.exp(0.15 * l - 0.08 * l * l)))
 
 
 @pytest.mark.parametrize("e", [None, 1.0, 0.7])
@@ -108,7 +109,7 @@ def test_restitution_that_was_not_fitted_is_outside_the_domain() -> None:
 
 def test_less_restitution_less_shaking_and_more_strength_are_safer() -> None:
     models = (
-        stored("pgv_pga", (8.0, -2.56, 5.9, -8.4, -1.1, 0.46, -0.31)),
+        stored("pgv_pga", T2),
         stored("pgv", (0.43, -1.92, 1.54, -0.34, -5.0, -1.26)),
     )
     block = {"p2": 3.0, "kr": 0.2, "restitution": 0.9}
@@ -120,6 +121,10 @@ def test_less_restitution_less_shaking_and_more_strength_are_safer() -> None:
         assert p(restitution=0.8) < p() < p(restitution=1.0)
         assert p(kr=0.25) < p() < p(kr=0.15)
         assert p(pgv_m_s=0.4, pga_g=0.4) < p() < p(pgv_m_s=0.6, pga_g=0.6)
+        # also far outside what is fitted
+        rising = [p(pgv_m_s=v) for v in np.geomspace(1e-4, 10.0, 60).tolist()]
+        assert np.all(np.diff(rising) >= 0.0)
+        assert rising[0] < 1e-3
 
 
 def test_a_description_says_which_blocks_are_meant() -> None:

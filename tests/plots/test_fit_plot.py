@@ -150,6 +150,9 @@ def test_nothing_to_draw_is_refused(table, model, tmp_path):
     empty = replace(table, status=np.full(N, "below_limit", dtype=object))
     with pytest.raises(InputError, match="no critical value"):
         plot_fit(empty, model, tmp_path / "fit.png")
+    outcomes_alone = replace(table, status=np.full(N, "not_searched", dtype=object))
+    with pytest.raises(InputError, match="kind toppling have no critical values"):
+        plot_fit(outcomes_alone, model, tmp_path / "fit.png")
     with pytest.raises(InputError, match=r"\.jpg"):
         plot_fit(table, model, tmp_path / "fit.jpg")
     assert list(tmp_path.iterdir()) == []

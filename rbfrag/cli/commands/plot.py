@@ -139,7 +139,8 @@ def plot_curve(
     from rbfrag.fragility.measures import MEASURES
     from rbfrag.plots.curve import plot_curve as draw
 
-    p2, kr, remarks = block.toppling()
+    numbers, remarks = block.toppling()
+    p2, kr = numbers["p2"], numbers["kr"]
     fixed = held.given()
     varied = None if over is None else VARIED.get(over)
     if over is not None and varied is None:
@@ -262,7 +263,8 @@ def plot_response(
     from rbfrag.plots.response import plot_response as draw
     from rbfrag.solver.toppling_run import respond
 
-    p2, kr, about = block.toppling()
+    numbers, about = block.toppling()
+    p2, kr = numbers["p2"], numbers["kr"]
     ground, upward, remarks = find_shaking(motion, direction, db=db, reading=reading)
     say_when_compiling()
     response = respond(

@@ -7,7 +7,7 @@ from typing import Any
 
 from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlocksOptions
+from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 
@@ -47,6 +47,7 @@ def shakemap(
     grid: str = argument("ShakeMap grid, version 3 or 4.", metavar="GRID.xml"),
     out: str = option("File to write: .geojson, .csv, .parquet or .gpkg (extra gis).", ...),
     blocks: BlocksOptions,
+    standing: StandingOptions,
     meaning: MapOptions,
     drawing: DrawOptions,
     answering: options.Answering,
@@ -59,10 +60,12 @@ def shakemap(
     One block, a table without lon and lat, or a rock mass stands at every node; a table with lon
     and lat [deg] is answered block by block. The best model that the map's measures suffice for
     answers: PGV and PGA, or, without PGV, PGA with spectral accelerations. Blocks are backed by a
-    slope; free-standing ones fail at weaker shaking. How many of all fail together is drawn.
+    slope; free-standing ones fail at weaker shaking: --kind rocking. How many of all fail together
+    is drawn.
     """
     import numpy as np
 
+    from rbfrag.exchange.block_table import SIGMAS
     from rbfrag.exchange.shakemap import at_places, read_shakemap
     from rbfrag.files import output_path
     from rbfrag.hazards.conversions import component as component_named
@@ -72,11 +75,17 @@ def shakemap(
     target = output_path(out, SUFFIXES, "map")
     check_files(plot=plot)
     component = component_named(meaning.component)
-    class_blocks, _, remarks = blocks.toppling_blocks(n=n)
+    class_blocks, _, remarks = blocks.toppling_blocks(standing, n=n)
     shaken = read_shakemap(
         grid, uncertainty=meaning.uncertainty, allow_partial=meaning.allow_partial
     )
     warnings = [*remarks, *shaken.warnings]
+    uncertain = [name for name in SIGMAS if np.any(class_blocks.get(name, 0.0))]
+    if uncertain:
+        warnings.append(
+            f"{' and '.join(uncertain)} of the blocks are not integrated: the map is that of their "
+            "medians"
+        )
     own = "lon" in class_blocks
     if own:
         lon, lat = class_blocks["lon"], class_blocks["lat"]
@@ -99,12 +108,15 @@ def shakemap(
     )
     here = on_map if own else slice(None)
     p2, kr = class_blocks["p2_1_s2"][here], class_blocks["kr"][here]
+    options_of = {
+        name: class_blocks[name][here] for name in ("restitution",) if name in class_blocks
+    }
     weight = class_blocks.get("weight")
     answer = site_probability(
         {name: values[on_map] for name, values in measures.items()}, p2, kr,
         component=component, weight=None if own else weight, own_block=own,
-        std_ln={name: values[on_map] for name, values in std_ln.items()},
-        model=answering.model, level=answering.level, db=answering.db,
+        std_ln={name: values[on_map] for name, values in std_ln.items()}, kind=standing.kind,
+        model=answering.model, level=answering.level, db=answering.db, **options_of,
     )  # fmt: skip
     shaking, chosen = answer.shaking, answer.shaking.model
     if chosen.term.advice:
@@ -123,7 +135,7 @@ def shakemap(
         answer, p2, kr,
         Places.of(lon[on_map], lat[on_map], None if names is None else names[on_map]),
         weight=None if weight is None else weight[here],
-        draws=drawing.draws, seed=drawing.seed,
+        draws=drawing.draws, seed=drawing.seed, **options_of,
     )  # fmt: skip
     warnings += failures.warnings
 

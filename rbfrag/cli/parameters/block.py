@@ -131,8 +131,11 @@ class UncertaintyOptions:
 class BlockOptions(ShapeOptions, NumberOptions):
     """A block by numbers or by its shape."""
 
-    def toppling(self) -> tuple[float, float, tuple[str, ...]]:
-        """Return p2 [1/s²], k_r and warnings.
+    def toppling(self, kind: str | None = None) -> tuple[dict[str, float], tuple[str, ...]]:
+        """Return ``p2`` [1/s²] and ``kr``, what else predictions read of the block, and warnings.
+
+        Args:
+            kind: how the block fails; None for toppling.
 
         Raises:
             InputError: an option is missing, or the block does not topple; the message names the
@@ -147,9 +150,48 @@ class BlockOptions(ShapeOptions, NumberOptions):
                 raise InputError(
                     f"{missing} is missing: a block is given by --p2 and --kr, or by {WAYS}"
                 )
-            return self.p2, self.kr, ()
-        values, remarks = numbers_of_kind(described, TOPPLING_BLOCK.kind)
-        return values["p2"], values["kr"], remarks
+            return {"p2": self.p2, "kr": self.kr}, ()
+        return numbers_of_kind(described, kind or TOPPLING_BLOCK.kind)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StandingOptions:
+    """Whether blocks are backed by a slope."""
+
+    kind: str | None = option(
+        "toppling (backed by a slope, the default) or rocking (free-standing, which fails at "
+        "weaker shaking)."
+    )
+    restitution: _Number = option(
+        "Rocking: speed after an impact over that before it, above 0 and up to 1; a column "
+        "restitution goes before. Default: what angular momentum leaves."
+    )
+
+    @property
+    def is_free(self) -> bool:
+        """Whether they stand free."""
+        if self.kind is None:
+            return False
+        from rbfrag.solver.kinds import model_of_kind
+
+        return model_of_kind(self.kind).free_standing
+
+    def completed(self, columns: dict[str, Any]) -> dict[str, Any]:
+        """Return a table of blocks with what is stated for all; backed ones have no restitution.
+
+        Raises:
+            InputError: a restitution of blocks that do not stand free.
+        """
+        import numpy as np
+
+        if not self.is_free:
+            if self.restitution is not None:
+                raise InputError("--restitution goes with blocks that stand free: --kind rocking")
+            return {name: column for name, column in columns.items() if name != "restitution"}
+        if self.restitution is None:
+            return columns
+        own = columns.get("restitution", np.full(columns["kr"].size, np.nan))
+        return {**columns, "restitution": np.where(np.isnan(own), self.restitution, own)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,27 +204,34 @@ class TableOptions(BlockOptions):
         metavar="FILE",
     )
 
-    def toppling_blocks(self, *, name: str | None = None) -> TopplingBlocks:
+    def toppling_blocks(
+        self, standing: StandingOptions | None = None, *, name: str | None = None
+    ) -> TopplingBlocks:
         """Return the blocks that the options describe.
 
         Args:
+            standing: how they stand; None for backed by a slope.
             name: identifier of a single block.
         """
         import numpy as np
 
+        standing = standing or StandingOptions()
         if self.blocks is not None:
             from rbfrag.exchange.block_table import waiting_blocks
 
-            return TopplingBlocks(waiting_blocks(self.blocks), False, ())
+            table = waiting_blocks(self.blocks, standing.kind)
+            return TopplingBlocks(standing.completed(table), False, ())
         from rbfrag.solver.quantity import positive
 
-        p2, kr, remarks = self.toppling()
-        columns = {
+        values, remarks = self.toppling(standing.kind)
+        columns: dict[str, Any] = {
             "block_id": [name],
-            "p2_1_s2": np.array([positive(p2, "p2", "1/s²")]),
-            "kr": np.array([positive(kr, "kr", "g")]),
+            "p2_1_s2": np.array([positive(values["p2"], "p2", "1/s²")]),
+            "kr": np.array([positive(values["kr"], "kr", "g")]),
         }
-        return TopplingBlocks(columns, False, remarks)
+        if standing.restitution is None and "restitution" in values:
+            columns["restitution"] = np.array([values["restitution"]])
+        return TopplingBlocks(standing.completed(columns), False, remarks)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,16 +242,28 @@ class BlocksOptions(TableOptions):
         "Rock mass file (.toml, .csv): the mean over its stable toppling blocks.", metavar="FILE"
     )
 
-    def toppling_blocks(self, *, name: str | None = None, n: int | None = None) -> TopplingBlocks:
+    def toppling_blocks(
+        self,
+        standing: StandingOptions | None = None,
+        *,
+        name: str | None = None,
+        n: int | None = None,
+    ) -> TopplingBlocks:
         """Return the blocks that the options describe.
 
         Args:
+            standing: how they stand; None for backed by a slope.
             name: identifier of a single block.
             n: number of realisations of the rock mass; None for what its file says.
         """
-        if self.rockmass is not None:
-            return _of_rock_mass(self.rockmass, n)
-        return super().toppling_blocks(name=name)
+        if self.rockmass is None:
+            return super().toppling_blocks(standing, name=name)
+        if standing is not None and standing.is_free:
+            raise InputError(
+                f"--rockmass does not go with --kind {standing.kind}: its blocks are backed by the "
+                "rock behind them"
+            )
+        return _of_rock_mass(self.rockmass, n)
 
 
 class TopplingBlocks(NamedTuple):

@@ -228,6 +228,25 @@ class BlockParameters:
         uncertain = (self.size, self.strength, *self.fractions)
         return {f"{name}_sigma": name for name in uncertain if name is not None}
 
+    def filled(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return arrays with what a block has of itself where an option is NaN.
+
+        Args:
+            values: the question, arrays that numpy can broadcast.
+        """
+        import numpy as np
+
+        filled = dict(values)
+        for name in self.options:
+            if self.adjust is None or name not in values or not np.isnan(values[name]).any():
+                continue
+            own = {n: np.asarray(value) for n, value in values.items() if n != name}
+            with np.errstate(all="ignore"):
+                self.adjust(own, arrays())
+            if name in own:
+                filled[name] = np.where(np.isnan(values[name]), own[name], values[name])
+        return filled
+
     def completed(self, given: Mapping[str, Any], term: Term, ns: Numbers) -> dict[str, Any]:
         """Return the given values with what formulas read.
 

@@ -1,17 +1,17 @@
 """The method ``overturning``: what free-standing blocks did, logistic, with their restitution.
 
-    eta = b0 + b1 L + b2 ln z + b3 s + b4 s L + b5 (ln z)² + b6 L ln z,   P = 1/(1 + exp(-eta))
+    P = 1/(1 + exp(-eta)), 0 from r = 1 on,   h(p) = exp(A l - B l²)
 
-r = k_r/PGA, L = ln(r/(1 - r)), z = p PGV/(PGA g), s = sqrt(1 - e); P = 0 from r = 1 on. e is the
-speed after an impact over that before it: Housner's 1 - 1.5 sin² α (1963) of the rectangle with
-tan α = k_r, unless it is given. Where PGV and PGA are not both known, with l = ln p,
-u = ln(y/x), x being PGV or SA(1.0) g/2π, Q = ln(SA(1.0)/(2π PGA)) and h(p) = exp(A l - B l²):
+    pgv_pga    A = .15, B = .08   eta = h (b0 + b1 L + b2 ln z + b3 s + b4 s L)
+    pga_sa10   A = .40, B = .04         h (b0 + b1 L + b2 l + b3 l² + b4 s + b5 s L + b6 Q)
+    pgv        A = .35, B = .02         h (b0 + b1 u + b2 l + b3 l² + b4 s + b5 s u)
+    sa10       A = .45, B = .04         the same
 
-    pgv        A = .35, B = .02   h (b0 + b1 u + b2 l + b3 l² + b4 s + b5 s u)
-    sa10       A = .45, B = .04   the same
-    pga_sa10   A = .40, B = .04   h (b0 + b1 L + b2 l + b3 l² + b4 s + b5 s L + b6 Q)
-
-How well they do stands in docs/theory/rocking.md.
+r = k_r/PGA, L = ln(r/(1 - r)), z = p PGV/(PGA g), l = ln p, u = ln(y/x), x being PGV or
+SA(1.0) g/2π, Q = ln(SA(1.0)/(2π PGA)), s = sqrt(1 - e). e is the speed after an impact over that
+before it: Housner's 1 - 1.5 sin² α (1963) of the rectangle with tan α = k_r, unless it is given.
+Of terms of second order in ln z P would rise again towards weak shaking. How well the models do
+stands in docs/theory/rocking.md.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def _log_odds(v: Mapping[str, Any], ns: Numbers) -> Any:
 def _pgv_pga(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     odds, s = _log_odds(v, ns), v["speed_loss"]
     z = ns.log(v["p"] * v["intensity_m_s"] / (v["pga_g"] * STANDARD_GRAVITY_M_S2))
-    return _sum(b, (1.0, odds, z, s, s * odds, z * z, odds * z))
+    return _sum(b, (1.0, odds, z, s, s * odds))
 
 
 def _velocity(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
@@ -113,9 +113,8 @@ METHOD = Method(
     link=LOGIT,
     forms={
         "pgv_pga": Form(
-            ("b0", "b_logit_r", "b_ln_z", "b_s", "b_s_logit_r", "b_ln_z_squared",
-             "b_logit_r_ln_z"),
-            _pgv_pga, 0, (BLOCK.at_rest,),
+            ("b0", "b_logit_r", "b_ln_z", "b_s", "b_s_logit_r"),
+            _pgv_pga, 0, (BLOCK.at_rest,), size_factor=SizeFactor(0.15, 0.08),
         ),
         "pgv": Form(_OF_VELOCITY, _velocity, 0, size_factor=SizeFactor(0.35, 0.02)),
         "sa10": Form(_OF_VELOCITY, _velocity, 0, size_factor=SizeFactor(0.45, 0.04)),
