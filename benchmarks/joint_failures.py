@@ -184,10 +184,13 @@ def line(
         failures = FailureCount.of(own, blocks, law)
         drawn = JointSampler(law, blocks).counts(own, SAMPLES, generator)
         ends = np.quantile(drawn, (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), method="inverted_cdf")
+        any_fails = float(np.mean(drawn > 0))
+        if kind == "rare":  # of these it is scored
+            any_fails = float(1.0 - none_fails(own, blocks, law, POINTS).mean())
         rows.append((
             float(data.event[some[0]]), count, failures.mean, failures.variance,
             float(np.sum(own * (1.0 - own))), float(ends[0] <= count <= ends[1]),
-            float(1.0 - none_fails(own, blocks, law, POINTS).mean()), failures.probability_any,
+            any_fails, failures.probability_any,
             float(1.0 - np.prod(1.0 - own)), float(own.max()),
         ))  # fmt: skip
         if len(rows) == asked:
