@@ -131,7 +131,7 @@ def json_document(text: str) -> Any:
         InputError: it is not JSON, nested too deeply, or has a key twice in one object.
     """
     try:
-        return json.loads(text, object_pairs_hook=_object)
+        return json.loads(text, object_pairs_hook=unique_keys)
     except RecursionError:
         raise InputError("not JSON for us: objects or arrays nested too deeply") from None
     except InputError:
@@ -140,7 +140,12 @@ def json_document(text: str) -> Any:
         raise InputError(f"not JSON: {error}") from None
 
 
-def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the object of some keys and values of JSON, for `object_pairs_hook`.
+
+    Raises:
+        InputError: a key is there twice.
+    """
     document = dict(pairs)
     if len(document) < len(pairs):
         names = [name for name, _ in pairs]

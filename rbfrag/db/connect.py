@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import sqlite3
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -20,6 +21,7 @@ from sqlalchemy import (
 )
 
 from rbfrag.db.sqlite_file import (
+    LONGEST_WAIT_S,
     connect_sqlite,
     explained_sqlite_error,
 )
@@ -101,10 +103,21 @@ def _server_engine(url: URL, read_only: bool) -> Engine:
         raise MissingExtraError("PostgreSQL databases need psycopg", "postgres")
     # A connection that the server closed between two transactions is replaced without a word.
     engine = create_engine(url, pool_pre_ping=True)
+    longest_s = LONGEST_WAIT_S.get()
+    if longest_s is not None:
+        event.listen(engine, "connect", partial(_wait_at_most, longest_s))
     if read_only:
         # All queries of one transaction see the same moment, as SQLite's do.
         return engine.execution_options(postgresql_readonly=True, isolation_level="REPEATABLE READ")
     return engine
+
+
+def _wait_at_most(seconds: float, connection: Any, _record: object) -> None:
+    """Have the server give up a lock or a statement that takes longer."""
+    before, connection.autocommit = connection.autocommit, True  # else it ends with a rollback
+    for name in ("lock_timeout", "statement_timeout"):
+        connection.execute(f"SET {name} = {max(int(1000.0 * seconds), 1)}")
+    connection.autocommit = before
 
 
 def sqlalchemy_url(place: Path | str) -> URL:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sqlite3
 import stat
+from contextvars import ContextVar
 from pathlib import Path
 
 from rbfrag.db.location import APPLICATION_ID, VERSION_TABLE, check_revision
@@ -22,6 +23,10 @@ from rbfrag.errors import (
 _MAGIC = b"SQLite format 3\x00"
 # Primary result codes; extended codes hold them in the low byte (sqlite.org/rescode.html).
 _BUSY, _LOCKED, _READONLY, _IOERR, _CORRUPT, _FULL, _CANTOPEN, _NOTADB = 5, 6, 8, 10, 11, 13, 14, 26
+
+
+LONGEST_WAIT_S: ContextVar[float | None] = ContextVar("LONGEST_WAIT_S", default=None)
+"""How long whoever asks waits for a database [s]; None for what each connection waits by itself."""
 
 
 def require_sqlite_file(path: Path) -> None:
@@ -77,6 +82,7 @@ def connect_sqlite(
     """
     require_sqlite_file(path)
     try:
+        busy_timeout_s = min(busy_timeout_s, LONGEST_WAIT_S.get() or busy_timeout_s)
         try:
             return _connect(path, "mode=rw", read_only, busy_timeout_s, check_same_thread)
         except sqlite3.Error as error:

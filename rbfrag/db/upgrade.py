@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import glob
 import os
+import platform
 import sqlite3
 import tempfile
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 
@@ -113,9 +116,10 @@ def create_if_missing(place: Path | str, *, busy_timeout_s: float) -> None:
         _create_on_server(place)
         return
     try:
+        folder = place.absolute().parent
+        _remove_drafts_of_the_dead(place, folder)
         if place.is_symlink() or place.exists():
             return
-        folder = place.absolute().parent
         if not folder.is_dir():
             raise DatabaseNotFoundError(
                 f"cannot make the database {place}: there is no folder {folder}; make it first"
@@ -137,9 +141,37 @@ def create_if_missing(place: Path | str, *, busy_timeout_s: float) -> None:
             Path(f"{draft}{tail}").unlink(missing_ok=True)
 
 
+def _draft_prefix(place: Path, pid: int | str) -> str:
+    return f".{place.name}.{platform.node()}-{pid}."
+
+
+def _remove_drafts_of_the_dead(place: Path, folder: Path) -> None:
+    """Remove what processes of this computer left that were killed while they made the database."""
+    if os.name != "posix":
+        return  # where nothing tells, without harm, whether a process lives
+    before, after = _draft_prefix(place, "*").split("*")
+    for draft in folder.glob(f"{glob.escape(before)}*{glob.escape(after)}*.new*"):
+        pid = draft.name.removeprefix(before).partition(".")[0]
+        if pid.isdecimal() and not _lives(int(pid)):
+            with suppress(OSError):
+                draft.unlink()
+
+
+def _lives(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True  # of another user, or nothing that can be said
+    return True
+
+
 def _draft_file(place: Path, folder: Path) -> Path:
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{place.name}.", suffix=".new", dir=folder)
+        handle, name = tempfile.mkstemp(
+            prefix=_draft_prefix(place, os.getpid()), suffix=".new", dir=folder
+        )
     except OSError as error:
         raise DatabaseReadOnlyError(
             f"cannot make the database {place}: {error.strerror or error}; name a folder that can "

@@ -305,11 +305,7 @@ def stored_rows(db: str | PathLike[str] | None = None) -> list[ModelRow]:
 
 def _store(db: str | PathLike[str] | None) -> _Store:
     """Return the models of a database; those of a file are read again only when it has changed."""
-    named = db if db is not None else os.environ.get("RBFRAG_DB") or None
-    if named is None and not _stamp(DEFAULT_NAME, False):
-        kept = _unchanged(_SHIPPED, True)
-    else:
-        kept = _unchanged(DEFAULT_NAME if named is None else os.fspath(named), False)
+    kept = _in_memory(db)
     if kept is not None:
         return kept
     place, shipped = _place(db)
@@ -320,6 +316,18 @@ def _store(db: str | PathLike[str] | None) -> _Store:
 
     with opened_database(place, read_only=True) as engine, engine.connect() as connection:
         return _Store(str(engine.url), (), model_rows(connection))
+
+
+def models_in_memory(db: str | PathLike[str] | None = None) -> bool:
+    """Return whether the models of a database are in memory: an answer then waits for no file."""
+    return _in_memory(db) is not None
+
+
+def _in_memory(db: str | PathLike[str] | None) -> _Store | None:
+    named = db if db is not None else os.environ.get("RBFRAG_DB") or None
+    if named is None and not _stamp(DEFAULT_NAME, False):
+        return _unchanged(_SHIPPED, True)
+    return _unchanged(DEFAULT_NAME if named is None else os.fspath(named), False)
 
 
 def _unchanged(path: str, shipped: bool) -> _Store | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.dependence import normal_quantile
 from rbfrag.frames import Tabular
 from rbfrag.hazards.event_counts import (
     MOST_IN_CLOSED_FORM,
@@ -48,8 +50,8 @@ class Exceedance:
     Args:
         value: the number of failures, or the loss.
         annual_rate: rate of events that reach it [1/a]; of a scenario its probability.
-        ci_low: lower end of its interval by the counting error of the event set (Fay and Feuer
-            1997).
+        ci_low: lower end of its interval by the counting error of the event set (`rate_interval`,
+            of a scenario `share_interval`).
         ci_high: upper end.
         largest_of_year: probability that the largest event of a year reaches it; None of a
             scenario.
@@ -463,19 +465,19 @@ def _curve(
 ) -> tuple[Exceedance, ...]:
     """Return the numbers that are reached at all, each with its interval."""
     widest = float(events.weight.max())
-    effective = events.effective_years
+    effective, alike = events.effective_years, float((events.weight**2).sum())
     rows = []
     for k, end in enumerate(ends.tolist()):
         rate, squares = curve.events[:, law, k].tolist()
         if rate <= 0.0:
             break
+        if effective is None:
+            ends_of_share = share_interval(rate, squares - rate * rate * alike, alike, level)
+            rows.append(Exceedance(end, rate, *ends_of_share, None, None, False))
+            continue
         low, high = rate_interval(rate, squares, widest, level)
         largest, total = (float(years[0, law, k]) for years in (curve.largest, curve.sum))
-        rows.append(
-            Exceedance(end, rate, low, min(high, 1.0), None, None, False)
-            if effective is None
-            else Exceedance(end, rate, low, high, largest, total, rate * effective < 1.0)
-        )
+        rows.append(Exceedance(end, rate, low, high, largest, total, rate * effective < 1.0))
     return tuple(rows)
 
 
@@ -501,6 +503,29 @@ def rate_interval(rate: float, squares: float, widest: float, level: float) -> t
     more, wider = rate + widest, squares + widest * widest
     high = wider / (2.0 * more) * float(chi2.ppf(1.0 - tail, 2.0 * more * more / wider))
     return low, high
+
+
+def share_interval(
+    share: float, variance: float, least: float, level: float
+) -> tuple[float, float]:
+    """Return both ends of the interval of a mean probability over realisations.
+
+    Wilson (1927), with as many realisations as give the variance. Probable inference, the law of
+    succession, and statistical inference. Journal of the American Statistical Association 22(158),
+    209-212.
+
+    Args:
+        share: the mean.
+        variance: its variance.
+        least: sum of the squared weights of the realisations, one over their number.
+        level: confidence level.
+    """
+    z = -normal_quantile(0.5 - 0.5 * level)
+    alone = share * (1.0 - share)
+    n = alone / variance if variance > 1e-12 * alone > 0.0 else 1.0 / least
+    middle, width = share + 0.5 * z * z / n, z * math.sqrt(alone / n + 0.25 * (z / n) ** 2)
+    low, high = ((middle + side * width) / (1.0 + z * z / n) for side in (-1.0, 1.0))
+    return max(low, 0.0), min(high, 1.0)
 
 
 def _of_rows(events: EventSet, portfolio: Portfolio, blocks: FloatArray) -> FloatArray:
@@ -556,7 +581,7 @@ def _warnings(
         names = " and ".join(name.partition("_")[0].upper() for name in portfolio.measures)
         warnings.append(
             f"the engine draws {names} of one event and site independently given the rupture, and "
-            "pairs them as nature does not: P comes out too low (10 to 50 % with PGV and PGA); PGV "
+            "pairs them as nature does not: P of PGV and PGA comes out 10 to 50 % too low; PGV "
             "alone is safer"
         )
     if len(laws) > 1:

@@ -111,7 +111,7 @@ def make_app(settings: Settings) -> FastAPI:
         shipped with rbfrag.
         """
         # read anew each time, and from a server if there is one
-        return model_list(await run_in_threadpool(stored_rows, settings.db))
+        return model_list(await work.in_thread(settings.time_limit, stored_rows, settings.db))
 
     @app.get("/v1/healthz", summary="Whether the service answers")
     async def healthz() -> Health:

@@ -31,7 +31,8 @@ class Guard:
 
     def __init__(self, app: Application, settings: Settings, metrics: Metrics) -> None:
         self._app = app
-        self._bearer = None if settings.token is None else f"Bearer {settings.token}".encode()
+        self._token = None if settings.token is None else settings.token.encode()
+        self._origins = {origin.lower().encode() for origin in settings.allow_origin}
         self._hosts = {name.lower().encode() for name in settings.allow_host}
         self._metrics = metrics
 
@@ -43,9 +44,14 @@ class Guard:
         start = perf_counter()
         status, size = 500, 0
         own = scope["path"].startswith("/v1/")
+        # HEAD is answered as GET, and its body is left out
+        head_alone = own and scope["method"] == "HEAD"
+        as_get = {**scope, "method": "GET"} if head_alone else scope
 
         async def watched(message: Message) -> None:
             nonlocal status, size
+            if head_alone and message["type"] == "http.response.body":
+                message = {**message, "body": b""}
             if message["type"] == "http.response.start":
                 status = message["status"]
                 if own:
@@ -57,7 +63,7 @@ class Guard:
         refusal = self._refusal(scope)
         try:
             if refusal is None:
-                await self._app(scope, receive, watched)
+                await self._app(as_get, receive, watched)
             else:
                 await refusal(scope, receive, watched)
         finally:
@@ -66,20 +72,26 @@ class Guard:
             log_request(scope, status, size, elapsed_s)
 
     def _refusal(self, scope: Message) -> Any:
-        if self._bearer is None and not self._hosts:
-            return None
         given = dict(scope["headers"])
+        if not self._is_own(scope["method"], given):
+            return problem(
+                403,
+                "origin",
+                "a page of another origin may not send to this service: start it with "
+                "--allow-origin ORIGIN",
+            )
         if self._hosts and _name(given.get(b"host", b"")) not in self._hosts:
             return problem(
                 421,
                 "host",
                 "this service is not asked by that name: start it with --allow-host NAME",
             )
-        if self._bearer is None or not scope["path"].startswith("/v1/"):
+        if self._token is None or not scope["path"].startswith("/v1/"):
             return None
         if scope["path"] == OPEN_TO_ALL:
             return None
-        if hmac.compare_digest(given.get(b"authorization", b""), self._bearer):
+        scheme, _, token = given.get(b"authorization", b"").partition(b" ")
+        if hmac.compare_digest(token.strip(), self._token) and scheme.lower() == b"bearer":
             return None
         return problem(
             401,
@@ -87,6 +99,14 @@ class Guard:
             "this service asks for its token: send the header  Authorization: Bearer TOKEN",
             {"www-authenticate": 'Bearer realm="rbfrag"'},
         )
+
+    def _is_own(self, method: str, given: dict[bytes, bytes]) -> bool:
+        """Whether a request that changes or costs something comes from no foreign page."""
+        origin = given.get(b"origin")
+        if origin is None or method in ("GET", "HEAD", "OPTIONS"):
+            return True
+        own = origin.partition(b"://")[2].lower() == given.get(b"host", b"").lower()
+        return own or bool({origin.lower(), b"*"} & self._origins)
 
 
 def _name(host: bytes) -> bytes:

@@ -6,11 +6,9 @@ import math
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
-from fastapi.concurrency import run_in_threadpool
 
-from rbfrag.db.location import locate
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.lookup import find_model, models_in_memory
 from rbfrag.fragility.predict import answer_given, prediction_document
 from rbfrag.service.documents import PredictAnswer, PredictArrays
 from rbfrag.service.parameters import (
@@ -25,7 +23,7 @@ from rbfrag.service.parameters import (
 from rbfrag.service.problem import READ, SENT
 from rbfrag.service.reading import QueryRoute
 from rbfrag.service.settings import Settings
-from rbfrag.service.work import WorkerPool, json_answer, json_text
+from rbfrag.service.work import WorkerPool, in_thread, json_answer, json_text
 
 ROWS_BESIDE = 5000
 """So many rows are answered beside other requests; more than these, by another process."""
@@ -135,14 +133,14 @@ def _with_null(values: Any) -> list[float | None]:
 
 def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
     """Add the operations on `/v1/predict`, whose long work is done by a pool."""
-    # a server's answer is waited for; a file's models are in memory
-    on_server = isinstance(locate(settings.db), str)
 
     async def predict_one(query: Annotated[PredictQuery, Query()]) -> PredictAnswer:
         """Return what `rbfrag predict --json` prints for the same values."""
-        if on_server:
-            return await run_in_threadpool(answer_one, query, settings.db)
-        return answer_one(query, settings.db)
+        if models_in_memory(settings.db):
+            return answer_one(query, settings.db)
+        # a server, or a file that has changed and may be locked: nobody else waits for it
+        answer: PredictAnswer = await in_thread(settings.time_limit, answer_one, query, settings.db)
+        return answer
 
     routes.add_api_route(
         "/v1/predict",
@@ -170,4 +168,4 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
         longest = max((len(each) for each in columns.values() if isinstance(each, list)), default=1)
         if longest > ROWS_BESIDE:
             return json_answer(await pool.run(request, answer_many, *given))
-        return json_answer(await run_in_threadpool(answer_many, *given))
+        return json_answer(await in_thread(settings.time_limit, answer_many, *given))

@@ -15,6 +15,7 @@ from fastapi import Request, Response
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
 from rbfrag.db.location import locate, reference_file
 from rbfrag.errors import DatabaseError, InputError, RbfragError, UnknownModelError
@@ -121,12 +122,24 @@ def _by_the_framework(request: Request, error: HTTPException) -> Response:
     if status == 400:
         return problem(400, "malformed", _unreadable(error))
     words = HTTPStatus(status).phrase.lower()
+    headers = {**(error.headers or {}), **({"allow": _allowed(request)} if status == 405 else {})}
     return problem(
         status,
         words.replace(" ", "-"),
         f"{request.method[:20]} {request.url.path[:200]}: {words}; see /v1/openapi.json",
-        error.headers,
+        headers,
     )
+
+
+def _allowed(request: Request) -> str:
+    """Return the methods of a path, of all its routes; each route knows its own alone."""
+    methods: set[str] = set()
+    for route in request.app.routes:
+        if route.matches(request.scope)[0] != Match.NONE:
+            methods |= getattr(route, "methods", None) or set()
+    if "GET" in methods or not methods:  # what is no route is a file of the page
+        methods |= {"GET", "HEAD"}
+    return ", ".join(sorted(methods))
 
 
 def _unreadable(error: HTTPException) -> str:
@@ -136,6 +149,8 @@ def _unreadable(error: HTTPException) -> str:
         return f"byte {cause.start} of the body is not UTF-8 text"
     if isinstance(cause, RecursionError):
         return "the body is nested too deeply"
+    if isinstance(cause, InputError):  # a key that is there twice
+        return str(cause)
     if isinstance(cause, ValueError):  # a number of thousands of digits
         return f"the body is not JSON: {cause}"
     return f"the form cannot be read: {error.detail}"

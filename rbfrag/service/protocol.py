@@ -16,6 +16,12 @@ HEADERS_BYTES = 64 * 1024
 LAST_WORDS_S = 0.5
 """How long [s] an idle connection is still read when the service ends."""
 
+LINGER_S = 5.0
+"""How long [s] a client whose body was refused may go on sending before the connection ends."""
+
+LINGER_BYTES = 1 << 26
+"""How much it may send; a 64th of it where it does not say how much it will."""
+
 _END = b"connection: close\r\ncontent-length: 0\r\n\r\n"
 _TOO_LARGE = b"HTTP/1.1 431 Request Header Fields Too Large\r\n" + _END
 _TOO_SLOW = b"HTTP/1.1 408 Request Timeout\r\n" + _END
@@ -27,6 +33,7 @@ class BoundedProtocol(HttpToolsProtocol):
     _late: asyncio.TimerHandle | None = None
     _read = 0
     _ending = False
+    _unread: int | None = None
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin to wait for the first headers."""
@@ -40,6 +47,11 @@ class BoundedProtocol(HttpToolsProtocol):
 
     def data_received(self, data: bytes) -> None:
         """Read on, unless the headers are too long."""
+        if self._unread is not None:
+            self._unread -= len(data)
+            if self._unread < 0:
+                self.transport.close()
+            return
         super().data_received(data)
         if self._late is not None:
             self._read += len(data)
@@ -56,8 +68,21 @@ class BoundedProtocol(HttpToolsProtocol):
         """Begin to answer."""
         self._stop_waiting()
         super().on_headers_complete()
+        self.cycle.transport = _Lingering(self, self.cycle)  # type: ignore[assignment]
         if self._ending:
             self.cycle.keep_alive = False
+
+    def linger(self) -> None:
+        """End the answer, and let what the client still sends go by for a while.
+
+        A connection that is closed upon unread bytes is reset, and the client may never read why
+        it was refused (RFC 9112, section 9.6).
+        """
+        stated = any(name == b"content-length" for name, _ in self.scope["headers"])
+        self._unread = LINGER_BYTES if stated else LINGER_BYTES // 64
+        self.transport.write_eof()
+        self.flow.resume_reading()
+        self.loop.call_later(LINGER_S, self.transport.close)
 
     def shutdown(self) -> None:
         """End after the answer that is due, if one is: the client may have asked just now."""
@@ -89,3 +114,21 @@ class BoundedProtocol(HttpToolsProtocol):
         if not self.transport.is_closing():
             self.transport.write(answer)
             self.transport.close()
+
+
+class _Lingering:
+    """The transport of an answer: it is not closed upon a body of which a part is unread."""
+
+    def __init__(self, protocol: BoundedProtocol, cycle: Any) -> None:
+        self._protocol = protocol
+        self._cycle = cycle
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._protocol.transport, name)
+
+    def close(self) -> None:
+        """Close the connection, at once if nothing more is to come."""
+        if self._cycle.more_body and not self._protocol.transport.is_closing():
+            self._protocol.linger()
+        else:
+            self._protocol.transport.close()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager
 from typing import Any
@@ -14,6 +15,7 @@ from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError
 
 from rbfrag.errors import InputError
+from rbfrag.files import unique_keys
 from rbfrag.service.problem import BUSY, GONE, MalformedError, RequestRefusedError
 from rbfrag.service.settings import Settings
 
@@ -28,6 +30,15 @@ FILE_FORM = {
     }
 }
 """A form of one file, as OpenAPI describes it."""
+
+SMALL_BYTES = 1 << 16
+"""Bodies that state at most this size are read at once, however many others are being read."""
+
+MOST_BRACKETS = 1000
+"""Lists and objects of a request: one list a name, and one object around them."""
+
+MOST_NAMES = 40
+"""Names with a list each that a request can hold."""
 
 _CLOSE = {"connection": "close"}
 """What still comes is not read."""
@@ -53,19 +64,41 @@ class Bodies:
         stated = request.headers.get("content-length", "")
         if stated.isdigit() and int(stated) > limits.body_limit_bytes:
             raise self._too_long()
+        if stated.isdigit() and int(stated) <= SMALL_BYTES:
+            # it takes no memory to speak of, and so no place: nobody waits behind idle ones
+            yield _with_body(request, await self._in_time(request))
+            return
         try:
             await asyncio.wait_for(self._places.acquire(), limits.time_limit)
         except TimeoutError:
             raise RequestRefusedError(*BUSY) from None
         try:
-            try:
-                body = await asyncio.wait_for(self._whole(request), limits.body_time)
-            except TimeoutError:
-                words = f"the body took longer than {limits.body_time:g} s to come"
-                raise RequestRefusedError(408, "too-slow", words, _CLOSE) from None
-            yield _with_body(request, body)
+            yield _with_body(request, await self._in_time(request))
         finally:
             self._places.release()
+
+    async def _in_time(self, request: Request) -> bytes:
+        limit_s = self._settings.body_time
+        try:
+            return await asyncio.wait_for(self._whole(request), limit_s)
+        except TimeoutError:
+            words = f"the body took longer than {limit_s:g} s to come"
+            raise RequestRefusedError(408, "too-slow", words, _CLOSE) from None
+
+    def check_json(self, body: bytes) -> None:
+        """Refuse JSON whose parsing would take long, before it is parsed.
+
+        Raises:
+            InputError: more brackets or elements than any request needs.
+        """
+        if body.count(b"[") + body.count(b"{") > MOST_BRACKETS:
+            raise MalformedError(
+                "the body is nested too deeply, or holds more than "
+                f"{MOST_BRACKETS} lists and objects"
+            )
+        most = MOST_NAMES * self._settings.row_limit
+        if body.count(b",") > most:
+            raise InputError(f"the body holds more than {most} elements: split the request")
 
     async def _whole(self, request: Request) -> bytes:
         parts, size, more = [], 0, True
@@ -93,7 +126,14 @@ def _with_body(request: Request, body: bytes) -> Request:
     async def receive() -> Any:
         return unread.pop() if unread else await request.receive()
 
-    return Request(request.scope, receive)
+    return _StrictRequest(request.scope, receive)
+
+
+class _StrictRequest(Request):
+    """A request in whose JSON each key is there once."""
+
+    async def json(self) -> Any:
+        return json.loads(await self.body(), object_pairs_hook=unique_keys)
 
 
 class BoundedRoute(APIRoute):
@@ -111,7 +151,10 @@ class BoundedRoute(APIRoute):
                 # JSON is all that these routes take, and what curl sends says that it is a form
                 headers = [each for each in request.scope["headers"] if each[0] != b"content-type"]
                 request.scope["headers"] = [*headers, (b"content-type", b"application/json")]
-            async with request.app.state.bodies.read(request) as read:
+            bodies: Bodies = request.app.state.bodies
+            async with bodies.read(request) as read:
+                if self.body_field is not None:
+                    bodies.check_json(await read.body())
                 return await handler(read)
 
         return bounded

@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from fastapi import Request, Response
 from pebble import ProcessExpired, ProcessPool
 
+from rbfrag.db.sqlite_file import LONGEST_WAIT_S
 from rbfrag.errors import InputError, MotionFileError
+from rbfrag.files import unique_keys
 from rbfrag.service.parameters import (
     MEASURES,
     CriticalQuery,
@@ -70,7 +72,7 @@ def rock_mass(
 
     if form == "json":
         try:
-            document = json.loads(body, parse_constant=_no_number)
+            document = json.loads(body, parse_constant=_no_number, object_pairs_hook=unique_keys)
         except (ValueError, RecursionError) as error:
             raise MalformedError(f"the body is not JSON: {error}") from None
         if not isinstance(document, dict):
@@ -244,6 +246,18 @@ class WorkerPool:
         if self._pool is not None:
             self._pool.stop()  # type: ignore[no-untyped-call]
             self._pool.join()
+
+
+async def in_thread(limit_s: float, function: Callable[..., Any], *given: Any) -> Any:
+    """Return what a function answers that may wait for a database, beside other requests.
+
+    Whoever asks is told after the limit of time; the database is waited for no longer either.
+    """
+    LONGEST_WAIT_S.set(limit_s)  # for this request alone, and for its thread
+    try:
+        return await asyncio.wait_for(asyncio.to_thread(function, *given), limit_s)
+    except TimeoutError:
+        raise RequestRefusedError(*BUSY) from None
 
 
 async def _disconnected(request: Request) -> None:

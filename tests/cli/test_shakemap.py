@@ -75,6 +75,10 @@ def test_a_class_of_blocks_with_uncertainty(shell: Shell, grid: Path) -> None:
     )  # fmt: skip
     assert told["uncertainty_integrated"]
     assert "probability of toppling" in Path("a.svg").read_text()
+    note = "values of the map taken as certain"
+    assert note not in Path("a.svg").read_text()
+    shell("shakemap", grid, "--p2", "3", "--kr", "0.1", "--out", "b.csv", "--plot", "b.svg")
+    assert note in Path("b.svg").read_text()
     certain, mean = (
         np.genfromtxt(name, delimiter=",", names=True)["probability"]
         for name in ("certain.csv", "a.csv")
@@ -129,6 +133,10 @@ def test_how_many_fail_together(shell: Shell, grid: Path) -> None:
     assert any("correlated over 25.7 km (Jayaram and Baker 2009)" in t for t in told["warnings"])
     again = shell.json("shakemap", grid, *block, "uncertainty.xml", "--seed", "1", "--draws", "200")
     assert (again["draws"], again["seed"]) == (200, 1)
+    Path("s.csv").write_text("p2_1_s2,kr,kr_sigma\n3,0.1,0.3\n")
+    medians = shell.json("shakemap", grid, "--blocks", "s.csv", *block[4:], "uncertainty.xml")
+    assert medians["expected_failures"] == told["expected_failures"]
+    assert any("kr_sigma of the blocks are not integrated" in t for t in medians["warnings"])
     # the 6 nodes hold every one of three blocks, two of the second
     Path("b.csv").write_text("p2_1_s2,kr,weight\n3,0.1,1\n3,0.1,2\n")
     more = shell.json("shakemap", grid, "--blocks", "b.csv", *block[4:], "uncertainty.xml")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.special import ndtr
-from scipy.stats import binom, chi2
+from scipy.stats import binom, binomtest, chi2
 
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
@@ -24,7 +24,7 @@ from rbfrag.fragility.predict import predict
 from rbfrag.hazards import event_counts
 from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.event_counts import Part, count_part
-from rbfrag.hazards.losses import LossAnswer, rate_interval
+from rbfrag.hazards.losses import LossAnswer, rate_interval, share_interval
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from tests.exchange.openquake_job import write_job
 from tests.fragility.conftest import SHARED, model_row
@@ -363,6 +363,16 @@ def test_interval_of_equal_weights_is_the_exact_one() -> None:
     low, high = rate_interval(n * weight, n * weight**2, weight, 0.95)
     assert low == pytest.approx(weight * chi2.ppf(0.025, 2 * n) / 2)
     assert high == pytest.approx(weight * chi2.ppf(0.975, 2 * n + 2) / 2)
+
+
+def test_interval_of_a_share_is_wilsons() -> None:
+    """Where each of n realisations reaches a number or does not, and 3 of 20 do."""
+    low, high = share_interval(0.15, 0.15 * 0.85 / 20, 1 / 20, 0.95)
+    same = binomtest(3, 20).proportion_ci(0.95, method="wilson")
+    assert (low, high) == pytest.approx((same.low, same.high))
+    low, high = share_interval(1.0, 0.0, 1 / 20, 0.95)
+    same = binomtest(20, 20).proportion_ci(0.95, method="wilson")
+    assert (low, high) == pytest.approx((same.low, same.high))
 
 
 def test_minimum_intensity_above_the_weakest_block_is_warned_of(tmp_path: Path) -> None:

@@ -303,3 +303,11 @@ def test_a_free_block_of_los_angeles(formats_dir: Path) -> None:
     assert answer.annual_rate_any == pytest.approx(1.345e-3, rel=5e-3)
     assert answer.factor_5_percent == pytest.approx(0.2228, rel=5e-3)
     assert answer.probability_standing == pytest.approx(1.44e-6, rel=0.02)
+    # the number was worked with straight lines between the logarithms of the points
+    level = np.geomspace(curve.levels[0], curve.levels[-1], 2000)
+    rate = np.interp(np.log(level), np.log(curve.levels), np.log(curve.annual_rate))
+    straight = hazard_curve(curve.measure, level, np.exp(rate), period_s=1.0)
+    worked = survival(straight, fragility=lambda sa: overturns(0.946 * sa), age_years=10_000.0)
+    assert worked.annual_rate_any == pytest.approx(1.334e-3, rel=5e-3)
+    assert worked.factor_5_percent == pytest.approx(0.225, rel=5e-3)
+    assert worked.probability_standing == pytest.approx(1.6e-6, rel=2e-2)

@@ -65,6 +65,7 @@ def shakemap(
     """
     import numpy as np
 
+    from rbfrag.exchange.block_table import SIGMAS
     from rbfrag.exchange.shakemap import at_places, read_shakemap
     from rbfrag.files import output_path
     from rbfrag.hazards.conversions import component as component_named
@@ -79,6 +80,12 @@ def shakemap(
         grid, uncertainty=meaning.uncertainty, allow_partial=meaning.allow_partial
     )
     warnings = [*remarks, *shaken.warnings]
+    uncertain = [name for name in SIGMAS if np.any(class_blocks.get(name, 0.0))]
+    if uncertain:
+        warnings.append(
+            f"{' and '.join(uncertain)} of the blocks are not integrated: the map is that of their "
+            "medians"
+        )
     own = "lon" in class_blocks
     if own:
         lon, lat = class_blocks["lon"], class_blocks["lat"]
