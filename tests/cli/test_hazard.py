@@ -81,7 +81,7 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     assert any("blocks are taken as those of one site" in text for text in found["warnings"])
     printed = shell("hazard", curve, "--blocks", "blocks.csv", "--years", "100").stdout
     assert f"{once_in(found['annual_rate_any'])} on average" in printed
-    assert f"{found['expected_failures_per_year']:.4g} failures a year are expected" in printed
+    assert f"{found['expected_failures_per_year']:.2g} failures a year are expected" in printed
 
 
 def test_numbers_of_failures_that_are_asked_for(shell: Shell, curve: Path) -> None:
