@@ -143,6 +143,8 @@ def hazard(
     convert_sigma: float | None = None,
     component: str | None = None,
     years: float = 50.0,
+    kind: str | None = None,
+    restitution: ArrayLike | None = None,
     model: Model | None = None,
     level: float = 0.95,
     db: str | PathLike[str] | None = None,
@@ -178,6 +180,9 @@ def hazard(
         component: what the curve's horizontal component means: single, geometric_mean,
             rotd50 or larger; None for single, with a warning.
         years: period for the probability [a].
+        kind: how the blocks fail; None for toppling, backed by a slope.
+        restitution: of blocks that rock: speed after an impact over that before it, scalar or
+            shape (m,); None, or NaN for one of them, for what angular momentum leaves.
         model: as in :func:`rbfrag.predict`.
         level: confidence level of the interval.
         db: as in :func:`rbfrag.predict`.
@@ -199,14 +204,16 @@ def hazard(
     reading = Shaking.of(
         curves[0], convert=convert, convert_sigma=convert_sigma, component=component
     )
-    chosen = find_model(model, ("p2", "kr", reading.name), db)
+    known = ("p2", "kr") if restitution is None else ("p2", "kr", "restitution")
+    chosen = find_model(model, (*known, reading.name), db, kind=kind)
+    stated = None if restitution is None else np.broadcast_to(restitution, p2s.shape)
     warnings = list(reading.warnings)
     for one in curves:
         warnings.extend(one.warnings)
         warnings.extend(quantile_warning(one, "a rate"))
     if chosen.term.advice:
         warnings.append(chosen.term.advice)
-    site = _Site.of(p2s, krs, reading, chosen, level, curves, counts, one_class=one_class)
+    site = _Site.of(p2s, krs, stated, reading, chosen, level, curves, counts, one_class=one_class)
     each = [site.under(one, years) for one in curves]
     parts = (
         each[:1]
@@ -304,6 +311,7 @@ class _Site:
         cls,
         p2: FloatArray,
         kr: FloatArray,
+        restitution: FloatArray | None,
         reading: Shaking,
         model: FragilityModel,
         level: float,
@@ -317,7 +325,12 @@ class _Site:
         length = p2.size if one_class else _CHUNK
         blocks = [
             ModelBlocks.certain(
-                p2[i : i + length], kr[i : i + length], shaking=reading, model=model, level=level
+                p2[i : i + length],
+                kr[i : i + length],
+                shaking=reading,
+                model=model,
+                level=level,
+                restitution=None if restitution is None else restitution[i : i + length],
             )
             for i in starts
         ]

@@ -22,6 +22,7 @@ from rbfrag.hazards.annual_rate import Fragility
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.shaking import Shaking
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.scatter import fraction, lognormal
 
 FloatArray = NDArray[np.float64]
 
@@ -30,7 +31,10 @@ TABLE_STEP, SMOOTH_STEP = 0.01, 0.02
 
 FEWEST_NODES = 65
 
+_OF_ROCKING = ("p2", "kr", "restitution")
 _SIGMA_POINTS, _SIGMA_REACH = 15, 5.0
+_ALWAYS = 2
+"""p² and k_r have their points even where certain: what else is uncertain does not move them."""
 _AT_ONCE, _BLOCKS_AT_ONCE = 400_000, 512
 
 
@@ -98,6 +102,8 @@ class ModelBlocks:
         shaking: what the curve's levels are to the model.
         model: the model.
         level: confidence level.
+        restitution: of blocks that rock, draws x blocks; None for what angular momentum leaves.
+        stated_restitution: the one about which they are drawn, shape (m,); None likewise.
     """
 
     p2: FloatArray
@@ -107,6 +113,8 @@ class ModelBlocks:
     shaking: Shaking
     model: FragilityModel
     level: float
+    restitution: FloatArray | None = None
+    stated_restitution: FloatArray | None = None
 
     @classmethod
     def of(
@@ -116,6 +124,8 @@ class ModelBlocks:
         *,
         p2_sigma: ArrayLike,
         kr_sigma: ArrayLike,
+        restitution: ArrayLike | None,
+        restitution_sigma: ArrayLike,
         draws: int,
         seed: int,
         kind: str | None,
@@ -127,11 +137,15 @@ class ModelBlocks:
         """Return the blocks of medians and sigmas; arguments as for :func:`rbfrag.survival`."""
         if p2 is None or kr is None:
             raise InputError("give p2 and kr of the blocks, or a fragility of the curve's measure")
-        columns = {"p2": p2, "kr": kr, "p2_sigma": p2_sigma, "kr_sigma": kr_sigma}
+        columns = {
+            "p2": p2, "kr": kr, "p2_sigma": p2_sigma, "kr_sigma": kr_sigma,
+            "restitution_sigma": restitution_sigma,
+            "restitution": np.nan if restitution is None else restitution,
+        }  # fmt: skip
         values = np.broadcast_arrays(
             *(np.atleast_1d(np.asarray(one, dtype=np.float64)) for one in columns.values())
         )
-        for name, value in zip(columns, values, strict=True):
+        for name, value in zip(list(columns)[:-1], values, strict=False):
             least = 0.0 if name.endswith("sigma") else np.nextafter(0.0, 1.0)
             wrong = ~(np.isfinite(value) & (value >= least))
             if wrong.any():
@@ -140,10 +154,18 @@ class ModelBlocks:
                     + ("0 or more" if least == 0.0 else "a finite number above 0")
                 )
         medians = (values[0], values[1])
-        z, weight = _standard_draws(values[2], values[3], draws, seed)
-        drawn = [m * np.exp(s * part) for m, s, part in zip(medians, values[2:], z, strict=True)]
-        chosen = find_model(model, ("p2", "kr", shaking.name), db, kind=kind)
-        return cls(drawn[0], drawn[1], weight, medians, shaking, chosen, level)
+        z, weight = _standard_draws(values[2:5], draws, seed)
+        p2s, krs = (lognormal(z[i], medians[i], values[2 + i]) for i in (0, 1))
+        stated = None if restitution is None else values[5]
+        names = ("p2", "kr", shaking.name) if stated is None else (*_OF_ROCKING, shaking.name)
+        chosen = find_model(model, names, db, kind=kind)
+        if stated is None:
+            if values[4].any():
+                raise InputError("restitution_sigma goes with restitution: give its mean, too")
+            return cls(p2s, krs, weight, medians, shaking, chosen, level)
+        own = _with_own(chosen, medians, stated)
+        scattered = fraction(z[2], own, values[4])
+        return cls(p2s, krs, weight, medians, shaking, chosen, level, scattered, own)
 
     @classmethod
     def certain(
@@ -154,9 +176,12 @@ class ModelBlocks:
         shaking: Shaking,
         model: FragilityModel,
         level: float,
+        restitution: FloatArray | None = None,
     ) -> ModelBlocks:
         """Return blocks whose parameters are known, shape (m,) each."""
-        return cls(p2[None], kr[None], np.ones(1), (p2, kr), shaking, model, level)
+        own = None if restitution is None else _with_own(model, (p2, kr), restitution)
+        drawn = None if own is None else own[None]
+        return cls(p2[None], kr[None], np.ones(1), (p2, kr), shaking, model, level, drawn, own)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -198,6 +223,7 @@ class ModelBlocks:
             for some in _slices(m, _BLOCKS_AT_ONCE):
                 answer = self._predicted(
                     self.p2[draws, some, None], self.kr[draws, some, None],
+                    None if self.restitution is None else self.restitution[draws, some, None],
                     {self.shaking.name: values},
                 )  # fmt: skip
                 bands = np.stack([answer.probability, answer.ci_low, answer.ci_high], axis=1)
@@ -222,37 +248,72 @@ class ModelBlocks:
     def _at_medians(self, levels: FloatArray) -> PredictionArray:
         p2, kr = self.medians
         shaking = {self.shaking.name: levels[None, :] * self.shaking.median}
-        return self._predicted(p2[:, None], kr[:, None], shaking)
+        stated = self.stated_restitution
+        own = None if stated is None else stated[:, None]
+        return self._predicted(p2[:, None], kr[:, None], own, shaking)
 
     def _predicted(
-        self, p2: FloatArray, kr: FloatArray, shaking: Mapping[str, Any]
+        self,
+        p2: FloatArray,
+        kr: FloatArray,
+        restitution: FloatArray | None,
+        shaking: Mapping[str, Any],
     ) -> PredictionArray:
-        answer = answer_given(self.model, {"p2": p2, "kr": kr, **shaking}, self.level)
+        own = {} if restitution is None else {"restitution": restitution}
+        answer = answer_given(self.model, {"p2": p2, "kr": kr, **own, **shaking}, self.level)
         assert isinstance(answer, PredictionArray)
         return answer
 
 
+def _with_own(
+    model: FragilityModel, medians: tuple[FloatArray, FloatArray], stated: FloatArray
+) -> FloatArray:
+    """Return restitutions, with that of the block itself where none is stated.
+
+    Raises:
+        InputError: one that no block has.
+    """
+    p2, kr = medians
+    own = model.method.block.filled({"p2": p2, "kr": kr, "restitution": stated})["restitution"]
+    wrong = ~((own > 0.0) & (own <= 1.0))
+    if wrong.any():
+        raise InputError(
+            f"restitution = {own[wrong][0]:g}: give the speed after an impact over that before it, "
+            "above 0 and up to 1 (a block that comes to rest at its first impact is outside the "
+            "model)"
+        )
+    return np.asarray(own)
+
+
 def _standard_draws(
-    p2_sigma: FloatArray, kr_sigma: FloatArray, draws: int, seed: int
-) -> tuple[tuple[FloatArray, FloatArray], FloatArray]:
-    """Return standard normal values of ln p² and ln k_r, draws x blocks each, and weights.
+    sigmas: Sequence[FloatArray], draws: int, seed: int
+) -> tuple[list[FloatArray], FloatArray]:
+    """Return standard normal values of each parameter, draws x blocks each, and weights.
 
     One block: a product of steps, exact for smooth integrands. Several: scrambled Sobol points
     (Owen 1998), normal by their quantiles.
     """
-    m = p2_sigma.size
-    if not (p2_sigma.any() or kr_sigma.any()):
-        return (np.zeros((1, m)), np.zeros((1, m))), np.ones(1)
+    m = sigmas[0].size
+    if not any(sigma.any() for sigma in sigmas):
+        return [np.zeros((1, m)) for _ in sigmas], np.ones(1)
     if m == 1:
-        x, wx = normal_steps(_SIGMA_POINTS if p2_sigma.any() else 1, _SIGMA_REACH)
-        y, wy = normal_steps(_SIGMA_POINTS if kr_sigma.any() else 1, _SIGMA_REACH)
-        a, b = np.meshgrid(x, y, indexing="ij")
-        return (a.reshape(-1, 1), b.reshape(-1, 1)), np.outer(wx, wy).ravel()
+        steps = [normal_steps(_SIGMA_POINTS if s.any() else 1, _SIGMA_REACH) for s in sigmas]
+        weight = np.ones(1)
+        for _, of_one in steps:
+            weight = np.outer(weight, of_one).ravel()
+        return [
+            z.reshape(-1, 1) for z in np.meshgrid(*(x for x, _ in steps), indexing="ij")
+        ], weight
     if isinstance(draws, bool) or not 1 <= draws <= 2**16:
         raise InputError(f"draws = {draws}: give a number from 1 to 65536")
     from scipy.special import ndtri
     from scipy.stats.qmc import Sobol
 
-    points = Sobol(2 * m, rng=np.random.default_rng(seed)).random(1 << (draws - 1).bit_length())
+    uncertain = [i for i, sigma in enumerate(sigmas) if sigma.any() or i < _ALWAYS]
+    points = Sobol(len(uncertain) * m, rng=np.random.default_rng(seed)).random(
+        1 << (draws - 1).bit_length()
+    )
     z = ndtri(points[:draws])
-    return (z[:, :m], z[:, m:]), np.full(draws, 1.0 / draws)
+    place = {i: slice(k * m, (k + 1) * m) for k, i in enumerate(uncertain)}
+    each = [z[:, place[i]] if i in place else np.zeros((draws, m)) for i in range(len(sigmas))]
+    return each, np.full(draws, 1.0 / draws)

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from itertools import product
 from os import PathLike
 from typing import Any
 
@@ -228,29 +227,6 @@ class Portfolio:
     def _answering(self) -> tuple[FragilityModel, ...]:
         return tuple(FragilityModel.from_row(row) for row in self.models)
 
-    @cached_property
-    def _alike(self) -> tuple[tuple[int, tuple[str, ...]], ...]:
-        """Models, and which of their options are stated: blocks that are answered together."""
-        ways = [
-            tuple(name for name, is_stated in zip(self.options, way, strict=True) if is_stated)
-            for way in product((False, True), repeat=len(self.options))
-        ]
-        return tuple(
-            (number, way)
-            for number, model in enumerate(self._answering)
-            for way in ways
-            if set(way) <= set(model.method.block.options)
-        )
-
-    def _states(self, names: Sequence[str]) -> NDArray[np.bool_]:
-        """Return which blocks state these options of their model, and no others, shape (n,)."""
-        exact = np.ones(self.size, dtype=np.bool_)
-        for number, model in enumerate(self._answering):
-            own = self.model == number
-            for name in set(self.options) & set(model.method.block.options):
-                exact[own] &= np.isfinite(self.options[name][own]) == (name in names)
-        return exact
-
     def probability(
         self,
         some: NDArray[np.intp],
@@ -275,13 +251,14 @@ class Portfolio:
         shape = np.broadcast_shapes(*(value.shape for value in given.values()))
         given = {name: np.broadcast_to(value, shape) for name, value in given.items()}
         p, in_domain = np.empty(shape), np.empty(shape, dtype=np.bool_)
-        for number, stated in self._alike:
-            own = (self.model[some] == number) & self._states(stated)[some]
+        for number, model in enumerate(self._answering):
+            own = self.model[some] == number
             if not own.any():
                 continue
-            model = self._answering[number]
             part = {name: given[name][..., own] for name in ("p2", "kr", *model.term.inputs)}
-            part |= {name: self.options[name][some][own] for name in stated}
+            for name in set(self.options) & set(model.method.block.options):
+                part[name] = self.options[name][some][own]
+            part = model.method.block.filled(part)
             answer = answer_given(model, part, _LEVEL, interval=False)
             assert isinstance(answer, PredictionArray)
             p[..., own], in_domain[..., own] = answer.probability, answer.in_domain

@@ -142,6 +142,8 @@ def survival(
     weights: Sequence[float | None] | None = None,
     p2_sigma: ArrayLike = 0.0,
     kr_sigma: ArrayLike = 0.0,
+    restitution: ArrayLike | None = None,
+    restitution_sigma: ArrayLike = 0.0,
     kind: str | None = None,
     fragility: Fragility | None = None,
     convert: str | None = None,
@@ -175,6 +177,9 @@ def survival(
             they sum to 1.
         p2_sigma: standard deviations of ln p², independent of block to block, as `p2`.
         kr_sigma: the same of ln k_r.
+        restitution: of blocks that rock: speed after an impact over that before it; None, or NaN
+            for one of them, for what angular momentum leaves.
+        restitution_sigma: standard deviation of it; it is cut off at 0 and 1.
         kind: how the blocks fail; None for toppling, backed by a slope.
         fragility: instead of blocks, a function from levels of the curves' measure, shape (n,), to
             probabilities of failure, shape (n,) or one row for each block, (m, n).
@@ -204,8 +209,9 @@ def survival(
             each[0], convert=convert, convert_sigma=convert_sigma, component=component
         )
         known = ModelBlocks.of(
-            p2, kr, p2_sigma=p2_sigma, kr_sigma=kr_sigma, draws=draws, seed=seed, kind=kind,
-            model=model, level=level, db=db, shaking=shaking,
+            p2, kr, p2_sigma=p2_sigma, kr_sigma=kr_sigma, restitution=restitution,
+            restitution_sigma=restitution_sigma, draws=draws, seed=seed, kind=kind, model=model,
+            level=level, db=db, shaking=shaking,
         )  # fmt: skip
         blocks = StandingBlocks.of_blocks(known, each)
     elif p2 is None and kr is None:

@@ -58,8 +58,8 @@ def add_routes(routes: APIRouter) -> None:
                     f"{min(others)} does not go with p2 and kr: a block is these two numbers, or a "
                     "shape with its beta and phi"
                 )
-            (p2, kr), _ = query.toppling("p2", "kr")
-            body, result = level_rectangle(p2, kr)
+            numbers, _ = query.toppling("p2", "kr")
+            body, result = level_rectangle(numbers["p2"], numbers["kr"])
         lines = block_lines(body, result)
         return {
             "mode": result.mode,

@@ -182,15 +182,17 @@ class Shape(Parameters):
 
         return kind_of(described, TOPPLING_BLOCK.kind)
 
-    def toppling(self, *names: str) -> tuple[list[float], tuple[str, ...]]:
-        """Return some of p2 [1/s²] and k_r, and warnings."""
-        values, remarks = self.numbers()
+    def toppling(
+        self, *names: str, kind: str | None = None
+    ) -> tuple[dict[str, float], tuple[str, ...]]:
+        """Return p2 [1/s²] and k_r, of which some must be given, and warnings."""
+        values, remarks = self.numbers(kind)
         for name in names:
             if name not in values:
                 raise InputError(
                     f"{name} is missing: a block is given by {' and '.join(names)}, or by {WAYS}"
                 )
-        return [values[name] for name in names], remarks
+        return values, remarks
 
 
 class _Weight(Parameters):
@@ -353,6 +355,8 @@ class RockmassQuery(Motion):
 class HazardQuery(TopplingBlock):
     """Parameters of `/v1/hazard`."""
 
+    kind: Annotated[Text | None, KIND] = None
+    restitution: Annotated[Positive | None, RESTITUTION] = None
     years: Positive = 50.0
     """Period of the probability [years]."""
     imt: Text | None = None

@@ -124,7 +124,7 @@ def critical(body: bytes, query: CriticalQuery) -> bytes:
     from rbfrag.solver.reports import critical_as_dict
     from rbfrag.solver.search.critical import critical as search
 
-    (p2,), _ = query.toppling("p2")
+    p2 = query.toppling("p2")[0]["p2"]
     result = search(
         _motion(body, query),
         p2=p2,
@@ -141,7 +141,8 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     from rbfrag.hazards.conversions import velocity_conversion
     from rbfrag.hazards.report import as_dict
 
-    (p2, kr), remarks = query.toppling("p2", "kr")
+    block, remarks = query.toppling("p2", "kr", kind=query.kind)
+    known: dict[str, Any] = {**block, **query.given({"restitution": "restitution"})}
     try:
         curves = hazard_curves_in(_text(body), FILE, imt=query.imt, site=query.site)
     except RecursionError:
@@ -152,9 +153,9 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
         converted_period_s=None if convert is None else convert.period_s,
     )
     chosen = query.model_dump(
-        include={"years", "level", "convert", "convert_sigma", "component", "model"}
+        include={"years", "kind", "level", "convert", "convert_sigma", "component", "model"}
     )
-    rates = [answer(curve, p2, kr, **chosen, db=db) for curve in curves]
+    rates = [answer(curve, **known, **chosen, db=db) for curve in curves]
     return json_text(as_dict(curves, [[None]] * len(curves), rates, remarks))
 
 

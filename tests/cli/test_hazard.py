@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import rbfrag
 from rbfrag.cli.sentences import once_in
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
-from tests.cli.conftest import Shell
+from tests.cli.conftest import Refuses, Shell
 from tests.fragility.conftest import model_row
 
 
@@ -227,3 +228,52 @@ def test_a_block_that_waits_for_no_earthquake_is_refused(
 ) -> None:
     told = shell("hazard", curve, f"--p2={p2}", f"--kr={kr}", expect=2).stderr
     assert "above" in told or "finite" in told
+
+
+def test_free_standing_blocks_with_their_restitution(shell: Shell, refuses: Refuses) -> None:
+    Path("curve.csv").write_text("pgv_m_s,annual_rate\n0.05,0.02\n0.5,0.002\n2,0.0001\n")
+    Path("b.csv").write_text(
+        "block_id,p2_1_s2,kr,restitution,kr_sigma\nA,7,0.2,,0.1\nB,7,0.2,0.8,\n"
+    )
+    asked = ("hazard", "curve.csv", "--component", "single", "--kind", "rocking")
+    answer = shell.json(*asked, "--blocks", "b.csv")
+    rows = answer["blocks"]
+    assert any("kr_sigma of the blocks is not integrated" in text for text in answer["warnings"])
+    for row, stated in zip(rows, ((), ("--restitution", "0.8")), strict=True):
+        told = shell.json(*asked, "--p2", "7", "--kr", "0.2", *stated)
+        assert told["model"] == "rocking-pgv"
+        assert row["annual_rate"] == pytest.approx(told["annual_rate"], rel=1e-6)
+    assert rows[1]["annual_rate"] < rows[0]["annual_rate"]
+    shape = shell.json(*asked, "--height", "2", "--width", "0.5")
+    kr = shell.json(*asked, "--p2", repr(rbfrag.Block.rectangle(2.0, 0.5).p2), "--kr", "0.25")
+    assert shape["annual_rate"] == pytest.approx(kr["annual_rate"], rel=1e-6)
+    backed = ("hazard", "curve.csv", "--p2", "7", "--kr", "0.2", "--restitution", "0.8")
+    assert "--restitution goes with blocks that stand free" in refuses(*backed)
+    wrong = (*asked, "--p2", "7", "--kr", "0.2", "--restitution", "1.2")
+    assert "restitution = 1.2" in refuses(*wrong)
+
+
+def test_a_standing_rock_is_uncertain_in_its_restitution_too(shell: Shell) -> None:
+    Path("curve.csv").write_text("pgv_m_s,annual_rate\n0.05,0.02\n0.5,0.002\n2,0.0001\n")
+    asked = (
+        "survival", "curve.csv", "--component", "single", "--kind", "rocking", "--p2", "7",
+        "--kr", "0.2", "--restitution", "0.85", "--age", "500",
+    )  # fmt: skip
+    certain = shell.json(*asked)
+    nearly = shell.json(*asked, "--restitution-sigma", "1e-6")
+    assert nearly["probability_standing"] == pytest.approx(
+        certain["probability_standing"], rel=1e-5
+    )
+    values = np.linspace(0.85 - 0.2, 0.85 + 0.15, 301)
+    weight = np.exp(-0.5 * ((values - 0.85) / 0.05) ** 2)
+    curve = rbfrag.read_hazard_curves("curve.csv")[0]
+    standing = [
+        rbfrag.survival(
+            curve, 7.0, 0.2, age_years=500.0, kind="rocking", restitution=e, component="single"
+        ).probability_standing
+        for e in values[::10]
+    ]
+    mean = float(np.average(standing, weights=weight[::10]))
+    told = shell.json(*asked, "--restitution-sigma", "0.05")
+    assert told["probability_standing"] == pytest.approx(mean, rel=2e-3)
+    assert told["probability_standing"] != certain["probability_standing"]

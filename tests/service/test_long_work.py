@@ -186,3 +186,16 @@ def test_rows_are_answered_alike_however_many_there_are(client):
 def test_more_rows_than_the_limit_are_refused(client):
     answer = client.post("/v1/predict", json={"p2": 3.0, "kr": [0.1] * 6001, "pgv": 0.6})
     assert "one request may hold 6000" in refusal(answer)
+
+
+def test_hazard_answers_for_free_standing_blocks(client):
+    free = "component=single&kind=rocking"
+    backed = client.post("/v1/hazard?p2=7&kr=0.2&component=single", content=CURVE).json()
+    own = client.post(f"/v1/hazard?p2=7&kr=0.2&{free}", content=CURVE).json()
+    loses = client.post(f"/v1/hazard?p2=7&kr=0.2&restitution=0.8&{free}", content=CURVE).json()
+    assert own["model"].startswith("rocking")
+    assert backed["annual_rate"] < loses["annual_rate"] < own["annual_rate"]
+    sides = client.post(f"/v1/hazard?height=2&width=0.5&{free}", content=CURVE).json()
+    assert sides["annual_rate"] > 0.0
+    wrong = client.post(f"/v1/hazard?p2=7&kr=0.2&restitution=1.5&{free}", content=CURVE)
+    assert wrong.status_code == 422

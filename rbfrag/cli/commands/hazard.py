@@ -14,7 +14,7 @@ from rbfrag.cli.output import (
     print_warnings,
 )
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlocksOptions
+from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.cli.sentences import once_in, rate_in_words
 from rbfrag.errors import InputError
@@ -88,6 +88,7 @@ def hazard(
         metavar="CURVE...",
     ),
     blocks: BlocksOptions,
+    standing: StandingOptions,
     meaning: CurveOptions,
     answering: options.Answering,
     wanted: RateOptions,
@@ -105,7 +106,7 @@ def hazard(
     knows of blocks that share the shaking. Curves of PGV, PGA and SA at 0.3, 1, 2 and 3 s are
     answered, each by a model of that very measure; another needs --convert. With --weights curves
     are branches of a logic tree: the mean of the rates, and how they are distributed. The block is
-    backed by a slope; a free-standing one fails at weaker shaking.
+    backed by a slope; a free-standing one fails at weaker shaking: --kind rocking.
     """
     from rbfrag.exchange.block_table import write_block_table
     from rbfrag.exchange.branch_weights import stated_weights
@@ -116,7 +117,7 @@ def hazard(
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot)
-    table, is_class, remarks = blocks.toppling_blocks()
+    table, is_class, remarks = blocks.toppling_blocks(standing)
     period = None if meaning.convert is None else velocity_conversion(meaning.convert).period_s
     files = [
         suited_curves(
@@ -135,7 +136,8 @@ def hazard(
             weights=None if wanted.weights is None else stated_weights(wanted.weights, one.curves),
             at_least=wanted.counts(), convert=meaning.convert, convert_sigma=meaning.convert_sigma,
             component=meaning.component, years=wanted.years, model=answering.model,
-            level=answering.level, db=answering.db, one_class=is_class,
+            level=answering.level, db=answering.db, one_class=is_class, kind=standing.kind,
+            restitution=one.columns.get("restitution"),
         )
         for one in sites
     ]  # fmt: skip
@@ -146,7 +148,9 @@ def hazard(
         from rbfrag.plots.hazard import plot_contribution
 
         plot_contribution(first[0], answers[0], plot)
-    document = as_dict(first, [one.names for one in sites], answers, (*remarks, *joined))
+    document = as_dict(
+        first, [one.names for one in sites], answers, (*remarks, *taken_as_medians(table), *joined)
+    )
     if printing.json:
         print_json(document)
         return

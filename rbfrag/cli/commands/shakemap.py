@@ -7,7 +7,7 @@ from typing import Any
 
 from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions
+from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 
@@ -65,7 +65,6 @@ def shakemap(
     """
     import numpy as np
 
-    from rbfrag.exchange.block_table import SIGMAS
     from rbfrag.exchange.shakemap import at_places, read_shakemap
     from rbfrag.files import output_path
     from rbfrag.hazards.conversions import component as component_named
@@ -79,13 +78,7 @@ def shakemap(
     shaken = read_shakemap(
         grid, uncertainty=meaning.uncertainty, allow_partial=meaning.allow_partial
     )
-    warnings = [*remarks, *shaken.warnings]
-    uncertain = [name for name in SIGMAS if np.any(class_blocks.get(name, 0.0))]
-    if uncertain:
-        warnings.append(
-            f"{' and '.join(uncertain)} of the blocks are not integrated: the map is that of their "
-            "medians"
-        )
+    warnings = [*remarks, *taken_as_medians(class_blocks), *shaken.warnings]
     own = "lon" in class_blocks
     if own:
         lon, lat = class_blocks["lon"], class_blocks["lat"]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rbfrag.cli.commands.hazard import CurveOptions
 from rbfrag.cli.output import cell, check_files, print_json, print_table, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import TableOptions
+from rbfrag.cli.parameters.block import StandingOptions, TableOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 
@@ -37,6 +37,7 @@ class Uncertainty:
         "Standard deviation of ln k_r of each block; a column kr_sigma of a table goes before.",
         0.0,
     )
+    restitution_sigma: float = option("Rocking: standard deviation of the restitution.", 0.0)
     draws: int = option("Number of draws where several uncertain blocks are given.", 128)
     seed: int = option("Seed of these draws.", 0)
 
@@ -50,15 +51,13 @@ def survival(
         metavar="CURVE...",
     ),
     blocks: TableOptions,
+    standing: StandingOptions,
     known: Uncertainty,
     meaning: CurveOptions,
     answering: options.Answering,
     weights: str | None = option(
         "Weights of the branches: 0.5,0.3,0.2 in the order of the curves, or OpenQuake's file of "
         "realizations."
-    ),
-    kind: str | None = option(
-        "Kind of failure that the model is of. Default: toppling, backed by a slope."
     ),
     plot: str | None = option(
         "Draw the curves, survival over the factor on their rates, and weights (.png, .pdf, .svg)."
@@ -75,13 +74,14 @@ def survival(
     from rbfrag.hazards.survival import survival as answered
 
     check_files(plot=plot)
-    table, _, remarks = blocks.toppling_blocks()
+    table, _, remarks = blocks.toppling_blocks(standing)
     read = [_one_curve(path, meaning) for path in curves]
     answer = answered(
         read, table["p2_1_s2"], table["kr"], age_years=known.age, age_sd_years=known.age_sd,
         weights=None if weights is None else stated_weights(weights, read),
         p2_sigma=table.get("p2_sigma", known.p2_sigma),
-        kr_sigma=table.get("kr_sigma", known.kr_sigma), kind=kind, convert=meaning.convert,
+        kr_sigma=table.get("kr_sigma", known.kr_sigma), restitution=table.get("restitution"),
+        restitution_sigma=known.restitution_sigma, kind=standing.kind, convert=meaning.convert,
         convert_sigma=meaning.convert_sigma, component=meaning.component, model=answering.model,
         level=answering.level, draws=known.draws, seed=known.seed, db=answering.db,
     )  # fmt: skip

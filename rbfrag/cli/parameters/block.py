@@ -281,6 +281,18 @@ class TopplingBlocks(NamedTuple):
     remarks: tuple[str, ...]
 
 
+def taken_as_medians(columns: dict[str, Any]) -> tuple[str, ...]:
+    """Return what a command says that leaves standard deviations of blocks aside."""
+    sigmas = ("p2_sigma", "kr_sigma")
+    stated = [name for name in sigmas if name in columns and columns[name].any()]
+    if not stated:
+        return ()
+    return (
+        f"{' and '.join(stated)} of the blocks is not integrated here: each block is taken as its "
+        "median (predict, survival and losses integrate)",
+    )
+
+
 def option_of(name: str) -> str:
     """Return what a name is called on the command line."""
     return "--" + name.removesuffix("_deg").removesuffix("_m").replace("_", "-")
