@@ -238,7 +238,7 @@ def test_free_standing_blocks_with_their_restitution(shell: Shell, refuses: Refu
     asked = ("hazard", "curve.csv", "--component", "single", "--kind", "rocking")
     answer = shell.json(*asked, "--blocks", "b.csv")
     rows = answer["blocks"]
-    assert any("kr_sigma of the blocks is not integrated" in text for text in answer["warnings"])
+    assert any("kr_sigma of the blocks are not integrated" in text for text in answer["warnings"])
     for row, stated in zip(rows, ((), ("--restitution", "0.8")), strict=True):
         told = shell.json(*asked, "--p2", "7", "--kr", "0.2", *stated)
         assert told["model"] == "rocking-pgv"

@@ -12,6 +12,7 @@ from rbfrag.cli.output import (
     print_pairs,
     print_table,
     print_warnings,
+    write_table,
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
@@ -93,6 +94,7 @@ def hazard(
     answering: options.Answering,
     wanted: RateOptions,
     out: str | None = option("Write one row a block and site (.csv, .parquet)."),
+    excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option(
         "Draw which shaking the rate of one block comes from (.png, .pdf, .svg)."
     ),
@@ -108,7 +110,6 @@ def hazard(
     are branches of a logic tree: the mean of the rates, and how they are distributed. The block is
     backed by a slope; a free-standing one fails at weaker shaking: --kind rocking.
     """
-    from rbfrag.exchange.block_table import write_block_table
     from rbfrag.exchange.branch_weights import stated_weights
     from rbfrag.exchange.hazard_curves import read_hazard_curves, suited_curves
     from rbfrag.exchange.site_rates import blocks_at_sites, rate_columns
@@ -142,7 +143,7 @@ def hazard(
         for one in sites
     ]  # fmt: skip
     if out is not None:
-        write_block_table(rate_columns(sites, answers), out)
+        write_table(rate_columns(sites, answers), out, excel_text=excel_text)
     first = [one.curves[0] for one in sites]
     if plot is not None:
         from rbfrag.plots.hazard import plot_contribution

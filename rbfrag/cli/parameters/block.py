@@ -288,7 +288,7 @@ def taken_as_medians(columns: dict[str, Any]) -> tuple[str, ...]:
     if not stated:
         return ()
     return (
-        f"{' and '.join(stated)} of the blocks is not integrated here: each block is taken as its "
+        f"{' and '.join(stated)} of the blocks are not integrated here: each block is taken as its "
         "median (predict, survival and losses integrate)",
     )
 

@@ -97,6 +97,7 @@ NEEDS = (
     Need(("--investigation-time",), ("--ses",), "--ses", "both say how long the events took"),
     Need(("--batch",), ("--out",), "--out", "--out FILE names the table of answers"),
     Need(("--out",), ("--batch",), "--batch", "--batch FILE names the table of blocks"),
+    Need(("--excel-text",), ("--out",), "--out", "--out FILE names the table that it is about"),
     Need(
         ("--vertical", "--reverse", "--scales", "--jobs", "--units", "--dt", "--polarity"),
         ("--motion",),
