@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -46,6 +47,16 @@ def print_warnings(warnings: Iterable[str]) -> None:
     """Print warnings on standard error, one a line."""
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)
+
+
+def write_table(columns: Mapping[str, Any], out: str | PathLike[str], *, excel_text: bool) -> None:
+    """Write the table of a command, and warn of texts that spreadsheets take for formulas."""
+    from rbfrag.exchange.block_table import write_block_table
+    from rbfrag.exchange.excel_text import formula_warnings
+
+    write_block_table(columns, out, excel_text=excel_text)
+    if not excel_text and str(out).lower().endswith(".csv"):
+        print_warnings(formula_warnings(columns))
 
 
 @cache

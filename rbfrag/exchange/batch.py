@@ -28,6 +28,7 @@ from rbfrag.exchange.block_table import (
     rectangle_columns,
     table_path,
 )
+from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
 from rbfrag.files import reading, written_whole
 from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.measures import STATED
@@ -66,6 +67,7 @@ def predict_table(
     db: str | PathLike[str] | None,
     kind: str | None = None,
     rotation_deg: float | None = None,
+    excel_text: bool = False,
 ) -> dict[str, object]:
     """Answer every block of a table and write the table with the answers.
 
@@ -81,6 +83,7 @@ def predict_table(
         db: database of the model.
         kind: how the blocks fail; None for what they are given by.
         rotation_deg: rotation that counts as failure [deg], where models of several are fitted.
+        excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
 
     Returns:
         Counts: rows, answered, without an answer, in_domain; kind, model, term, method; warnings.
@@ -109,10 +112,16 @@ def predict_table(
             kept = [name for name in header if name not in (*ANSWERS, OF_UNCERTAIN)]
             write = writer(partial, kept, answers, NUMERIC, stack)
             counts = np.zeros(3, dtype=np.int64)
+            formulas: list[str] = []
             for first_line, part in parts:
                 answer = _answer(origin, part, names, first_line, given, chosen, level)
                 for name in (*ANSWERS, OF_UNCERTAIN):
                     part.pop(name, None)
+                part = changed_texts(part, as_written)
+                if goal.suffix.lower() == ".csv" and excel_text:
+                    part = changed_texts(part, as_text)
+                elif goal.suffix.lower() == ".csv":
+                    formulas = formulas or formula_warnings(part)
                 write(part, answer)
                 finite = np.isfinite(answer["probability"])
                 counts += [finite.size, int(finite.sum()), int(answer["in_domain"].sum())]
@@ -128,7 +137,7 @@ def predict_table(
         "model": chosen.name,
         "term": chosen.term.name,
         "method": chosen.row.method,
-        "warnings": list(chosen.notes),
+        "warnings": [*chosen.notes, *formulas],
     }
 
 

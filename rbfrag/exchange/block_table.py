@@ -22,6 +22,7 @@ from rbfrag.exchange.batch_table import (
     parquet_parts,
     pyarrow,
 )
+from rbfrag.exchange.excel_text import as_text, as_written, changed_texts
 from rbfrag.exchange.points import SUFFIXES as GEOJSON
 from rbfrag.exchange.points import read_points
 from rbfrag.files import is_number, output_path, reading, written_whole
@@ -68,7 +69,12 @@ def table_path(path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def write_block_table(columns: Mapping[str, NDArray[Any]], path: str | os.PathLike[str]) -> Path:
+def write_block_table(
+    columns: Mapping[str, NDArray[Any]],
+    path: str | os.PathLike[str],
+    *,
+    excel_text: bool = False,
+) -> Path:
     """Write a table of blocks, whole or not at all, and return its path.
 
     Numbers keep all their digits. NaN is an empty cell in CSV and null in Parquet.
@@ -76,8 +82,11 @@ def write_block_table(columns: Mapping[str, NDArray[Any]], path: str | os.PathLi
     Args:
         columns: arrays of one length by column name, units in the names.
         path: file to write, ``.csv`` or ``.parquet``; an existing file is replaced.
+        excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
     """
     target = table_path(path)
+    if excel_text and target.suffix.lower() == ".csv":
+        columns = changed_texts(columns, as_text)
     with written_whole(target, "table") as partial:
         if target.suffix.lower() == ".parquet":
             _write_parquet(columns, partial)
@@ -146,7 +155,9 @@ def read_columns(
                 for name, arrays in collected.items():
                     if name in texts:
                         cells = [
-                            checked_name(str(cell).strip(), f"{source}: a cell of {name}")
+                            checked_name(
+                                as_written(str(cell).strip()), f"{source}: a cell of {name}"
+                            )
                             for cell in cells_of(part[name])
                         ]
                         arrays.append(np.array(cells, dtype=object))

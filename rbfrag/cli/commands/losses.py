@@ -15,6 +15,7 @@ from rbfrag.cli.output import (
     print_pairs,
     print_table,
     print_warnings,
+    write_table,
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import argument, option, stacked
@@ -108,6 +109,7 @@ def losses(
     workers: Workers,
     answering: options.Answering,
     out: str | None = option("Write the table of events (.csv, .parquet)."),
+    excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option("Draw how often numbers of failures are reached (.png, .pdf, .svg)."),
     json: options.Json = False,
 ) -> None:
@@ -119,7 +121,6 @@ def losses(
     by the model's dependence: what the earthquake shares, what a site shares, what each block has.
     The answer is the same for any number of workers.
     """
-    from rbfrag.exchange.block_table import write_block_table
     from rbfrag.exchange.event_losses import losses as answered
 
     check_files(table=out, plot=plot)
@@ -133,7 +134,7 @@ def losses(
             run=_Workers(workers.jobs, workers.scheduler), on_progress=bar.show,
         )  # fmt: skip
     if out is not None:
-        write_block_table(answer.table_columns(), out)
+        write_table(answer.table_columns(), out, excel_text=excel_text)
     if plot is not None:
         from rbfrag.plots.losses import plot_losses
 

@@ -75,6 +75,7 @@ class Table:
         "ci_high, event_low, event_high, in_domain, reason and, of uncertain blocks, block_sd.",
         metavar="FILE",
     )
+    excel_text: bool = option(options.EXCEL_TEXT, False)
 
 
 @stacked
@@ -120,7 +121,14 @@ def predict(
 
         if block.beta is not None:
             given["beta_deg"] = block.beta
-        summary = predict_table(table.batch, table.out, given=given, kind=failure.kind, **question)
+        summary = predict_table(
+            table.batch,
+            table.out,
+            given=given,
+            kind=failure.kind,
+            excel_text=table.excel_text,
+            **question,
+        )
         _show_summary(summary, json=printing.json)
         return
     from rbfrag.fragility.predict import prediction_document

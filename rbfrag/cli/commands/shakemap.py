@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings
+from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
 from rbfrag.cli.parameters.stack import argument, option, stacked
@@ -46,6 +46,7 @@ def shakemap(
     *,
     grid: str = argument("ShakeMap grid, version 3 or 4.", metavar="GRID.xml"),
     out: str = option("File to write: .geojson, .csv, .parquet or .gpkg (extra gis).", ...),
+    excel_text: bool = option(options.EXCEL_TEXT, False),
     blocks: BlocksOptions,
     standing: StandingOptions,
     meaning: MapOptions,
@@ -175,7 +176,7 @@ def shakemap(
         "uncertainty_integrated": bool(shaking.integrated),
     }
     document |= {**failures.as_dict(), "seed": drawing.seed}
-    _write(columns, {**document, "warnings": warnings}, target)
+    _write(columns, {**document, "warnings": warnings}, target, excel_text=excel_text)
     if plot is not None:
         from rbfrag.plots.shakemap import plot_shakemap
 
@@ -204,12 +205,12 @@ def shakemap(
     print_warnings(warnings)
 
 
-def _write(columns: dict[str, Any], about: dict[str, Any], target: Any) -> None:
+def _write(
+    columns: dict[str, Any], about: dict[str, Any], target: Any, *, excel_text: bool
+) -> None:
     suffix = target.suffix.lower()
     if suffix in (".csv", ".parquet"):
-        from rbfrag.exchange.block_table import write_block_table
-
-        write_block_table(columns, target)
+        write_table(columns, target, excel_text=excel_text)
     elif suffix == ".gpkg":
         from rbfrag.exchange.points import write_geopackage
 

@@ -9,6 +9,11 @@ import typer
 
 from rbfrag.cli.parameters.stack import option
 
+EXCEL_TEXT = (
+    "In CSV: write texts that begin with = + - or @ with an apostrophe, so that Excel does not "
+    "compute them; rbfrag takes it off when it reads the table."
+)
+
 Json = Annotated[
     bool, typer.Option("--json", help="Print one JSON document on standard output, nothing else.")
 ]

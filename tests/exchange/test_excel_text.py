@@ -1,0 +1,68 @@
+"""Texts that a spreadsheet would compute: warned of, written as text on request, read back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rbfrag.exchange.batch import predict_table
+from rbfrag.exchange.block_table import waiting_blocks, write_block_table
+from rbfrag.exchange.excel_text import as_text, as_written, formula_warnings
+
+TEXTS = [
+    "=1+1",
+    "+cmd|' /C calc'!A0",
+    "-x",
+    "@SUM(A1)",
+    "block",
+    "'quoted'",
+    "",
+    "-0.5",
+    "+1e-3",
+    "-",
+]
+COMPUTED = ["=1+1", "+cmd|' /C calc'!A0", "-x", "@SUM(A1)", "-"]
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_there_and_back(text: str) -> None:
+    written = as_text(text)
+    assert written == (f"'{text}" if text in COMPUTED else text)
+    assert as_written(written) == text
+
+
+def test_a_table_is_read_back(tmp_path: Path) -> None:
+    names = np.array([text for text in TEXTS if text], dtype=object)
+    columns = {
+        "block_id": names,
+        "p2_1_s2": np.full(names.size, 3.0),
+        "kr": np.full(names.size, 0.1),
+    }
+    path = write_block_table(columns, tmp_path / "blocks.csv", excel_text=True)
+    assert "\n'=1+1,3.0,0.1\n" in path.read_text()
+    assert waiting_blocks(path)["block_id"].tolist() == names.tolist()
+    assert write_block_table(columns, tmp_path / "b.csv").read_text().count("\n=1+1,") == 1
+
+
+def test_the_first_cell_is_named() -> None:
+    (warning,) = formula_warnings({"kr": np.array([-1.0]), "block_id": ["a", "=1+1", "@b"]})
+    assert "'=1+1' of the column block_id begins with =" in warning
+    assert "--excel-text" in warning
+    assert formula_warnings({"x": ["-0.5", "a=b"], "y": np.array(["+1"], dtype=object)}) == []
+
+
+@pytest.mark.parametrize("excel_text", [True, False])
+def test_answers_of_a_table(tmp_path: Path, excel_text: bool) -> None:
+    source, out = tmp_path / "blocks.csv", tmp_path / "answers.csv"
+    source.write_text("name,p2_1_s2,kr,pgv_m_s\n'=1+1,3,0.1,0.5\n-2.5,3,0.1,0.5\nx,3,0.1,0.5\n")
+    summary = predict_table(
+        source, out, given={}, model=None, level=0.95, db=None, excel_text=excel_text
+    )
+    first, second, _ = out.read_text().splitlines()[1:]
+    assert first.replace('"', "").startswith("'=1+1,3" if excel_text else "=1+1,3")
+    assert second.replace('"', "").startswith("-2.5,3")
+    warnings = summary["warnings"]
+    assert isinstance(warnings, list)
+    assert any("--excel-text" in text for text in warnings) is not excel_text
