@@ -43,6 +43,14 @@ class _Store:
     models: dict[str, FragilityModel] = field(default_factory=dict)
     suited: dict[tuple[object, ...], list[FragilityModel]] = field(default_factory=dict)
 
+    def row(self, name: str) -> ModelRow:
+        """Return one of its models as it is stored."""
+        for row in self.rows:
+            if row.name == name:
+                return row
+        known = sorted(row.name for row in self.rows)
+        raise UnknownModelError(unknown_model(name, known, self.place))
+
     def model(self, row: ModelRow) -> FragilityModel:
         """Return one of its models, ready to answer."""
         model = self.models.get(row.name)
@@ -287,11 +295,20 @@ def _place(db: str | PathLike[str] | None) -> tuple[Path | str, bool]:
 
 def _named(name: str, db: str | PathLike[str] | None) -> FragilityModel:
     store = _store(db)
-    for row in store.rows:
-        if row.name == name:
-            return store.model(row)
-    known = sorted(row.name for row in store.rows)
-    raise UnknownModelError(unknown_model(name, known, store.place))
+    return store.model(store.row(name))
+
+
+def stored_row(name: str, db: str | PathLike[str] | None = None) -> ModelRow:
+    """Return a model of a database as it is stored.
+
+    Args:
+        name: of the model.
+        db: database, as for :func:`find_model`.
+
+    Raises:
+        UnknownModelError: no model of that name.
+    """
+    return _store(db).row(name)
 
 
 def stored_rows(db: str | PathLike[str] | None = None) -> list[ModelRow]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rbfrag.db.model_file import ModelRow
@@ -18,6 +18,7 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
             "method": row.method,
             "is_default": row.is_default,
             "n": row.diagnostics.get("n"),
+            "log_loss": _scores(row).get("log_loss_held_out"),
             "events": row.diagnostics.get("events"),
             "sensitive_share": row.diagnostics.get("sensitive_share"),
             "domain": dict(row.domain),
@@ -25,3 +26,8 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
         }
         for row in rows
     ]
+
+
+def _scores(row: ModelRow) -> Mapping[str, Any]:
+    scores = row.diagnostics.get("scores")
+    return scores if isinstance(scores, Mapping) else {}

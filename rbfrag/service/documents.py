@@ -150,7 +150,8 @@ class DrawingAnswer(_Document):
 class ModelListed(_Document):
     """A stored model: what `rbfrag models list --json` prints.
 
-    `sensitive_share` is the share of the simulated outcomes behind it that a change of the motion
+    `log_loss` is that of outcomes of earthquakes left out, the smaller the better among models of a
+    kind; `sensitive_share` is the share of the simulated outcomes behind it that a change of the motion
     by a millionth changes; null of kinds of which that is not asked.
     """
 
@@ -160,6 +161,7 @@ class ModelListed(_Document):
     method: str
     is_default: bool
     n: int | None
+    log_loss: float | None
     events: int | None
     sensitive_share: float | None
     domain: dict[str, Pair]

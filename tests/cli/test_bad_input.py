@@ -55,7 +55,7 @@ def test_no_database(refuses: Refuses, tmp_path: Path) -> None:
         ("motions", "list"),
         ("simulate",),
         ("fit", "--term", "pgv"),
-        ("models", "list"),
+        ("models", "check"),
         ("db", "info"),
         ("db", "check"),
         ("db", "upgrade"),

@@ -20,20 +20,21 @@ Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the model.")]
 
 @app.command("list", epilog="Example:  rbfrag models list --json")
 def list_models(db: options.Db = None, json: options.Json = False) -> None:
-    """List the fitted models; the default answers when none is named."""
-    from rbfrag.db.engine import opened_database
-    from rbfrag.db.models import model_rows
+    """List the fitted models; the default answers when none is named.
+
+    The log loss is that of earthquakes left out, the smaller the better among the models of a kind;
+    without a database the models that are shipped are listed.
+    """
+    from rbfrag.fragility.lookup import stored_rows
     from rbfrag.fragility.model_list import model_list
 
-    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        rows = model_rows(connection)
-    listed = model_list(rows)
+    listed = model_list(stored_rows(db))
     if json:
         print_json(listed)
         return
-    shown = ("name", "kind", "term", "method", "is_default", "n", "events", "created")
+    shown = ("name", "kind", "term", "method", "is_default", "log_loss", "events", "created")
     print_table(
-        ("name", "kind", "term", "method", "default", "n", "earthquakes", "fitted"),
+        ("name", "kind", "term", "method", "default", "log_loss", "earthquakes", "fitted"),
         [tuple(each[name] for name in shown) for each in listed],
     )
 
@@ -42,13 +43,11 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
 def show_model(name: Name, db: options.Db = None, json: options.Json = False) -> None:
     """Print the report of a fitted model from its stored row."""
     from rbfrag.cli.commands.fit import print_report
-    from rbfrag.db.engine import opened_database
-    from rbfrag.db.models import load_model
     from rbfrag.fragility.fit.report import FitReport
+    from rbfrag.fragility.lookup import stored_row
     from rbfrag.fragility.model import FragilityModel
 
-    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        row = load_model(connection, name)
+    row = stored_row(name, db)
     print_report(FitReport.from_model(FragilityModel.from_row(row)), json=json)
 
 
