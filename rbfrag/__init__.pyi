@@ -14,9 +14,11 @@ from rbfrag.exchange.hazard_curves import read_hazard_curves as read_hazard_curv
 from rbfrag.exchange.mesh_file import block_from_mesh as block_from_mesh
 from rbfrag.fragility.fit.stored import fit as fit
 from rbfrag.fragility.predict import predict as predict
+from rbfrag.hazards.answer import BranchRate as BranchRate
 from rbfrag.hazards.answer import HazardAnswer as HazardAnswer
 from rbfrag.hazards.answer import hazard as hazard
 from rbfrag.hazards.curve import HazardCurve as HazardCurve
+from rbfrag.hazards.joint_rate import CountRate as CountRate
 from rbfrag.hazards.joint_rate import JointRate as JointRate
 from rbfrag.hazards.losses import LossAnswer as LossAnswer
 from rbfrag.hazards.survival import BranchSurvival as BranchSurvival

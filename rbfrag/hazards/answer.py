@@ -37,6 +37,9 @@ QUANTILES = (0.05, 0.16, 0.5, 0.84, 0.95)
 NUMERICAL_AIM = 1e-3
 """Relative error of quadrature of a block's rate above which a warning tells of it."""
 
+NEVER = 1e-9
+"""Annual rate below which no such warning is given: such rates come from the last level alone."""
+
 _CHUNK = MOST_JOINT
 
 
@@ -246,10 +249,11 @@ def hazard(
             f"{why}: bounds has annual_rate_any under full dependence and if they fail "
             "independently"
         )
-    if float(mean["numerical_error"].max(initial=0.0)) > NUMERICAL_AIM:
+    worst = float(mean["numerical_error"][mean["annual_rate"] > NEVER].max(initial=0.0))
+    if worst > NUMERICAL_AIM:
         warnings.append(
-            f"quadrature of a rate may be off by {100.0 * float(mean['numerical_error'].max()):.2g}"
-            " %: its P changes abruptly between levels of the curve"
+            f"quadrature of a rate may be off by {100.0 * worst:.2g} %: its P changes abruptly "
+            "between levels of the curve"
         )
     return HazardAnswer(
         **mean,

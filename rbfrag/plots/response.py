@@ -153,8 +153,8 @@ def plot_motion(
     history = response.history
     if history is None or history.displacement_m is None or history.strength_g is None:
         raise InputError("this response holds no displacements in time: ask for its history")
-    figure, _, lower = _panels(
-        history, history.strength_g, "strength of the block", float(history.strength_g[0])
+    figure, upper, lower = _panels(
+        history, history.strength_g, "strength of the block", _least_top(history.strength_g)
     )
     largest = float(np.abs(history.displacement_m).max())
     factor, unit = (
@@ -169,9 +169,18 @@ def plot_motion(
         right.plot(history.time_s, np.degrees(history.theta_rad), color=ROTATION, lw=1.1, ls="--")
         right.set_ylabel("rotation [deg]", color=ROTATION)
         right.set_ylim(*_around(float(np.degrees(history.theta_rad).max()), 0.0))
+    for part in response.parts[1:]:
+        for axes in (upper, lower):
+            axes.axvline(part.begins_s, color="black", lw=0.9, ls=":")
     lower.set_xlim(*_motion_window(history, response))
     figure.suptitle(_title(title, reverse, _motion_verdict(response)), fontsize=10)
     save_figure(figure, path)
+
+
+def _least_top(strength_g: FloatArray) -> float:
+    """Return the first strength that is known; 0 where none is."""
+    known = strength_g[np.isfinite(strength_g)]
+    return float(known[0]) if known.size else 0.0
 
 
 def _motion_window(history: ResponseHistory, response: Response) -> tuple[float, float]:

@@ -27,21 +27,22 @@ FloatArray = NDArray[np.float64]
 
 OUTCOMES = (
     "at_rest", "stays", "fails", "unstable", "locked",
-    "undetermined", "contact_lost", "indeterminate", "jump",
+    "undetermined", "contact_lost", "seated_with_gap", "indeterminate", "jump",
 )  # fmt: skip
 """What may become of a block, by its code:
 
 ``at_rest``: never moves; ``stays``: moves, and does not fail; ``fails``; ``unstable``: fails at
 rest, whatever the motion; ``locked``: no horizontal acceleration moves it in its mode;
-``undetermined``: closer to failure than the error of its run; ``contact_lost``, ``indeterminate``
-and ``jump``: the model ended before the block did, for the reason of that outcome.
+``undetermined``: closer to failure than the error of its run; ``seated_with_gap``: back on its base
+with a gap at its heel, rocked and slid on from there; ``contact_lost``, ``indeterminate`` and
+``jump``: the model ended before the block did, for the reason of that outcome.
 """
 
 AT_REST, STAYS, FAILS, UNSTABLE, LOCKED, UNDETERMINED = range(6)
 NO_BLOCK = -1
 """Code of a realisation that is no block."""
 
-OPEN = ("undetermined", "contact_lost", "indeterminate", "jump")
+OPEN = ("undetermined", "contact_lost", "seated_with_gap", "indeterminate", "jump")
 """Outcomes that leave open whether the block fails."""
 
 DISPLACEMENT_M = 0.05

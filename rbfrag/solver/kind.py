@@ -19,6 +19,7 @@ from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.results import (
     MAP_DEPTH,
     POLARITIES,
+    BlockState,
     CriticalResult,
     FloatArray,
     Outcome,
@@ -79,6 +80,7 @@ class Shaking:
         polarity: ``forward`` or ``reverse``.
         history: keep the motion in time.
         remarks: what is known about the block that the answer should say.
+        start: the state that the motion finds; None for a block at rest in its first place.
     """
 
     motion: GroundMotion
@@ -86,6 +88,7 @@ class Shaking:
     polarity: Polarity
     history: bool
     remarks: tuple[str, ...] = ()
+    start: BlockState | None = None
 
 
 @dataclass(frozen=True)
@@ -165,6 +168,7 @@ class Kind:
         kind: its name.
         mode: failure mode of its blocks; None where no geometry chooses it.
         free_standing: whether its blocks have no plane behind them.
+        carries_state: whether a motion leaves a block somewhere else than it found it.
         settings: options of `rbfrag.respond` that it understands.
         parameters: what describes its block in predictions, and in `rbfrag.respond` without a
             shape; () where no fragility is fitted.
@@ -180,6 +184,7 @@ class Kind:
     kind: str
     mode: ModeName | None = None
     free_standing: bool = False
+    carries_state: bool = False
     settings: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()
     searchable: bool = False

@@ -5,17 +5,33 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
-from rbfrag.solver.integrator.one_freedom.equation import Mechanism
-from rbfrag.solver.integrator.one_freedom.follow import MotionHistory, follow
+from rbfrag.solver.free_motion import (
+    FreeMotion,
+    Release,
+    free_motion,
+    gap_m,
+    released,
+    touching,
+)
+from rbfrag.solver.integrator.one_freedom.equation import Mechanism, Pose
+from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, MotionHistory, follow
 from rbfrag.solver.kind import BlockOnPlanes, Kind, RunEnd, Runner, Shaking
 from rbfrag.solver.kinds import model_of_kind
-from rbfrag.solver.results import ModeChange, Outcome, Response, ResponseHistory
+from rbfrag.solver.results import (
+    BlockState,
+    FloatArray,
+    ModeChange,
+    Outcome,
+    Response,
+    ResponseHistory,
+)
 from rbfrag.solver.stability.modes import words_of_mode
 from rbfrag.solver.stability.single import stability
 
@@ -30,6 +46,7 @@ class MechanismKind(Kind):
 
     one_phase = False
     yield_name = "k"
+    carries_state = True
 
     def mechanism(self, site: BlockOnPlanes) -> Mechanism:
         """Return the mechanism of a block."""
@@ -41,21 +58,24 @@ class MechanismKind(Kind):
         Raises:
             InputError: the base has cohesion.
         """
-        return mechanism_response(self.kind, self._without_cohesion(site), shaking)
+        mechanism = self._without_cohesion(site)
+        excited = excitation(shaking.motion, shaking.vertical, shaking.polarity)
+        whole = whole_run(mechanism, site, excited, history=shaking.history, start=shaking.start)
+        return _response(self.kind, whole, excited, shaking)
 
     def runner(self, site: BlockOnPlanes) -> Runner:
         """Return a function that says how the block ends under an excitation."""
         mechanism = self._without_cohesion(site)
 
         def run(excited: Excitation) -> RunEnd:
-            end = follow(mechanism, excited)
-            failed = end.outcome is Outcome.TOPPLED
+            whole = whole_run(mechanism, site, excited)
+            failed = whole.outcome is Outcome.TOPPLED
             return RunEnd(
-                outcome=end.outcome,
-                moved=end.started_s is not None,
-                peak_rad=end.peak if mechanism.rotates and not failed else None,
-                peak_displacement_m=None if failed else end.peak_displacement_m,
-                error=end.error,
+                outcome=whole.outcome,
+                moved=whole.started_s is not None,
+                peak_rad=None if failed else whole.peak_rad,
+                peak_displacement_m=None if failed else whole.peak_displacement_m,
+                error=whole.error,
                 about_block=mechanism.warnings,
             )
 
@@ -71,92 +91,301 @@ class MechanismKind(Kind):
         return self.mechanism(site)
 
 
-def mechanism_response(kind: str, mechanism: Mechanism, shaking: Shaking) -> Response:
-    """Run a mechanism under a motion.
+@dataclass(frozen=True, eq=False)
+class WholeRun:
+    """A block followed to its end: by its mechanism, and from where that ends step by step.
 
     Args:
-        kind: name of the model, for the answer.
-        mechanism: the block.
-        shaking: the motion.
+        mechanism: the block as its model describes it.
+        site: the block on its planes.
+        start: the state that it started from; None for its first place.
+        run: what its mechanism did; None for a start that no mechanism describes.
+        free: what the block did after it; None where the mechanism goes to the end.
     """
-    excited = excitation(shaking.motion, shaking.vertical, shaking.polarity)
-    run = follow(mechanism, excited, history=shaking.history)
-    failed = run.outcome is Outcome.TOPPLED
-    turned = mechanism.rotates and not failed
-    critical = mechanism.critical
-    start = mechanism.first.pose(0.0).centroid_m
-    at_end = None if failed else run.pose
+
+    mechanism: Mechanism
+    site: BlockOnPlanes
+    start: BlockState | None
+    run: MechanismRun | None
+    free: FreeMotion | None
+
+    @property
+    def outcome(self) -> Outcome:
+        """How it ended."""
+        return self._last.outcome
+
+    @property
+    def _last(self) -> MechanismRun | FreeMotion:
+        last = self.run if self.free is None else self.free
+        assert last is not None
+        return last
+
+    @property
+    def pose(self) -> Pose | None:
+        """Where the block is at the end; None where that is not known."""
+        return self._last.pose if self.outcome is not Outcome.SEATED_WITH_GAP else None
+
+    @property
+    def started_s(self) -> float | None:
+        """First motion [s]."""
+        of_free = None if self.free is None else self.free.started_s
+        return of_free if self.run is None or self.run.started_s is None else self.run.started_s
+
+    @property
+    def ended_s(self) -> float | None:
+        """Last standstill, or where the model ended [s]; None for no motion."""
+        if self.free is None:
+            assert self.run is not None
+            return self.run.ended_s
+        moved = self.started_s is not None or self.outcome is Outcome.JUMP
+        return self.free.time_s if moved else None
+
+    @property
+    def peak_rad(self) -> float | None:
+        """Greatest rotation [rad]; None for a block that only slides."""
+        peak = self.run.peak if self.run is not None and self.mechanism.rotates else None
+        if self.free is None:
+            return peak
+        return max(peak or 0.0, self.free.backward_rad, self.free.forward_rad)
+
+    @property
+    def peak_displacement_m(self) -> float:
+        """Greatest displacement along the base [m]."""
+        slips = [self.run.peak_displacement_m] if self.run is not None else []
+        return max([*slips, self.free.slip_m] if self.free is not None else slips)
+
+    @property
+    def error(self) -> float:
+        """Bound on the error of the peak rotation [rad], of a sliding block [m]."""
+        error = 0.0 if self.run is None else self.run.error
+        if self.free is None:
+            return error
+        return error + (self.free.error_rad if self.mechanism.rotates else self.free.error_m)
+
+    @property
+    def changes(self) -> tuple[ModeChange, ...]:
+        """What the block did after its first motion."""
+        changes = () if self.run is None else self.run.changes
+        free = () if self.free is None else self.free.changes
+        return (*(ModeChange(change.time_s, change.name) for change in changes), *free)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What the answer takes for granted, and where it ends."""
+        known = () if self.run is None else self.run.sentences
+        if self.free is None:
+            return known
+        if self.run is not None and self.run.ending:
+            known = known[:-1]
+        impact = [FALLS_ON_ITS_BASE.format(self.free.landed_s)] if self.free.landed_s else []
+        return (*known, *impact, *([self.free.sentence] if self.free.sentence else []))
+
+    @property
+    def state(self) -> BlockState | None:
+        """Where the block is left at rest; None where it is not, or not known."""
+        pose, block = self.pose, self.site.block
+        if pose is None or self.outcome is not Outcome.STABLE:
+            return None
+        position, error = None, self.error
+        if self.free is None and self.run is not None and self.run.phase is self.mechanism.first:
+            position = self.run.x
+        return BlockState(
+            turned_rad=pose.turned_rad,
+            centroid_m=pose.centroid_m,
+            displacement_m=pose.displacement_m,
+            gap_m=gap_m(block, pose) if block is not None else pose.displacement_m,
+            touching=touching(self.site, pose) if block is not None else ("base",),
+            position=position,
+            error=error if position else 0.0,
+        )
+
+
+FALLS_ON_ITS_BASE = (
+    "at {:.3f} s, and perhaps later, the block falls on its whole base: rigid contact takes the "
+    "speed of such an impact and does not decide how far it pushes the block, so that the "
+    "displacement may be a tenth off"
+)
+
+
+def whole_run(
+    mechanism: Mechanism,
+    site: BlockOnPlanes,
+    excited: Excitation,
+    *,
+    history: bool = False,
+    start: BlockState | None = None,
+) -> WholeRun:
+    """Follow a block to its end.
+
+    Args:
+        mechanism: the block as its model describes it.
+        site: the block on its planes.
+        excited: the excitation.
+        history: keep the motion in time.
+        start: the state that the motion finds; None for the first place.
+    """
+    run, release = None, None
+    if start is None or start.position is not None:
+        at = (0.0, 0.0) if start is None or not start.position else (start.position, start.error)
+        run = follow(mechanism, excited, history=history, start=at)
+        if not (mechanism.goes_on and run.outcome is Outcome.CONTACT_LOST):
+            return WholeRun(mechanism, site, start, run, None)
+        assert run.ended_s is not None
+        release = released(run.ended_s, run.phase.pose, run.x, run.rate)
+    else:
+        pose = Pose(start.turned_rad, start.centroid_m, start.displacement_m)
+        release = Release(float(excited.time_s[0]), pose)
+    free = free_motion(
+        site, excited, release, at_toe=mechanism.at_toe, stop_at_landing=mechanism.until_landing
+    )
+    return WholeRun(mechanism, site, start, run, free)
+
+
+def _response(kind: str, whole: WholeRun, excited: Excitation, shaking: Shaking) -> Response:
+    """Return the answer about a block that was followed."""
+    failed = whole.outcome is Outcome.TOPPLED
+    peak_rad = None if failed else whole.peak_rad
+    critical = whole.mechanism.critical
+    first = whole.mechanism.first.pose(0.0)
+    before_m = 0.0 if whole.start is None else whole.start.displacement_m
+    at_end = None if failed else whole.pose
+    run = whole.run
+    certain_s = None if run is None else run.certain_s
+    steps, moved = (0, 0) if run is None else (run.steps, run.samples_moved)
+    if whole.free is not None:
+        steps += whole.free.steps
+        moved += _samples(excited, whole)
     return Response(
         kind=kind,
-        outcome=run.outcome,
-        peak_theta_n=run.peak / critical if turned and critical else None,
-        peak_theta_rad=run.peak if turned else None,
+        outcome=whole.outcome,
+        peak_theta_n=None if peak_rad is None or not critical else peak_rad / critical,
+        peak_theta_rad=peak_rad,
         critical_angle_deg=None if critical is None else math.degrees(critical),
-        started_s=run.started_s,
-        toppled_s=(run.certain_s or run.ended_s) if failed else None,
-        error_estimate=run.error,
-        steps=run.steps,
-        samples_moved=run.samples_moved,
+        started_s=whole.started_s,
+        toppled_s=(certain_s or whole.ended_s) if failed else None,
+        error_estimate=whole.error,
+        steps=steps,
+        samples_moved=moved,
         samples_total=int(np.count_nonzero(excited.interval_s)),
         warnings=(
             *shaking.remarks,
             *motion_remarks(shaking.motion, shaking.vertical, excited),
-            *run.sentences,
+            *whole.sentences,
         ),
-        history=_history(mechanism, excited, run.history) if run.history else None,
-        final_theta_rad=abs(at_end.turned_rad) if turned and at_end else None,
-        displacement_m=at_end.displacement_m if at_end else None,
-        peak_displacement_m=None if failed else run.peak_displacement_m,
-        centroid_displacement_m=math.dist(at_end.centroid_m, start) if at_end else None,
-        stopped_s=run.ended_s,
-        mode_changes=tuple(ModeChange(change.time_s, change.name) for change in run.changes),
+        history=_history(whole, excited) if shaking.history else None,
+        final_theta_rad=abs(at_end.turned_rad) if peak_rad is not None and at_end else None,
+        displacement_m=at_end.displacement_m - before_m if at_end else None,
+        peak_displacement_m=None if failed else whole.peak_displacement_m,
+        centroid_displacement_m=math.dist(at_end.centroid_m, first.centroid_m) if at_end else None,
+        stopped_s=whole.ended_s,
+        mode_changes=whole.changes,
+        state=whole.state,
     )
 
 
-def _history(mechanism: Mechanism, excited: Excitation, history: MotionHistory) -> ResponseHistory:
-    """Put the nodes of rest, which the kernel skips, back between those of motion."""
-    time_s, rate = history.time_s, history.rate
-    displacement = np.array([pose.displacement_m for pose in history.poses])
-    centroid = np.array([pose.centroid_m for pose in history.poses])
-    turned = np.array([pose.turned_rad for pose in history.poses])
-    if excited.time_s[-1] > time_s[-1] and rate[-1] == 0.0:
+def _samples(excited: Excitation, whole: WholeRun) -> int:
+    """Return the sample intervals through which a block was followed step by step."""
+    assert whole.free is not None
+    history = whole.free.history
+    moving = history.time_s[(history.spin_rad_s != 0.0) | (history.slip_m_s != 0.0)]
+    return int(np.unique(np.searchsorted(excited.time_s, moving)).size)
+
+
+class _Kept(NamedTuple):
+    """The motion in time; arrays of shape (n,), the centroid (n, 2)."""
+
+    time_s: FloatArray
+    turned_rad: FloatArray
+    spin_rad_s: FloatArray
+    slip_m: FloatArray
+    slip_m_s: FloatArray
+    centroid_m: FloatArray
+    strength_g: FloatArray
+
+
+def _of_mechanism(mechanism: Mechanism, history: MotionHistory) -> _Kept:
+    nothing = np.zeros_like(history.rate)
+    return _Kept(
+        history.time_s,
+        np.array([pose.turned_rad for pose in history.poses]),
+        history.rate if mechanism.rotates else nothing,
+        np.array([pose.displacement_m for pose in history.poses]),
+        nothing if mechanism.rotates else history.rate,
+        np.array([pose.centroid_m for pose in history.poses]),
+        history.strength_g,
+    )
+
+
+def _history(whole: WholeRun, excited: Excitation) -> ResponseHistory:
+    """Put the nodes of rest, which the kernels skip, back between those of motion."""
+    mechanism, free = whole.mechanism, whole.free
+    parts = []
+    if whole.run is not None and whole.run.history is not None:
+        parts.append(_of_mechanism(mechanism, whole.run.history))
+    if free is not None:
+        there = free.history
+        sign = np.where(there.turned_rad < 0.0, -1.0, 1.0)
+        parts.append(
+            _Kept(
+                there.time_s,
+                there.turned_rad,
+                sign * there.spin_rad_s,
+                there.slip_m,
+                there.slip_m_s,
+                there.centroid_m,
+                np.full_like(there.time_s, np.nan),
+            )
+        )
+    kept = _Kept(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+    time_s = kept.time_s
+    moves = (kept.spin_rad_s, kept.slip_m_s)
+    if not time_s.size or (
+        excited.time_s[-1] > time_s[-1] and all(values[-1] == 0.0 for values in moves)
+    ):
         rest = excited.time_s
     else:
         rest = excited.time_s[excited.time_s < time_s[-1]]
     rest = rest[~np.isin(rest, time_s)]
     last = np.searchsorted(time_s, rest, side="right") - 1
     known = last >= 0
-    start = mechanism.first.pose(0.0)
+    first = mechanism.first
+    at_start, position = first.pose(0.0), 0.0
+    if whole.start is not None:
+        state = whole.start
+        at_start = Pose(state.turned_rad, state.centroid_m, state.displacement_m)
+        position = math.nan if state.position is None else state.position
+    strength = first.forward.threshold(position) if position == position else math.nan
 
-    def merged(moving: np.ndarray, before: float | tuple[float, float]) -> np.ndarray:
-        resting = np.where(
-            known if moving.ndim == 1 else known[:, None], moving[np.maximum(last, 0)], before
-        )
-        together: np.ndarray = np.concatenate([moving, resting])[order]
+    def merged(moving: FloatArray, before: float | tuple[float, float]) -> FloatArray:
+        resting = np.full((rest.size, *moving.shape[1:]), before, dtype=np.float64)
+        if moving.size:
+            there = moving[np.maximum(last, 0)]
+            resting = np.where(known if moving.ndim == 1 else known[:, None], there, resting)
+        together: FloatArray = np.concatenate([moving, resting])[order]
         return together
 
     order = np.argsort(np.concatenate([time_s, rest]), kind="stable")
     at_s = np.concatenate([time_s, rest])[order]
-    speed = np.concatenate([rate, np.zeros(rest.size)])[order]
-    nothing = np.zeros_like(speed)
+    spin, speed = (np.concatenate([values, np.zeros(rest.size)])[order] for values in moves)
     k_h = np.interp(at_s, excited.time_s, excited.k_h, right=0.0)
     k_v = np.interp(at_s, excited.time_s, excited.w - 1.0, right=0.0)
     # of a jump, the first entry at its time shows what was before
     for jump in np.flatnonzero(excited.interval_s == 0.0):
-        first = int(np.searchsorted(at_s, excited.time_s[jump]))
-        if first + 1 < at_s.size and at_s[first] == at_s[first + 1] == excited.time_s[jump]:
-            k_h[first], k_v[first] = excited.k_h[jump], excited.w[jump] - 1.0
+        before = int(np.searchsorted(at_s, excited.time_s[jump]))
+        if before + 1 < at_s.size and at_s[before] == at_s[before + 1] == excited.time_s[jump]:
+            k_h[before], k_v[before] = excited.k_h[jump], excited.w[jump] - 1.0
+    turned = merged(kept.turned_rad, at_start.turned_rad)
     return ResponseHistory(
         time_s=at_s,
-        theta_rad=merged(np.abs(turned), 0.0),
-        theta_dot_rad_s=speed if mechanism.rotates else nothing,
+        theta_rad=np.abs(turned),
+        theta_dot_rad_s=spin,
         k_h=k_h,
         k_v=k_v,
-        displacement_m=merged(displacement, 0.0),
+        displacement_m=merged(kept.slip_m, at_start.displacement_m),
         velocity_m_s=None if mechanism.rotates else speed,
-        centroid_m=merged(centroid, start.centroid_m),
-        turned_rad=merged(turned, 0.0),
-        strength_g=merged(history.strength_g, mechanism.first.forward.threshold(0.0)),
+        centroid_m=merged(kept.centroid_m, at_start.centroid_m),
+        turned_rad=turned,
+        strength_g=merged(kept.strength_g, strength),
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.files import written_whole
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.results import CriticalResult, Response, ResponseHistory
+from rbfrag.solver.results import CriticalResult, FloatArray, Part, Response, ResponseHistory
 
 HISTORY_COLUMNS = (
     "time_s",
@@ -59,7 +59,21 @@ def response_as_dict(response: Response) -> dict[str, Any]:
             "impacts": response.impacts,
             "sensitive": response.sensitive,
         }
+    if response.parts:
+        answer["parts"] = [_part(part) for part in response.parts]
     return answer
+
+
+def _part(part: Part) -> dict[str, Any]:
+    """Return one motion of a sequence: the answer to it alone, and both states."""
+    own, end = part.response, part.response.state
+    return {
+        "motion": part.motion,
+        "begins_s": part.begins_s,
+        "start": None if part.start is None else part.start.as_dict(),
+        **response_as_dict(own),
+        "end": None if end is None else end.as_dict(),
+    }
 
 
 MOTION_COLUMNS = (
@@ -96,7 +110,7 @@ def write_history(response: Response, path: str | os.PathLike[str]) -> None:
 
 
 def _rows(response: Response, history: ResponseHistory) -> Iterator[tuple[float | str, ...]]:
-    columns: list[list[float] | list[str]] = [
+    columns: list[list[float] | list[str] | list[float | str]] = [
         history.time_s.tolist(),
         history.theta_rad.tolist(),
         _over_critical(response, history),
@@ -107,7 +121,7 @@ def _rows(response: Response, history: ResponseHistory) -> Iterator[tuple[float 
     if history.displacement_m is not None:
         centroid = history.centroid_m
         columns += [
-            values.tolist() if values is not None else [""] * history.time_s.size
+            [""] * history.time_s.size if values is None else _written(values)
             for values in (
                 history.displacement_m,
                 history.velocity_m_s,
@@ -117,6 +131,11 @@ def _rows(response: Response, history: ResponseHistory) -> Iterator[tuple[float 
             )
         ]
     return zip(*columns, strict=True)
+
+
+def _written(values: FloatArray) -> list[float | str]:
+    """Return numbers as they are written; nothing where there is none."""
+    return [value if math.isfinite(value) else "" for value in values.tolist()]
 
 
 def _over_critical(response: Response, history: ResponseHistory) -> list[float] | list[str]:

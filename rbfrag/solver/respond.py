@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.described import NOT_BACKED
 from rbfrag.solver.kind import BlockOnPlanes, Kind, Shaking
 from rbfrag.solver.kinds import model_of_kind, model_of_mode, stands_free_of
 from rbfrag.solver.quantity import angle, positive
-from rbfrag.solver.results import Polarity, Response
+from rbfrag.solver.results import BlockState, Polarity, Response
+from rbfrag.solver.sequence import STARTS_ANEW, Motions, respond_in_sequence
 from rbfrag.solver.stability.modes import ModeName, words_of_mode
 from rbfrag.solver.stability.single import Stability, stability
 
 
 def respond(
-    motion: MotionLike,
+    motion: MotionLike | Sequence[MotionLike],
     *,
     p2: float | None = None,
     kr: float | None = None,
@@ -32,15 +34,17 @@ def respond(
     back_fracture: bool = True,
     cohesion_pa: float = 0.0,
     density_kg_m3: float | None = None,
-    vertical: MotionLike | None = None,
+    vertical: MotionLike | Sequence[MotionLike | None] | None = None,
     polarity: Polarity = "forward",
     kind: str | None = None,
+    gap_s: float | None = None,
+    start: BlockState | None = None,
     two_way: bool = False,
     horizontal: bool = False,
     restitution: float | None = None,
     history: bool = False,
 ) -> Response:
-    """Return what a block does under a ground motion.
+    """Return what a block does under a ground motion, or under several one after another.
 
     The block is given in one of three ways: `p2` and `kr` (it topples, or rocks on level ground if
     `kind` says so), `ky` (it slides), or `block` with `beta_deg` and `phi_deg`, whose failure mode
@@ -48,7 +52,8 @@ def respond(
     user states; a kind refuses those of another.
 
     Args:
-        motion: horizontal ground motion, or its file.
+        motion: horizontal ground motion, or its file; or a list of them: of slides and slumps each
+            finds the block where the one before has left it.
         p2: frequency parameter p² of a toppling or rocking block [1/s²], > 0.
         kr: its rocking acceleration coefficient k_r = tan(critical angle), > 0.
         ky: yield acceleration coefficient tan(φ - β) of a block that slides, whatever its
@@ -62,10 +67,15 @@ def respond(
             both corners.
         cohesion_pa: cohesion of the base [Pa]; only a block that topples may have any.
         density_kg_m3: density of the rock [kg/m³], needed with a cohesion.
-        vertical: vertical motion of the same recording, upward positive.
+        vertical: vertical motion of the same recording, upward positive; of a list of motions, a
+            list of as many, None where there is none.
         polarity: ``forward`` (positive samples drive forward motion) or ``reverse``.
         kind: ``toppling``, ``rocking``, ``sliding``, ``slumping`` or ``confined_toppling``; None
             for the model of the failure mode.
+        gap_s: of a list of motions, rest between the end of one and the beginning of the next [s];
+            None for as long as the block takes to come to rest.
+        start: the state of the block before the motion, as an earlier answer has it; None for its
+            first place.
         two_way: sliding up the base too, where the ground drives the block that way.
         horizontal: sliding without the factor cos(φ - β)/cos φ, as Newmark's horizontal block.
         restitution: rocking: speed after an impact over that before it, above 0 and up to 1;
@@ -75,15 +85,16 @@ def respond(
     Raises:
         InputError: a value outside its range, a block given in no way or in two, a block that
             fails at rest or that nothing moves, an unknown kind or polarity, an option of
-            another model, components that cannot be brought together.
+            another model, components that cannot be brought together, a start of a block that
+            carries none.
     """
-    motion = as_motion(motion)
-    vertical = None if vertical is None else as_motion(vertical, "vertical")
     settings = {
         "two_way": two_way or None,
         "horizontal": horizontal or None,
         "restitution": restitution,
     }
+    shaken = _Shaken(motion, vertical, polarity, history, gap_s, start)
+    answer = shaken.answer
     free_standing = kind is not None and model_of_kind(kind).free_standing
     conditions = {
         "beta_deg": beta_deg,
@@ -115,10 +126,10 @@ def respond(
         if phi_deg is None:
             site = replace(site, phi_rad=0.5 * math.pi)
         remarks = _remarks(judged, model)
-        return model.respond(site, Shaking(motion, vertical, polarity, history, remarks))
+        return answer(model, site, remarks)
     numbers = {"p2": p2, "kr": kr, "ky": ky, **conditions}
     model, site = known_by_numbers(kind, numbers, settings)
-    return model.respond(site, Shaking(motion, vertical, polarity, history))
+    return answer(model, site)
 
 
 def known_by_numbers(
@@ -152,6 +163,54 @@ def known_by_numbers(
         raise InputError(f"{extra[0]} does not go with p2 and kr, which say all about the block")
     model = _by_numbers(kind, "topple", ("p2", "kr"))
     return model, block_of_numbers(given["p2"], given["kr"], _known(model, settings))
+
+
+@dataclass(frozen=True, eq=False)
+class _Shaken:
+    """What shakes the block, as :func:`respond` was asked."""
+
+    motion: MotionLike | Sequence[MotionLike]
+    vertical: MotionLike | Sequence[MotionLike | None] | None
+    polarity: Polarity
+    history: bool
+    gap_s: float | None
+    start: BlockState | None
+
+    def answer(self, model: Kind, site: BlockOnPlanes, remarks: tuple[str, ...] = ()) -> Response:
+        """Return what a model answers."""
+        if self.start is not None and not model.carries_state:
+            raise InputError(f"start does not go with {model.kind}: {STARTS_ANEW}")
+
+        def run(
+            motion: GroundMotion, vertical: GroundMotion | None, start: BlockState | None
+        ) -> Response:
+            shaking = Shaking(motion, vertical, self.polarity, self.history, remarks, start)
+            return model.respond(site, shaking)
+
+        if not isinstance(self.motion, list | tuple):
+            if self.gap_s is not None:
+                raise InputError("gap_s goes with a list of motions: it is the rest between them")
+            if isinstance(self.vertical, list | tuple):
+                raise InputError("vertical is a list: one motion has one vertical motion")
+            return run(_one(self.motion), _vertical(self.vertical), self.start)
+        if not (self.vertical is None or isinstance(self.vertical, list | tuple)):
+            raise InputError("vertical is one motion: of a list of motions it is a list, too")
+        motions = Motions(
+            [as_motion(each) for each in self.motion],
+            [_vertical(each) for each in self.vertical or ()],
+            self.gap_s,
+        )
+        return respond_in_sequence(
+            run, motions, carries_state=model.carries_state, start=self.start
+        )
+
+
+def _one(given: Any) -> GroundMotion:
+    return as_motion(given)
+
+
+def _vertical(given: Any) -> GroundMotion | None:
+    return None if given is None else as_motion(given, "vertical")
 
 
 def block_of_numbers(p2: float, kr: float, settings: Mapping[str, Any]) -> BlockOnPlanes:

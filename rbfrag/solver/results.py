@@ -58,6 +58,12 @@ class Outcome(StrEnum):
         "a block in contact does not apply; use the horizontal motion alone or another method.",
     )
     CONTACT_LOST = "contact_lost", "A contact opened: the motion after it is outside the model."
+    SEATED_WITH_GAP = (
+        "seated_with_gap",
+        "The block fell back on its base with its toe displaced and a gap at its heel, and the "
+        "rest of the record rocks and slides it on from there: how far depends on impacts that "
+        "rigid contact does not decide.",
+    )
     INDETERMINATE = "indeterminate", "The rigid-body problem has no unique answer here."
 
 
@@ -110,6 +116,58 @@ class ModeChange:
     motion: str
 
 
+@dataclass(frozen=True)
+class BlockState:
+    """A block at rest where a motion has left it, from which another one may start.
+
+    Args:
+        turned_rad: rotation, counter-clockwise with the slope falling to the right [rad].
+        centroid_m: position of the centroid in the base frame, the heel's first place as origin
+            [m].
+        displacement_m: how far its contact on the base has slipped along it since the first [m].
+        gap_m: gap between the heel and its back plane, along the base [m].
+        touching: corners that touch a plane.
+        position: coordinate of its mechanism [rad] or [m]; None where no mechanism describes it.
+        error: bound on the error of the coordinate.
+    """
+
+    turned_rad: float
+    centroid_m: tuple[float, float]
+    displacement_m: float
+    gap_m: float
+    touching: tuple[str, ...]
+    position: float | None
+    error: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it with the keys of the JSON contract."""
+        return {
+            "rotation_rad": self.turned_rad,
+            "displacement_m": self.displacement_m,
+            "gap_m": self.gap_m,
+            "touching": list(self.touching),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One motion of a sequence.
+
+    Args:
+        begins_s: when it begins, on the clock of the sequence [s].
+        first_s: time of its first sample on its own clock [s].
+        motion: its label.
+        start: the state that it finds; None for a block at rest in its first place.
+        response: the answer to it alone, on its own clock.
+    """
+
+    begins_s: float
+    first_s: float
+    motion: str
+    start: BlockState | None
+    response: Response
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Response(Tabular):
     """The answer of one run.
@@ -135,10 +193,11 @@ class Response(Tabular):
         history: the motion in time, only if it was asked for.
         final_theta_rad: rotation that is left at the end of the run [rad]; None for toppling
             and sliding, and when the block fails.
-        displacement_m: permanent displacement along the base, down the slope positive: of
-            the sliding block, of the heel of a slumping one, of the toe of a confined
+        displacement_m: permanent displacement along the base by this motion, down the slope
+            positive: of the sliding block, of the heel of a slumping one, of the toe of a confined
             one [m]; None for toppling, and when the block fails.
-        peak_displacement_m: greatest displacement along the base [m]; None likewise.
+        peak_displacement_m: greatest displacement along the base, from the block's first place
+            [m]; None likewise.
         centroid_displacement_m: distance of the centroid from where it was [m]; None likewise.
         stopped_s: time of the last standstill, or at which the model ended [s]; None if the
             block never moved, and for toppling.
@@ -149,6 +208,8 @@ class Response(Tabular):
         peak_backward_rad: greatest rotation about the heel [rad]; None likewise.
         impacts: impacts within the record; the free motion after it is decided in closed form.
         sensitive: whether the outcome is another one for the motion times 1 + 1e-6 or 1 - 1e-6.
+        state: where the block is left at rest; None where it is not, or not known.
+        parts: of a sequence, the answer to each motion; () for a single one.
     """
 
     kind: str
@@ -175,6 +236,8 @@ class Response(Tabular):
     peak_backward_rad: float | None = None
     impacts: int | None = None
     sensitive: bool | None = None
+    state: BlockState | None = None
+    parts: tuple[Part, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

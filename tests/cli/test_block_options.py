@@ -156,7 +156,7 @@ def test_respond_needs_friction_for_the_film_of_a_rectangle(
     shell: Shell, refuses: Refuses, files: Path
 ) -> None:
     asked = ("respond", "record.AT2", *SIDES)
-    assert "needs the shape of the block and its --phi" in refuses(*asked, "--animate", "a.gif")
+    assert "needs the shape of the block and its --phi" in refuses(*asked, "--film", "a.gif")
     for command in ("respond", "critical"):
         said = shell.json(command, *asked[1:])["warnings"]
         assert any("taken to topple" in text for text in said)

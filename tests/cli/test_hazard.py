@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import rbfrag
+from rbfrag.cli.sentences import once_in
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from tests.cli.conftest import Refuses, Shell
@@ -80,8 +81,8 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     assert found["probability_any"] == pytest.approx(1 - np.exp(-100 * found["annual_rate_any"]))
     assert any("blocks are taken as those of one site" in text for text in found["warnings"])
     printed = shell("hazard", curve, "--blocks", "blocks.csv", "--years", "100").stdout
-    assert f"once in {1 / found['annual_rate_any']:.4g} years on average" in printed
-    assert f"{found['expected_failures_per_year']:.4g} failures a year are expected" in printed
+    assert f"{once_in(found['annual_rate_any'])} on average" in printed
+    assert f"{found['expected_failures_per_year']:.2g} failures a year are expected" in printed
 
 
 def test_numbers_of_failures_that_are_asked_for(shell: Shell, curve: Path) -> None:

@@ -67,7 +67,7 @@ def test_sliding_by_its_yield_and_by_its_shape(shell: Shell, record: Path) -> No
         (("--ky", "0.1", *SLUMP), "--ky does not go with --alpha1"),
         (("--ky", "0.1", "--phi", "20"), "--phi does not go with --ky"),
         (("--ky", "0.1", "--no-back"), "--no-back does not go with --ky"),
-        (("--ky", "0.1", "--animate", "a.gif"), "--animate needs the shape"),
+        (("--ky", "0.1", "--film", "a.gif"), "--film needs the shape"),
         (("--ky", "-0.1"), "ky"),
         (("--ky", "1e9", "--beta", "80"), "friction angle"),
         (("--ky", "0.1", "--kind", "slumping"), "needs the shape"),
@@ -75,7 +75,7 @@ def test_sliding_by_its_yield_and_by_its_shape(shell: Shell, record: Path) -> No
         (("--p2", "3", "--kr", "0.1", "--two-way"), "two_way does not go with toppling"),
         (("--p2", "3", "--kr", "0.1", "--beta", "3"), "--beta does not go with --p2"),
         ((*SLUMP, "--two-way"), "two_way does not go with slumping"),
-        ((*SLUMP, "--exaggerate", "3"), "--exaggerate goes with --animate"),
+        ((*SLUMP, "--exaggerate", "3"), "--exaggerate goes with --film"),
         ((*SLUMP, "--kind", "rolling"), "unknown kind 'rolling'"),
         ((*SLUMP, "--kind", "confined_toppling"), "topples freely"),
         ((*SLUMP[:6], "--beta", "40", "--phi", "35"), "unstable"),
@@ -89,7 +89,7 @@ def test_a_film_that_cannot_be_made_is_refused_before_anything_is_written(
     refuses: Refuses, record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", "")
-    asked = ("respond", record, *SLUMP, "--csv", "m.csv", "--animate", "m.mp4")
+    asked = ("respond", record, *SLUMP, "--csv", "m.csv", "--film", "m.mp4")
     assert "name the film .gif or .html" in refuses(*asked)
     assert list(tmp_path.iterdir()) == [record]
 
@@ -110,7 +110,7 @@ def test_cohesion_is_refused_where_motion_breaks_it(refuses: Refuses, record: Pa
 
 def test_a_block_without_a_back_plane_rocks(shell: Shell, record: Path, tmp_path: Path) -> None:
     block = ("--alpha1", "-17", "--alpha3", "20", "--r3", "2", "--beta", "1", "--phi", "35")
-    files = ("--csv", "m.csv", "--plot", "m.png", "--animate", "m.gif")
+    files = ("--csv", "m.csv", "--plot", "m.png", "--film", "m.gif")
     answer = shell.json("respond", record, *block, "--no-back", *files)
     assert (answer["kind"], answer["outcome"]) == ("rocking", "stable")
     assert answer["peak_forward_rad"] > 0.0 < answer["peak_backward_rad"]

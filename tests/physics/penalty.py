@@ -62,6 +62,7 @@ def simulate(
     keep: int = 250,
     stiffness: float = STIFFNESS,
     step_s: float = STEP_S,
+    damping: float = DAMPING,
 ) -> Simulated:
     """Shake a block that has settled under gravity.
 
@@ -77,6 +78,8 @@ def simulate(
         keep: steps between states that are kept.
         stiffness: of a contact, per mass [1/s²].
         step_s: step of the integration [s].
+        damping: of a contact, part of critical damping: 0.1 rebounds with 0.7 of the speed, 1 with
+            a twentieth.
     """
     nodes = np.asarray(time_s, dtype=np.float64)
     horizontal = np.asarray(k_h, dtype=np.float64)
@@ -97,6 +100,7 @@ def simulate(
         stiffness,
         step_s,
         keep,
+        damping,
     )
     return Simulated(kept[0], kept[1], kept[2], kept[3])
 
@@ -117,6 +121,7 @@ def _shake(
     stiffness: float,
     dt: float,
     keep: int,
+    damping: float,
 ) -> FloatArray:
     settle = int(SETTLE_S / dt)
     steps = int(until_s / dt)
@@ -127,7 +132,7 @@ def _shake(
     normal_y = np.array([1.0, 1.0, math.cos(gamma), math.cos(gamma)])
     mu = np.array([mu_base, mu_base, mu_back, mu_back])
     held = np.zeros(4)  # stretch of the springs along the planes
-    dashpot = 2.0 * DAMPING * math.sqrt(stiffness)
+    dashpot = 2.0 * damping * math.sqrt(stiffness)
     x, y, turned = start[0], start[1], 0.0
     vx, vy, spin = 0.0, 0.0, 0.0
     turned0 = heel0 = toe0 = 0.0

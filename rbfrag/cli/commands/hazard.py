@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.output import (
     check_files,
+    percent,
     print_json,
     print_pairs,
     print_table,
@@ -16,11 +17,18 @@ from rbfrag.cli.output import (
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
 from rbfrag.cli.parameters.stack import argument, option, stacked
+from rbfrag.cli.sentences import once_in, rate_in_words
 from rbfrag.errors import InputError
 
 if TYPE_CHECKING:
     from rbfrag.hazards.answer import HazardAnswer
     from rbfrag.hazards.curve import HazardCurve
+
+SHORT = (
+    "site", "annual_rate", "ci_low", "ci_high", "annual_rate_any", "expected_failures_per_year",
+    "probability", "probability_any", "years", "model", "imt", "curve_kind",
+)  # fmt: skip
+"""Values that are shown without --verbose."""
 
 EXAMPLE = "Example:  rbfrag hazard pgv-curve.csv --p2 3 --kr 0.1 --component rotd50 --years 50"
 
@@ -90,7 +98,7 @@ def hazard(
     plot: str | None = option(
         "Draw which shaking the rate of one block comes from (.png, .pdf, .svg)."
     ),
-    json: options.Json = False,
+    printing: options.Printing,
 ) -> None:
     """Print the annual rate at which a block topples.
 
@@ -144,14 +152,18 @@ def hazard(
     document = as_dict(
         first, [one.names for one in sites], answers, (*remarks, *taken_as_medians(table), *joined)
     )
-    if json:
+    if printing.json:
         print_json(document)
         return
-    _print(document, answers, first)
+    _print(document, answers, first, verbose=printing.verbose)
 
 
 def _print(
-    document: dict[str, Any], answers: list[HazardAnswer], curves: list[HazardCurve]
+    document: dict[str, Any],
+    answers: list[HazardAnswer],
+    curves: list[HazardCurve],
+    *,
+    verbose: bool,
 ) -> None:
     warnings = document.pop("warnings")
     branches = document.pop("branches", None)
@@ -164,16 +176,17 @@ def _print(
         for law, bound in document.pop("bounds", {}).items():
             document |= {f"{name}_{law}": value for name, value in bound.items()}
         counts = document.pop("annual_rate_at_least", None)
-        print_pairs(document)
+        print_pairs(document if verbose else _short(document))
         for some in (counts, branches, rows):
             if some:
                 print()
                 print_table(list(some[0]), [list(row.values()) for row in some])
     else:
         del document["contributions"]
-        print_pairs(document)
+        print(rate_in_words(document))
+        print()
+        print_pairs(document if verbose else _short(document))
         if document["annual_rate"] > 0.0:
-            print(f"once in {1.0 / document['annual_rate']:.4g} years on average")
             print()
             print_table(["from", "to", "share_%"], _shares(answers[0], curves[0]))
         if branches:
@@ -182,28 +195,32 @@ def _print(
     print_warnings(warnings)
 
 
+def _short(document: dict[str, Any]) -> dict[str, Any]:
+    """Return what is shown without --verbose."""
+    return {name: document[name] for name in SHORT if document.get(name) is not None}
+
+
 def _in_common(answer: HazardAnswer, curve: HazardCurve) -> str:
     """Return what several blocks of one site do, in two sentences."""
     assert answer.joint is not None
     where = f"{curve.place}: " if curve.place else ""
     expected = (
-        f"{answer.expected_failures_per_year:.4g} failures a year are expected of all "
+        f"{answer.expected_failures_per_year:.2g} failures a year are expected of all "
         f"{answer.annual_rate.size} blocks, several of them in one earthquake."
     )
     rate, chance = answer.joint.annual_rate_any, answer.joint.probability_any
     if rate is not None and chance is not None:
-        often = f"once in {1.0 / rate:.4g} years on average" if rate > 0.0 else "never"
         return (
-            f"{where}at least one of the blocks fails in an earthquake {often}, with a probability "
-            f"of {100.0 * chance:.3g} % in {answer.years:g} years. {expected}"
+            f"{where}at least one of the blocks fails in an earthquake {once_in(rate)} on average, "
+            f"with a probability of {percent(chance)} in {answer.years:g} years. {expected}"
         )
     least, most = (
-        100.0 * answer.joint.bounds[name]["probability_any"]
+        percent(answer.joint.bounds[name]["probability_any"])
         for name in ("fully_dependent", "independent")
     )
     return (
         f"{where}at least one of the blocks fails in {answer.years:g} years with a probability of "
-        f"{least:.3g} % under full dependence and {most:.3g} % if independent. {expected}"
+        f"{least} under full dependence and {most} if independent. {expected}"
     )
 
 

@@ -65,14 +65,14 @@ class Table:
 
     batch: str | None = option(
         "Block table (.csv or .parquet) with columns p2_1_s2 and kr (or height_m and "
-        "width_m; or ky and displacement_m; or ks and ps2_1_s2) and any of pgv_m_s, sa03_g, "
-        "sa10_g, sa20_g, sa30_g, pga_g, tm_s, pgd_m; what is the same for all rows may be an "
-        "option.",
+        "width_m; or ky and displacement_m; or ks and ps2_1_s2), restitution, p2_sigma, kr_sigma "
+        "and the like, and any of pgv_m_s, sa03_g, sa10_g, sa20_g, sa30_g, pga_g, tm_s, pgd_m; "
+        "what is the same for all rows may be an option.",
         metavar="FILE",
     )
     out: str | None = option(
         "With --batch: table to write, the same columns with probability, ci_low, "
-        "ci_high, event_low, event_high, in_domain and reason.",
+        "ci_high, event_low, event_high, in_domain, reason and, of uncertain blocks, block_sd.",
         metavar="FILE",
     )
     excel_text: bool = option(options.EXCEL_TEXT, False)

@@ -6,7 +6,13 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.cli.output import print_json, print_pairs, print_warnings, say_when_compiling
+from rbfrag.cli.output import (
+    print_json,
+    print_pairs,
+    print_table,
+    print_warnings,
+    say_when_compiling,
+)
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import WAYS, BlockOptions, UncertaintyOptions
 from rbfrag.cli.parameters.motion import find_shaking
@@ -18,6 +24,12 @@ if TYPE_CHECKING:
     from rbfrag.solver.block.geometry import Block
     from rbfrag.solver.respond_draws import DrawnResponses
     from rbfrag.solver.results import Response
+
+_PART = (
+    "motion", "begins_s", "outcome", "peak_theta_rad", "final_theta_rad", "displacement_m",
+    "started_s", "stopped_s",
+)  # fmt: skip
+"""What is told of each motion of several; all of it with --json."""
 
 EXAMPLE = "Example:  rbfrag respond record.AT2 --p2 3 --kr 0.1 --plot response.png"
 
@@ -42,6 +54,30 @@ class Rocking:
         "Rocking: speed after an impact over that before it, above 0 and up to 1. Default: what "
         "angular momentum leaves at each corner."
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Directions(options.Direction):
+    """How several motions act on the block."""
+
+    vertical: list[str] | None = option(  # type: ignore[assignment]
+        "Vertical accelerogram of the same recording, upward positive; of several motions one for "
+        "each, in their order.",
+        metavar="MOTION",
+    )
+    gap: float | None = option(
+        "Rest between two motions [s]. Default: as long as the block takes to come to rest."
+    )
+
+    def each(self, count: int) -> list[options.Direction]:
+        """Return the direction of each of so many motions."""
+        texts: list[str | None] = [None] * count if self.vertical is None else [*self.vertical]
+        if len(texts) != count:
+            raise InputError(
+                f"{count} motions and {len(texts)} times --vertical: give one for each motion, or "
+                "none at all"
+            )
+        return [options.Direction(vertical=text, reverse=self.reverse) for text in texts]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +108,7 @@ class Files:
         "Draw the acceleration against the strength that is left, and the motion of the "
         "block (.png, .pdf, .svg)."
     )
-    animate: str | None = option(
+    film: str | None = option(
         "Film the block on its planes (.gif, .mp4 where ffmpeg is installed, .html); it "
         "must be given by its shape."
     )
@@ -84,12 +120,12 @@ class Files:
 @stacked
 def respond(
     *,
-    motion: options.Motion,
+    motions: options.Motions,
     block: BlockOptions,
     sliding: Sliding,
     rocking: Rocking,
     drawn: Draws,
-    direction: options.Direction,
+    direction: Directions,
     files: Files,
     reading: options.Reading,
     ky: float | None = option(
@@ -105,6 +141,9 @@ def respond(
 ) -> None:
     """Run one block under one accelerogram.
 
+    Several are run one after another: a block that slides or slumps meets each motion where the
+    one before has left it; one that topples or rocks starts again from rest.
+
     The block is --p2 and --kr (toppling, or with --kind rocking a free-standing one on level
     ground), --ky (sliding), or its shape, from which the failure mode and with it the model follow;
     of a rectangle without --phi, that it topples.
@@ -119,7 +158,10 @@ def respond(
         from rbfrag.solver.respond_draws import respond_draws
 
         possible, remarks = _possible(drawn, block, ky, kind)
-        ground, upward, about = find_shaking(motion, direction, db=db, reading=reading)
+        if len(motions) > 1:
+            raise InputError("--draws runs blocks under one motion: leave the others out")
+        one = direction.each(1)[0]
+        ground, upward, about = find_shaking(motions[0], one, db=db, reading=reading)
         say_when_compiling()
         shares = respond_draws(
             ground,
@@ -135,25 +177,33 @@ def respond(
         _show_shares(replace(shares, warnings=(*about, *remarks, *shares.warnings)), json=json)
         return
     body, what, remarks = _body(block, ky, kind)
-    if files.animate is not None:
+    if files.film is not None:
         if body is None:
             raise InputError(
-                "--animate needs the shape of the block and its --phi, unless it stands free"
+                "--film needs the shape of the block and its --phi, unless it stands free"
             )
         from rbfrag.plots.film import film_path
 
-        film_path(files.animate)
-    ground, upward, about = find_shaking(motion, direction, db=db, reading=reading)
+        film_path(files.film)
+    read = [
+        find_shaking(each, one, db=db, reading=reading)
+        for each, one in zip(motions, direction.each(len(motions)), strict=True)
+    ]
+    about = [text for *_, texts in read for text in texts]
+    grounds, upwards = [each for each, *_ in read], [each for _, each, _ in read]
+    title = ",\nthen ".join(ground.label for ground in grounds)
+    several = len(grounds) > 1
     say_when_compiling()
     try:
         response = run(
-            ground,
-            vertical=upward,
+            grounds if several else grounds[0],
+            vertical=upwards if several else upwards[0],
             polarity=direction.polarity,
+            gap_s=direction.gap,
             two_way=sliding.two_way,
             horizontal=sliding.horizontal,
             restitution=rocking.restitution,
-            history=any((files.csv, files.plot, files.animate)),
+            history=any((files.csv, files.plot, files.film)),
             **what,
         )
     except InputError as error:
@@ -164,16 +214,16 @@ def respond(
         write_history(response, files.csv)
     if files.plot is not None:
         p2 = what.get("p2") if body is None else body.p2
-        _draw(response, files.plot, p2, what.get("kr"), ground.label, direction.reverse)
-    if files.animate is not None and body is not None:
+        _draw(response, files.plot, p2, what.get("kr"), title, direction.reverse)
+    if files.film is not None and body is not None:
         from rbfrag.plots.film import film
         from rbfrag.solver.kinds import model_of_kind
 
         backed = not model_of_kind(response.kind).free_standing
         film(
-            response, body, files.animate, beta_deg=what["beta_deg"],
+            response, body, files.film, beta_deg=what["beta_deg"],
             exaggerate=files.exaggerate, back_fracture=backed and what.get("back_fracture", True),
-            title=ground.label,
+            title=title,
         )  # fmt: skip
     answer = response_as_dict(response)
     if json:
@@ -181,7 +231,11 @@ def respond(
         return
     answer.pop("warnings")
     changes = answer.pop("mode_changes")
+    parts = answer.pop("parts", [])
     print_pairs({name: value for name, value in answer.items() if value is not None})
+    if parts:
+        print()
+        print_table(_PART, [[part[name] for name in _PART] for part in parts])
     for change in changes:
         print(f"from {change['time_s']:.6g} s on the block {change['motion']}")
     print(response.outcome.advice)

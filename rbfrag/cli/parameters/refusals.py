@@ -67,7 +67,7 @@ CONFLICTS = (
     ),
     Conflict(("--block-draws",), ("--batch",), "one question is about one block"),
     Conflict(("--block-draws",), ("--ky", "--restitution"), "the table has the block"),
-    Conflict(("--draws",), ("--csv", "--plot", "--animate"), "they show one run", ("respond",)),
+    Conflict(("--draws",), ("--csv", "--plot", "--film"), "they show one run", ("respond",)),
     Conflict(("--polarity",), ("--reverse",), "one of them is enough"),
     Conflict(
         (*PLANES, "--cohesion", "--kv"),
@@ -133,7 +133,7 @@ NEEDS = (
         "it is about what the block may be, of which so many are run",
         ("respond",),
     ),
-    Need(("--exaggerate",), ("--animate",), "--animate", "it is a factor on what the film shows"),
+    Need(("--exaggerate",), ("--film",), "--film", "it is a factor on what the film shows"),
     Need(("--up", "--contact-mm"), ("--mesh",), "--mesh", "it is about the pose of a mesh"),
     Need(
         ("--out",), ("--mesh",), "--mesh", "only a mesh makes a table, of its azimuths", ("block",)

@@ -220,6 +220,22 @@ class Block:
         return math.degrees(math.atan2(self.back[0], -self.back[1]))
 
     @property
+    def on_back_edge_rad(self) -> float:
+        """Backward rotation that lays the back edge on the base [rad]."""
+        edge_x, edge_y = (b - h for b, h in zip(self.back, self.heel, strict=True))
+        return math.pi - math.atan2(edge_y, edge_x)
+
+    @property
+    def on_front_face_rad(self) -> float:
+        """Forward rotation about the toe that lays the front face on the base [rad]."""
+        toe_x, toe_y = self.toe
+        return min(
+            math.atan2(y - toe_y, x - toe_x)
+            for x, y in self.outline
+            if y - toe_y > 1e-9 * self.r3_m
+        )
+
+    @property
     def base_m(self) -> float:
         """Distance from heel to toe [m]."""
         return self.toe[0] - self.heel[0]

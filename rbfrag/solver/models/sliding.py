@@ -7,6 +7,14 @@ while it moves. (4.15) lacks the factor, which comes from the normal force: the 
 inertial force that is normal to the base changes the friction. The dissertation's form is the
 horizontal one, whose factor is 1. Nothing depends on s, so that s is a cubic of time between
 samples and the answer exact.
+
+A block that leans on its back plane at rest (β < α1) slides away from it while its base stays in
+touch, because the resultant then lies at φ. Where it has stopped, and the resultant falls behind
+its heel,
+
+    k_h < (1 + k_v) tan(α1 - β),
+
+it tips back; from there it is followed step by step (docs/theory/slide-to-slump.md).
 """
 
 from __future__ import annotations
@@ -81,18 +89,24 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         )
     forward = _equation(site, 1.0)
     start = site.centroid_m
+    tips = _leans(site) and not (two_way or site.settings.get("horizontal", False))
 
     def pose(s: float) -> Pose:
         return Pose(0.0, (start[0] + s, start[1]), s)
 
     def after(exit: Exit) -> Ending:
-        raise AssertionError(f"a sliding block has no end of its plane: {exit}")
+        return Ending(Outcome.CONTACT_LOST, f"at {exit.time_s:.3f} s the block tips back")
+
+    reverse = _tips_back(site) if tips else None
+    if two_way:
+        reverse = _equation(site, -1.0)
 
     return Mechanism(
         first=Phase(
             name="slides",
             forward=forward,
-            reverse=_equation(site, -1.0) if two_way else None,
+            reverse=reverse,
+            leaves_in_reverse=tips,
             pose=pose,
             after=after,
             # with a plane behind it the block cannot go further up than it was
@@ -100,7 +114,27 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         ),
         rotates=False,
         critical=None,
-        warnings=_warnings(site),
+        warnings=() if tips else _warnings(site),
+        goes_on=site.block is not None and not site.settings.get("horizontal", False),
+    )
+
+
+def _leans(site: BlockOnPlanes) -> bool:
+    """Whether the block leans on its back plane at rest."""
+    block = site.block
+    return (
+        block is not None and site.back_fracture and math.degrees(site.beta_rad) < block.alpha1_deg
+    )
+
+
+def _tips_back(site: BlockOnPlanes) -> Equation:
+    """Return the equation of the start of a rotation backward about the heel."""
+    assert site.block is not None
+    past_heel = math.radians(site.block.alpha1_deg) - site.beta_rad
+    return Equation(
+        inertia=constant(1.0),
+        driving=constant(math.cos(past_heel)),
+        resistance=constant(math.sin(past_heel)),
     )
 
 
@@ -128,12 +162,11 @@ def _equation(site: BlockOnPlanes, sense: float) -> Equation:
 
 
 def _warnings(site: BlockOnPlanes) -> tuple[str, ...]:
-    block = site.block
-    if block is None or not site.back_fracture or math.degrees(site.beta_rad) >= block.alpha1_deg:
+    if not _leans(site):
         return ()
     return (
         "at rest the block leans on its back plane (beta is below alpha1): once it has slid away, "
-        "it tips back against the plane and may slump later, which is not followed",
+        "it tips back on the plane and may slump later, which horizontal and two_way leave out",
     )
 
 

@@ -92,9 +92,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
             "slumping in time is known for blocks whose heel lies on the back plane: the corner "
             "at the heel of this outline is missing"
         )
-    edge_x, edge_y = (b - h for b, h in zip(block.back, block.heel, strict=True))
-    # the back edge then lies on the base
-    flat = math.pi - math.atan2(edge_y, edge_x)
+    flat = block.on_back_edge_rad
     slip = heel_slip(block)
     path = centroid_path(block)
 
@@ -123,6 +121,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         if_impact="the block was driven back to where it had been: it is taken to stop there "
         "without rebound, whatever its speed",
         least_q=_driven_up_the_back_plane(site),
+        goes_on=True,
         if_below="the record drives the block up its back plane at times, which is not followed",
     )
 

@@ -214,6 +214,9 @@ class Mechanism:
         if_impact: the same where the block has come back to its lowest position in motion.
         least_q: least k_h/(1 + k_v) that the model covers.
         if_below: what the reader should know where the record goes below it.
+        goes_on: whether the block is followed step by step where a contact is lost.
+        until_landing: whether that ends where its whole base falls on the base plane.
+        at_toe: whether its displacement is that of the toe.
     """
 
     first: Phase
@@ -223,3 +226,6 @@ class Mechanism:
     if_impact: str = ""
     least_q: float = -np.inf
     if_below: str = ""
+    goes_on: bool = False
+    until_landing: bool = False
+    at_toe: bool = False

@@ -108,6 +108,8 @@ class MechanismRun:
         samples_moved: sample intervals that had to be integrated.
         changes: changes of phase.
         sentences: what the answer takes for granted, and where it ends.
+        phase: the phase in which it ended.
+        ending: the last of the sentences, how it ended; empty for none.
         history: the motion in time, if it is kept.
     """
 
@@ -125,6 +127,8 @@ class MechanismRun:
     samples_moved: int
     changes: tuple[Change, ...]
     sentences: tuple[str, ...]
+    phase: Phase
+    ending: str
     history: MotionHistory | None = None
 
 
@@ -135,6 +139,7 @@ def follow(
     history: bool = False,
     turn_max: float = TURN_MAX,
     order: int = ORDER,
+    start: tuple[float, float] = (0.0, 0.0),
 ) -> MechanismRun:
     """Run a mechanism from rest under one excitation until nothing moves any more.
 
@@ -144,13 +149,14 @@ def follow(
         history: keep the motion in time.
         turn_max: greatest step, in units of the block's own time; for convergence studies.
         order: order of the method; for convergence studies.
+        start: position in the first phase at which it rests, and the bound on its error.
 
     Raises:
         InputError: a block so small that the run would not end in reasonable time.
     """
     _refuse_endless(mechanism, excitation, turn_max)
     record = record_of(excitation)
-    phase, entry = mechanism.first, FROM_REST
+    phase, entry = mechanism.first, FROM_REST._replace(x=start[0], error_x=start[1])
     changes: list[Change] = []
     histories: list[MotionHistory] = []
     steps = samples_moved = impacts = 0
@@ -214,6 +220,8 @@ def follow(
         samples_moved=samples_moved,
         changes=tuple(changes),
         sentences=tuple(sentences),
+        phase=phase,
+        ending=following.sentence,
         history=_joined(histories) if history else None,
     )
 

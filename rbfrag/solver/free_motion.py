@@ -1,0 +1,385 @@
+"""A block on its planes where no mechanism describes it any more: `free_motion`.
+
+Which corners touch is found step by step (`rbfrag.solver.integrator.free_body`). Impacts take the
+speed towards the plane and leave the rest: rigid bodies without rebound.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rbfrag.errors import InputError
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.integrator.free_body import (
+    AT_REST,
+    BACKWARD,
+    FORWARD,
+    LANDED,
+    LANDS,
+    ROWS,
+    THROWN,
+    Corners,
+    Frame,
+    FreeRun,
+    Motion,
+    run_free,
+    work_of,
+)
+from rbfrag.solver.integrator.one_freedom.equation import Pose
+from rbfrag.solver.integrator.one_freedom.state import record_of
+from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.results import FloatArray, ModeChange, Outcome
+
+STEP_S = 2e-4
+"""Step [s]; a run of twice the step beside it tells the error."""
+
+SHORTEST_S = 0.02
+"""Time for which a block must do something for it to count as a change of what it does [s]."""
+
+ON_ITS_BACK_EDGE = (
+    "at {:.3f} s the back edge of the block lies on the base plane: it slides on from there, past "
+    "recovery"
+)
+ON_ITS_FACE = "at {:.3f} s the block lies on its front face"
+
+
+@dataclass(frozen=True)
+class Release:
+    """Where and how fast a block is when its mechanism ends.
+
+    Args:
+        time_s: when [s].
+        pose: where it is.
+        velocity_m_s: velocity of the centroid in the base frame [m/s].
+        spin_rad_s: rate of its rotation, counter-clockwise [rad/s].
+    """
+
+    time_s: float
+    pose: Pose
+    velocity_m_s: tuple[float, float] = (0.0, 0.0)
+    spin_rad_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class FreeHistory:
+    """The motion in time; arrays of shape (n,) but for the centroid (n, 2)."""
+
+    time_s: FloatArray
+    turned_rad: FloatArray
+    spin_rad_s: FloatArray
+    centroid_m: FloatArray
+    slip_m: FloatArray
+    slip_m_s: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class FreeMotion:
+    """What became of a block without a mechanism.
+
+    Args:
+        outcome: how it ended.
+        sentence: what happened at the end; empty where it came to rest.
+        time_s: when it came to rest, or ended [s].
+        pose: where it is then.
+        started_s: first motion [s]; None for none.
+        landed_s: first time at which its whole base fell on the base plane [s], or None.
+        backward_rad: greatest rotation backward (counter-clockwise) [rad].
+        forward_rad: greatest rotation forward [rad].
+        slip_m: greatest displacement of the contact along the base [m].
+        error_rad: difference of the rotation from a run of twice the step [rad].
+        error_m: the same of the displacement [m].
+        steps: steps of both runs.
+        block: the block.
+        contact: the contact whose displacement is told, from the centroid [m].
+        rows: what the kernel kept of the motion.
+    """
+
+    outcome: Outcome
+    sentence: str
+    time_s: float
+    pose: Pose
+    started_s: float | None
+    landed_s: float | None
+    backward_rad: float
+    forward_rad: float
+    slip_m: float
+    error_rad: float
+    error_m: float
+    steps: int
+    block: Block
+    contact: tuple[float, float]
+    rows: FloatArray
+
+    @cached_property
+    def history(self) -> FreeHistory:
+        """The motion in time."""
+        return _history(self.block, self.rows, self.contact)
+
+    @cached_property
+    def changes(self) -> tuple[ModeChange, ...]:
+        """What the block did."""
+        return _changes(self.block, self.rows)
+
+
+def free_motion(
+    site: BlockOnPlanes,
+    excited: Excitation,
+    release: Release,
+    *,
+    at_toe: bool = False,
+    stop_at_landing: bool = False,
+) -> FreeMotion:
+    """Return what a block does from where its mechanism has left it.
+
+    Args:
+        site: the block on its planes.
+        excited: the excitation.
+        release: where and how fast it is.
+        at_toe: whether displacements along the base are those of the toe, else of the heel.
+        stop_at_landing: whether an impact of the whole base ends the run.
+    """
+    block = site.block
+    assert block is not None
+    contact = block.toe if at_toe else block.heel
+    coarse, coarse_rows = _run(site, excited, release, 2.0 * STEP_S, stop_at_landing)
+    fine, rows = _run(site, excited, release, STEP_S, stop_at_landing)
+    slips, slips_coarse = (
+        _extremes(release.pose.displacement_m, _slips(block, each, contact))
+        for each in (rows, coarse_rows)
+    )
+    turns, turns_coarse = (
+        _extremes(release.pose.turned_rad, each[3]) for each in (rows, coarse_rows)
+    )
+    outcome, sentence = _ending(fine)
+    if (fine.stop in (BACKWARD, FORWARD)) != (coarse.stop in (BACKWARD, FORWARD)):
+        outcome, sentence = Outcome.UNDETERMINED, Outcome.UNDETERMINED.advice
+    return FreeMotion(
+        outcome=outcome,
+        sentence=sentence,
+        time_s=fine.time_s,
+        pose=_pose(block, fine.motion, contact),
+        started_s=None if math.isnan(fine.moved_s) else fine.moved_s,
+        landed_s=None if math.isnan(fine.landed_s) else fine.landed_s,
+        backward_rad=max(0.0, turns[1]),
+        forward_rad=max(0.0, -turns[0]),
+        slip_m=slips[1],
+        error_rad=max(abs(a - b) for a, b in zip(turns, turns_coarse, strict=True)),
+        error_m=abs(slips[1] - slips_coarse[1]),
+        steps=fine.steps + coarse.steps,
+        block=block,
+        contact=contact,
+        rows=rows,
+    )
+
+
+def gap_m(block: Block, pose: Pose) -> float:
+    """Return the gap between the heel and its back plane, along the base [m]."""
+    gamma = math.radians(block.gamma_deg)
+    normal = (math.sin(gamma), math.cos(gamma))
+    low = [a - b for a, b in zip(block.lowest_on_back, block.heel, strict=True)]
+    off = low[0] * normal[0] + low[1] * normal[1]
+    x, y = _corner(pose.centroid_m, pose.turned_rad, block.heel)
+    gap = (x * normal[0] + y * normal[1] - off) / normal[0]
+    return gap if gap > 1e-12 * block.r3_m else 0.0
+
+
+def _corner(
+    centroid: tuple[float, float], turned_rad: float, arm: tuple[float, float]
+) -> tuple[float, float]:
+    c, s = math.cos(turned_rad), math.sin(turned_rad)
+    return centroid[0] + arm[0] * c - arm[1] * s, centroid[1] + arm[0] * s + arm[1] * c
+
+
+def _run(
+    site: BlockOnPlanes, excited: Excitation, release: Release, step_s: float, at_landing: bool
+) -> tuple[FreeRun, FloatArray]:
+    block = site.block
+    assert block is not None
+    corners = _corners(site, block)
+    frame = Frame(
+        block.inertia_m2,
+        math.sin(site.beta_rad),
+        math.cos(site.beta_rad),
+        block.on_back_edge_rad,
+        block.on_front_face_rad,
+    )
+    (x, y), (vx, vy) = release.pose.centroid_m, release.velocity_m_s
+    start = Motion(x, y, release.pose.turned_rad, vx, vy, release.spin_rad_s)
+    record = record_of(excited)
+    size = 4 * excited.time_s.size + 200_000
+    while True:
+        rows = np.empty((ROWS, size))
+        run = run_free(
+            record, corners, frame, release.time_s, start, step_s, at_landing, work_of(corners),
+            rows,
+        )  # fmt: skip
+        if run.filled < size:
+            return run, rows[:, : run.filled]
+        size *= 4
+        if size > 1e8:
+            raise InputError("the record is too long to follow the block in steps: cut it")
+
+
+def _corners(site: BlockOnPlanes, block: Block) -> Corners:
+    """Return the pairs of corner and plane: those with the base first."""
+    arms = np.array(block.outline)
+    gamma = math.radians(block.gamma_deg)
+    normals = [(0.0, 1.0), (math.sin(gamma), math.cos(gamma))]
+    from_heel = arms - np.array(block.heel)
+    planes = 2 if site.back_fracture else 1
+    offs = [float((from_heel @ np.array(normal)).min()) for normal in normals]
+    n = len(arms)
+    friction = (math.tan(site.phi_rad), math.tan(site.phi_back_rad))
+
+    def both(values: list[float] | tuple[float, ...]) -> FloatArray:
+        return np.repeat(np.array(values[:planes], dtype=np.float64), n)
+
+    return Corners(
+        np.tile(arms[:, 0], planes),
+        np.tile(arms[:, 1], planes),
+        both([x for x, _ in normals]),
+        both([y for _, y in normals]),
+        both(offs),
+        both(friction),
+    )
+
+
+def _pose(block: Block, at: Motion, contact: tuple[float, float]) -> Pose:
+    here = _corner((at.x, at.y), at.turned, contact)
+    start = contact[0] - block.heel[0]
+    return Pose(at.turned, (at.x, at.y), here[0] - start)
+
+
+def _extremes(start: float, values: FloatArray) -> tuple[float, float]:
+    return (
+        float(values.min(initial=start)),
+        float(values.max(initial=start)),
+    )
+
+
+def _slips(block: Block, rows: FloatArray, contact: tuple[float, float]) -> FloatArray:
+    """Return how far a contact has slipped along the base [m]."""
+    x, turned = rows[1], rows[3]
+    start = contact[0] - block.heel[0]
+    slips: FloatArray = x + contact[0] * np.cos(turned) - contact[1] * np.sin(turned) - start
+    return slips
+
+
+def _history(block: Block, rows: FloatArray, contact: tuple[float, float]) -> FreeHistory:
+    time_s, x, y, turned, vx, _, spin, _ = rows
+    return FreeHistory(
+        time_s=time_s.copy(),
+        turned_rad=turned.copy(),
+        spin_rad_s=spin.copy(),
+        centroid_m=np.stack([x, y], axis=1),
+        slip_m=_slips(block, rows, contact),
+        slip_m_s=vx - spin * (contact[0] * np.sin(turned) + contact[1] * np.cos(turned)),
+    )
+
+
+def _ending(run: FreeRun) -> tuple[Outcome, str]:
+    if run.stop == AT_REST:
+        return Outcome.STABLE, ""
+    if run.stop == BACKWARD:
+        return Outcome.TOPPLED, ON_ITS_BACK_EDGE.format(run.time_s)
+    if run.stop == FORWARD:
+        return Outcome.TOPPLED, ON_ITS_FACE.format(run.time_s)
+    if run.stop == THROWN:
+        return Outcome.JUMP, f"at {run.time_s:.3f} s: {Outcome.JUMP.advice}"
+    if run.stop == LANDED:
+        return Outcome.SEATED_WITH_GAP, f"at {run.time_s:.3f} s the block falls back on its base"
+    return Outcome.UNDETERMINED, "a minute after the record the block neither stops nor falls"
+
+
+SLIDES = "slides on its base"
+SLUMPS = "slumps against its back plane"
+ON_HEEL = "tips about its heel"
+CLIMBS = "is driven back against its back plane"
+ROCKS = "rocks about its toe"
+CONFINED = "topples against its back plane"
+ON_BACK = "slides on its back plane"
+OFF = "is off both planes"
+
+
+def _changes(block: Block, rows: FloatArray) -> tuple[ModeChange, ...]:
+    """Return what the block did, one entry where it does something else than before."""
+    n = len(block.outline)
+    heel, toe = (block.outline.index(corner) for corner in (block.heel, block.toe))
+    changes: list[ModeChange] = []
+    since, doing, last = 0.0, "", ""
+    for now, vx, vy, spin, bits in zip(rows[0], rows[4], rows[5], rows[6], rows[7], strict=True):
+        touch = int(bits) & ~LANDS
+        if vx == 0.0 and vy == 0.0 and spin == 0.0:
+            continue
+        base, back = touch & ((1 << n) - 1), touch >> n
+        name = _named(base, back, 1 << heel, 1 << toe, spin)
+        if name != doing:
+            since, doing = float(now), name
+        if doing != last and now - since >= SHORTEST_S:
+            changes.append(ModeChange(since, doing))
+            last = doing
+    return tuple(changes)
+
+
+def _named(base: int, back: int, heel: int, toe: int, spin: float) -> str:
+    """Return what a moving block does, by the corners that touch its planes."""
+    if base & heel and base & toe:
+        return SLIDES
+    if base & heel:
+        if back:
+            return SLUMPS if spin > 0.0 else CLIMBS
+        return ON_HEEL
+    if base:
+        return CONFINED if back else ROCKS
+    return ON_BACK if back else OFF
+
+
+_MOMENT_S = 1e-6
+"""Time over which the velocity of a mechanism is taken from its poses [s]."""
+
+
+def released(time_s: float, pose: Callable[[float], Pose], position: float, rate: float) -> Release:
+    """Return where and how fast a mechanism leaves its block.
+
+    Args:
+        time_s: when [s].
+        pose: where the block is at a position of the mechanism.
+        position: the position.
+        rate: its rate.
+    """
+    here = pose(position)
+    if rate == 0.0:
+        return Release(time_s, here)
+    half = 0.5 * _MOMENT_S * rate
+    before, after = pose(position - half), pose(position + half)
+    vx, vy = ((b - a) / _MOMENT_S for a, b in zip(before.centroid_m, after.centroid_m, strict=True))
+    return Release(time_s, here, (vx, vy), (after.turned_rad - before.turned_rad) / _MOMENT_S)
+
+
+_TOUCHES = 1e-6
+"""Distance from a plane, over the size of the block, at which a corner touches it: steps leave
+a few times 1e-9 of it."""
+
+
+def touching(site: BlockOnPlanes, pose: Pose) -> tuple[str, ...]:
+    """Return which corners of a block touch which plane."""
+    block = site.block
+    assert block is not None
+    corners = _corners(site, block)
+    n = len(block.outline)
+    names = {block.heel: "heel", block.toe: "toe", block.back: "upper back corner"}
+    contacts = []
+    for i in range(corners.arm_x.size):
+        arm = block.outline[i % n]
+        x, y = _corner(pose.centroid_m, pose.turned_rad, arm)
+        away = x * corners.normal_x[i] + y * corners.normal_y[i] - corners.off_m[i]
+        if away <= _TOUCHES * block.r3_m:
+            plane = "base" if i < n else "back plane"
+            contacts.append(f"{names.get(arm, 'another corner')} on the {plane}")
+    return tuple(contacts)

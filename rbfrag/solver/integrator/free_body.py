@@ -1,0 +1,335 @@
+"""A rigid block between two planes without a mechanism: three degrees of freedom, time steps.
+
+Where a block has left the contacts of its mechanism, which corner touches which plane is part of
+the question. A step of length h looks for the impulses of all corners that may touch within it:
+of each corner that ends on its plane one that pushes, without rebound and with Coulomb friction
+(Stewart and Trinkle 1996, International Journal for Numerical Methods in Engineering 39,
+2673-2691; Moreau 1988). Impulses are found by Gauss-Seidel sweeps from
+zero. A block at rest costs one look a sample: the loads that its contacts bear are a convex
+set, so that what both ends of a straight line leave at rest, the whole of it does.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel
+from rbfrag.solver.integrator.one_freedom.state import Record
+from rbfrag.solver.results import FloatArray
+
+AT_REST, BACKWARD, FORWARD, THROWN, ENDLESS, LANDED = range(6)
+"""How a run ends: at rest to the end; on its back edge; on its front face; by a jump of the ground;
+not within `FREE_MOST_S` of rest after the record; by an impact of its whole base."""
+
+LANDS = 1 << 30
+"""Bit of a step in which the block falls on its whole base."""
+
+LANDING_M_S = 1e-3
+"""Speed of a corner from which its impact counts as one."""
+
+FREE_MOST_S = 60.0
+"""Time after the record for which a motion that does not end is followed [s]."""
+
+SWEEPS_MAX = 400
+"""Gauss-Seidel sweeps of one step."""
+
+CONVERGED = 1e-10
+"""Change of velocity in a sweep, over g h, at which the impulses are found."""
+
+STANDSTILL = 1e-8
+"""Velocity over g h below which a block is at rest."""
+
+
+class Corners(NamedTuple):
+    """The pairs of corner and plane that may touch; all arrays have shape (m,).
+
+    Args:
+        arm_x: from the centroid to the corner, block not turned, along the base [m].
+        arm_y: the same normal to the base [m].
+        normal_x: unit normal of the plane, into the block.
+        normal_y: the other component.
+        off_m: distance of the plane from the origin along its normal [m].
+        friction: tangent of its friction angle.
+    """
+
+    arm_x: FloatArray
+    arm_y: FloatArray
+    normal_x: FloatArray
+    normal_y: FloatArray
+    off_m: FloatArray
+    friction: FloatArray
+
+
+class Frame(NamedTuple):
+    """What else of the block and its slope enters.
+
+    Args:
+        inertia_m2: moment of inertia about the centroid per mass [m²].
+        sine: of the dip of the base.
+        cosine: of it.
+        backward_rad: rotation at which the back edge lies on the base [rad].
+        forward_rad: clockwise rotation at which the front face does [rad].
+    """
+
+    inertia_m2: float
+    sine: float
+    cosine: float
+    backward_rad: float
+    forward_rad: float
+
+
+class Motion(NamedTuple):
+    """Place and velocity of the block: centroid, rotation counter-clockwise, and their rates."""
+
+    x: float
+    y: float
+    turned: float
+    vx: float
+    vy: float
+    spin: float
+
+
+class FreeRun(NamedTuple):
+    """The end of a run.
+
+    Args:
+        stop: how it ended.
+        time_s: when it came to rest, or ended [s].
+        motion: place and velocity then.
+        steps: integration steps.
+        filled: columns of the history that are filled.
+        moved_s: first motion [s]; NaN for none.
+        landed_s: first impact of the whole base [s]; NaN for none.
+    """
+
+    stop: int
+    time_s: float
+    motion: Motion
+    steps: int
+    filled: int
+    moved_s: float
+    landed_s: float
+
+
+ROWS = 8
+"""Rows of a history: time, the six numbers of :class:`Motion`, and the corners in touch as bits."""
+
+
+@inner_kernel
+def one_step(
+    corners: Corners,
+    frame: Frame,
+    at: Motion,
+    h: float,
+    a: float,
+    w: float,
+    work: FloatArray,
+) -> tuple[Motion, int]:
+    """Take one step; return where it leads and which corners touched, as bits.
+
+    Args:
+        corners: pairs of corner and plane.
+        frame: the block on its slope.
+        at: motion at the start.
+        h: length of the step [s].
+        a: driving acceleration in its middle [g].
+        w: 1 + k_v there.
+        work: shape (9, m). Impulses begin at zero, not where the last step left them: planes that
+            could hold the block by friction alone do so only where something presses it on them.
+    """
+    g = STANDARD_GRAVITY_M_S2
+    vx = at.vx + h * g * (w * frame.sine + a * frame.cosine)
+    vy = at.vy + h * g * (a * frame.sine - w * frame.cosine)
+    spin = at.spin
+    c, s = math.cos(at.turned), math.sin(at.turned)
+    across, along = work[0], work[1]
+    active = 0
+    for i in range(corners.arm_x.size):
+        rx = corners.arm_x[i] * c - corners.arm_y[i] * s
+        ry = corners.arm_x[i] * s + corners.arm_y[i] * c
+        nx, ny = corners.normal_x[i], corners.normal_y[i]
+        gap = (at.x + rx) * nx + (at.y + ry) * ny - corners.off_m[i]
+        # the greatest approach of a corner within the step, with its speed before and after
+        fastest = min((vx - spin * ry) * nx + (vy + spin * rx) * ny,
+                      (at.vx - spin * ry) * nx + (at.vy + spin * rx) * ny)  # fmt: skip
+        across[i] = 0.0
+        along[i] = 0.0
+        if gap + 2.0 * h * fastest > 0.0 and gap > 1e-9:
+            continue
+        k = active
+        active += 1
+        work[2, k] = i
+        # moments of a unit impulse along the normal, and along (n_y, -n_x) down the plane
+        work[3, k] = rx * ny - ry * nx
+        work[4, k] = -rx * nx - ry * ny
+        work[8, k] = -((at.vx - at.spin * ry) * nx + (at.vy + at.spin * rx) * ny)
+        work[5, k] = 1.0 / (1.0 + work[3, k] * work[3, k] / frame.inertia_m2)
+        work[6, k] = 1.0 / (1.0 + work[4, k] * work[4, k] / frame.inertia_m2)
+        # a corner above its plane may come down to it; one that rounding put below it is let out
+        work[7, k] = -gap / h if gap > 0.0 else -0.2 * gap / h
+    tolerance = CONVERGED * g * h
+    for _ in range(SWEEPS_MAX):
+        change = 0.0
+        for k in range(active):
+            i = int(work[2, k])
+            nx, ny = corners.normal_x[i], corners.normal_y[i]
+            mn, mt = work[3, k], work[4, k]
+            speed = vx * nx + vy * ny + spin * mn
+            push = max(across[i] - (speed - work[7, k]) * work[5, k], 0.0)
+            part = push - across[i]
+            across[i] = push
+            vx += part * nx
+            vy += part * ny
+            spin += part * mn / frame.inertia_m2
+            change = max(change, abs(part))
+            speed = vx * ny - vy * nx + spin * mt
+            limit = corners.friction[i] * push
+            grip = min(max(along[i] - speed * work[6, k], -limit), limit)
+            part = grip - along[i]
+            along[i] = grip
+            vx += part * ny
+            vy -= part * nx
+            spin += part * mt / frame.inertia_m2
+            change = max(change, abs(part))
+        if change <= tolerance:
+            break
+    touch = on_base = 0
+    hardest = 0.0
+    for k in range(active):
+        i = int(work[2, k])
+        if across[i] > 0.0:
+            touch |= 1 << i
+            if corners.normal_x[i] == 0.0:
+                on_base += 1
+                hardest = max(hardest, work[8, k])
+    if on_base > 1 and hardest > LANDING_M_S:
+        touch |= LANDS
+    return Motion(at.x + h * vx, at.y + h * vy, at.turned + h * spin, vx, vy, spin), touch
+
+
+@inner_kernel
+def rests(
+    corners: Corners, frame: Frame, at: Motion, h: float, a: float, w: float, work: FloatArray
+) -> bool:
+    """Whether a block at rest stays so under two accelerations [g]."""
+    after, _ = one_step(corners, frame, at, h, a, w, work)
+    return at_standstill(after, frame, h)
+
+
+@inner_kernel
+def at_standstill(at: Motion, frame: Frame, h: float) -> bool:
+    """Whether the velocities are nought but for rounding."""
+    least = STANDSTILL * STANDARD_GRAVITY_M_S2 * h
+    turning = abs(at.spin) * math.sqrt(frame.inertia_m2)
+    return abs(at.vx) <= least and abs(at.vy) <= least and turning <= least
+
+
+@bare_kernel
+def run_free(
+    record: Record,
+    corners: Corners,
+    frame: Frame,
+    start_s: float,
+    at: Motion,
+    h: float,
+    stop_at_landing: bool,
+    work: FloatArray,
+    history: FloatArray,
+) -> FreeRun:
+    """Run a block from a time of the record until nothing moves it any more.
+
+    Args:
+        record: the excitation; a time may repeat.
+        corners: pairs of corner and plane.
+        frame: the block on its slope.
+        start_s: where in the record the run begins [s].
+        at: motion there.
+        h: greatest step [s].
+        stop_at_landing: whether an impact of the whole base ends the run.
+        work: shape (9, m).
+        history: shape (8, k) for what is kept; (8, 0) for nothing.
+    """
+    time_s, k_h, w, last = record.time_s, record.k_h, record.w, record.last
+    node = 0
+    while node < last and time_s[node + 1] <= start_s:
+        node += 1
+    now, steps, filled = start_s, 0, 0
+    stopped_s, moved_s, landed_s = start_s, math.nan, math.nan
+    resting = at_standstill(at, frame, h)
+    end_s = time_s[-1]
+    every = 0
+    while True:
+        free = node >= last
+        if free and last < time_s.size - 1:
+            return FreeRun(THROWN, now, at, steps, filled, moved_s, landed_s)
+        if free and now > end_s + FREE_MOST_S:
+            return FreeRun(ENDLESS, now, at, steps, filled, moved_s, landed_s)
+        a0 = a1 = 0.0
+        w0 = w1 = 1.0
+        length = 0.05
+        begin = now
+        if not free:
+            begin, length = time_s[node], time_s[node + 1] - time_s[node]
+            a0, a1, w0, w1 = k_h[node], k_h[node + 1], w[node], w[node + 1]
+            if length <= 0.0 or now >= time_s[node + 1]:
+                node += 1
+                continue
+        if resting:
+            part = (now - begin) / length
+            if rests(corners, frame, at, h, a0 + part * (a1 - a0), w0 + part * (w1 - w0), work):
+                if free:
+                    return FreeRun(AT_REST, stopped_s, at, steps, filled, moved_s, landed_s)
+                if rests(corners, frame, at, h, a1, w1, work):
+                    node += 1
+                    now = time_s[node]
+                    continue
+        parts = max(1, math.ceil((begin + length - now) / h - 1e-9))
+        size = (begin + length - now) / parts
+        first = now
+        for n in range(parts):
+            middle = (first + (n + 0.5) * size - begin) / length
+            at, touch = one_step(
+                corners, frame, at, size, a0 + middle * (a1 - a0), w0 + middle * (w1 - w0), work
+            )
+            steps += 1
+            every += 1
+            was = resting
+            resting = at_standstill(at, frame, size)
+            now = first + (n + 1) * size
+            if resting:
+                at = Motion(at.x, at.y, at.turned, 0.0, 0.0, 0.0)
+                if not was:
+                    stopped_s = now
+            elif math.isnan(moved_s):
+                moved_s = now - size
+            if touch & LANDS and math.isnan(landed_s):
+                landed_s = now
+            if filled < history.shape[1] and (every >= KEEP or resting != was or n == parts - 1):
+                history[0, filled] = now
+                history[1, filled], history[2, filled], history[3, filled] = at.x, at.y, at.turned
+                history[4, filled], history[5, filled], history[6, filled] = at.vx, at.vy, at.spin
+                history[7, filled] = touch
+                filled += 1
+                every = 0
+            if stop_at_landing and not math.isnan(landed_s):
+                return FreeRun(LANDED, now, at, steps, filled, moved_s, landed_s)
+            if at.turned >= frame.backward_rad:
+                return FreeRun(BACKWARD, now, at, steps, filled, moved_s, landed_s)
+            if at.turned <= -frame.forward_rad:
+                return FreeRun(FORWARD, now, at, steps, filled, moved_s, landed_s)
+        if not free:
+            node += 1
+            now = time_s[node]
+
+
+KEEP = 5
+"""Steps between states that are kept."""
+
+
+def work_of(corners: Corners) -> FloatArray:
+    """Return the work arrays of a run."""
+    return np.zeros((9, corners.arm_x.size))

@@ -1,0 +1,214 @@
+"""Several motions, one after another: each finds the block where the one before has left it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.quantity import not_negative
+from rbfrag.solver.results import (
+    BlockState,
+    FloatArray,
+    ModeChange,
+    Outcome,
+    Part,
+    Response,
+    ResponseHistory,
+)
+
+WORST_LAST = (
+    Outcome.STABLE,
+    Outcome.UNDETERMINED,
+    Outcome.SEATED_WITH_GAP,
+    Outcome.CONTACT_LOST,
+    Outcome.INDETERMINATE,
+    Outcome.JUMP,
+    Outcome.TOPPLED,
+)
+"""Outcomes by how much they say against the block."""
+
+STARTS_ANEW = (
+    "a block that topples or rocks carries no state from one motion to the next but damage, which "
+    "no law here describes: each motion finds it at rest in its place"
+)
+
+Run = Callable[[GroundMotion, GroundMotion | None, BlockState | None], Response]
+"""Answers one motion with its vertical one, from a state."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """The motions of a sequence.
+
+    Args:
+        horizontal: horizontal motions, one or more.
+        vertical: the vertical motion of each, or None.
+        gap_s: rest between the end of one and the beginning of the next [s]; None for as long as
+            the block takes to come to rest.
+
+    Raises:
+        InputError: no motion, or not one vertical motion for each; a gap below zero.
+    """
+
+    horizontal: Sequence[GroundMotion]
+    vertical: Sequence[GroundMotion | None] = ()
+    gap_s: float | None = None
+
+    def __post_init__(self) -> None:
+        if not self.horizontal:
+            raise InputError("no motion: give one accelerogram or more")
+        if self.vertical and len(self.vertical) != len(self.horizontal):
+            raise InputError(
+                f"{len(self.horizontal)} motions and {len(self.vertical)} vertical ones: give one "
+                "vertical motion for each (None where there is none), or leave them out"
+            )
+        if self.gap_s is not None:
+            not_negative(self.gap_s, "gap_s", "s")
+
+
+def respond_in_sequence(
+    run: Run, motions: Motions, *, carries_state: bool, start: BlockState | None = None
+) -> Response:
+    """Return what a block does under several motions.
+
+    Args:
+        run: answers one motion.
+        motions: the motions.
+        carries_state: whether the next motion finds the block where the last one left it.
+        start: the state that the first of them finds.
+    """
+    verticals = motions.vertical or [None] * len(motions.horizontal)
+    parts: list[Part] = []
+    warnings = [] if carries_state else [STARTS_ANEW]
+    state, begins_s = start, 0.0
+    for number, (motion, vertical) in enumerate(
+        zip(motions.horizontal, verticals, strict=True), start=1
+    ):
+        if parts and _is_over(parts[-1].response, carries_state):
+            warnings.append(f"motion {number} and later ones are left out: {_why(parts[-1])}")
+            break
+        answer = run(motion, vertical, state)
+        first_s, last_s = float(motion.time_s[0]), float(motion.time_s[-1])
+        begins_s = begins_s if parts else first_s
+        parts.append(Part(begins_s, first_s, motion.label, state, answer))
+        at_rest_s = max(last_s, answer.stopped_s or last_s) - first_s
+        ends_s = at_rest_s if motions.gap_s is None else last_s - first_s + motions.gap_s
+        if ends_s < at_rest_s:
+            warnings.append(
+                f"the block moves for {at_rest_s - (last_s - first_s):.3g} s after motion "
+                f"{number}, longer than the gap: the next one begins when it is at rest"
+            )
+        begins_s += max(ends_s, at_rest_s)
+        state = answer.state if carries_state else None
+    return _together(parts, warnings)
+
+
+def _is_over(response: Response, carries_state: bool) -> bool:
+    """Whether nothing can be said of the next motion."""
+    if carries_state:
+        return response.state is None
+    return response.outcome in (Outcome.TOPPLED, Outcome.JUMP)
+
+
+def _why(part: Part) -> str:
+    outcome = part.response.outcome
+    if outcome is Outcome.STABLE:
+        return "where the one before leaves the block is not known"
+    return f"the one before ends as {outcome.value}. {outcome.advice}"
+
+
+def _together(parts: Sequence[Part], warnings: Sequence[str]) -> Response:
+    """Return the values of a whole sequence."""
+    answers = [part.response for part in parts]
+    outcome = max((answer.outcome for answer in answers), key=WORST_LAST.index)
+    own = (
+        f"motion {number}: {text}"
+        for number, answer in enumerate(answers, start=1)
+        for text in answer.warnings
+    )
+
+    def greatest(name: str) -> Any:
+        values = [getattr(answer, name) for answer in answers]
+        # of a block that has failed a peak is not known
+        return None if None in values and outcome is not Outcome.STABLE else _most(values)
+
+    def clock(name: str) -> list[float]:
+        times = [(_on_clock(part, getattr(part.response, name))) for part in parts]
+        return [time_s for time_s in times if time_s is not None]
+
+    slips = [answer.displacement_m for answer in answers]
+    known_slips = [slip for slip in slips if slip is not None]
+    return replace(
+        answers[-1],
+        outcome=outcome,
+        **{name: greatest(name) for name in _GREATEST},
+        started_s=min(clock("started_s"), default=None),
+        toppled_s=min(clock("toppled_s"), default=None),
+        stopped_s=max(clock("stopped_s"), default=None),
+        **{name: sum(getattr(answer, name) for answer in answers) for name in _SUMS},
+        displacement_m=math.fsum(known_slips) if len(known_slips) == len(slips) else None,
+        impacts=_total([answer.impacts for answer in answers]),
+        sensitive=_any([answer.sensitive for answer in answers]),
+        warnings=(*warnings, *own),
+        mode_changes=tuple(
+            ModeChange(begun, change.motion)
+            for part in parts
+            for change in part.response.mode_changes
+            if (begun := _on_clock(part, change.time_s)) is not None
+        ),
+        history=_histories(parts),
+        parts=tuple(parts),
+    )
+
+
+_GREATEST = (
+    "peak_theta_n", "peak_theta_rad", "peak_displacement_m", "error_estimate", "peak_forward_rad",
+    "peak_backward_rad",
+)  # fmt: skip
+_SUMS = ("steps", "samples_moved", "samples_total")
+
+
+def _most(values: Sequence[float | None]) -> float | None:
+    return max((value for value in values if value is not None), default=None)
+
+
+def _total(values: Sequence[int | None]) -> int | None:
+    known = [value for value in values if value is not None]
+    return sum(known) if known else None
+
+
+def _any(values: Sequence[bool | None]) -> bool | None:
+    known = [value for value in values if value is not None]
+    return any(known) if known else None
+
+
+def _on_clock(part: Part, time_s: float | None) -> float | None:
+    """Return a time of one motion on the clock of the sequence [s]."""
+    if time_s is None:
+        return None
+    return part.begins_s + time_s - part.first_s
+
+
+def _histories(parts: Sequence[Part]) -> ResponseHistory | None:
+    histories = [part.response.history for part in parts]
+    if any(history is None for history in histories):
+        return None
+    joined: dict[str, FloatArray | None] = {}
+    for field in fields(ResponseHistory):
+        columns = [getattr(history, field.name) for history in histories]
+        if any(column is None for column in columns):
+            joined[field.name] = None
+            continue
+        if field.name in ("time_s", "impact_s"):
+            columns = [
+                column + (part.begins_s - part.first_s)
+                for part, column in zip(parts, columns, strict=True)
+            ]
+        joined[field.name] = np.concatenate(columns)
+    return ResponseHistory(**joined)  # type: ignore[arg-type]

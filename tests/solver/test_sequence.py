@@ -1,0 +1,161 @@
+"""Sequences of motions: what one leaves is what the next finds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rbfrag.errors import InputError
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.reports import response_as_dict
+from rbfrag.solver.respond import respond
+from rbfrag.solver.results import Outcome, Response
+from tests.synthetic import shaking
+
+DT_S = 0.01
+
+BLOCKS: dict[str, dict[str, Any]] = {
+    "slides": {"ky": 0.1, "beta_deg": 10.0},
+    "slides, then leans": {
+        "block": Block.from_angles(30.0, 70.0, 1.0), "beta_deg": 20.0, "phi_deg": 38.0,
+    },
+    "slumps": {"block": Block.from_angles(45.0, 65.0, 1.0), "beta_deg": 10.0, "phi_deg": 35.0},
+}  # fmt: skip
+
+
+def motion(seed: int, factor: float = 3.0) -> GroundMotion:
+    """Shaking between two stretches of rest."""
+    quiet = np.zeros(300)
+    return GroundMotion(np.concatenate([quiet, factor * shaking(seed), quiet]), DT_S)
+
+
+def final(answer: Response) -> tuple[float, ...]:
+    state = answer.state
+    assert state is not None
+    return (*state.centroid_m, state.turned_rad, state.displacement_m)
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_one_motion_in_two_parts_is_one_motion(name: str) -> None:
+    # cut where nothing moves: the trajectory is the same
+    first, second = motion(1), motion(2)
+    whole = GroundMotion(np.concatenate([first.acceleration_g, second.acceleration_g[1:]]), DT_S)
+    one = respond(whole, **BLOCKS[name], history=True)
+    two = respond([first, second], **BLOCKS[name], history=True)
+    assert one.displacement_m is not None
+    assert one.displacement_m > 0.005
+    assert [part.response.started_s is not None for part in two.parts] == [True, True]
+    assert final(two) == pytest.approx(final(one), rel=1e-10, abs=1e-12)
+    assert two.displacement_m == pytest.approx(one.displacement_m, rel=1e-10)
+    if one.peak_theta_rad is not None:
+        assert two.peak_theta_rad == pytest.approx(one.peak_theta_rad, rel=1e-10)
+    assert two.peak_displacement_m == pytest.approx(one.peak_displacement_m, rel=1e-10)
+    assert two.started_s == one.started_s
+    assert two.stopped_s == pytest.approx(one.stopped_s, abs=1e-10)
+    assert two.centroid_displacement_m == pytest.approx(one.centroid_displacement_m, rel=1e-10)
+    # and so it is on the way, where both histories have a state
+    assert one.history is not None
+    assert two.history is not None
+    for ours in ("displacement_m", "turned_rad"):
+        there = np.interp(one.history.time_s, two.history.time_s, getattr(two.history, ours))
+        nodes = np.isin(one.history.time_s, whole.time_s)
+        here = getattr(one.history, ours)
+        assert there[nodes] == pytest.approx(here[nodes], abs=1e-10)
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_a_block_that_has_not_moved_answers_to_the_bit(name: str) -> None:
+    weak, strong = motion(1, 0.01), motion(2)
+    alone = response_as_dict(respond(strong, **BLOCKS[name]))
+    both = respond([weak, strong], **BLOCKS[name])
+    after = response_as_dict(both.parts[1].response)
+    assert after == alone
+    assert both.displacement_m == alone["displacement_m"]
+    assert both.parts[0].response.started_s is None
+
+
+def test_values_of_a_sequence() -> None:
+    motions = [motion(1), motion(2), motion(3)]
+    answer = respond(motions, **BLOCKS["slumps"], gap_s=5.0)
+    parts = [part.response for part in answer.parts]
+    assert answer.displacement_m == pytest.approx(sum(part.displacement_m or 0.0 for part in parts))
+    assert answer.peak_theta_rad == max(part.peak_theta_rad or 0.0 for part in parts)
+    assert answer.final_theta_rad == parts[-1].final_theta_rad
+    # a slump is not undone: what one motion leaves, the next finds
+    for before, part in zip(answer.parts, answer.parts[1:], strict=False):
+        assert part.start == before.response.state
+        length_s = float(motions[0].time_s[-1])
+        assert part.begins_s == pytest.approx(before.begins_s + length_s + 5.0)
+    assert answer.samples_total == sum(part.samples_total for part in parts)
+    as_dict = response_as_dict(answer)
+    assert [part["motion"] for part in as_dict["parts"]] == [each.label for each in motions]
+    assert as_dict["parts"][1]["start"] == as_dict["parts"][0]["end"]
+    assert "parts" not in response_as_dict(parts[0])
+
+
+def test_toppling_and_rocking_start_again_from_rest() -> None:
+    for kind in ("toppling", "rocking"):
+        motions = [motion(1, 1.0), motion(2, 1.0)]
+        alone = [respond(each, p2=3.0, kr=0.25, kind=kind) for each in motions]
+        answer = respond(motions, p2=3.0, kr=0.25, kind=kind)
+        assert None not in [each.peak_theta_n for each in alone]
+        assert [part.response.peak_theta_n for part in answer.parts] == [
+            each.peak_theta_n for each in alone
+        ]
+        assert any("carries no state" in text for text in answer.warnings)
+        assert answer.displacement_m is None
+    fallen = respond([motion(1, 20.0), motion(2)], p2=3.0, kr=0.05)
+    assert fallen.outcome is Outcome.TOPPLED
+    assert len(fallen.parts) == 1
+    assert fallen.peak_theta_n is None
+    assert any("left out" in text for text in fallen.warnings)
+
+
+def test_a_block_still_in_motion_is_waited_for() -> None:
+    # the record stops in its strongest pulse: the slide goes on after it
+    cut = GroundMotion.from_nodes([0.0, 0.5, 0.5], [0.0, 1.0, 0.0])
+    answer = respond([cut, motion(2)], ky=0.05, gap_s=0.0)
+    first, second = answer.parts
+    assert first.response.stopped_s is not None
+    assert first.response.stopped_s > 0.6
+    assert second.begins_s == pytest.approx(first.response.stopped_s)
+    assert any("longer than the gap" in text for text in answer.warnings)
+
+
+def test_a_run_from_a_state() -> None:
+    block = BLOCKS["slides, then leans"]
+    first = respond(motion(1), **block)
+    assert first.state is not None
+    assert first.state.gap_m > 0.0
+    assert set(first.state.touching) == {"heel on the base", "upper back corner on the back plane"}
+    second = respond(motion(2), **block, start=first.state)
+    together = respond([motion(1), motion(2)], **block)
+    assert final(second) == final(together)
+
+
+@pytest.mark.parametrize(
+    ("motions", "options", "word"),
+    [
+        ([], {}, "no motion"),
+        (motion(1), {"gap_s": 1.0}, "goes with a list"),
+        ([motion(1)], {"gap_s": -1.0}, "negative"),
+        ([motion(1), motion(2)], {"vertical": [None]}, "one vertical motion for each"),
+        ([motion(1), motion(2)], {"vertical": motion(1)}, "it is a list, too"),
+        (motion(1), {"vertical": [motion(1)]}, "one vertical motion"),
+    ],
+)
+def test_what_is_refused(
+    motions: GroundMotion | Sequence[GroundMotion], options: dict[str, Any], word: str
+) -> None:
+    with pytest.raises(InputError, match=word):
+        respond(motions, ky=0.1, **options)
+
+
+def test_a_state_of_a_block_that_carries_none() -> None:
+    slid = respond(motion(1), ky=0.1).state
+    with pytest.raises(InputError, match="start does not go with toppling"):
+        respond(motion(1), p2=3.0, kr=0.1, start=slid)
