@@ -58,6 +58,22 @@ def rate_in_words(document: Mapping[str, Any]) -> str:
     )
 
 
+def response_in_words(answer: Mapping[str, Any], advice: str) -> Iterator[str]:
+    """Yield how a run ended, with the number that decides.
+
+    Args:
+        answer: an answer of `rbfrag respond` under the keys of the JSON contract.
+        advice: what its outcome means.
+    """
+    at_s = answer.get("toppled_s")
+    yield advice if at_s is None else f"At {at_s:.2f} s the block topples. {advice}"
+    if answer.get("peak_theta_n") is not None:
+        ratio = answer["peak_theta_n"]
+        yield f"Its greatest rotation is {percent(ratio)} of the critical angle."
+    if answer.get("displacement_m") is not None:
+        yield f"It is displaced by {rounded(answer['displacement_m'])} m."
+
+
 def critical_in_words(answer: Mapping[str, Any]) -> str:
     """Return what a search has found.
 

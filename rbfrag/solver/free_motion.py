@@ -20,10 +20,13 @@ from rbfrag.solver.integrator.free_body import (
     AT_REST,
     BACKWARD,
     FORWARD,
+    HEEL,
     LANDED,
-    LANDS,
+    ON_BACK,
+    ON_BASE,
     ROWS,
     THROWN,
+    TOE,
     Corners,
     Frame,
     FreeRun,
@@ -124,7 +127,7 @@ class FreeMotion:
     @cached_property
     def changes(self) -> tuple[ModeChange, ...]:
         """What the block did."""
-        return _changes(self.block, self.rows)
+        return _changes(self.rows)
 
 
 def free_motion(
@@ -236,6 +239,8 @@ def _corners(site: BlockOnPlanes, block: Block) -> Corners:
     offs = [float((from_heel @ np.array(normal)).min()) for normal in normals]
     n = len(arms)
     friction = (math.tan(site.phi_rad), math.tan(site.phi_back_rad))
+    named = {block.heel: HEEL, block.toe: TOE}
+    bits = [named.get(arm, ON_BASE) for arm in block.outline] + [ON_BACK] * (planes - 1) * n
 
     def both(values: list[float] | tuple[float, ...]) -> FloatArray:
         return np.repeat(np.array(values[:planes], dtype=np.float64), n)
@@ -247,6 +252,7 @@ def _corners(site: BlockOnPlanes, block: Block) -> Corners:
         both([y for _, y in normals]),
         both(offs),
         both(friction),
+        np.array(bits, dtype=np.float64),
     )
 
 
@@ -303,22 +309,18 @@ ON_HEEL = "tips about its heel"
 CLIMBS = "is driven back against its back plane"
 ROCKS = "rocks about its toe"
 CONFINED = "topples against its back plane"
-ON_BACK = "slides on its back plane"
+ALONG_BACK = "slides on its back plane"
 OFF = "is off both planes"
 
 
-def _changes(block: Block, rows: FloatArray) -> tuple[ModeChange, ...]:
+def _changes(rows: FloatArray) -> tuple[ModeChange, ...]:
     """Return what the block did, one entry where it does something else than before."""
-    n = len(block.outline)
-    heel, toe = (block.outline.index(corner) for corner in (block.heel, block.toe))
     changes: list[ModeChange] = []
     since, doing, last = 0.0, "", ""
     for now, vx, vy, spin, bits in zip(rows[0], rows[4], rows[5], rows[6], rows[7], strict=True):
-        touch = int(bits) & ~LANDS
         if vx == 0.0 and vy == 0.0 and spin == 0.0:
             continue
-        base, back = touch & ((1 << n) - 1), touch >> n
-        name = _named(base, back, 1 << heel, 1 << toe, spin)
+        name = _named(int(bits), spin)
         if name != doing:
             since, doing = float(now), name
         if doing != last and now - since >= SHORTEST_S:
@@ -327,17 +329,17 @@ def _changes(block: Block, rows: FloatArray) -> tuple[ModeChange, ...]:
     return tuple(changes)
 
 
-def _named(base: int, back: int, heel: int, toe: int, spin: float) -> str:
-    """Return what a moving block does, by the corners that touch its planes."""
-    if base & heel and base & toe:
+def _named(touch: int, spin: float) -> str:
+    """Return what a moving block does, by what touches its planes."""
+    if touch & HEEL and touch & TOE:
         return SLIDES
-    if base & heel:
-        if back:
+    if touch & HEEL:
+        if touch & ON_BACK:
             return SLUMPS if spin > 0.0 else CLIMBS
         return ON_HEEL
-    if base:
-        return CONFINED if back else ROCKS
-    return ON_BACK if back else OFF
+    if touch & (TOE | ON_BASE):
+        return CONFINED if touch & ON_BACK else ROCKS
+    return ALONG_BACK if touch & ON_BACK else OFF
 
 
 _MOMENT_S = 1e-6

@@ -17,6 +17,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import WAYS, BlockOptions, UncertaintyOptions
 from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.sentences import response_in_words
 from rbfrag.errors import InputError
 from rbfrag.solver.described import TAKEN_NOT_TO_SLIP, TAKEN_TO_TOPPLE, toppling_rectangle
 
@@ -30,6 +31,12 @@ _PART = (
     "started_s", "stopped_s",
 )  # fmt: skip
 """What is told of each motion of several; all of it with --json."""
+
+SHORT = (
+    "kind", "outcome", "peak_theta_n", "critical_angle_deg", "displacement_m",
+    "started_s", "toppled_s", "stopped_s", "impacts", "sensitive",
+)  # fmt: skip
+"""Values that are shown without --verbose."""
 
 EXAMPLE = "Example:  rbfrag respond record.AT2 --p2 3 --kr 0.1 --plot response.png"
 
@@ -137,7 +144,7 @@ def respond(
         "that of the block's failure mode; of a block that topples with --no-back, rocking."
     ),
     db: options.Db = None,
-    json: options.Json = False,
+    printing: options.Printing,
 ) -> None:
     """Run one block under one accelerogram.
 
@@ -174,7 +181,9 @@ def respond(
             displacement_m=drawn.displacement,
             **{"restitution": rocking.restitution, **possible},
         )
-        _show_shares(replace(shares, warnings=(*about, *remarks, *shares.warnings)), json=json)
+        _show_shares(
+            replace(shares, warnings=(*about, *remarks, *shares.warnings)), json=printing.json
+        )
         return
     body, what, remarks = _body(block, ky, kind)
     if files.film is not None:
@@ -226,19 +235,22 @@ def respond(
             title=title,
         )  # fmt: skip
     answer = response_as_dict(response)
-    if json:
+    if printing.json:
         print_json(answer)
         return
     answer.pop("warnings")
     changes = answer.pop("mode_changes")
     parts = answer.pop("parts", [])
-    print_pairs({name: value for name, value in answer.items() if value is not None})
+    for sentence in response_in_words(answer, response.outcome.advice):
+        print(sentence)
+    print()
+    shown = answer if printing.verbose else {name: answer.get(name) for name in SHORT}
+    print_pairs({name: value for name, value in shown.items() if value is not None})
     if parts:
         print()
         print_table(_PART, [[part[name] for name in _PART] for part in parts])
     for change in changes:
         print(f"from {change['time_s']:.6g} s on the block {change['motion']}")
-    print(response.outcome.advice)
     print_warnings(response.warnings)
 
 

@@ -25,8 +25,9 @@ AT_REST, BACKWARD, FORWARD, THROWN, ENDLESS, LANDED = range(6)
 """How a run ends: at rest to the end; on its back edge; on its front face; by a jump of the ground;
 not within `FREE_MOST_S` of rest after the record; by an impact of its whole base."""
 
-LANDS = 1 << 30
-"""Bit of a step in which the block falls on its whole base."""
+HEEL, TOE, ON_BASE, ON_BACK, LANDS = 1, 2, 4, 8, 16
+"""Bits of what touches in a step: heel and toe on the base, another corner there, any corner on the
+back plane; and that the block falls on its whole base."""
 
 LANDING_M_S = 1e-3
 """Speed of a corner from which its impact counts as one."""
@@ -54,6 +55,7 @@ class Corners(NamedTuple):
         normal_y: the other component.
         off_m: distance of the plane from the origin along its normal [m].
         friction: tangent of its friction angle.
+        bit: what it means where they touch: `HEEL`, `TOE`, `ON_BASE` or `ON_BACK`.
     """
 
     arm_x: FloatArray
@@ -62,6 +64,7 @@ class Corners(NamedTuple):
     normal_y: FloatArray
     off_m: FloatArray
     friction: FloatArray
+    bit: FloatArray
 
 
 class Frame(NamedTuple):
@@ -116,7 +119,7 @@ class FreeRun(NamedTuple):
 
 
 ROWS = 8
-"""Rows of a history: time, the six numbers of :class:`Motion`, and the corners in touch as bits."""
+"""Rows of a history: time, the six numbers of :class:`Motion`, and what touches, as bits."""
 
 
 @inner_kernel
@@ -129,7 +132,7 @@ def one_step(
     w: float,
     work: FloatArray,
 ) -> tuple[Motion, int]:
-    """Take one step; return where it leads and which corners touched, as bits.
+    """Take one step; return where it leads and what touched, as bits.
 
     Args:
         corners: pairs of corner and plane.
@@ -202,8 +205,8 @@ def one_step(
     for k in range(active):
         i = int(work[2, k])
         if across[i] > 0.0:
-            touch |= 1 << i
-            if corners.normal_x[i] == 0.0:
+            touch |= int(corners.bit[i])
+            if corners.bit[i] != ON_BACK:
                 on_base += 1
                 hardest = max(hardest, work[8, k])
     if on_base > 1 and hardest > LANDING_M_S:
