@@ -4,13 +4,17 @@
 PYTHON ?= python3
 VENV ?= .venv
 
+FLOORS ?= .venv-floors
+CORE := tests/cli tests/db tests/exchange tests/fragility tests/hazards tests/motions tests/plots \
+  tests/rockmasses tests/solver
+
 BIN := $(VENV)/bin
 RUN := $(BIN)/python -m
 PIP := $(RUN) pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint types docs unit format cli-reference wheel clean
+.PHONY: help demo test lint types docs unit floors format cli-reference wheel clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 16
@@ -39,6 +43,16 @@ docs: $(VENV)/.installed-dev  ## the documentation, into docs/_build/html
 # The folder of matplotlib's settings is given because HOME may not be writable.
 unit: $(VENV)/.installed-dev  ## the tests alone, one process a core
 	MPLCONFIGDIR="$$(cd $(VENV) && pwd)/matplotlib" $(RUN) pytest -n auto
+
+# Not part of .ci/run, which stays below 25 minutes. Warnings of old libraries about each other are none of ours.
+floors:  ## the core of the tests with the lowest versions that are allowed
+	$(PYTHON) -m venv --clear $(FLOORS)
+	$(PYTHON) benchmarks/floors.py > $(FLOORS)/floors.txt
+	$(FLOORS)/bin/python -m pip install --quiet --disable-pip-version-check \
+	  --constraint $(FLOORS)/floors.txt \
+	  '.[plot,postgres,parquet,gis,dask,mesh,service]' pytest pytest-xdist hypothesis httpx2
+	MPLCONFIGDIR="$$(cd $(FLOORS) && pwd)/matplotlib" $(FLOORS)/bin/python -m pytest \
+	  -o filterwarnings=default --disable-warnings -n auto $(CORE)
 
 format: $(VENV)/.installed-dev  ## put the source in the style that lint asks for
 	$(RUN) ruff check --fix .

@@ -1,9 +1,9 @@
 """Several blocks in one earthquake, in closed form: how many fail, and whether any does.
 
 The law is the normal copula of :mod:`rbfrag.fragility.dependence`. Means and variances of counts
-are exact; the probability of any failure and quantiles of a count are those of the beta-binomial
-distribution with the same mean and variance. Samples are drawn in
-:mod:`rbfrag.fragility.joint_sampling`.
+are exact. The beta-binomial distribution of the same mean and variance is a cheap stand-in for that
+of the count, where thousands are wanted; :mod:`rbfrag.fragility.joint_law` has the law itself.
+Samples are drawn in :mod:`rbfrag.fragility.joint_sampling`.
 """
 
 from __future__ import annotations
@@ -221,25 +221,6 @@ def count_moments(
     p, w = checked(probability, blocks, weights)
     mean, variance = _moments(p, w, blocks, dependence)
     return float(mean), float(variance)
-
-
-def any_failure(probability: ArrayLike, blocks: Placement, dependence: Dependence) -> FloatArray:
-    """Return the probability that at least one block fails, for many sets of P at once.
-
-    That of the beta-binomial law of `FailureCount`.
-
-    Args:
-        probability: P of each block, shape (..., n).
-        blocks: where they stand.
-        dependence: the copula.
-
-    Returns:
-        Probabilities of shape (...).
-    """
-    p = np.asarray(probability, dtype=np.float64)
-    _, w = checked(np.zeros(p.shape[-1:]), blocks, None)
-    mean, variance = _moments(p, w, blocks, dependence)
-    return _probability_any(blocks.size, mean, variance, p.max(axis=-1, initial=0.0))
 
 
 def _moments(

@@ -107,7 +107,7 @@ def rebuild_table(
             sa.UniqueConstraint(*unique["column_names"], name=op.f(str(unique["name"])))
             for unique in inspector.get_unique_constraints(name)
         ),
-        sqlite_with_rowid=inspector.get_table_options(name).get("sqlite_with_rowid", True),
+        sqlite_with_rowid=_has_rowid(connection, name),
     )
     listed = ", ".join(columns)
     op.execute(f"INSERT INTO {name}_rebuilt ({listed}) SELECT {listed} FROM {name}")
@@ -115,3 +115,9 @@ def rebuild_table(
     op.rename_table(f"{name}_rebuilt", name)
     for statement in indexes:
         op.execute(statement)
+
+
+def _has_rowid(connection: sa.Connection, name: str) -> bool:
+    # SQLAlchemy's inspector tells it from 2.1 on
+    query = sa.text("SELECT sql FROM sqlite_master WHERE type = 'table' AND name = :name")
+    return "WITHOUT ROWID" not in str(connection.scalar(query, {"name": name})).upper()

@@ -18,7 +18,6 @@ from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import (
     FailureCount,
     Placement,
-    any_failure,
     bivariate_normal,
     count_moments,
     joint_excess,
@@ -126,22 +125,6 @@ def test_any_failure_is_near_that_of_samples() -> None:
         found = FailureCount.of(p, blocks, LAW).probability_any
         sampled = (JointSampler(LAW, blocks).counts(p, 50_000, random) > 0).mean()
         assert found == pytest.approx(sampled, abs=0.04)
-
-
-def test_any_failure_of_many_sets_is_that_of_each() -> None:
-    blocks = anywhere(7, 4)
-    p = np.random.default_rng(4).uniform(0.0, 1.0, (3, 5, 7)) ** 4
-    p[0, 0], p[0, 1], p[0, 2] = 0.0, 1.0, 1e-300
-    together = any_failure(p, blocks, LAW)
-    assert together.shape == (3, 5)
-    for i, j in np.ndindex(3, 5):
-        alone = FailureCount.of(p[i, j], blocks, LAW).probability_any
-        assert together[i, j] == pytest.approx(alone, rel=1e-12, abs=0.0)
-    same = Dependence(1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0)
-    two = Placement.of([0.5, 0.5], [0.0, 0.0], polarity=0)
-    each = np.array([0.0, 1e-320, 1e-300, 1e-20, 0.3, 1.0 - 1e-10, 1.0])
-    one_or_both = any_failure(np.stack([each, each], axis=-1), two, same)
-    np.testing.assert_allclose(one_or_both, each, rtol=1e-7, atol=1e-300)
 
 
 def test_count_has_the_given_mean_and_variance() -> None:
