@@ -151,8 +151,8 @@ class ModelListed(_Document):
     """A stored model: what `rbfrag models list --json` prints.
 
     `log_loss` is that of outcomes of earthquakes left out, the smaller the better among models of a
-    kind; `sensitive_share` is the share of the simulated outcomes behind it that a change of the motion
-    by a millionth changes; null of kinds of which that is not asked.
+    kind; `sensitive_share` is the share of the simulated outcomes behind it that a change of the
+    motion by a millionth changes; null of kinds of which that is not asked.
     """
 
     name: str
