@@ -237,7 +237,7 @@ def openquake_curves(text: str, source: str) -> list[HazardCurve]:
                 f"{where}: {poe[wrong][0]:g} is no probability: poe lies between 0 and 1"
             )
         place_of = {name: row[i].strip() for i, name in enumerate(names)}
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             rates = rates_from_probabilities(poe, years)
         curves.append(
             hazard_curve(
@@ -335,7 +335,7 @@ def table_curves(text: str, source: str) -> list[HazardCurve]:
             )
     rates = np.array(values)
     if years is not None:
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             rates = rates_from_probabilities(rates, years)
     return [hazard_curve(measure, levels, rates, source=source, period_s=period)]
 
