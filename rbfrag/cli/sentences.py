@@ -74,6 +74,32 @@ def response_in_words(answer: Mapping[str, Any], advice: str) -> Iterator[str]:
         yield f"It is displaced by {rounded(answer['displacement_m'])} m."
 
 
+MOVES = {
+    "slide": "slides",
+    "topple": "topples",
+    "slump": "slumps",
+    "confined_topple": "topples against its back plane",
+}
+"""What a block does by its failure mode."""
+
+
+def block_in_words(answer: Mapping[str, Any]) -> str:
+    """Return how a block fails, and from which acceleration on.
+
+    Args:
+        answer: an answer of `rbfrag block` under the keys of the JSON contract.
+    """
+    moves = MOVES.get(answer["mode"], answer["mode"])
+    if answer["state"] == "locked":
+        return f"The block {moves} if at all: no horizontal acceleration moves it."
+    if answer["state"] == "unstable":
+        return f"The block {moves} at rest, without any earthquake."
+    return (
+        f"The block {moves} where the ground's horizontal acceleration exceeds "
+        f"{rounded(answer['yield_acceleration'])} g."
+    )
+
+
 def critical_in_words(answer: Mapping[str, Any]) -> str:
     """Return what a search has found.
 

@@ -92,11 +92,16 @@ def test_no_back_and_cohesion(shell: Shell) -> None:
 
 
 def test_table_for_people(shell: Shell) -> None:
-    result = shell("block", *ANGLES, *PLANES)
+    short = shell("block", *ANGLES, *PLANES).stdout
+    assert short.startswith("The block topples where the ground's horizontal acceleration exceeds")
+    assert "changes by" not in short
+    result = shell("block", *ANGLES, *PLANES, "--verbose")
     assert "topple" in result.stdout
     assert "slide if phi changes by -10 deg" in result.stdout
     assert "warning: friction on the back plane" in result.stderr
-    bonded = shell("block", *ANGLES, *PLANES, "--cohesion", "5000", "--density", "2700")
+    bonded = shell(
+        "block", *ANGLES, *PLANES, "--cohesion", "5000", "--density", "2700", "--verbose"
+    )
     assert "cohesion_phi_equivalent_deg" in bonded.stdout
 
 

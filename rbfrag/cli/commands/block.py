@@ -8,6 +8,7 @@ from rbfrag.cli.output import check_files, print_json, print_pairs, print_table,
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import WAYS, MeshOptions, ShapeOptions
 from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.sentences import block_in_words
 from rbfrag.errors import InputError
 from rbfrag.solver.stability.modes import ModeName
 
@@ -17,6 +18,10 @@ FREE_STANDING = (
 )
 
 EXAMPLE = "Example:  rbfrag block --s1 1 --s2 0.6 --gamma 25 --beta 20 --phi 40"
+
+
+SHORT = ("mode", "p2", "kr", "ky", "ks", "kct", "alpha1_deg", "alpha3_deg", "gamma_deg")
+"""Values that are shown without --verbose."""
 
 
 @stacked
@@ -31,7 +36,7 @@ def block(
         "Draw the block on its planes with its contacts and the resultant at yield, or the "
         "contacts of a mesh and k_r over azimuth (.png, .pdf, .svg)."
     ),
-    json: options.Json = False,
+    printing: options.Printing,
 ) -> None:
     """Print a block's failure mode, yield accelerations and size.
 
@@ -42,7 +47,7 @@ def block(
     restitution about its contacts with the ground.
     """
     if mesh.mesh is not None:
-        _mesh(mesh.mesh, mesh, density, plot, json=json)
+        _mesh(mesh.mesh, mesh, density, plot, json=printing.json)
         return
     from rbfrag.solver.stability.single import stability, stability_as_dict
 
@@ -64,17 +69,24 @@ def block(
 
         plot_block(body, result, plot)
     answer = stability_as_dict(body, result)
-    if json:
+    if printing.json:
         print_json(answer)
         return
     answer.pop("warnings")
     margins = answer.pop("margins")
     bond = answer.pop("cohesion")
-    print_pairs(answer | {f"cohesion_{name}": value for name, value in (bond or {}).items()})
-    for margin in margins:
-        print(
-            f"{margin['mode']} if {margin['variable']} changes by {margin['change_deg']:+.6g} deg"
-        )
+    answer |= {f"cohesion_{name}": value for name, value in (bond or {}).items()}
+    print(block_in_words(answer))
+    print()
+    if printing.verbose:
+        print_pairs(answer)
+        for margin in margins:
+            print(
+                f"{margin['mode']} if {margin['variable']} changes by "
+                f"{margin['change_deg']:+.6g} deg"
+            )
+    else:
+        print_pairs({name: answer[name] for name in SHORT if answer[name] is not None})
     print_warnings(result.warnings)
 
 
