@@ -39,6 +39,7 @@ EXCEPTIONS = {
     "DatabaseNotFoundError": "a public error: scripts catch it by this name",
     "found": {
         "campaign/simulate.py": "a key of the JSON answer of `simulate`",
+        "db/queries.py": "the same of `db info --by suite`",
     },
     "FOUND_HAS_VALUE": "about the stored status `found`",
 }

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sqlalchemy import Connection, RowMapping, Select, and_, case, func, select
+from sqlalchemy import ColumnElement, Connection, RowMapping, Select, and_, case, func, select
 
 from rbfrag.db.location import SCHEMA_REVISION
 from rbfrag.db.motions import require_suite
@@ -23,6 +23,7 @@ from rbfrag.db.schema import (
     simulation,
     suite_motion,
 )
+from rbfrag.db.schema import suite as suite_table
 from rbfrag.db.stored_json import stored_json, stored_number
 from rbfrag.errors import InputError
 from rbfrag.motions.quality import PGD_IN_DOUBT
@@ -50,6 +51,30 @@ class DatabaseInfo:
     combinations_by_status: dict[str, int]
     numerics_versions: tuple[str, ...]
     default_model: str | None
+
+
+@dataclass(frozen=True)
+class SuiteCount:
+    """What a database holds of one suite and one kind of response, as in the dissertation's
+    Table 4.2.
+
+    Args:
+        suite: name of the suite; None for the motions that are in none.
+        kind: response kind; None for a suite of which nothing was searched.
+        motions: number of its horizontal motions, whether they were searched or not.
+        combinations: number of stored combinations, of all versions of the numerics.
+        found: of these, those with a critical value.
+        below_limit: of these, those in which nothing fails down to the search limit.
+        vertical: of these, those with a vertical motion beside the horizontal one.
+    """
+
+    suite: str | None
+    kind: str | None
+    motions: int
+    combinations: int
+    found: int
+    below_limit: int
+    vertical: int
 
 
 def combination_table(
@@ -230,6 +255,53 @@ def database_info(connection: Connection, *, kind: str = "toppling") -> Database
             )
         ),
     )
+
+
+def suite_counts(connection: Connection) -> tuple[SuiteCount, ...]:
+    """Return what the database holds of every suite and kind, by name.
+
+    A motion that is in several suites counts in each, so that columns need not add up to the
+    numbers of rows.
+
+    References:
+        Gibson's dissertation, Table 4.2.
+    """
+    name = suite_table.c.name
+    motions = dict.fromkeys(connection.scalars(select(name)), 0)
+    in_suite = (
+        select(name, func.count())
+        .select_from(motion.outerjoin(suite_motion).outerjoin(suite_table))
+        .where(motion.c.is_vertical.is_(False))
+        .group_by(name)
+    )
+    motions.update((row[0], row[1]) for row in connection.execute(in_suite))
+
+    def number(condition: ColumnElement[bool]) -> ColumnElement[int]:
+        return func.sum(case((condition, 1), else_=0))
+
+    searched = (
+        select(
+            name,
+            combination.c.kind,
+            func.count(),
+            number(combination.c.status == "found"),
+            number(combination.c.status == "below_limit"),
+            number(combination.c.vertical_motion_id.is_not(None)),
+        )
+        .select_from(
+            combination.outerjoin(
+                suite_motion, suite_motion.c.motion_id == combination.c.motion_id
+            ).outerjoin(suite_table)
+        )
+        .group_by(name, combination.c.kind)
+    )
+    counts = [
+        SuiteCount(row[0], row[1], motions.get(row[0], 0), *map(int, row[2:]))
+        for row in connection.execute(searched)
+    ]
+    without = motions.keys() - {count.suite for count in counts}
+    counts += [SuiteCount(suite, None, motions[suite], 0, 0, 0, 0) for suite in without]
+    return tuple(sorted(counts, key=lambda c: (c.suite is None, c.suite or "", c.kind or "")))
 
 
 def _pgd_in_doubt(row: RowMapping) -> bool:

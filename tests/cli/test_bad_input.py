@@ -66,6 +66,10 @@ def test_no_database(refuses: Refuses, tmp_path: Path) -> None:
     assert not list(tmp_path.glob("*.db"))
 
 
+def test_counts_by_something_else(refuses: Refuses) -> None:
+    assert "'kind'" in refuses("db", "info", "--by", "kind")
+
+
 def test_without_a_database_the_reference_answers_and_says_so(shell: Shell) -> None:
     found = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
     assert any("reference model" in text for text in found["warnings"])

@@ -117,6 +117,12 @@ def test_from_files_to_a_probability(shell: Shell, tmp_path: Path) -> None:
     assert shell.json("models", "list")[0]["is_default"] is True
     assert shell.json("models", "show", "wls-pgv")["coefficients"] == report["coefficients"]
     assert shell.json("db", "info")["rows"]["combination"] == 24
+    (row,) = shell.json("db", "info", "--by", "suite")["suites"]
+    assert (row["suite"], row["kind"], row["combinations"]) == ("made-up", "toppling", 24)
+    assert (row["motions"], row["vertical"], row["found"]) == (6, 0, summary["found"])
+    printed = shell("db", "info", "--by", "suite").stdout.split()
+    assert printed[:3] == ["suite", "kind", "motions"]
+    assert "made-up" in printed
     checked = shell.json("db", "check")
     assert (checked["sound"], checked["findings"]) == (True, [])
     assert checked["resimulated"]["exact"] == checked["resimulated"]["sampled"] > 0

@@ -21,8 +21,8 @@ from rbfrag.db.campaigns import (
 )
 from rbfrag.db.engine import opened_database
 from rbfrag.db.keys import combination_key
-from rbfrag.db.motions import add_motion
-from rbfrag.db.queries import combination_table, database_info
+from rbfrag.db.motions import add_motion, add_to_suite
+from rbfrag.db.queries import SuiteCount, combination_table, database_info, suite_counts
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.stored_combination import stored_combination
 from rbfrag.errors import InputError
@@ -252,6 +252,38 @@ class TestTables:
         assert info.numerics_versions == (NUMERICS_VERSION,)
         assert info.default_model is None
         assert info.dialect == filled.dialect.name
+
+    def test_by_suite(
+        self, filled: Engine, make_motion: Any, make_result: Any, store_result: Any
+    ) -> None:
+        motion, up, idle = (make_motion(seed) for seed in (4, 5, 6))
+        with filled.begin() as connection:
+            ids = [
+                add_motion(connection, each, earthquake=QUAKE, is_vertical=vertical, suite=suite)[0]
+                for each, vertical, suite in (
+                    (motion, False, "t"),
+                    (up, True, "t"),
+                    (idle, False, "not searched"),
+                )
+            ]
+            add_to_suite(connection, "s", ids[0])
+            campaign = start_campaign(connection, {})
+            result = make_result(motion.pga_g)
+            store_result(connection, campaign, motion, ids[0], result, vertical=(ids[1], up))
+        with filled.connect() as connection:
+            counts = suite_counts(connection)
+        # Motions 1 and 2 of suite s and motion 3 of none have a found and a censored search each;
+        # the new motion, in s and t, has one with its vertical component.
+        assert counts == (
+            SuiteCount("not searched", None, 1, 0, 0, 0, 0),
+            SuiteCount("s", "toppling", 3, 5, 3, 2, 1),
+            SuiteCount("t", "toppling", 1, 1, 1, 0, 1),
+            SuiteCount(None, "toppling", 1, 2, 1, 1, 0),
+        )
+
+    def test_by_suite_of_an_empty_database(self, engine: Engine) -> None:
+        with engine.connect() as connection:
+            assert suite_counts(connection) == ()
 
 
 class TestEqualDatabases:

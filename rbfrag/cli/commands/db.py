@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict
+from collections.abc import Iterable
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING
 
 import typer
 
 from rbfrag.cli.output import print_json, print_pairs, print_table, say_when_compiling
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import argument, command_group, option, stacked
+from rbfrag.errors import InputError
+
+if TYPE_CHECKING:
+    from rbfrag.db.queries import DatabaseInfo, SuiteCount
 
 app = command_group(
     "Upgrade, describe, check, export and merge databases.",
@@ -31,14 +37,28 @@ def upgrade(db: options.Db = None, json: options.Json = False) -> None:
         print(f"schema {before} upgraded to {after}")
 
 
-@app.command("info", epilog="Example:  rbfrag db info --json")
-def info(db: options.Db = None, json: options.Json = False) -> None:
-    """Print the schema, the number of rows and the default model."""
+@app.command("info", epilog="Example:  rbfrag db info --by suite")
+@stacked
+def info(
+    *,
+    db: options.Db = None,
+    by: str | None = option("suite: what was searched and found of each suite instead."),
+    json: options.Json = False,
+) -> None:
+    """Print the schema, the number of rows and the default model, or the results by suite."""
     from rbfrag.db.engine import opened_database
-    from rbfrag.db.queries import database_info
+    from rbfrag.db.queries import database_info, suite_counts
 
+    if by not in (None, "suite"):
+        raise InputError(f"--by {by!r}: the one thing to count by is suite")
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        content = database_info(connection)
+        if by is None:
+            _print_info(database_info(connection), json=json)
+        else:
+            _print_suites(suite_counts(connection), json=json)
+
+
+def _print_info(content: DatabaseInfo, *, json: bool) -> None:
     if json:
         print_json(asdict(content))
         return
@@ -55,6 +75,17 @@ def info(db: options.Db = None, json: options.Json = False) -> None:
     if content.combinations_by_status:
         print()
         print_table(("combinations", "number"), content.combinations_by_status.items())
+
+
+def _print_suites(counts: Iterable[SuiteCount], *, json: bool) -> None:
+    from rbfrag.db.queries import SuiteCount
+
+    rows = [asdict(count) for count in counts]
+    if json:
+        print_json({"suites": rows})
+    else:
+        columns = [field.name for field in fields(SuiteCount)]
+        print_table(columns, [tuple(row.values()) for row in rows])
 
 
 @app.command("check", epilog="Example:  rbfrag db check --sample 100 --seed 7")
