@@ -220,11 +220,14 @@ def record_case(records_dir: Path, record: str, case: Case) -> tuple[Response, S
 def test_slump_under_a_record(record: str, records_dir: Path) -> None:
     answer, free, until_s = record_case(records_dir, record, REAL_SLUMPS[record])
     assert answer.kind == "slumping"
-    assert answer.peak_theta_rad is not None
-    assert answer.peak_theta_rad > 0.01
-    here = free.time_s <= until_s
-    assert free.turned_rad[here].max() == pytest.approx(answer.peak_theta_rad, rel=1e-3)
-    assert deviation(answer, free, until_s) < 1e-3 * answer.peak_theta_rad
+    assert answer.history is not None
+    # up to where it leaves the plane, or to the end; what follows is in benchmarks.followed_on
+    peak = float(answer.history.theta_rad[answer.history.time_s <= until_s].max())
+    assert peak > 0.01
+    if not answer.mode_changes:
+        assert peak == answer.peak_theta_rad
+    assert free.turned_rad[free.time_s <= until_s].max() == pytest.approx(peak, rel=1e-3)
+    assert deviation(answer, free, until_s) < 1e-3 * peak
 
 
 @pytest.mark.parametrize("record", ["CHY028-N.AT2", "CHY080-N.AT2"])
@@ -237,5 +240,5 @@ def test_confined_under_a_record(record: str, records_dir: Path) -> None:
     assert peak > 0.02
     assert deviation(answer, free, until_s, sign=-1.0) < 1e-3 * peak
     # it comes back on its base, and what it does there with a gap at the heel is not known
-    assert answer.outcome is Outcome.CONTACT_LOST
+    assert answer.outcome is Outcome.SEATED_WITH_GAP
     assert answer.displacement_m is None
