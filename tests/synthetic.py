@@ -52,3 +52,10 @@ def write_suite(folder: Path, count: int = 6) -> Path:
             station=f"S{seed}",
         )
     return folder
+
+
+def unknown_spectrum(n: int) -> dict[str, np.ndarray]:
+    """Return the columns of spectral accelerations of n motions of which none is known."""
+    from rbfrag.db.rows import SPECTRAL_COLUMNS
+
+    return {name: np.full(n, np.nan) for name in SPECTRAL_COLUMNS}

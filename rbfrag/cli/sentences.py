@@ -100,6 +100,40 @@ def block_in_words(answer: Mapping[str, Any]) -> str:
     )
 
 
+def rock_mass_in_words(document: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how the blocks of a rock mass fail, and how many under the shaking that is given.
+
+    Args:
+        document: an answer of `rbfrag rockmass` under the keys of the JSON contract.
+    """
+    shares = {name: tally["share"] for name, tally in document["modes"].items()}
+    most = sorted((name for name in shares if shares[name] > 0.0), key=lambda n: -shares[n])
+    parts = [f"{percent(shares[name])} would {_MODE_VERBS.get(name, name)}" for name in most]
+    yield f"Of {document['blocks']:,} blocks {' and '.join(parts) or 'none could fail'}."
+    answer, shaking = document["scenario"], document["shaking"]
+    if answer is not None and answer["covered_only"]["probability"] is not None:
+        total = answer["covered_only"]
+        yield (
+            f"Under this shaking {percent(total['probability'])} of the blocks that there is a "
+            f"model for fail ({percent(total['ci_low'])} to {percent(total['ci_high'])}); these "
+            f"are {percent(answer['covered_share'])} of all."
+        )
+    for scale in () if shaking is None else shaking["scales"]:
+        of_all = scale["all"]["fails_of_all"]
+        yield (
+            f"{shaking['motion']} times {scale['scale']:g}: {percent(of_all['share'])} of the "
+            f"blocks fail ({percent(of_all['ci_low'])} to {percent(of_all['ci_high'])})."
+        )
+
+
+_MODE_VERBS = {
+    "slide": "slide",
+    "topple": "topple",
+    "slump": "slump",
+    "confined_topple": "topple against their back plane",
+}
+
+
 def critical_in_words(answer: Mapping[str, Any]) -> str:
     """Return what a search has found.
 

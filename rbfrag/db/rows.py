@@ -5,7 +5,6 @@ This module loads neither SQLAlchemy nor numpy, because `rbfrag predict` needs i
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
@@ -128,12 +127,7 @@ class CombinationTable:
     tm_s: NDArray[np.float64]
     natural_key: NDArray[np.object_]
     block: NDArray[np.object_]
-    sa03_g: NDArray[np.float64] = None  # type: ignore[assignment]
-    sa10_g: NDArray[np.float64] = None  # type: ignore[assignment]
-    sa20_g: NDArray[np.float64] = None  # type: ignore[assignment]
-    sa30_g: NDArray[np.float64] = None  # type: ignore[assignment]
-
-    def __post_init__(self) -> None:
-        for name in SPECTRAL_COLUMNS:
-            if getattr(self, name) is None:
-                object.__setattr__(self, name, self.pga_g * math.nan)
+    sa03_g: NDArray[np.float64]
+    sa10_g: NDArray[np.float64]
+    sa20_g: NDArray[np.float64]
+    sa30_g: NDArray[np.float64]

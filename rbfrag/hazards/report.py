@@ -50,7 +50,7 @@ def as_dict(
         "imt": curves[0].imt,
         "curve_kind": first.curve_kind,
     }
-    warnings = [*remarks, *dict.fromkeys(word for each in answers for word in each.warnings)]
+    warnings = [*remarks, *_warnings(curves, answers)]
     if any(len(own) > 1 for own in names):
         sites = [_of_site(curve, one) for curve, one in zip(curves, answers, strict=True)]
         common = sites[0] if len(sites) == 1 else {"sites": sites}
@@ -69,6 +69,17 @@ def as_dict(
     return {
         **rows[0], **shared, **branches, "contributions": contributions, "warnings": warnings,
     }  # fmt: skip
+
+
+def _warnings(curves: Sequence[HazardCurve], answers: Sequence[HazardAnswer]) -> list[str]:
+    """Return the warnings, each once; one that does not hold of every site names its own."""
+    everywhere = set.intersection(*(set(each.warnings) for each in answers))
+    named = {
+        text if text in everywhere or not curve.place else f"{curve.place}: {text}": None
+        for curve, each in zip(curves, answers, strict=True)
+        for text in each.warnings
+    }
+    return list(named)
 
 
 def _quantiles(answer: HazardAnswer, i: int) -> dict[str, float]:

@@ -23,6 +23,7 @@ from benchmarks.claims.vertical import vertical_is_irrelevant
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import FitError
 from rbfrag.plots.critical_strength import lobe_line, vertical_pairs
+from tests.synthetic import unknown_spectrum
 
 G = 9.80665
 P2 = np.array([30.0, 3.0, 1.0, 0.1])
@@ -62,6 +63,7 @@ def table(seed: int = 1, *, slope: float = 0.72, scatter: float = 0.2) -> Combin
         tm_s=tm,
         natural_key=np.array([str(next(number)) for _ in range(n)], dtype=object),
         block=np.full(n, None, dtype=object),
+        **unknown_spectrum(n),
     )
 
 

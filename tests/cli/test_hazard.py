@@ -119,6 +119,15 @@ def test_blocks_stand_at_sites_by_their_id(shell: Shell, curve: Path, logic_tree
     assert any("rbfrag losses" in text for text in found["warnings"])
     with Path("rates.csv").open() as file:
         assert [row["site"] for row in csv.DictReader(file)] == ["SLIDE-A", "0012", "0012"]
+    own = {text.partition(": ")[0] for text in found["warnings"] if "outside the ranges" in text}
+    assert own <= {"SLIDE-A", "0012"}
+    assert own
+    both = shell.json("hazard", mean, "--blocks", "blocks.csv", "--at-least", "2")
+    counts = [[each["count"] for each in one["annual_rate_at_least"]]
+              for one in both["sites"] if "annual_rate_at_least" in one]  # fmt: skip
+    assert counts == [[1, 2]]
+    refused = shell("hazard", mean, "--blocks", "blocks.csv", "--at-least", "3", expect=2).stderr
+    assert "at least 3 failures of" in refused
     only = shell.json("hazard", mean, "--blocks", "blocks.csv", "--site", "0012")
     assert [row["block_id"] for row in only["blocks"]] == ["B", "C"]
     Path("blocks.csv").write_text(head + "A,3,0.1,12\n")

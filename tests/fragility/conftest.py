@@ -11,6 +11,7 @@ from rbfrag.db.model_file import ModelRow
 from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.model import FragilityModel
 from tests.fragility.portfolio_draws import SHARED
+from tests.synthetic import unknown_spectrum
 
 G = 9.80665
 P2 = (30.0, 10.0, 3.0, 1.0, 0.3, 0.1)
@@ -65,6 +66,7 @@ def critical_values(
         tm_s=tm,
         natural_key=np.array([f"key-{i:06d}" for i in range(n)], dtype=object),
         block=np.full(n, None, dtype=object),
+        **unknown_spectrum(n),
     )
 
 

@@ -11,6 +11,7 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.fit.data import LEAST_DISPLACEMENT_M, FitSource
 from rbfrag.fragility.methods import arrays, method_named
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from tests.synthetic import unknown_spectrum
 
 TRUE = {
     ("sliding", "pgv_pga"): (0.3, 0.8, 3.5, -0.6, 1.0),
@@ -91,4 +92,5 @@ def _table(
         tm_s=none,
         natural_key=np.array([f"key-{i:06d}" for i in range(n)], dtype=object),
         block=np.full(n, None, dtype=object),
+        **unknown_spectrum(n),
     )

@@ -67,16 +67,22 @@ class RateOptions:
         metavar="K,K",
     )
 
-    def counts(self) -> list[int] | None:
-        """Return the numbers of failures."""
+    def counts(self, blocks: int, most: int) -> list[int] | None:
+        """Return the numbers of failures whose rates are wanted at a site.
+
+        Args:
+            blocks: number of blocks at the site; what it cannot reach is left out.
+            most: number at the site that has most; beyond it a number is kept, and refused.
+        """
         if self.at_least is None:
             return None
         try:
-            return [int(part) for part in self.at_least.split(",")]
+            numbers = [int(part) for part in self.at_least.split(",")]
         except ValueError:
             raise InputError(
                 f"--at-least {self.at_least!r}: give whole numbers with commas, as 1,5,20"
             ) from None
+        return [number for number in numbers if number <= blocks or number > most]
 
 
 @stacked
@@ -131,11 +137,13 @@ def hazard(
         raise InputError(
             "--plot draws one block at one site: choose them with --site, --p2 and --kr"
         )
+    most = max(len(one.names) for one in sites)
     answers = [
         answer(
             one.curves, one.columns["p2_1_s2"], one.columns["kr"],
             weights=None if wanted.weights is None else stated_weights(wanted.weights, one.curves),
-            at_least=wanted.counts(), convert=meaning.convert, convert_sigma=meaning.convert_sigma,
+            at_least=wanted.counts(len(one.names), most), convert=meaning.convert,
+            convert_sigma=meaning.convert_sigma,
             component=meaning.component, years=wanted.years, model=answering.model,
             level=answering.level, db=answering.db, one_class=is_class, kind=standing.kind,
             restitution=one.columns.get("restitution"),

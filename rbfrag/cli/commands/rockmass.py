@@ -19,6 +19,7 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.cli.parameters.values import number_list
+from rbfrag.cli.sentences import rock_mass_in_words
 
 if TYPE_CHECKING:
     from rbfrag.rockmasses.joint_sets import Realisations
@@ -130,7 +131,7 @@ def rockmass(
         "Draw the cumulative counts of blocks against PGA by mode, with a motion the "
         "shares that fail (.png, .pdf, .svg)."
     ),
-    json: options.Json = False,
+    printing: options.Printing,
 ) -> None:
     """Draw blocks from two fracture sets; print their modes and yields.
 
@@ -177,10 +178,13 @@ def rockmass(
             from rbfrag.plots.rockmass import plot_failures
 
             plot_failures(outcomes, plot, level=answering.level)
-    if json:
+    if printing.json:
         print_json(document)
         return
-    _print(document)
+    for sentence in rock_mass_in_words(document):
+        print(sentence)
+    print()
+    _print(document, verbose=printing.verbose)
     print_warnings(document["warnings"])
 
 
@@ -216,19 +220,20 @@ def _run(
     return outcomes, [*remarks, *failure_warnings(outcomes)]
 
 
-def _print(document: dict[str, Any]) -> None:
-    print_pairs(
-        {
-            "realisations": document["realisations"],
-            "blocks": document["blocks"],
-            "seed": document["seed"],
-            **document["variables"],
-            "block.back_fracture": document["back_fracture"],
-        }
-    )
+def _print(document: dict[str, Any], *, verbose: bool) -> None:
+    if verbose:
+        print_pairs(
+            {
+                "realisations": document["realisations"],
+                "blocks": document["blocks"],
+                "seed": document["seed"],
+                **document["variables"],
+                "block.back_fracture": document["back_fracture"],
+            }
+        )
+        print()
     for text, count in document["impossible"].items():
         print(f"no block {count} times: {text}")
-    print()
     quantiles = ("q05", "q50", "q95")
     print_table(
         ["mode", "count", "share_%", "+-", "unstable", "locked", *(f"k_{q}_g" for q in quantiles)],
