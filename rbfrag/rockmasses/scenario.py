@@ -204,6 +204,10 @@ def scenario(
             modelled.add(mode)
             others[mode] = answers.model
             fill(blocks, answers)
+        # their models exist, but not for a bond
+        modelled |= {
+            m for m in ("slide", "slump") if np.any(realisations.of_mode(m) & (reason == BONDED))
+        }
 
     covered = np.isfinite(probability)
     modes = []

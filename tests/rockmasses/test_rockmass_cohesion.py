@@ -72,7 +72,7 @@ def test_cohesion_holds_slides_and_none_changes_nothing() -> None:
     there = without.is_block
     assert np.all(bonded.stability.ky[there] >= without.stability.ky[there])
     before, after = mode_counts(without), mode_counts(bonded)
-    # a bond bars sliding on the base: blocks that slid turn instead, and fewer fail at rest
+    # a bond hinders sliding on the base: blocks that slid turn instead, and fewer fail at rest
     assert after["slide"].count < before["slide"].count
     assert after["topple"].count > before["topple"].count
     assert after["slide"].states["unstable"] < before["slide"].states["unstable"]
@@ -120,6 +120,10 @@ def test_a_scenario_leaves_out_slides_with_a_bond(
         assert set(answer.reason[stable]) == {BONDED}
     assert np.isfinite(answer.probability[many.of_mode("topple", "stable")]).all()
     assert any(BONDED in text for text in answer.warnings)
+    assert not any(
+        text.endswith("no fragility model for this mode") and text.startswith("sl")
+        for text in answer.warnings
+    )
 
 
 def test_a_chart_of_modes_says_that_it_knows_no_cohesion(tmp_path: Path) -> None:
