@@ -53,7 +53,7 @@ class Variable(NamedTuple):
     def range_text(self) -> str:
         """The permitted range in words."""
         if math.isinf(self.high):
-            return f"above {self.low:g}"
+            return f"{self.low:g} or more" if self.from_low else f"above {self.low:g}"
         if self.from_low:
             return f"from {self.low:g} to below {self.high:g}"
         return f"between {self.low:g} and {self.high:g}"
@@ -68,11 +68,15 @@ VARIABLES: dict[str, Variable] = {
     "friction.phi_back_deg": Variable(5, 0.0, 90.0, from_low=True),
     "block.size_factor": Variable(6, 0.0, math.inf, default=1.0),
     "block.kv": Variable(7, -1.0, math.inf, default=0.0),
+    "friction.cohesion_pa": Variable(8, 0.0, math.inf, from_low=True),
+    "block.density_kg_m3": Variable(9, 0.0, math.inf),
 }
 """The variables of a rock mass by their keys."""
 
 _SETTINGS = ("block.back_fracture", "realisations", "seed")
 _BACK_FRICTION = "friction.phi_back_deg"
+_COHESION, _DENSITY = "friction.cohesion_pa", "block.density_kg_m3"
+_OPTIONAL = (_BACK_FRICTION, _COHESION, _DENSITY)
 
 IMPOSSIBLE = (
     "",
@@ -83,6 +87,8 @@ IMPOSSIBLE = (
     "a friction angle is not from 0 to below 90 degrees",
     "the size factor is not above zero",
     "kv is not above -1 g",
+    "the cohesion is below zero",
+    "the density is not above zero",
     "the planes make a sliver without thickness (alpha1 is not below alpha3)",
 )
 """Why a realisation is no block, by its reason code; 0 for one that is."""
@@ -113,6 +119,7 @@ class RockMass:
         Args:
             description: keys such as ``base.dip_deg`` with a number or the keys of a
                 :class:`~rbfrag.rockmasses.distributions.Distribution`; ``friction.phi_back_deg``,
+                ``friction.cohesion_pa``, ``block.density_kg_m3`` (needed with a cohesion),
                 ``block.size_factor``, ``block.kv``, ``block.back_fracture``, ``realisations``
                 and ``seed`` may be left out.
 
@@ -129,11 +136,16 @@ class RockMass:
                 variables[key] = _law(key, variable, description[key])
             elif not math.isnan(variable.default):
                 variables[key] = Distribution("constant", location=variable.default)
-            elif key != _BACK_FRICTION:
+            elif key not in _OPTIONAL:
                 raise InputError(
                     f"{key} is missing: give a number, or a table such as "
                     "{ distribution = 'normal', mean = …, sd = … }"
                 )
+        if _COHESION in variables and _DENSITY not in variables:
+            raise InputError(
+                f"{_COHESION} needs {_DENSITY}, the density of the rock (about 2700 kg/m³): its "
+                "effect is that of a stress over the weight"
+            )
         back_fracture = description.get("block.back_fracture", True)
         if not isinstance(back_fracture, bool):
             raise InputError(f"block.back_fracture = {back_fracture!r}: use true or false")
@@ -172,6 +184,7 @@ class RockMass:
         s1, s2 = drawn["base.spacing_m"] * factor, drawn["back.spacing_m"] * factor
         phi_back = drawn.get(_BACK_FRICTION, phi)
         gamma = back_dip - beta
+        cohesion, density = drawn.get(_COHESION, np.zeros(n)), drawn.get(_DENSITY, np.ones(n))
         reason = np.zeros(n, dtype=np.int8)
         # Slivers come last: where another reason holds there is no block to be one.
         for code, valid in enumerate(
@@ -183,6 +196,8 @@ class RockMass:
                 (phi >= 0.0) & (phi < 90.0) & (phi_back >= 0.0) & (phi_back < 90.0),
                 factor > 0.0,
                 drawn["block.kv"] > -1.0,
+                cohesion >= 0.0,
+                density > 0.0,
             ),
             start=1,
         ):
@@ -196,6 +211,8 @@ class RockMass:
             phi_back_deg=phi_back,
             kv=drawn["block.kv"],
             back_fracture=self.back_fracture,
+            cohesion_pa=cohesion if _COHESION in drawn else None,
+            density_kg_m3=density,
         )
         reason[possible & ((stability.reason_code != 0) | ~(stability.p2 > 0.0))] = (
             len(IMPOSSIBLE) - 1
@@ -210,6 +227,7 @@ class RockMass:
             phi_deg=phi,
             phi_back_deg=phi_back,
             kv=drawn["block.kv"],
+            cohesion_pa=cohesion,
             blocks=blocks,
             stability=stability,
             reason_code=reason,
@@ -233,6 +251,7 @@ class Realisations:
         phi_deg: friction angle of the base [deg].
         phi_back_deg: friction angle of the back [deg].
         kv: vertical acceleration of the ground [g].
+        cohesion_pa: cohesion of the base [Pa]; 0 where the description states none.
         blocks: the blocks.
         stability: their modes, states and yield accelerations.
         reason_code: why a realisation is no block, a place in :data:`IMPOSSIBLE`.
@@ -247,6 +266,7 @@ class Realisations:
     phi_deg: FloatArray
     phi_back_deg: FloatArray
     kv: FloatArray
+    cohesion_pa: FloatArray
     blocks: BlockArray
     stability: StabilityArray
     reason_code: NDArray[np.int8]
@@ -296,6 +316,11 @@ class Realisations:
                 "block.kv does not belong in a rock mass that is to be shaken: the vertical "
                 "acceleration comes with the motion; leave the key out"
             )
+
+    @property
+    def bonded(self) -> NDArray[np.bool_]:
+        """Whether a realisation is a block whose base has cohesion, shape (n,)."""
+        return self.is_block & (self.cohesion_pa > 0.0)
 
     @property
     def kr_at_rest(self) -> FloatArray:

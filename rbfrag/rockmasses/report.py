@@ -89,6 +89,12 @@ def _average(average: Average) -> dict[str, Any]:
 
 def _warnings(realisations: Realisations, answer: Scenario | None) -> list[str]:
     warnings = [] if answer is None else list(answer.warnings)
+    lifts = int(np.count_nonzero(realisations.is_block & realisations.stability.toe_lifts))
+    if lifts:
+        warnings.append(
+            f"{lifts} confined topples: the bond of the base is so strong that the toe lifts off "
+            "before it slides: their yields are upper bounds"
+        )
     bad = realisations.n - realisations.n_blocks
     if bad > NEAR_LIMIT * realisations.n:
         warnings.insert(
@@ -143,6 +149,8 @@ def block_columns(
         "s2_m": realisations.s2_m,
         "r3_m": only_blocks(realisations.blocks.r3_m),
     }
+    if realisations.bonded.any():
+        columns["cohesion_pa"] = realisations.cohesion_pa
     if answer is None:
         return columns | {"reason": realisations.reason}
     return columns | {

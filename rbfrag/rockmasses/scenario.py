@@ -28,6 +28,7 @@ MODELLED: tuple[ModeName, ...] = ("topple",)
 """Modes that a fragility model answers for."""
 
 UNCOVERED = "no fragility model for this mode"
+BONDED = "cohesion: the first slip breaks the bond, which no model of this mode describes"
 LOCKED = "locked: no horizontal acceleration moves it in this mode"
 
 
@@ -135,8 +136,9 @@ def scenario(
 
     A block that fails at rest has P = 1. A stable toppling block has the probability of the
     fragility model. With `displacement_m` a stable block that slides has the probability of
-    sliding further than that, and one that slumps that of slumping past recovery. All others have
-    no answer and are left out of every average; the answer says how many they are.
+    sliding further than that, and one that slumps that of slumping past recovery, unless its base
+    has cohesion: that bond breaks at the first slip. All others have no answer and are left out of
+    every average; the answer says how many they are.
 
     Args:
         realisations: blocks of a rock mass.
@@ -172,6 +174,7 @@ def scenario(
     probability, low, high, event_low, event_high = columns
     in_domain = np.zeros(realisations.n, dtype=np.bool_)
     reason = np.where(realisations.is_block, UNCOVERED, realisations.reason)
+    reason[realisations.bonded] = BONDED
     reason[realisations.is_block & np.isposinf(stability.yield_acceleration)] = LOCKED
     columns[:, unstable] = 1.0
     reason[unstable] = "unstable"
@@ -201,6 +204,10 @@ def scenario(
             modelled.add(mode)
             others[mode] = answers.model
             fill(blocks, answers)
+        # their models exist, but not for a bond
+        modelled |= {
+            m for m in ("slide", "slump") if np.any(realisations.of_mode(m) & (reason == BONDED))
+        }
 
     covered = np.isfinite(probability)
     modes = []
@@ -238,7 +245,7 @@ def scenario(
         event_high=event_high,
         in_domain=in_domain,
         reason=reason,
-        warnings=tuple(_warnings(missing, reason[topples], modelled)),
+        warnings=(*_warnings(missing, reason[topples], modelled), *_about_bonds(reason)),
         other_models=others,
     )
 
@@ -269,8 +276,9 @@ def _other_modes(
         phi_deg=realisations.phi_deg,
         phi_back_deg=realisations.phi_back_deg,
     )
-    slides = realisations.of_mode("slide", "stable") & (k > 0.0)
-    slumps = realisations.of_mode("slump", "stable") & (k > 0.0) & np.isfinite(p2)
+    described = (k > 0.0) & ~realisations.bonded
+    slides = realisations.of_mode("slide", "stable") & described
+    slumps = realisations.of_mode("slump", "stable") & described & np.isfinite(p2)
     beta_deg = realisations.beta_deg[slides]
     questions: tuple[tuple[ModeName, NDArray[np.bool_], dict[str, Any]], ...] = (
         ("slide", slides, {"ky": k[slides], "beta_deg": beta_deg, "displacement_m": distance}),
@@ -317,3 +325,8 @@ def _warnings(
     return warnings + [
         f"{count} of {total} toppling blocks: {sentence}" for sentence, count in tally.items()
     ]
+
+
+def _about_bonds(reason: NDArray[np.object_]) -> tuple[str, ...]:
+    count = int(np.count_nonzero(reason == BONDED))
+    return (f"{count} blocks without an answer: {BONDED}",) if count else ()

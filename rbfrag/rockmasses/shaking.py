@@ -121,7 +121,8 @@ class BlocksToRun:
         place: places of the blocks among the realisations.
         mode_code: their modes.
         numbers: ``yield_g`` [g], ``s1_m`` and ``s2_m`` [m], ``gamma_deg``, ``beta_deg``,
-            ``phi_deg`` and ``phi_back_deg``, as :class:`Realisations` has them.
+            ``phi_deg``, ``phi_back_deg`` and ``cohesion_pa`` [Pa], as :class:`Realisations`
+            has them.
         back_fracture: whether there is a plane behind them.
         moves: at which scale which of them moves.
         shaking: the motion.
@@ -200,7 +201,7 @@ def _runner(work: BlocksToRun, j: int) -> Runner:
         phi_rad=math.radians(one["phi_deg"]),
         phi_back_rad=math.radians(one["phi_back_deg"]),
         back_fracture=work.back_fracture,
-        cohesive=False,
+        cohesive=one["cohesion_pa"] > 0.0,
         yield_g=one["yield_g"],
         settings={},
     )
@@ -211,7 +212,9 @@ def _or_nan(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-_NUMBERS = ("s1_m", "s2_m", "gamma_deg", "beta_deg", "phi_deg", "phi_back_deg")
+_NUMBERS = (
+    "s1_m", "s2_m", "gamma_deg", "beta_deg", "phi_deg", "phi_back_deg", "cohesion_pa",
+)  # fmt: skip
 
 CHUNK = 250
 """Blocks handed out at a time: a second or less of work."""

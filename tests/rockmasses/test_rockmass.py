@@ -101,9 +101,10 @@ class TestStreams:
             "friction.phi_deg": "phi_deg",
             "friction.phi_back_deg": "phi_back_deg",
             "block.kv": "kv",
+            "friction.cohesion_pa": "cohesion_pa",
             "back.spacing_m": "s2_m",
         }
-        base = {**TABLE_3_4, "friction.phi_back_deg": 35.0}
+        base = {**TABLE_3_4, "friction.phi_back_deg": 35.0, "block.density_kg_m3": 2700.0}
         before = RockMass.of(base).realise(200, 9)
         low = 50.0 if key == "back.dip_deg" else 0.3
         changed = {"distribution": "uniform", "low": low, "high": low + 0.5}
@@ -207,6 +208,8 @@ class TestImpossible:
         ({"friction__phi_back_deg": normal(85.0, 5.0)}, 5),
         ({"block__size_factor": normal(1.0, 1.0)}, 6),
         ({"block__kv": normal(-0.5, 0.5)}, 7),
+        ({"friction__cohesion_pa": normal(9.0, 9.0), "block__density_kg_m3": 2700.0}, 8),
+        ({"block__density_kg_m3": normal(9.0, 9.0)}, 9),
     )
 
     @pytest.mark.parametrize(("changes", "code"), CASES)

@@ -382,6 +382,11 @@ def _differences(mass: RockMass, phi: float, phi_back: float | None, no_back: bo
             f"the chart is drawn for a friction angle of the back of {of_chart:g} deg, and that "
             f"of the rock mass is: {back}"
         )
+    if "friction.cohesion_pa" in mass.variables:
+        warnings.append(
+            "the chart is drawn without cohesion, and that of the rock mass is: "
+            f"{mass.variables['friction.cohesion_pa']} Pa"
+        )
     if mass.back_fracture == no_back:
         warnings.append(
             "the rock mass has "

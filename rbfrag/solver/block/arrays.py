@@ -85,6 +85,7 @@ REASONS = (
     "beta_deg is not between -90 and 90",
     "phi_deg or phi_back_deg is not a friction angle from 0 to below 90 degrees",
     "kv is not above -1: the ground falls away under the block (a jump)",
+    "cohesion_pa is below zero, density_kg_m3 is not above zero, or either is not finite",
 )
 """Why there is no answer for an element, by its reason code; 0 for none."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -31,15 +32,20 @@ from rbfrag.solver.block.formulas import (
 from rbfrag.solver.stability.modes import (
     CONFINED_TOPPLE,
     MODES,
+    SLIDE,
     SLUMP,
     STATES,
     TOPPLE,
+    confined_bond,
     confined_topple,
     mode_code,
     mode_code_without_back,
     on_its_branch,
+    sliding_limit,
     slump,
+    slump_bond,
     state_code,
+    toe_lifts,
     wedges,
     yield_coefficient,
 )
@@ -47,7 +53,15 @@ from rbfrag.solver.stability.modes import (
 NOTHING = -1
 """Mode and state code of an element without an answer."""
 
-_BETA, _PHI, _KV = 5, 6, 7
+_USABLE: dict[str, tuple[int, Callable[[FloatArray], NDArray[np.bool_]]]] = {
+    "beta_deg": (5, lambda beta: np.abs(beta) < 90.0),
+    "phi_deg": (6, lambda phi: (phi >= 0.0) & (phi < 90.0)),
+    "kv": (7, lambda kv: (kv > -1.0) & (kv < math.inf)),
+    "phi_back_deg": (6, lambda phi: (phi >= 0.0) & (phi < 90.0)),
+    "cohesion_pa": (8, lambda cohesion: (cohesion >= 0.0) & (cohesion < math.inf)),
+    "density_kg_m3": (8, lambda density: (density > 0.0) & (density < math.inf)),
+}
+"""Which values can be used, and the reason code of the others, by argument."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,6 +77,8 @@ class StabilityArray(Tabular):
         p2: frequency parameters p² [1/s²].
         reason_code: why there is no answer, a place in
             :data:`rbfrag.solver.block.arrays.REASONS`.
+        toe_lifts: where the bond of the base is so strong that the toe lifts off before it
+            slides, so that the yield is an upper bound.
     """
 
     mode_code: CodeArray
@@ -71,6 +87,7 @@ class StabilityArray(Tabular):
     ky: FloatArray
     p2: FloatArray
     reason_code: CodeArray
+    toe_lifts: NDArray[np.bool_]
 
     @property
     def mode(self) -> NDArray[np.str_]:
@@ -114,13 +131,14 @@ def stability_arrays(
     phi_back_deg: ArrayLike | None = None,
     kv: ArrayLike = 0.0,
     back_fracture: bool = True,
+    cohesion_pa: ArrayLike | None = None,
+    density_kg_m3: ArrayLike | None = None,
     nan: Literal["propagate", "raise"] = "propagate",
 ) -> StabilityArray:
     """Return the failure modes, states and yield accelerations of many parallelogram blocks.
 
     The formulas are those of :func:`rbfrag.solver.stability.single.stability`, and the answers are
-    the
-    same to the last bit. Cohesion is not taken into account.
+    the same to the last bit.
 
     Args:
         blocks: the blocks; the other arguments broadcast with them.
@@ -129,6 +147,8 @@ def stability_arrays(
         phi_back_deg: friction angles of the back planes [deg]; None for those of the bases.
         kv: vertical acceleration of the ground, up positive, above -1 [g].
         back_fracture: False for blocks that no plane supports or hinders from behind.
+        cohesion_pa: cohesions of the bases, from 0 [Pa]; None for none.
+        density_kg_m3: densities of the rock, needed with a cohesion [kg/m³].
         nan: ``propagate`` answers NaN with its reason where the input cannot be used,
             ``raise`` refuses it.
 
@@ -140,35 +160,58 @@ def stability_arrays(
     given = {"beta_deg": beta_deg, "phi_deg": phi_deg, "kv": kv}
     if phi_back_deg is not None:
         given["phi_back_deg"] = phi_back_deg
+    if cohesion_pa is not None:
+        if density_kg_m3 is None:
+            raise InputError("cohesion_pa needs density_kg_m3, the density of the rock")
+        given |= {"cohesion_pa": cohesion_pa, "density_kg_m3": density_kg_m3}
     arrays, shape = common_shape({"blocks": blocks.tan_alpha1, **given})
     functions = array_elementwise()
 
     def formula(
         t1: FloatArray, t3: FloatArray, h: FloatArray, bad: Any, *others: Any
     ) -> tuple[Any, ...]:
-        beta, phi, kv_there, phi_back = (*others, None) if phi_back_deg is None else others
-        reason = _reasons(bad, t1.size, beta, phi, kv_there, phi_back)
+        there = dict(zip(given, others, strict=True))
+        reason = _reasons(bad, t1.size, there)
         if reason.any():
             ok = reason == 0
             t1, t3, h = (np.where(ok, value, math.nan) for value in (t1, t3, h))
-            beta, phi, kv_there = (_harmless(value, ok) for value in (beta, phi, kv_there))
-            phi_back = None if phi_back is None else _harmless(phi_back, ok)
-        tb, mu1 = _tangent(beta), _tangent(phi)
-        mu2 = mu1 if phi_back is None else _tangent(phi_back)
-        weight = 1.0 + kv_there
+            there = {name: _harmless(value, ok) for name, value in there.items()}
+        tb, mu1 = _tangent(there["beta_deg"]), _tangent(there["phi_deg"])
+        mu2 = _tangent(there["phi_back_deg"]) if "phi_back_deg" in there else mu1
+        weight = 1.0 + there["kv"]
         cot = cot_gamma(t1, t3)
-        ky = yield_coefficient(mu1, 1.0, tb, weight, functions)
+        bond, limit = None, mu1
+        lifts: Any = False
+        if "cohesion_pa" in there:
+            bond = _bond(t1, t3, h, there["cohesion_pa"], there["density_kg_m3"])
+            term = bond * np.sqrt(1.0 + tb * tb)
+            ky = yield_coefficient(mu1, 1.0, tb, weight, functions, term)
+            limit = sliding_limit(mu1, tb, weight, ky, bond, functions)
+        else:
+            ky = yield_coefficient(mu1, 1.0, tb, weight, functions)
         if back_fracture:
-            mode = mode_code(t1, t3, mu1, cot < 0.0, functions)
+            mode = mode_code(t1, t3, limit, cot < 0.0, functions)
             sine, cosine = _direction(mode, t1, t3, cot, mu1, mu2)
-            k = yield_coefficient(sine, cosine, tb, weight, functions)
+            share = 0.0 if bond is None else term * _share_of_bond(mode, t1, t3, cot, mu2)
+            k = yield_coefficient(sine, cosine, tb, weight, functions, share)
             confined = mode == CONFINED_TOPPLE
             if confined.any():
                 branch = on_its_branch(k, ky, wedges(cot, mu1, mu2), functions)
                 k = np.where(confined, branch, k)
+            if bond is not None:
+                phi_back = there.get("phi_back_deg", there["phi_deg"])
+                beyond = phi_back > there["phi_deg"] + np.degrees(np.arctan2(1.0, cot))
+                reaction = _base_reaction(mode, t1, t3, cot, mu1, mu2)
+                slumps = mode == SLUMP
+                k = np.where(slumps, on_its_branch(k, ky, beyond, functions), k)
+                k = np.where(slumps & (reaction <= 0.0), -math.inf, k)
+                k = np.where(confined & (reaction <= 0.0), math.inf, k)
+                lifts = toe_lifts(k, reaction, cosine, mu2 - cot, tb, weight, bond, functions) & (
+                    confined & (bond > 0.0) & np.isfinite(k)
+                )
             state = state_code(k, functions)
         else:
-            mode = mode_code_without_back(t1, t3, mu1, tb, functions)
+            mode = mode_code_without_back(t1, t3, limit, tb, functions)
             k = np.where(mode == TOPPLE, yield_coefficient(t3, 1.0, tb, weight, functions), ky)
             k = np.where(tb < t1, -math.inf, k)
             state = state_code(k, functions)
@@ -177,16 +220,18 @@ def stability_arrays(
         if reason.any():
             mode, state = np.where(ok, mode, NOTHING), np.where(ok, state, NOTHING)
             k, ky, p2 = (np.where(ok, value, math.nan) for value in (k, ky, p2))
-        return mode, state, k, ky, p2, reason
+            lifts = np.where(ok, lifts, False)
+        return mode, state, k, ky, p2, reason, lifts
 
     codes = [np.empty(shape, dtype=np.int8) for _ in range(3)]
     k, ky, p2 = (np.empty(shape) for _ in range(3))
+    lifts = np.empty(shape, dtype=np.bool_)
     whole = (blocks.tan_alpha1, blocks.tan_alpha3, blocks.half_s1_m, blocks.reason_code)
     inputs: list[Any] = [np.broadcast_to(array, shape) for array in whole]
     inputs += [arrays[name] for name in given]
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        in_chunks(formula, inputs, (codes[0], codes[1], k, ky, p2, codes[2]))
-    result = StabilityArray(codes[0], codes[1], k, ky, p2, codes[2])
+        in_chunks(formula, inputs, (codes[0], codes[1], k, ky, p2, codes[2], lifts))
+    result = StabilityArray(codes[0], codes[1], k, ky, p2, codes[2], lifts)
     if nan == "raise" and result.reason_code.any():
         first = np.flatnonzero(result.reason_code.ravel())[0]
         place = tuple(int(i) for i in np.unravel_index(first, shape))
@@ -221,18 +266,39 @@ def _direction(
     return sine, cosine
 
 
-def _reasons(bad: CodeArray, size: int, beta: Any, phi: Any, kv: Any, phi_back: Any) -> CodeArray:
+def _bond(t1: FloatArray, t3: FloatArray, h: FloatArray, cohesion: Any, density: Any) -> FloatArray:
+    """Return the strength of the base's bond over the weight, c L/(ρ g A)."""
+    base = h * t3 - h * t1
+    area = base * 2.0 * h
+    return np.asarray(cohesion * base / (density * STANDARD_GRAVITY_M_S2 * area))
+
+
+def _share_of_bond(
+    mode: NDArray[Any], t1: FloatArray, t3: FloatArray, cot: FloatArray, mu2: Any
+) -> FloatArray:
+    """Return what a bond adds to the numerator of the governing yield, over that of sliding."""
+    share = np.where(mode == SLIDE, 1.0, 0.0)
+    share = np.where(mode == SLUMP, slump_bond(t1, -1.0, -t3, 1.0, cot, mu2), share)
+    confined = confined_bond(t3, -1.0, t1, -1.0, cot, mu2)
+    return np.asarray(np.where(mode == CONFINED_TOPPLE, confined, share))
+
+
+def _base_reaction(
+    mode: NDArray[Any], t1: FloatArray, t3: FloatArray, cot: FloatArray, mu1: Any, mu2: Any
+) -> FloatArray:
+    """Return the reaction of the base, up to a factor, of blocks that slump or topple confined."""
+    slumping = slump(t1, -1.0, -t3, 1.0, cot, mu1, mu2)[2]
+    confined = confined_topple(t3, -1.0, t1, -1.0, cot, mu1, mu2)[2]
+    return np.asarray(np.where(mode == SLUMP, slumping, confined))
+
+
+def _reasons(bad: CodeArray, size: int, given: Mapping[str, Any]) -> CodeArray:
     reason = np.broadcast_to(bad, (size,)).astype(np.int8)
-    checks = [
-        (_BETA, np.abs(beta) < 90.0),
-        (_PHI, (np.asarray(phi) >= 0.0) & (np.asarray(phi) < 90.0)),
-        (_KV, (np.asarray(kv) > -1.0) & (np.asarray(kv) < math.inf)),
-    ]
-    if phi_back is not None:
-        checks.append((_PHI, (np.asarray(phi_back) >= 0.0) & (np.asarray(phi_back) < 90.0)))
-    for code, fine in checks:
-        if not np.all(fine):
-            reason[~fine & (reason == 0)] = code
+    for name, (code, fine) in _USABLE.items():
+        if name in given:
+            usable = fine(np.asarray(given[name]))
+            if not np.all(usable):
+                reason[~usable & (reason == 0)] = code
     return reason
 
 

@@ -201,6 +201,54 @@ def confined_bond(toe_x: N, toe_y: N, low_x: N, low_y: N, cot: N, mu2: N) -> N:
     return (low_x - toe_x) * (cot - mu2) - (low_y - toe_y) * (1.0 + cot * mu2)
 
 
+def sliding_limit(
+    mu1: N, tan_beta: N, weight: N | float, ky: N, bond: N, functions: Elementwise[N]
+) -> N:
+    """Return the tangent of the resultant's angle at which the base slides.
+
+    Args:
+        mu1: tangent of the friction angle of the base.
+        tan_beta: tangent of the dip of the base.
+        weight: 1 + k_v.
+        ky: yield acceleration coefficient of sliding, with the bond.
+        bond: strength of the base's bond over the weight; without one the limit is `mu1`.
+        functions: the functions for this kind of number.
+    """
+    where = functions.where
+    normal = weight - ky * tan_beta
+    pressed = normal > 0.0
+    limit = where(pressed, (weight * tan_beta + ky) / where(pressed, normal, 1.0), math.inf)
+    result: N = where((bond == 0.0) | (abs(ky) == math.inf), mu1, limit)
+    return result
+
+
+def toe_lifts(
+    k: N,
+    r_base: N,
+    cosine: N,
+    pull: N,
+    tan_beta: N,
+    weight: N | float,
+    bond: N,
+    functions: Elementwise[N],
+) -> Any:
+    """Return whether the toe would have to pull at the yield of a confined topple with a bond.
+
+    Args:
+        k: yield acceleration coefficient, finite.
+        r_base: reaction of the base, up to the factor of `cosine`.
+        cosine: cos δ* up to that factor.
+        pull: what a bond of 1 m g takes from the reaction, in the same scale.
+        tan_beta: tangent of the dip of the base.
+        weight: 1 + k_v.
+        bond: strength of the base's bond over the weight.
+        functions: the functions for this kind of number.
+    """
+    normal = (weight - k * tan_beta) / functions.sqrt(1.0 + tan_beta * tan_beta)
+    pressed = normal * r_base + bond * pull
+    return ((pressed <= 0.0) & (cosine > 0.0)) | ((pressed >= 0.0) & (cosine < 0.0))
+
+
 def words_of_mode(mode: str) -> str:
     """Return the name of a mode as it stands in a sentence."""
     return mode.replace("_", " ")

@@ -33,9 +33,11 @@ from rbfrag.solver.stability.modes import (
     mode_code,
     mode_code_without_back,
     on_its_branch,
+    sliding_limit,
     slump,
     slump_bond,
     state_code,
+    toe_lifts,
     wedges,
     yield_coefficient,
 )
@@ -148,7 +150,7 @@ def stability(
     t1, t3, cot = block.tan_alpha1, block.tan_alpha3, block.cot_gamma
 
     ky = yield_coefficient(mu1, 1.0, tb, weight, SCALAR, bond_term)
-    limit = _sliding_limit(mu1, tb, weight, ky, bond)
+    limit = sliding_limit(mu1, tb, weight, ky, bond, SCALAR)
     if back_fracture:
         code = int(mode_code(t1, t3, limit, block.confines, SCALAR))
     else:
@@ -172,7 +174,8 @@ def stability(
         if r_base <= 0.0:
             k = math.inf
         if bond and math.isfinite(k):
-            lifts = _base_lifts(block, r_base, cosine, mu2, tb, weight, bond, k)
+            pull = block.arms.toe[1] * (cot - mu2)
+            lifts = bool(toe_lifts(k, r_base, cosine, pull, tb, weight, bond, SCALAR))
     elif code == TOPPLE:
         k = yield_coefficient(t3, 1.0, tb, weight, SCALAR)
     else:
@@ -238,14 +241,6 @@ def _bond(block: Block, cohesion_pa: object, density_kg_m3: object) -> float:
     return cohesion * block.base_m / (density * STANDARD_GRAVITY_M_S2 * block.area_m2)
 
 
-def _sliding_limit(mu1: float, tb: float, weight: float, ky: float, bond: float) -> float:
-    """Return the tangent of the resultant's angle at which the base slides."""
-    if bond == 0.0 or not math.isfinite(ky):
-        return mu1
-    normal = weight - ky * tb
-    return (weight * tb + ky) / normal if normal > 0.0 else math.inf
-
-
 def _friction_that_slides_at(
     alpha_deg: float, beta_deg: float, weight: float, bond: float
 ) -> float:
@@ -258,22 +253,6 @@ def _friction_that_slides_at(
     # of (1 + k_v) (T cos β - sin β) + C = k (cos β + T sin β) with k = (1 + k_v) tan(α - β)
     alpha = math.radians(alpha_deg)
     return degrees_of(math.tan(alpha) - bond * math.cos(tilt) / (weight * math.cos(alpha)))
-
-
-def _base_lifts(
-    block: Block,
-    r_base: float,
-    cosine: float,
-    mu2: float,
-    tb: float,
-    weight: float,
-    bond: float,
-    k: float,
-) -> bool:
-    """Whether the toe would have to pull at the yield of a confined topple with a bond."""
-    normal = (weight - k * tb) / math.sqrt(1.0 + tb * tb)
-    pressed = normal * r_base + bond * block.arms.toe[1] * (block.cot_gamma - mu2)
-    return pressed <= 0.0 < cosine or pressed >= 0.0 > cosine
 
 
 def _cohesion(mu1: float, tb: float, weight: float, bond: float, ky: float) -> Cohesion:

@@ -56,6 +56,59 @@ def test_bit_for_bit_the_scalar_answers(back_fracture: bool) -> None:
         assert blocks.gamma_deg[i] == pytest.approx(block.gamma_deg, rel=1e-15)
 
 
+@pytest.mark.parametrize("back_fracture", [True, False])
+def test_bit_for_bit_with_cohesion(back_fracture: bool) -> None:
+    random = np.random.default_rng(16)
+    n = 3000
+    a1, a3 = np.sort(random.uniform(-89.0, 89.0, (2, n)), axis=0)
+    phi, phi_back = random.uniform(0.0, 75.0, (2, n))
+    r3, beta = random.uniform(0.1, 10.0, n), random.uniform(-40.0, 40.0, n)
+    cohesion = 10.0 ** random.uniform(1.0, 6.0, n)
+    cohesion[::7] = 0.0
+    density, kv = random.uniform(1500.0, 3500.0, n), random.uniform(-0.9, 1.0, n)
+    found = stability_arrays(
+        BlockArray.from_angles(a1, a3, r3), beta_deg=beta, phi_deg=phi, phi_back_deg=phi_back,
+        kv=kv, back_fracture=back_fracture, cohesion_pa=cohesion, density_kg_m3=density,
+    )  # fmt: skip
+    assert not found.reason_code.any()
+    for i in range(n):
+        one = stability(
+            Block.from_angles(a1[i], a3[i], r3[i]), beta_deg=beta[i], phi_deg=phi[i],
+            phi_back_deg=phi_back[i], kv=kv[i], back_fracture=back_fracture,
+            cohesion_pa=cohesion[i], density_kg_m3=density[i],
+        )  # fmt: skip
+        assert (found.mode[i], found.state[i]) == (one.mode, one.state)
+        assert found.yield_acceleration[i] == one.yield_acceleration
+        assert found.ky[i] == one.ky
+        assert found.toe_lifts[i] == any("toe lifts" in text for text in one.warnings)
+    if back_fracture:
+        assert {*found.mode} == {"slide", "topple", "slump", "confined_topple"}
+        assert found.toe_lifts.any()
+
+
+def test_no_cohesion_leaves_every_bit() -> None:
+    random = np.random.default_rng(17)
+    a1, a3 = np.sort(random.uniform(-89.0, 89.0, (2, 2000)), axis=0)
+    blocks = BlockArray.from_angles(a1, a3, 1.0)
+    planes = {"beta_deg": 12.0, "phi_deg": random.uniform(0.0, 75.0, 2000)}
+    without = stability_arrays(blocks, **planes)
+    none = stability_arrays(blocks, **planes, cohesion_pa=0.0, density_kg_m3=2700.0)
+    for name in ("mode_code", "state_code", "yield_acceleration", "ky", "p2", "toe_lifts"):
+        assert np.array_equal(getattr(without, name), getattr(none, name), equal_nan=True)
+
+
+def test_cohesion_that_cannot_be() -> None:
+    blocks = BlockArray.from_angles(5.0, 40.0, 1.0)
+    with pytest.raises(InputError, match="density_kg_m3"):
+        stability_arrays(blocks, beta_deg=0.0, phi_deg=35.0, cohesion_pa=1e3)
+    found = stability_arrays(
+        blocks, beta_deg=0.0, phi_deg=35.0, cohesion_pa=[-1.0, 1.0, math.inf, 1.0],
+        density_kg_m3=[2700.0, 0.0, 2700.0, 2700.0],
+    )  # fmt: skip
+    assert ["cohesion" in reason for reason in found.reason] == [True, True, True, False]
+    assert np.isfinite(found.yield_acceleration).tolist() == [False, False, False, True]
+
+
 def test_fractures_bit_for_bit() -> None:
     random = np.random.default_rng(7)
     s1, s2 = random.uniform(0.1, 3.0, (2, 500))
