@@ -16,8 +16,8 @@ from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, methods
 from rbfrag.fragility.model import FragilityModel
 
 FROM_REFERENCE = (
-    "answered by the reference model that is shipped with rbfrag: there is no rbfrag.db here and "
-    "no --db or RBFRAG_DB names another"
+    "answered by the reference model that is shipped with rbfrag: there is no rbfrag.db with a "
+    "model here, and no --db or RBFRAG_DB names another"
 )
 
 _Stamp = tuple[int, ...]
@@ -286,7 +286,7 @@ def _of_row(row: ModelRow) -> FragilityModel:
 def _place(db: str | PathLike[str] | None) -> tuple[Path | str, bool]:
     """Return where the models are, and whether that is the shipped reference."""
     place = locate(db)
-    if db is None and not os.environ.get("RBFRAG_DB") and not Path(place).exists():
+    if _unnamed(db) and not Path(place).exists():
         shipped = reference_file()
         if shipped is not None:
             return shipped, True
@@ -321,10 +321,20 @@ def stored_rows(db: str | PathLike[str] | None = None) -> list[ModelRow]:
 
 
 def _store(db: str | PathLike[str] | None) -> _Store:
-    """Return the models of a database; those of a file are read again only when it has changed."""
-    kept = _in_memory(db)
-    if kept is not None:
-        return kept
+    """Return the models of a database; those of a file are read again only when it has changed.
+
+    A database that nobody names and that holds no model does not take the place of the reference.
+    """
+    store = _in_memory(db)
+    if store is not None:
+        return store
+    store = _read(db)
+    if not store.rows and _unnamed(db) and reference_file() is not None:
+        return _unchanged(_SHIPPED, True) or _read_again(REFERENCE, True)
+    return store
+
+
+def _read(db: str | PathLike[str] | None) -> _Store:
     place, shipped = _place(db)
     if isinstance(place, Path):
         return _unchanged(str(place), shipped) or _read_again(place, shipped)
@@ -341,10 +351,18 @@ def models_in_memory(db: str | PathLike[str] | None = None) -> bool:
 
 
 def _in_memory(db: str | PathLike[str] | None) -> _Store | None:
-    named = db if db is not None else os.environ.get("RBFRAG_DB") or None
-    if named is None and not _stamp(DEFAULT_NAME, False):
+    if not _unnamed(db):
+        named = os.environ["RBFRAG_DB"] if db is None else os.fspath(db)
+        return _unchanged(named, False)
+    if not _stamp(DEFAULT_NAME, False):
         return _unchanged(_SHIPPED, True)
-    return _unchanged(DEFAULT_NAME if named is None else os.fspath(named), False)
+    here = _unchanged(DEFAULT_NAME, False)
+    return here if here is None or here.rows else _unchanged(_SHIPPED, True)
+
+
+def _unnamed(db: str | PathLike[str] | None) -> bool:
+    """Return whether the database is the one of the current folder, or the reference."""
+    return db is None and not os.environ.get("RBFRAG_DB")
 
 
 def _unchanged(path: str, shipped: bool) -> _Store | None:

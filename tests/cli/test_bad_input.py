@@ -148,7 +148,7 @@ def test_fit(shell: Shell, refuses: Refuses, record: Path) -> None:
     assert "'pgx'" in refuses("fit", "--term", "pgx")
     assert "'ols'" in refuses("fit", "--term", "pgv", "--method", "ols")
     refuses("fit", "--term", "pgv")
-    assert shell.json("models", "list") == []
+    assert shell.json("models", "list", "--db", "rbfrag.db") == []
 
 
 def test_plot_folder_and_suffix(shell: Shell, refuses: Refuses, record: Path) -> None:

@@ -114,3 +114,14 @@ def test_the_reference_named_as_a_database_is_no_stopgap(tmp_path, monkeypatch):
     for _ in range(2):
         assert FROM_REFERENCE in predict(3.0, 0.1, pgv_m_s=0.6).warnings
         assert predict(3.0, 0.1, pgv_m_s=0.6, db=REFERENCE).warnings == ()
+
+
+def test_a_database_without_a_model_does_not_take_the_place_of_the_reference(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("RBFRAG_DB", raising=False)
+    with opened_database("rbfrag.db", create=True):
+        pass
+    for _ in range(2):
+        assert FROM_REFERENCE in predict(3.0, 0.1, pgv_m_s=0.6).warnings
+    with pytest.raises(UnknownModelError, match="holds no model yet"):
+        predict(3.0, 0.1, pgv_m_s=0.6, db="rbfrag.db")

@@ -12,6 +12,13 @@ from rbfrag.cli.parameters.stack import option, stacked
 
 EXAMPLE = "Example:  rbfrag demo"
 
+NEXT = (
+    "rbfrag predict --height 2 --width 0.4 --phi 40 --pgv 0.9",
+    "rbfrag predict --height 2 --width 0.4 --kind rocking --pgv 0.9",
+    "rbfrag serve",
+)
+"""Commands that are named at the end."""
+
 
 @stacked
 def demo(
@@ -54,6 +61,9 @@ def demo(
     print(f"\ndone in {time.perf_counter() - started:.0f} s; written:")
     for path in (database, response_png, fit_png):
         print(f"  {path}")
+    print("\nnext:")
+    for command in NEXT:
+        print(f"  {command}")
 
 
 def _run(context: typer.Context, arguments: tuple[str, ...]) -> None:
