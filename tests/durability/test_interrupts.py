@@ -29,7 +29,7 @@ from rbfrag.campaign.simulate import simulate
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="finds the workers under /proc")
 
-MOTIONS = 40
+MOTIONS = 200  # so many that a fast machine is still at it when the signal comes
 SIZES = (10.0, 1.0)
 WHOLE = MOTIONS * 2 * len(SIZES)
 
