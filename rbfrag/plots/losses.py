@@ -66,7 +66,9 @@ def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedan
     if drawn and max(one.value for curve in drawn for one in curve) > 30.0:
         axes.set_xscale("log")
         written_numbers(axes.xaxis, 1.0)
-    first = not axes.get_subplotspec().colspan.start  # type: ignore[union-attr]
+    place = axes.get_subplotspec()
+    assert place is not None  # it was made as one of a row
+    first = not place.colspan.start
     several = len(curves) > 1
     for colour, (law, curve) in zip(_COLOURS, curves.items(), strict=False):
         if not curve:

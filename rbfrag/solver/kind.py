@@ -6,6 +6,7 @@ it there. Campaigns, the database, fits and predictions ask that object, never f
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -14,6 +15,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.results import (
@@ -298,6 +300,24 @@ class Kind:
                 f"{foreign[0]} does not go with {self.kind}, which knows "
                 f"{' and '.join(own) or 'no such option'}"
             )
+
+
+def strengths_at(p2: float, measures: Measures, y_over_pgv: FloatArray) -> FloatArray:
+    """Return k_r/PGA of the blocks of a size whose toppling velocities are given ratios of PGV.
+
+    Args:
+        p2: frequency parameter p² of the blocks [1/s²].
+        measures: PGA and PGV of the motion.
+        y_over_pgv: k_r g/(p PGV), shape (n,).
+
+    Returns:
+        Shape (n,); empty where the motion has no acceleration.
+    """
+    ground = measures.pga_g * STANDARD_GRAVITY_M_S2
+    if not (ground > 0.0 and measures.pgv_m_s > 0.0):
+        return np.empty(0)
+    strengths: FloatArray = math.sqrt(p2) * measures.pgv_m_s / ground * y_over_pgv
+    return strengths
 
 
 def each_once(values: Sequence[float | None], option: str, for_none: str = "None") -> None:

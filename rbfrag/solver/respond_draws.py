@@ -207,7 +207,8 @@ def _checked(draws: object, seed: object) -> tuple[int, np.random.Generator]:
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
             raise InputError(f"{name} = {value!r}: give a whole number from {least} to {most}")
     assert isinstance(draws, int)
-    return draws, np.random.default_rng(seed)  # type: ignore[arg-type]
+    assert isinstance(seed, int)
+    return draws, np.random.default_rng(seed)
 
 
 def _drawn(

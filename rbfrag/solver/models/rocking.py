@@ -35,6 +35,7 @@ from rbfrag.solver.kind import (
     Runner,
     Shaking,
     each_once,
+    strengths_at,
 )
 from rbfrag.solver.quantity import number, positive
 from rbfrag.solver.results import (
@@ -276,11 +277,7 @@ class Rocking(Kind):
     def grid(self, case: Case, measures: Measures) -> FloatArray:
         """Return k_r/PGA of the blocks whose toppling velocities are fixed ratios of PGV."""
         assert case.p2 is not None
-        ground = measures.pga_g * STANDARD_GRAVITY_M_S2
-        if not (ground > 0.0 and measures.pgv_m_s > 0.0):
-            return np.empty(0)
-        strengths: FloatArray = math.sqrt(case.p2) * measures.pgv_m_s / ground * Y_OVER_PGV
-        return strengths
+        return strengths_at(case.p2, measures, Y_OVER_PGV)
 
     def run_cases(
         self,

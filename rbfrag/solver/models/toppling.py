@@ -17,7 +17,6 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Excitation, kept_excitation
 from rbfrag.solver.kind import (
     PLANES,
@@ -31,6 +30,7 @@ from rbfrag.solver.kind import (
     Runner,
     Shaking,
     each_once,
+    strengths_at,
 )
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import (
@@ -116,11 +116,7 @@ class Toppling(Kind):
     def grid(self, case: Case, measures: Measures) -> FloatArray:
         """Return k_r/PGA of the blocks whose toppling velocities are fixed ratios of PGV."""
         assert case.p2 is not None
-        ground = measures.pga_g * STANDARD_GRAVITY_M_S2
-        if not (ground > 0.0 and measures.pgv_m_s > 0.0):
-            return np.empty(0)
-        strengths: FloatArray = math.sqrt(case.p2) * measures.pgv_m_s / ground * Y_OVER_PGV
-        return strengths
+        return strengths_at(case.p2, measures, Y_OVER_PGV)
 
     def run_cases(
         self,
