@@ -1,9 +1,10 @@
 """Is this commit fit for a package index?  make release-check
 
-From a clean copy of the last commit, without git's own files: builds the source distribution and the wheel,
-compares their files with those of the commit, checks metadata, version, changelog and citation, installs
-the wheel into bare environments (newest and lowest versions of its dependencies), runs `rbfrag demo` there
-without a network, and lists the licences of everything that the wheel and its extras bring.
+From a clean copy of the last commit, without git's own files: builds the source distribution and the
+wheel, compares their files with those of the commit, checks metadata, version, changelog and citation,
+installs the wheel into bare environments (newest and lowest versions of its dependencies), runs
+`rbfrag demo` there without a network, and lists the licences of all that the wheel and its extras
+bring. Where nothing fails, both distributions are in dist/, for `twine upload dist/*`.
 """
 
 from __future__ import annotations
@@ -68,10 +69,10 @@ def run(command: Sequence[str | Path], **options: object) -> str:
 
 
 def versions_agree(root: Path = ROOT) -> str:
-    """Return the version that the package, CITATION.cff and the newest dated heading of the changelog state.
+    """Return the version that package, CITATION.cff and first heading of the changelog state.
 
     Raises:
-        RuntimeError: they differ, or the changelog has entries above that heading.
+        RuntimeError: they differ, or that heading has no day.
     """
     version = re.search(r'__version__ = "([^"]+)"', (root / "rbfrag/version.py").read_text())
     cited = re.search(r"^version: (\S+)$", (root / "CITATION.cff").read_text(), re.M)
@@ -127,16 +128,8 @@ class Check:
         version = versions_agree(self.source)
         if self.wheel.name.split("-")[1] != version:
             raise RuntimeError(f"{self.wheel.name} is not of version {version}")
-        run(
-            [
-                sys.executable,
-                "-m",
-                "cffconvert",
-                "--validate",
-                "--infile",
-                self.source / "CITATION.cff",
-            ]
-        )
+        cited = self.source / "CITATION.cff"
+        run([Path(sys.executable).with_name("cffconvert"), "--validate", "--infile", cited])
         return f"{version} in package, wheel, citation and changelog; CITATION.cff is valid"
 
     def files(self) -> str:
@@ -188,9 +181,10 @@ class Check:
             )
         )
         demo = run([*command, "demo"], cwd=folder, env=environment)
-        done = next(line for line in demo.splitlines() if line.startswith("done in"))
+        seconds = re.search(r"^done in (\d+ s)", demo, re.M)
         run([*command, "db", "check", "--db", "rbfrag-demo.db"], cwd=folder, env=environment)
-        return f"predict {answer['probability']:.4f}; demo without a network: {done.rstrip('; written:')}"
+        took = seconds[1] if seconds else "did not end"
+        return f"predict {answer['probability']:.4f}; demo without a network: {took}"
 
     def newest(self) -> str:
         about = tomllib.loads((self.source / "pyproject.toml").read_text(encoding="utf-8"))
@@ -227,9 +221,8 @@ class Check:
         )
         odd = []
         for row in sorted(rows, key=lambda row: str(row["Name"]).lower()):
-            print(
-                f"        {row['Name']:28} {row['Version']:14} {' '.join(row['License'].split())[:80]}"
-            )
+            licence = " ".join(row["License"].split())[:80]
+            print(f"        {row['Name']:28} {row['Version']:14} {licence}")
             known = any(word in row["License"] for word in LICENCES)
             if not known and row["Name"] not in DATA_ONLY:
                 odd.append(f"{row['Name']}: {row['License'][:40]}")
@@ -263,7 +256,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             except (RuntimeError, OSError, StopIteration, AttributeError) as error:
                 failed += 1
                 print(f"FAILED  {name}: {error}", flush=True)
-    print("fit for release" if not failed else f"{failed} of {len(steps)} steps failed")
+        if not failed:
+            (ROOT / "dist").mkdir(exist_ok=True)
+            for file in (check.sdist, check.wheel):
+                shutil.copy(file, ROOT / "dist")
+    print(
+        "fit for release; both distributions are in dist/"
+        if not failed
+        else f"{failed} of {len(steps)} steps failed"
+    )
     return 1 if failed else 0
 
 
