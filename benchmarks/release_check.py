@@ -1,7 +1,7 @@
 """Is this commit fit for a package index?  make release-check
 
-From a clean copy of the last commit, without git's own files: builds the source distribution and the
-wheel, compares their files with those of the commit, checks metadata, version, changelog and citation,
+From a clean copy of the last commit, without files of git: builds the source distribution and the
+wheel, compares their files with the commit, checks metadata, version, changelog and citation,
 installs the wheel into bare environments (newest and lowest versions of its dependencies), runs
 `rbfrag demo` there without a network, and lists the licences of all that the wheel and its extras
 bring. Where nothing fails, both distributions are in dist/, for `twine upload dist/*`.
