@@ -163,7 +163,8 @@ def _draw_kr_axis(axes: Axes, p2: float) -> None:
 
     per_kr = STANDARD_GRAVITY_M_S2 / math.sqrt(p2)
     beside = axes.secondary_yaxis(
-        _KR_AXIS_AT, functions=(lambda y: y / per_kr, lambda kr: kr * per_kr)
+        _KR_AXIS_AT,
+        functions=(lambda y: np.asarray(y) / per_kr, lambda kr: np.asarray(kr) * per_kr),
     )
     written_numbers(beside.yaxis, 1.0, 2.0, 5.0)
     beside.yaxis.set_minor_locator(NullLocator())
@@ -219,7 +220,8 @@ def _is_fitted(
     """Return where intensities x and velocities y, of one shape, are of the fitted ones."""
     kr = np.nan_to_num(y) * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
     answers = model_answers(model, held.p2, kr, held.measures(model, x))
-    return answers.in_domain & np.isfinite(y)
+    fitted: np.ndarray = answers.in_domain & np.isfinite(y)
+    return fitted
 
 
 def _caption(model: FragilityModel, held: HeldMeasures) -> str:

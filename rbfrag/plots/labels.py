@@ -138,7 +138,8 @@ def _lines(axes: Axes) -> Iterator[Path]:
 
     for line in axes.lines:
         path = line.get_transform().transform_path(line.get_path())
-        yield Path(path.vertices[np.isfinite(path.vertices).all(axis=1)])
+        vertices = np.asarray(path.vertices)
+        yield Path(vertices[np.isfinite(vertices).all(axis=1)])
     for points in axes.collections:
         offsets = np.ma.getdata(points.get_offsets())
         if len(offsets) > 1:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.coast import draw_coast
 from rbfrag.plots.labels import write_near
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def plot_shakemap(
     epicentre: tuple[float, float] | None = None,
     shape: tuple[int, int] | None = None,
 ) -> Path:
-    """Draw probabilities at nodes or blocks on a map with colour bar, epicentre and scale.
+    """Draw probabilities at nodes or blocks on a map with coast, colour bar, epicentre and scale.
 
     Args:
         lon: longitudes [deg], shape (n,).
@@ -81,6 +82,7 @@ def plot_shakemap(
         if inside:
             axes.legend(loc="upper right", fontsize=9, framealpha=0.9)
     axes.set(xlim=(west, east), ylim=(south, north), aspect=1.0 / middle)
+    draw_coast(axes, west, east, south, north)
     _scale(axes, west, east, south, north, middle)
     axes.set(xlabel="longitude [°]", ylabel="latitude [°]")
     axes.set_title(title, fontsize=10)
