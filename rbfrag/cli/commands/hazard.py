@@ -99,7 +99,7 @@ def hazard(
     meaning: CurveOptions,
     answering: options.Answering,
     wanted: RateOptions,
-    out: str | None = option("Write one row a block and site (.csv, .parquet)."),
+    out: str | None = option("Write one row a block and site (.csv, .xlsx, .parquet)."),
     excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option(
         "Draw which shaking the rate of one block comes from (.png, .pdf, .svg)."
@@ -124,7 +124,7 @@ def hazard(
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot)
-    table, is_class, remarks = blocks.toppling_blocks(standing)
+    (table, is_class, remarks), refused = blocks.blocks_and_refused(standing)
     period = None if meaning.convert is None else velocity_conversion(meaning.convert).period_s
     files = [
         suited_curves(
@@ -151,7 +151,7 @@ def hazard(
         for one in sites
     ]  # fmt: skip
     if out is not None:
-        write_table(rate_columns(sites, answers), out, excel_text=excel_text)
+        write_table(rate_columns(sites, answers, refused), out, excel_text=excel_text)
     first = [one.curves[0] for one in sites]
     if plot is not None:
         from rbfrag.plots.hazard import plot_contribution

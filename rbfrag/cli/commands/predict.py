@@ -64,7 +64,7 @@ class Table:
     """A table of blocks, and one of answers."""
 
     batch: str | None = option(
-        "Block table (.csv or .parquet) with columns p2_1_s2 and kr (or height_m and "
+        "Block table (.csv, .xlsx or .parquet) with columns p2_1_s2 and kr (or height_m and "
         "width_m; or ky and displacement_m; or ks and ps2_1_s2), restitution, p2_sigma, kr_sigma "
         "and the like, and any of pgv_m_s, sa03_g, sa10_g, sa20_g, sa30_g, pga_g, tm_s, pgd_m; "
         "what is the same for all rows may be an option.",
