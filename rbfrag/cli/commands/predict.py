@@ -9,6 +9,7 @@ from rbfrag.cli.output import print_json, print_pairs, print_warnings, show_pred
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import WAYS, BlockOptions, UncertaintyOptions, option_of
 from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.sentences import table_in_words
 from rbfrag.errors import InputError
 from rbfrag.solver.described import kind_of, numbers_of_kind
 
@@ -190,5 +191,7 @@ def _show_summary(summary: dict[str, Any], *, json: bool) -> None:
     if json:
         print_json({**summary, "warnings": warnings})
         return
+    print(table_in_words(summary))
+    print()
     print_pairs(summary)
     print_warnings(warnings)
