@@ -59,7 +59,7 @@ def test_the_python_of_the_pages_runs(
 ) -> None:
     shutil.copytree(folder, tmp_path, symlinks=True, dirs_exist_ok=True)
     (tmp_path / "docs").symlink_to(ROOT / "docs")
-    for name in ("rbfrag.db", "rock.db", "campaign.db"):
+    for name in re.findall(r'"(\w+\.db)"', "".join(PYTHON[page])):
         shutil.copy(folder / "rbfrag-demo.db", tmp_path / name)
     (tmp_path / "records").mkdir()
     for name in ("record.AT2", "records/RRS228.AT2"):
