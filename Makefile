@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV ?= .venv
 
 FLOORS ?= .venv-floors
+RELEASE ?= .venv-release
 CORE := tests/cli tests/db tests/exchange tests/fragility tests/hazards tests/motions tests/plots \
   tests/rockmasses tests/solver
 
@@ -14,7 +15,7 @@ PIP := $(RUN) pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint types docs unit floors format cli-reference wheel clean
+.PHONY: help demo test lint types docs unit floors release-check format cli-reference wheel clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 16
@@ -36,6 +37,7 @@ types: $(VENV)/.installed-dev  ## static types
 docs: $(VENV)/.installed-dev  ## the documentation, into docs/_build/html
 	$(BIN)/python docs/generate_cli_reference.py --check
 	$(BIN)/python docs/generate_data_dictionary.py --check
+	$(BIN)/python docs/generate_gallery.py --check
 	$(BIN)/python docs/locate_rules.py --check
 	$(BIN)/python docs/draw_architecture.py --check
 	$(RUN) sphinx -E -W --keep-going -q -b html docs docs/_build/html
@@ -54,13 +56,21 @@ floors:  ## the core of the tests with the lowest versions that are allowed
 	MPLCONFIGDIR="$$(cd $(FLOORS) && pwd)/matplotlib" $(FLOORS)/bin/python -m pytest \
 	  -o filterwarnings=default --disable-warnings -n auto $(CORE)
 
+# Not part of .ci/run either: ten minutes of installing. Uploading is then one command: twine upload dist/*
+release-check:  ## is the last commit fit for a package index: distributions, files, versions, licences, bare environments
+	$(PYTHON) -m venv --clear $(RELEASE)
+	$(RELEASE)/bin/python -m pip install --quiet --disable-pip-version-check $$($(PYTHON) -c \
+	  "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['optional-dependencies']['release'])")
+	$(RELEASE)/bin/python -m benchmarks.release_check --python $(PYTHON)
+
 format: $(VENV)/.installed-dev  ## put the source in the style that lint asks for
 	$(RUN) ruff check --fix .
 	$(RUN) ruff format .
 
-cli-reference: $(VENV)/.installed-dev  ## write anew what is generated: commands, data dictionary, figure of the packages
+cli-reference: $(VENV)/.installed-dev  ## write anew what is generated: commands, data dictionary, gallery, figure of the packages
 	$(BIN)/python docs/generate_cli_reference.py
 	$(BIN)/python docs/generate_data_dictionary.py
+	$(BIN)/python docs/generate_gallery.py
 	$(BIN)/python docs/locate_rules.py
 	$(BIN)/python docs/draw_architecture.py
 
