@@ -5,7 +5,7 @@ what blocks of one earthquake share (the copula of docs/theory/joint-failures.md
 fitted to them, and the intervals of blocks drawn at random are compared with the P that is known.
 The copula is that of an earlier estimate, or with --estimated of this project's.
 The reference that is shipped has all that is read. Two minutes of processor time. With --write the
-table of docs/theory/model-choice.md is replaced.
+table of docs/evidence/model-choice.md is replaced.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from rbfrag.fragility.methods import arrays
 
 FloatArray = NDArray[np.float64]
 
-PAGE = ROOT / "docs" / "theory" / "model-choice.md"
+PAGE = ROOT / "docs" / "evidence" / "model-choice.md"
 
 LEVEL = 0.95
 SETS = 300

@@ -3,7 +3,7 @@
 Every method on every measure is judged by earthquakes that it was not fitted to, and beside the
 plain table of what share of the blocks fails at each strength and size. The reference that is
 shipped has all that is read. Two minutes of processor time; --aims prints the aims alone. With
---write the tables of docs/theory/model-choice.md are replaced.
+--write the tables of docs/evidence/model-choice.md are replaced.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ FloatArray = NDArray[np.float64]
 Labels = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-PAGE = ROOT / "docs" / "theory" / "model-choice.md"
+PAGE = ROOT / "docs" / "evidence" / "model-choice.md"
 
 MIDDLE = (Y0_OVER_PGV >= 0.3) & (Y0_OVER_PGV <= 1.5)
 """Strengths of the grid at which outcomes are not nearly decided."""

@@ -4,7 +4,7 @@
 
 reads the campaigns of a database (toppling, slumping by 2 degrees and past recovery, sliding), fits
 the models, compares them with published regressions, and writes the tables and the figure of
-docs/theory/other-kinds.md. Toppling may be in another database, such as the shipped one. What the
+docs/evidence/other-kinds.md. Toppling may be in another database, such as the shipped one. What the
 blocks of one earthquake share is that of the shipped models.
 """
 
@@ -40,7 +40,7 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]
 
-PAGE = ROOT / "docs" / "theory" / "other-kinds.md"
+PAGE = ROOT / "docs" / "evidence" / "other-kinds.md"
 FIGURE = ROOT / "docs" / "figures" / "other-kinds.svg"
 
 

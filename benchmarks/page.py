@@ -9,7 +9,7 @@ from pathlib import Path
 from rbfrag.campaign.machine import machine
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "performance.md"
+PAGE = ROOT / "docs" / "evidence" / "performance.md"
 FIGURE = ROOT / "docs" / "figures" / "work-precision.svg"
 
 

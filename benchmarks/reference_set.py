@@ -50,7 +50,7 @@ MOST_BYTES = 8_300_000
 """Greatest size of the file that is shipped: everyone downloads it. What models of slumping and
 rocking blocks are fitted to would be another 20 million bytes."""
 
-PAGE = ROOT / "docs" / "reference" / "reference-data.md"
+PAGE = ROOT / "docs" / "evidence" / "reference-data.md"
 
 SUITE = "reference"
 
@@ -268,7 +268,7 @@ builds the file and this page from the records.
   limit. A fit to the file is exactly the model that is shipped in it.
 - {ends:,} critical blocks.
 - {displacements:,} displacements of sliding blocks, of 23 strengths in both polarities of every
-  horizontal motion ([how](../theory/other-kinds.md)).
+  horizontal motion ([how](other-kinds.md)).
 - {len(added.added) + len(added.known)} motions of {events} earthquakes with their intensity
   measures, the hash of their samples, their earthquake, and what was done to them: uncorrected
   records were filtered as `rbfrag motions add` does it.
@@ -327,7 +327,7 @@ def model_section(models: Sequence[FitReport]) -> str:
     return f"""## Models
 
 Fitted without vertical motion ([how](../theory/fragility.md), [how
-well](../theory/model-choice.md), [blocks that slide or slump](../theory/other-kinds.md),
+well](model-choice.md), [blocks that slide or slump](other-kinds.md),
 [free-standing blocks](../theory/rocking.md)) to what is shipped; those of slumping and of rocking
 to grids of blocks whose results are too many to be shipped. The first of each kind is its default.
 

@@ -84,7 +84,7 @@ def _of_site(curves: list[HazardCurve], site: str, source: str) -> list[HazardCu
 
 
 BEST_FIRST = ("pgv_m_s", "sa10_g", "sa20_g", "sa30_g", "sa03_g", "pga_g")
-"""Measures by falling skill of the models that read them alone (docs/theory/model-choice.md)."""
+"""Measures by falling skill of the models that read them alone (docs/evidence/model-choice.md)."""
 
 
 def suited_curves(
