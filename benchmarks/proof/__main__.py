@@ -23,7 +23,9 @@ def main(arguments: Sequence[str] | None = None) -> list[ends.Row]:
     options.add_argument("--records", help="folder with MANIFEST.csv (RBFRAG_TEST_RECORDS)")
     options.add_argument("--combinations", type=int, default=50)
     options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--rows", type=Path, required=True, help="CSV file to write and go on from")
+    options.add_argument(
+        "--rows", type=Path, required=True, help="CSV file to write and go on from"
+    )
     options.add_argument("--write", action="store_true", help="write the tables into the page")
     chosen = options.parse_args(arguments)
     known = recordings(chosen.records)

@@ -18,7 +18,8 @@ phi = -90°: the block does not come back. *After the record* (k_h = 0, w = 1) e
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from flint import arb, arb_poly, ctx, fmpq
@@ -51,7 +52,7 @@ class Enclosure:
     Args:
         outcome: ``toppled``, ``stable`` or ``not enclosed``.
         reason: what the balls did not decide, where nothing is enclosed.
-        decided_by: the event that decides: ``past recovery``, ``last impact``, ``energy``, ``rest``.
+        decided_by: event that decides: ``past recovery``, ``last impact``, ``energy`` or ``rest``.
         decided_s: time of that event [s].
         width: width of the enclosure of what decides: of the rotation [rad] for ``past recovery``
             and ``energy``, of the time [s] for ``last impact``; zero where the block never starts.
@@ -70,23 +71,13 @@ class Enclosure:
     bits: int = 0
 
 
-def enclose(
-    drive: Excitation,
-    *,
-    p2: float,
-    kr: float,
-    first: int = 0,
-    one_excursion: bool = False,
-    bits: tuple[int, ...] = BITS,
-) -> Enclosure:
+def enclose(drive: Excitation, *, p2: float, kr: float, bits: tuple[int, ...] = BITS) -> Enclosure:
     """Run one block over one excitation and say what is proven of it.
 
     Args:
         drive: the excitation, with 1 + k_v > 0 throughout.
         p2: frequency parameter p² [1/s²], taken as exact.
         kr: rocking acceleration coefficient, taken as exact, > 0.
-        first: node at which the block is at rest and from which it is looked at.
-        one_excursion: end at the first impact.
         bits: precisions to try in turn.
 
     Raises:
@@ -99,12 +90,36 @@ def enclose(
     reason = ""
     for precision in bits:
         with ctx.workprec(precision):
-            run = _Run(drive, p2, kr)
             try:
-                return run.go(first, one_excursion)
+                return _enclosed(Block(drive, p2, exact(kr)))
             except NotEnclosedError as error:
-                reason = f"{error} at {run.now_s:.3f} s"
+                reason = str(error)
     return Enclosure(NOT_ENCLOSED, reason=reason, bits=bits[-1])
+
+
+def _enclosed(block: Block) -> Enclosure:
+    """Follow excursion after excursion."""
+    times = block.drive.time_s
+    impacts: list[tuple[float, float]] = []
+    place: Place | None = Place(0, arb(0))
+    while (place := block.next_start(place)) is not None:
+        flight = block.fly(place, arb(0), arb(0), lifted=True)
+        place = flight.place
+        at_s = float(times[place.interval]) + float(place.at.mid())
+        if flight.event == IMPACT:
+            impacts.append((at_s, width(place.at)))
+            continue
+        outcome = STABLE if flight.event == RETURNS else TOPPLED
+        event = "past recovery" if flight.event == LOST else "energy"
+        return Enclosure(
+            outcome, "", event, at_s, width(flight.theta), tuple(impacts), block.steps, ctx.prec
+        )
+    if not impacts:
+        return Enclosure(STABLE, "", "rest", float(times[-1]), 0.0, (), block.steps, ctx.prec)
+    time_s, width_s = impacts[-1]
+    return Enclosure(
+        STABLE, "", "last impact", time_s, width_s, tuple(impacts), block.steps, ctx.prec
+    )
 
 
 def least_later_q(drive: Excitation) -> FloatArray:
@@ -119,129 +134,179 @@ def exact(value: float) -> fmpq:
     return fmpq(*float(value).as_integer_ratio())
 
 
-@dataclass(eq=False)
-class _Run:
-    """The state of a run; angles and times are balls, node values exact."""
+class Place(NamedTuple):
+    """An instant: time since the beginning of an interval, a ball where it is that of an impact."""
 
-    drive: Excitation
-    p2_given: float
-    kr_given: float
-    impacts: list[tuple[float, float]] = field(default_factory=list)
-    steps: int = 0
-    now_s: float = 0.0
+    interval: int
+    at: arb
 
-    def __post_init__(self) -> None:
-        self.p2 = arb(self.p2_given)
-        self.p = math.sqrt(self.p2_given)
-        self.kr = exact(self.kr_given)
-        self.theta_c = arb(self.kr).atan()
-        self.least = least_later_q(self.drive)
-        self.moving = False
-        self.lifted = False
-        self.theta = self.rate = arb(0)
-        # what rounding cannot change the sign of is known from doubles
-        product = self.drive.w * self.kr_given
-        self.excess = self.drive.k_h - product
-        self.sure = np.abs(self.excess) > 1e-14 * (np.abs(self.drive.k_h) + product)
 
-    def above(self, node: int) -> fmpq | float:
-        """k_h - w k_r at a node: its sign is right, and where it is a rational so is its value."""
-        if self.sure[node]:
-            return float(self.excess[node])
-        return self.exact_excess(node)
+class Flight(NamedTuple):
+    """How an excursion ended.
 
-    def exact_excess(self, node: int) -> fmpq:
+    Args:
+        event: IMPACT, STOPPED, LOST (past recovery), or, by energy, TOPPLES or RETURNS.
+        place: where, the end of the record for what is decided by energy.
+        theta: rotation there.
+        rate: its rate.
+    """
+
+    event: str
+    place: Place
+    theta: arb
+    rate: arb
+
+
+IMPACT, LOST, TOPPLES, RETURNS, STOPPED = "impact", "lost", "topples", "returns", "stopped"
+
+
+class Block:
+    """One block under one excitation. Balls have the precision of flint's context at each call.
+
+    Args:
+        drive: the excitation, with 1 + k_v > 0.
+        p2: frequency parameter p² [1/s²].
+        kr: rocking acceleration coefficient, a rational number.
+    """
+
+    def __init__(self, drive: Excitation, p2: float, kr: fmpq) -> None:
+        self.drive = drive
+        self.kr = kr
+        self.p2 = arb(float(p2))
+        self.p = math.sqrt(p2)
+        self.theta_c = arb(kr).atan()
+        self.least = least_later_q(drive)
+        self.steps = 0
+        # the sign of k_h - w k_r is known from doubles where rounding cannot change it
+        product = drive.w * float(arb(kr))
+        self.excess = drive.k_h - product
+        self.sure = np.abs(self.excess) > 1e-14 * (np.abs(drive.k_h) + product)
+
+    def sign(self, node: int) -> int:
+        """Sign of k_h - w k_r at a node."""
+        value = float(self.excess[node]) if self.sure[node] else self._exact_excess(node)
+        return (value > 0) - (value < 0)
+
+    def _exact_excess(self, node: int) -> fmpq:
         return exact(self.drive.k_h[node]) - exact(self.drive.w[node]) * self.kr
 
-    def go(self, first: int, one_excursion: bool) -> Enclosure:
-        drive = self.drive
-        last = drive.k_h.size - 1
-        for i in range(first, last):
-            self.now_s = float(drive.time_s[i])
-            if drive.interval_s[i] == 0.0:
-                continue
-            if not self.moving and self.above(i) <= 0 and self.above(i + 1) <= 0:
-                continue
-            self.cross(i, one_excursion)
-            if not self.moving:
-                if one_excursion and self.impacts:
-                    break
-            elif self.past_recovery(self.least[i + 1]):
-                return self.end(TOPPLED, "past recovery", drive.time_s[i + 1], self.theta)
-        self.now_s = float(drive.time_s[-1])
-        if self.moving:
-            outcome = TOPPLED if self.topples_by_energy() else STABLE
-            return self.end(outcome, "energy", self.now_s, self.theta)
-        if not self.impacts:
-            return self.end(STABLE, "rest", self.now_s, arb(0))
-        time_s, width = self.impacts[-1]
-        return Enclosure(
-            STABLE, "", "last impact", time_s, width, tuple(self.impacts), self.steps, ctx.prec
-        )
-
-    def end(self, outcome: str, event: str, time_s: float, ball: arb) -> Enclosure:
-        return Enclosure(
-            outcome, "", event, float(time_s), _width(ball), tuple(self.impacts), self.steps,
-            ctx.prec,
-        )  # fmt: skip
-
-    def cross(self, i: int, one_excursion: bool) -> None:
-        """Carry the run over interval i, of positive length."""
-        drive = self.drive
-        length = exact(drive.interval_s[i])
-        a0, a1 = exact(drive.k_h[i]), exact(drive.k_h[i + 1])
-        w0, w1 = exact(drive.w[i]), exact(drive.w[i + 1])
-        g0, g1 = a0 - w0 * self.kr, a1 - w1 * self.kr
-        line = _Line(*(arb(x) for x in (a0, (a1 - a0) / length, w0, (w1 - w0) / length)))
-        crossing = g0 / (g0 - g1) * length if (g0 > 0) != (g1 > 0) else None
-        whole = arb(length)
-        at = arb(0)
-        if g0 < 0 or (g0 == 0 and g1 < 0):
-            self.lifted = False
-        while True:
-            if not self.moving:
-                start = self.start(at, g0, g1, length, crossing)
-                if start is None:
-                    return
-                at = start
-                self.moving = self.lifted = True
-                self.theta = self.rate = arb(0)
-            if self.lifted:
-                # k_h >= w k_r up to the downward crossing, or to the end: no impact until then
-                target = whole if g1 >= 0 or crossing is None else arb(crossing)
-                self.integrate(line, at, target)
-                at = target
-                if g1 >= 0:
-                    return
-                self.lifted = False
-            landing = self.integrate(line, at, whole, look=True)
-            if landing is None:
-                return
-            at = landing
-            self.impacts.append((float(drive.time_s[i]) + float(at.mid()), _width(at)))
-            self.moving = False
-            if one_excursion:
-                return
-
-    def start(
-        self, at: arb, g0: fmpq, g1: fmpq, length: fmpq, crossing: fmpq | None
-    ) -> arb | None:
-        """When a block that rests from `at` on starts in this interval; None if it does not."""
-        if at.is_zero():
-            if g0 > 0:
-                return at
-        else:
-            g = arb(g0) + arb((g1 - g0) / length) * at
-            if g > 0:
-                return at
-            if not g < 0:
-                raise NotEnclosedError("whether an impact comes before q falls below k_r")
-        if g1 > 0 and crossing is not None:
-            return arb(crossing)
+    def next_start(self, place: Place) -> Place | None:
+        """First instant from a place on at which q > k_r; None where there is none."""
+        last = self.drive.k_h.size - 1
+        i, at = place
+        if i < last and not at.is_zero():
+            sign = self.sign_at(place)
+            if sign > 0:
+                return place
+            crossing = self._rise(i)
+            if crossing is not None:
+                return crossing
+            i += 1
+        while i < last:
+            if self.drive.interval_s[i] > 0.0:
+                if self.sign(i) > 0:
+                    return Place(i, arb(0))
+                crossing = self._rise(i)
+                if crossing is not None:
+                    return crossing
+            i += 1
         return None
 
-    def integrate(self, line: _Line, at: arb, target: arb, *, look: bool = False) -> arb | None:
-        """Carry the motion from `at` to `target`; with `look`, return where it ends by an impact."""
+    def sign_at(self, place: Place) -> int:
+        """Sign of k_h - w k_r inside an interval.
+
+        Raises:
+            NotEnclosedError: the ball of time holds a crossing.
+        """
+        i, at = place
+        if at.is_zero():
+            return self.sign(i)
+        g0, g1 = self._exact_excess(i), self._exact_excess(i + 1)
+        g = arb(g0) + arb((g1 - g0) / exact(self.drive.interval_s[i])) * at
+        if g > 0:
+            return 1
+        if g < 0:
+            return -1
+        raise NotEnclosedError("whether an impact comes before q crosses k_r")
+
+    def _rise(self, i: int) -> Place | None:
+        """Where q rises through k_r in an interval."""
+        if self.sign(i) > 0 or self.sign(i + 1) <= 0:
+            return None
+        g0, g1 = self._exact_excess(i), self._exact_excess(i + 1)
+        return Place(i, arb(g0 / (g0 - g1) * exact(self.drive.interval_s[i])))
+
+    def fly(
+        self,
+        place: Place,
+        theta: arb,
+        rate: arb,
+        *,
+        lifted: bool,
+        stop: Place | None = None,
+        look: bool = True,
+    ) -> Flight:
+        """Carry one excursion to its impact, its loss, the end of the record, or a place.
+
+        Args:
+            place: where it begins.
+            theta: rotation there.
+            rate: its rate.
+            lifted: theta >= 0, theta' >= 0 and q >= k_r there: no impact while q >= k_r (lift).
+            stop: where to stop.
+            look: look for impacts and for the loss; without, theta may be below zero.
+        """
+        drive = self.drive
+        self.theta, self.rate = theta, rate
+        first, begin = place
+        last = drive.k_h.size - 1
+        for i in range(first, last):
+            at = begin if i == first else arb(0)
+            if stop is not None and stop.interval == i and stop.at.is_zero():
+                return Flight(STOPPED, stop, self.theta, self.rate)
+            if drive.interval_s[i] == 0.0:
+                continue
+            stops = stop is not None and stop.interval == i
+            length = exact(drive.interval_s[i])
+            limit = stop.at if stops and stop is not None else arb(length)
+            line = self._line(i, length)
+            g0, g1 = self.sign(i), self.sign(i + 1)
+            if at.is_zero() and (g0 < 0 or (g0 == 0 and g1 < 0)):
+                lifted = False
+            if lifted and look:
+                # k_h >= w k_r as far as the downward crossing, or to the end: no impact until then
+                target = limit
+                if g0 > 0 and g1 < 0:
+                    a, b = self._exact_excess(i), self._exact_excess(i + 1)
+                    crossing = arb(a / (a - b) * length)
+                    if crossing < limit:
+                        target, lifted = crossing, False
+                    elif not crossing >= limit:
+                        raise NotEnclosedError("whether a block is lifted at an impact of another")
+                self._integrate(line, at, target)
+                at = target
+            if not (lifted and look):
+                landing = self._integrate(line, at, limit, look=look)
+                if landing is not None:
+                    return Flight(IMPACT, Place(i, landing), self.theta, self.rate)
+            if stops and stop is not None:
+                return Flight(STOPPED, stop, self.theta, self.rate)
+            if look and self._past_recovery(self.least[i + 1]):
+                return Flight(LOST, Place(i + 1, arb(0)), self.theta, self.rate)
+        end = Place(last, arb(0))
+        if stop is not None and stop.interval >= last:
+            return Flight(STOPPED, end, self.theta, self.rate)
+        event = TOPPLES if self._topples_by_energy() else RETURNS
+        return Flight(event, end, self.theta, self.rate)
+
+    def _line(self, i: int, length: fmpq) -> _Line:
+        drive = self.drive
+        a0, a1 = exact(drive.k_h[i]), exact(drive.k_h[i + 1])
+        w0, w1 = exact(drive.w[i]), exact(drive.w[i + 1])
+        return _Line(*(arb(x) for x in (a0, (a1 - a0) / length, w0, (w1 - w0) / length)))
+
+    def _integrate(self, line: _Line, at: arb, target: arb, *, look: bool = False) -> arb | None:
+        """Carry the motion on to `target`; with `look`, return where an impact ends it."""
         span = target - at
         if span.is_zero():
             return None
@@ -249,16 +314,16 @@ class _Run:
         h = span / pieces
         for _ in range(pieces):
             self.steps += 1
-            rates, path = self.series(line, at, h)
+            rates, path = self._series(line, at, h)
             if look:
-                landing = self.landing(rates, path, h)
+                landing = self._landing(rates, path, h)
                 if landing is not None:
                     return at + landing
             self.theta, self.rate = path(h), rates(h)
             at = at + h
         return None
 
-    def series(self, line: _Line, at: arb, h: arb) -> tuple[arb_poly, arb_poly]:
+    def _series(self, line: _Line, at: arb, h: arb) -> tuple[arb_poly, arb_poly]:
         """Polynomials in time of theta' and theta that hold the solution on all of [0, h]."""
         a, w = line.a + line.da * at, line.w + line.dw * at
         reach = arb(0).union(h)
@@ -271,14 +336,14 @@ class _Run:
         theta_box = self.theta + self.rate * reach + arb(0, (slack * h_most / 2).upper())
         size = float(h_most) * (math.sqrt(float(bound.upper())) + float(abs(self.rate).upper()))
         degree = _degree(size, ctx.prec)
-        rates = self.coefficients(self.theta, self.rate, a, w, line, degree)
+        rates = self._coefficients(self.theta, self.rate, a, w, line, degree)
         # only the last coefficient over the box is used, as the remainder
-        boxed = self.coefficients(theta_box, rate_box, a_box, w_box, line, degree)
+        boxed = self._coefficients(theta_box, rate_box, a_box, w_box, line, degree)
         rates[degree] = boxed[degree]
         path = [self.theta] + [rates[k] / (k + 1) for k in range(degree + 1)]
         return arb_poly(rates), arb_poly(path)
 
-    def coefficients(
+    def _coefficients(
         self, theta: arb, rate: arb, a: arb, w: arb, line: _Line, degree: int
     ) -> list[arb]:
         """Taylor coefficients of theta' from a state and an excitation."""
@@ -297,7 +362,7 @@ class _Run:
             c.append(sum_c / (k + 1))
         return u
 
-    def landing(self, rates: arb_poly, path: arb_poly, h: arb) -> arb | None:
+    def _landing(self, rates: arb_poly, path: arb_poly, h: arb) -> arb | None:
         """The first time in the step at which theta falls through zero; None if it stays above."""
         end = h.upper()
         if self.theta - end * abs(rates(arb(0).union(end))).upper() > 0:
@@ -324,7 +389,7 @@ class _Run:
             parts += [(middle, high), (low, middle)]
         raise NotEnclosedError("whether a touch is an impact")
 
-    def past_recovery(self, least_q: float) -> bool:
+    def _past_recovery(self, least_q: float) -> bool:
         """Whether theta' > 0, 0 > phi > -90° and tan phi < every later q are certain."""
         if not (self.rate > 0 and self.theta > self.theta_c):
             return False
@@ -332,20 +397,19 @@ class _Run:
         upright = self.theta - self.theta_c < arb.pi() / 2
         return bool(upright and cosine > 0 and sine < cosine * arb(least_q))
 
-    def topples_by_energy(self) -> bool:
+    def _topples_by_energy(self) -> bool:
         """Whether the block topples after the record; (theta'/p)²/2 + cos(phi) is kept."""
         phi = self.theta_c - self.theta
         beyond = self.rate * self.rate / (2 * self.p2) + phi.cos() - 1
         if not abs(phi) < arb.pi():
             raise NotEnclosedError("where the block is after the record")
-        if phi > 0 and (beyond < 0 or self.rate < 0):
-            return False
-        if phi < 0 and beyond > 0 and self.rate < 0:
-            return False
-        if (beyond > 0 or phi < 0) and self.rate > 0:
+        # with more energy than upright it goes on the way it goes, with less it stays on its side
+        if self.rate > 0 and (beyond > 0 or phi < 0):
             return True
-        if phi < 0 and beyond < 0:
-            return True
+        if self.rate < 0 and (beyond > 0 or phi > 0):
+            return False
+        if beyond < 0 and (phi < 0 or phi > 0):
+            return bool(phi < 0)
         raise NotEnclosedError("whether the energy suffices after the record")
 
 
@@ -381,5 +445,5 @@ def _degree(size: float, bits: int) -> int:
     return degree
 
 
-def _width(ball: arb) -> float:
+def width(ball: arb) -> float:
     return 2.0 * float(ball.rad())

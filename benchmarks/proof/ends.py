@@ -80,9 +80,7 @@ def draw(known: Sequence[Recording], rng: np.random.Generator) -> Iterator[Combi
 
 def prove(one: Combination) -> Row | None:
     """Search one combination and prove its ends; None where no block topples or w <= 0."""
-    result = critical(
-        one.recording.motion, p2=one.p2, vertical=one.vertical, polarity=one.polarity
-    )
+    result = critical(one.recording.motion, p2=one.p2, vertical=one.vertical, polarity=one.polarity)
     if result.status != "found" or result.lower is None or result.upper is None:
         return None
     drive = one.drive()
