@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from benchmarks.other_kinds_figure import plot_other_kinds
-from benchmarks.page import ROOT, replaced
+from benchmarks.page import ROOT, write_table
 from benchmarks.slide_comparison import comparison
 from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
@@ -224,8 +224,7 @@ def main() -> None:
     for name, table in found.items():
         print(name, table, sep="\n")
         if chosen.write:
-            text = replaced(PAGE.read_text(encoding="utf-8"), name, table)
-            PAGE.write_text(text, encoding="utf-8")
+            write_table(PAGE, name, table)
     if chosen.write:
         plot_other_kinds(
             sliding.report.model, sliding.data, slumping.report.model, slumping.data, FIGURE

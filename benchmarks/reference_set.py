@@ -280,8 +280,7 @@ simulate` makes them where the records are.
 
 {markdown((headers, cells))}
 
-The earthquakes are those of the metadata of the collection, one name for each. The records
-themselves belong to the networks that made them and are not passed on here.
+The records themselves belong to the networks that made them and are not passed on here.
 
 ## Identity
 
@@ -310,26 +309,17 @@ def model_section(models: Sequence[FitReport]) -> str:
     if not models:
         return ""
     rows = [
-        [
-            f"`{report.name}`",
-            ", ".join(
-                f"{name} = {value:.4g} ± {report.standard_errors[name]:.2g}"
-                for name, value in report.coefficients.items()
-            ),
-            f"{report.n:,}",
-            f"{report.n_censored:,}",
-            str(report.events),
-        ]
+        [f"`{report.name}`", f"{report.n:,}", f"{report.n_censored:,}", str(report.events)]
         for report in models
     ]
-    columns = ["model", "coefficients ± standard error", "critical values", "censored",
-               "earthquakes"]  # fmt: skip
+    columns = ["model", "critical values", "censored", "earthquakes"]
     return f"""## Models
 
 Fitted without vertical motion ([how](../theory/fragility.md), [how
 well](model-choice.md), [blocks that slide or slump](other-kinds.md),
 [free-standing blocks](../theory/rocking.md)) to what is shipped; those of slumping and of rocking
-to grids of blocks whose results are too many to be shipped. The first of each kind is its default.
+to grids of blocks whose results are too many to be shipped. The first of each kind is its default;
+`rbfrag models show` prints the coefficients with their errors, and the domain.
 
 {markdown((columns, rows))}
 
