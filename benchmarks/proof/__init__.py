@@ -2,4 +2,4 @@
 
 from benchmarks.page import ROOT
 
-PAGE = ROOT / "docs" / "evidence" / "proof.md"
+PAGE = ROOT / "docs" / "evidence" / "certificate.md"

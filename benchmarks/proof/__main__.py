@@ -12,13 +12,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.certify.recordings import recordings
-from benchmarks.page import ROOT, report
-from benchmarks.proof import ends, tables
-
-PAGE = ROOT / "docs" / "evidence" / "proof.md"
+from benchmarks.page import report
+from benchmarks.proof import PAGE, brackets, tables
 
 
-def main(arguments: Sequence[str] | None = None) -> list[ends.Row]:
+def main(arguments: Sequence[str] | None = None) -> list[brackets.Row]:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--records", help="folder with MANIFEST.csv (RBFRAG_TEST_RECORDS)")
     options.add_argument("--combinations", type=int, default=50)
@@ -26,12 +24,15 @@ def main(arguments: Sequence[str] | None = None) -> list[ends.Row]:
     options.add_argument(
         "--rows", type=Path, required=True, help="CSV file to write and go on from"
     )
+    options.add_argument(
+        "--seconds", type=float, default=600.0, help="for all stronger blocks of a combination"
+    )
     options.add_argument("--write", action="store_true", help="write the tables into the page")
     chosen = options.parse_args(arguments)
     known = recordings(chosen.records)
-    found = ends.study(known, chosen.combinations, chosen.seed, chosen.rows)
-    report("by-size", tables.by_size(found), write=chosen.write, page=PAGE)
-    report("by-combination", tables.by_combination(found), write=chosen.write, page=PAGE)
+    found = brackets.study(known, chosen.combinations, chosen.seed, chosen.rows, chosen.seconds)
+    report("proof", tables.by_size(found), write=chosen.write, page=PAGE)
+    report("proof-by-combination", tables.by_combination(found), write=chosen.write, page=PAGE)
     return found
 
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from flint import arb, ctx
 
+from benchmarks.certify.made_up import noise, plateaus, ties, vertical_of
 from benchmarks.certify.recordings import Combination, Recording
 from benchmarks.extended.toppling import truth
-from benchmarks.proof import ends, tables
+from benchmarks.proof import above, brackets, tables
 from benchmarks.proof.enclosed_run import (
     NOT_ENCLOSED,
     STABLE,
@@ -154,21 +155,72 @@ def test_the_study_goes_on_where_it_was_ended(tmp_path: Path) -> None:
         GroundMotion(0.3 * shaking(5, npts=300), 0.02),
     )
     rows = tmp_path / "rows.csv"
-    first = ends.study([*known, upright], 3, 1, rows)
+    first = brackets.study([*known, upright], 3, 1, rows, 60.0)
     text = rows.read_text()
-    again = ends.study([*known, upright], 5, 1, rows)
+    again = brackets.study([*known, upright], 5, 1, rows, 60.0)
     assert again[:3] == first
     assert rows.read_text().startswith(text)
-    assert all(row.off_proven and row.at_proven for row in again)
+    assert all(row.off_proven and row.at_proven and row.above_proven for row in again)
     assert len({row.p2 for row in again}) == 5
     table = tables.by_size(again)
-    assert "| all | 5 | 1 | 5 | 5 |" in table
+    assert "| all | 5, 1 | 5 | 5 | 5 |" in table
     assert tables.by_combination(again).count("\n") == 6
+
+
+def test_no_proof_where_a_stronger_block_topples() -> None:
+    motion = GroundMotion(shaking(3, npts=300), 0.02)
+    drive = excitation(motion)
+    found = critical(motion, p2=3.0)
+    assert found.lower is not None
+    assert found.k_up_over_pga is not None
+    k_up = found.k_up_over_pga * drive.pga_g
+    for off in (1e-2, 1e-5):
+        kr = found.lower * drive.pga_g * (1.0 - off)
+        said = above.nothing_above(drive, p2=3.0, kr=kr, k_up=k_up, seconds=60.0)
+        assert not said.proven
+        assert said.reached >= found.lower * drive.pga_g
+    low = above.nothing_above(drive, p2=3.0, kr=kr, k_up=kr, seconds=60.0)
+    assert "from rest" in low.reason
+    assert not above.nothing_above(
+        drive, p2=3.0, kr=0.99 * k_up, k_up=1.1 * k_up, seconds=0.0
+    ).proven
+
+
+def test_strong_shaking_both_ways_keeps_no_order() -> None:
+    motion = GroundMotion.from_nodes([0.0, 0.1, 0.2, 0.3], [0.0, 2.0, -0.5, 0.0])
+    assert above.keeps_order(excitation(motion))
+    motion = GroundMotion.from_nodes([0.0, 0.1, 0.2, 0.3], [0.0, 2.0, -0.501, 0.0])
+    assert not above.keeps_order(excitation(motion))
+    said = above.nothing_above(excitation(motion), p2=3.0, kr=0.5, k_up=1.0, seconds=60.0)
+    assert "D >= 0" in said.reason
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_verdicts_hold_for_blocks_inside(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    motion = (noise, plateaus, ties)[seed](rng)
+    drive = excitation(motion, vertical_of(motion, rng) if seed == 0 else None)
+    assert above.keeps_order(drive)
+    p2 = 10.0
+    seen = []
+    for _ in range(16):
+        low = drive.max_q * rng.uniform(0.05, 1.0)
+        high = low * (1.0 + 10.0 ** rng.uniform(-5.0, -1.0))
+        with ctx.workprec(above.BITS):
+            record = above.Record(drive, p2)
+            table = above.Table(record, exact(low))
+            verdict = above.decide(record, exact(low), exact(high), table, 0).verdict
+        seen.append(verdict)
+        if verdict != above.SPLIT:
+            wanted = TOPPLED if verdict == above.TOPPLE else STABLE
+            for kr in (low, *rng.uniform(low, high, 4)):
+                assert truth(drive, p2=p2, kr=float(kr)).outcome == wanted
+    assert {above.SAFE, above.TOPPLE} <= set(seen)
 
 
 def test_a_block_on_the_wrong_side_is_no_proof() -> None:
     one = Combination(Recording("pulse", PULSE, None), "forward", 5.0, False)
-    row = ends.prove(one)
+    row = brackets.prove(one, 60.0)
     assert row is not None
     assert row.off_proven
     found = critical(PULSE, p2=5.0)

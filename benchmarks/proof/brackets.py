@@ -1,4 +1,4 @@
-"""Part `ends`: both ends of brackets, proven in ball arithmetic."""
+"""Brackets of critical values, proven: their ends, and that no stronger block topples."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.certify.recordings import Combination, Recording
+from benchmarks.proof.above import nothing_above
 from benchmarks.proof.enclosed_run import STABLE, TOPPLED, Enclosure, enclose
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES
 from rbfrag.solver.search.critical import critical
@@ -26,7 +27,8 @@ EVERY_VERTICAL = 4
 class Row:
     """One combination; widths in rad (past recovery, energy) or s (last impact).
 
-    The ends are those of the bracket itself (`at`) and blocks at `DISTANCE` from it (`off`).
+    The ends are those of the bracket itself (`at`) and blocks at `DISTANCE` from it (`off`); what
+    begins with `above` is of all blocks from its upper end on.
     """
 
     motion: str
@@ -48,6 +50,10 @@ class Row:
     bits: int
     steps: int
     seconds: float
+    above_reason: str
+    above_undecided: float
+    above_intervals: int
+    above_seconds: float
 
     @property
     def key(self) -> tuple[str, str, bool, float]:
@@ -60,6 +66,10 @@ class Row:
     @property
     def at_proven(self) -> bool:
         return (self.topples_at, self.stays_at) == (TOPPLED, STABLE)
+
+    @property
+    def above_proven(self) -> bool:
+        return not self.above_reason
 
 
 def draw(known: Sequence[Recording], rng: np.random.Generator) -> Iterator[Combination]:
@@ -78,18 +88,26 @@ def draw(known: Sequence[Recording], rng: np.random.Generator) -> Iterator[Combi
         number += 1
 
 
-def prove(one: Combination) -> Row | None:
-    """Search one combination and prove its ends; None where no block topples or w <= 0."""
+def prove(one: Combination, seconds: float) -> Row | None:
+    """Search one combination and prove its bracket; None where no block topples or w <= 0.
+
+    Args:
+        one: the combination.
+        seconds: processor time after which the proof of all stronger blocks is given up.
+    """
     result = critical(one.recording.motion, p2=one.p2, vertical=one.vertical, polarity=one.polarity)
     if result.status != "found" or result.lower is None or result.upper is None:
         return None
     drive = one.drive()
     lower, upper = result.lower * drive.pga_g, result.upper * drive.pga_g
+    k_up = (result.k_up_over_pga or np.nan) * drive.pga_g
     started = time.process_time()
     ends: list[Enclosure] = [
         enclose(drive, p2=one.p2, kr=kr)
         for kr in (lower * (1.0 - DISTANCE), lower, upper, upper * (1.0 + DISTANCE))
     ]
+    took = time.process_time() - started
+    above = nothing_above(drive, p2=one.p2, kr=upper, k_up=k_up, seconds=seconds)
     return Row(
         motion=one.recording.name,
         polarity=one.polarity,
@@ -97,7 +115,7 @@ def prove(one: Combination) -> Row | None:
         p2=one.p2,
         lower_kr=lower,
         upper_kr=upper,
-        k_up=(result.k_up_over_pga or np.nan) * drive.pga_g,
+        k_up=k_up,
         certified=result.certified,
         topples_off=ends[0].outcome,
         topples_at=ends[1].outcome,
@@ -109,18 +127,25 @@ def prove(one: Combination) -> Row | None:
         stays_width=ends[3].width,
         bits=max(end.bits for end in ends),
         steps=sum(end.steps for end in ends),
-        seconds=time.process_time() - started,
+        seconds=took,
+        above_reason=above.reason,
+        above_undecided=above.undecided,
+        above_intervals=above.intervals,
+        above_seconds=above.seconds,
     )
 
 
-def study(known: Sequence[Recording], wanted: int, seed: int, rows: Path) -> list[Row]:
-    """Prove the ends of `wanted` combinations; those that the file of rows has are not repeated.
+def study(
+    known: Sequence[Recording], wanted: int, seed: int, rows: Path, seconds: float
+) -> list[Row]:
+    """Prove the brackets of `wanted` combinations; those in the file of rows are not repeated.
 
     Args:
         known: recordings to draw from.
         wanted: combinations with a bracket.
         seed: draws.
         rows: CSV file to which each row is written as it is known.
+        seconds: processor time for all stronger blocks of one combination.
     """
     before = {row.key: row for row in read(rows)} if rows.is_file() else {}
     found: list[Row] = []
@@ -134,12 +159,15 @@ def study(known: Sequence[Recording], wanted: int, seed: int, rows: Path) -> lis
         seen.add(key)
         row = before.get(key)
         if row is None:
-            row = prove(one)
+            row = prove(one, seconds)
             if row is None:
                 continue
             write([*before.values(), row], rows)
             before[key] = row
-        print(f"{len(found) + 1:3} {one.name}: {row.topples_off}, {row.stays_off}", flush=True)
+        above = row.above_reason or "nothing above topples"
+        print(
+            f"{len(found) + 1:3} {one.name}: {row.topples_at}, {row.stays_at}, {above}", flush=True
+        )
         found.append(row)
     return found
 
