@@ -62,7 +62,8 @@ def test_nothing_sticks_out_of_the_window(open_page, query):
         page.set_viewport_size({"width": width, "height": 844})
         page.wait_for_function(
             """() => [...document.querySelectorAll('#chart, #curve, #block')].every((each) =>
-              !each.checkVisibility() || each.querySelector('svg').getAttribute('width') == Math.floor(each.clientWidth))"""
+              !each.checkVisibility() ||
+              each.querySelector('svg').getAttribute('width') == Math.floor(each.clientWidth))"""
         )
         check_that_nothing_sticks_out(page, width)
 
