@@ -104,7 +104,8 @@ def test_scenario_covers_what_it_says(shell: Shell, steep: Path) -> None:
     assert found["uncovered_share"].keys() >= {"slide"}
     result = shell("rockmass", steep, "--pgv", "1.0")
     assert "covered blocks only" in result.stdout
-    assert "no fragility model for this mode" in result.stderr
+    assert "slide: " in result.stderr
+    assert "--displacement (displacement_m), how far is too far [m], gives them" in result.stderr
 
 
 @pytest.mark.usefixtures("stored_model")
