@@ -162,7 +162,7 @@ def test_a_block_is_drawn(shell: Shell) -> None:
         (("mass.toml", "--model", "line"), "--model goes with a measure of the motion"),
         (("mass.toml", "--db", "a.db"), "--db goes with a motion or a measure of it"),
         (("mass.toml", "--pgv", "1", "--level", "2"), "level = 2.0"),
-        (("mass.toml", "--out", "a.xlsx"), "none of .csv, .parquet"),
+        (("mass.toml", "--out", "a.xls"), "none of .csv, .xlsx, .parquet"),
         (("mass.toml", "--out", "none/a.csv"), "there is no folder none"),
         (("mass.toml", "--plot", "a.gif"), "none of .png"),
         (("none.toml",), "no such file"),
