@@ -19,14 +19,22 @@ def several(number: int, what: str) -> str:
 
 
 def with_error(mean: float, error: float) -> str:
-    """Return a mean with its standard error, of one digit, and not more digits than that."""
+    """Return a mean with its standard error, the error with two digits, and the mean as fine."""
     if not error > 0.0:
         return rounded(mean)
-    step = float(f"{error:.0e}")
-    digits = max(-int(f"{step:e}".partition("e")[2]), 0)
-    if digits > 6:
-        return f"{mean:.1e} ± {step:.0e}"
-    return f"{mean:,.{digits}f} ± {step:,.{digits}f}"
+    power = int(f"{error:.1e}".partition("e")[2])
+    if power < -6:
+        return f"{mean:.1e} ± {error:.0e}"
+    digits = max(1 - power, 0)
+    return f"{mean:,.{digits}f} ± {error:,.{digits}f}"
+
+
+def rounded_values(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values with three digits where they are no counts, names or yes and no."""
+    return {
+        name: float(f"{value:.3g}") if isinstance(value, float) else value
+        for name, value in values.items()
+    }
 
 
 def map_in_words(document: Mapping[str, Any], *, own: bool) -> Iterator[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.commands.simulate import Workers
-from rbfrag.cli.hazard_sentences import losses_in_words
+from rbfrag.cli.hazard_sentences import losses_in_words, rounded_values
 from rbfrag.cli.output import (
     ProgressBar,
     check_files,
@@ -189,16 +189,17 @@ def _print(answer: LossAnswer, *, verbose: bool) -> None:
     for law, bound in document.pop("bounds").items():
         document |= {f"{name}_{law}": value for name, value in bound.items()}
     known = {name: value for name, value in document.items() if value is not None}
-    print_pairs(
-        known if verbose else {name: known[name] for name in known if name.startswith(SHORT)}
-    )
+    short = {name: known[name] for name in known if name.startswith(SHORT)}
+    print_pairs(known if verbose else rounded_values(short))
     for curve in curves.values():
         for part in curve.values() if isinstance(curve, dict) else [curve]:
             if part:
                 print()
                 thin = part[:: math.ceil(len(part) / MOST_ROWS)]
                 names = [name for name in part[0] if verbose or name not in OF_YEARS]
-                print_table(names, [[row[name] for name in names] for row in thin])
+                shown = [row if verbose else rounded_values(row) for row in thin]
+                print_table(names, [[row[name] for name in names] for row in shown])
     print()
-    print_table(list(rows[0]), [list(row.values()) for row in rows])
+    shown = [row if verbose else rounded_values(row) for row in rows]
+    print_table(list(rows[0]), [list(row.values()) for row in shown])
     print_warnings(warnings)

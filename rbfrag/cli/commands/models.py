@@ -36,9 +36,7 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
     if json:
         print_json(listed)
         return
-    default = " and ".join(
-        f"{each['name']} ({each['kind']})" for each in listed if each["is_default"]
-    )
+    default = ", ".join(f"{each['name']} ({each['kind']})" for each in listed if each["is_default"])
     print(
         f"{several(len(listed), 'fitted model')}; where none is named, the default of a kind goes "
         f"first: {default or 'none'}."

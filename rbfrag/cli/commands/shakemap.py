@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from rbfrag.cli.hazard_sentences import map_in_words
+from rbfrag.cli.hazard_sentences import map_in_words, rounded_values
 from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
@@ -227,7 +227,8 @@ def shakemap(
     for sentence in map_in_words(document, own=own):
         print(sentence)
     print()
-    print_pairs(document if printing.verbose else {name: document[name] for name in SHORT})
+    short = rounded_values({name: document[name] for name in SHORT})
+    print_pairs(document if printing.verbose else short)
     print_warnings(warnings)
 
 
