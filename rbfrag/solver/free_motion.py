@@ -27,13 +27,12 @@ from rbfrag.solver.integrator.free_body import (
     ROWS,
     THROWN,
     TOE,
-    Corners,
     Frame,
     FreeRun,
     Motion,
     run_free,
-    work_of,
 )
+from rbfrag.solver.integrator.impulses import Corners, work_of
 from rbfrag.solver.integrator.one_freedom.equation import Pose
 from rbfrag.solver.integrator.one_freedom.state import record_of
 from rbfrag.solver.kind import BlockOnPlanes
