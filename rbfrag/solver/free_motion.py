@@ -216,7 +216,8 @@ def _run(
     record = record_of(excited)
     size = 4 * excited.time_s.size + 200_000
     while True:
-        rows = np.empty((ROWS, size))
+        # what is kept at one time lies together: a run touches little of the memory
+        rows = np.empty((size, ROWS)).T
         run = run_free(
             record, corners, frame, release.time_s, start, step_s, at_landing, work_of(corners),
             rows,

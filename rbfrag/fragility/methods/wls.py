@@ -67,8 +67,15 @@ def _doubts(
     )
 
 
-_LINE = Form(("c0", "c1", "v0", "v1"), _eta, 6)
-_QUADRATIC = Form(("c0", "c1", "v0", "v1", "v2"), _eta, 6)
+_LINE = Form(
+    ("c0", "c1", "v0", "v1"), _eta, 6,
+    terms=("1", "x", "", ""), equation=r"(<sum> - y)/\sigma", where=r"\sigma^2 = <v0> <+v1>\,x",
+)  # fmt: skip
+_QUADRATIC = Form(
+    ("c0", "c1", "v0", "v1", "v2"), _eta, 6,
+    terms=("1", "x", "", "", ""), equation=r"(<sum> - y)/\sigma",
+    where=r"\sigma^2 = <v0> <+v1>\,x <+v2>\,x^2",
+)  # fmt: skip
 
 METHOD = Method(
     name="wls",

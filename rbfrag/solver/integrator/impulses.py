@@ -90,8 +90,8 @@ class Work(NamedTuple):
 def work_of(corners: Corners) -> Work:
     """Return the work arrays of a run."""
     m = corners.arm_x.size
-    one = [np.zeros(m) for _ in range(10)]
-    return Work(*one, np.zeros((3, 4)), np.zeros((3, 3)))
+    shapes = [*10 * [(m,)], (3, 4), (3, 3)]
+    return Work(*[np.zeros(shape) for shape in shapes])
 
 
 class Velocity(NamedTuple):
