@@ -372,6 +372,18 @@ class Form:
         return unscaled._replace(eta=h * unscaled.eta, slopes=slopes)
 
 
+class FittedVariance(NamedTuple):
+    """Mean and variance of the critical velocity, of a method that fits the variance in bins.
+
+    Args:
+        mean_m_s: mean from the parameters and the intensity [m/s].
+        variance_m2_s2: variance [m²/s²] from them.
+    """
+
+    mean_m_s: Callable[[Sequence[float], Any], Any]
+    variance_m2_s2: Callable[[Sequence[float], Any], Any]
+
+
 @dataclass(frozen=True)
 class Method:
     """One method of fitting.
@@ -390,6 +402,7 @@ class Method:
         median_of: name of the block's parameter whose median is told beside the probability.
         doubts: yields (holds, name of the value, text) where the model makes no sense, from
             parameters, values and functions.
+        fitted_variance: mean and variance where the variance is fitted in bins; None elsewhere.
     """
 
     name: str
@@ -406,6 +419,7 @@ class Method:
         Callable[[Sequence[float], Mapping[str, Any], Numbers], Iterator[tuple[Any, str, str]]]
         | None
     ) = None
+    fitted_variance: FittedVariance | None = None
 
     def fitter(self) -> Callable[..., Any]:
         """Return the function that fits it; numpy is loaded only here."""

@@ -41,7 +41,7 @@ METHOD = Method(
             (ABOVE_SPECTRUM,),
             size_factor=SizeFactor(0.30),
             terms=("1", r"\ln(x/y)"),
-        )  # fmt: skip
+        )
     },
     reads="outcomes",
     meaning=OF_OUTCOME,
