@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 
 from rbfrag.fragility.methods import Form
 from rbfrag.fragility.model import FragilityModel
@@ -57,7 +58,7 @@ def rounded(value: float, *, signed: bool = False) -> str:
     return f"-{text}" if value < 0.0 else text
 
 
-def _filled(what: str, form: Form, known: dict[str, float]) -> str:
+def _filled(what: str, form: Form, known: Mapping[str, float]) -> str:
     if what == "sum":
         return _sum(form, known)
     if what.startswith("exp "):
@@ -67,7 +68,7 @@ def _filled(what: str, form: Form, known: dict[str, float]) -> str:
     return rounded(known[what])
 
 
-def _sum(form: Form, known: dict[str, float]) -> str:
+def _sum(form: Form, known: Mapping[str, float]) -> str:
     """Return the sum over the parameters, a line for some of its terms at a time."""
     text = ""
     count = 0

@@ -198,5 +198,5 @@ def _draw_variance(
     axes.set_xlim(left, right)
     axes.set_xlabel(model.term.label)
     axes.set_ylabel("variance of $y$\nabout the line [m²/s²]")
-    labels = [f"{binned.count.size} bins of equal count", "fitted variance"]
+    labels = [f"{binned.counts.size} bins of equal count", "fitted variance"]
     axes.legend([dots, curve], labels, loc="upper left", fontsize=8, frameon=False)

@@ -80,13 +80,13 @@ class BinVariances(NamedTuple):
     """Variances of residuals in the bins that hold points, shape (m,).
 
     Args:
-        count: points in each.
+        counts: points in each.
         centre: their mean intensity [m/s].
         variance: mean square of their residuals, with the two parameters of the line taken off the
             degrees of freedom [m²/s²].
     """
 
-    count: FloatArray
+    counts: FloatArray
     centre: FloatArray
     variance: FloatArray
 
