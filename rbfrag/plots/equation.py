@@ -24,11 +24,11 @@ def equation_lines(model: FragilityModel) -> list[str]:
     form, known = model.form, model.row.coefficients
     factor = form.size_factor
     eta = r"\eta" if factor is None else r"\eta/h"
-    right = re.sub("<([^>]+)>", lambda found: _filled(found[1], form, known), form.equation)
+    right = re.sub("<([^>]+)>", lambda match: _filled(match[1], form, known), form.equation)
     first, *others = right.split("\n")
     lines = [rf"$P = {model.method.link.formula},\quad {eta} = {first}$"]
     lines += [rf"${other}$" for other in others]
-    where = re.sub("<([^>]+)>", lambda found: _filled(found[1], form, known), form.where)
+    where = re.sub("<([^>]+)>", lambda match: _filled(match[1], form, known), form.where)
     if factor is not None:
         where = ",\\ ".join(part for part in (f"h = {factor.formula}", where) if part)
     if where:

@@ -33,7 +33,7 @@ def as_python(text: str) -> str:
         (r"\\ln\\frac\{1 - (\w)\}\{\1\}", r"log((1-\1)/\1)"), (r"\\ln\^2 p", "log(p)**2"),
         (r"\\ln\(", "log("), (r"\\ln ([A-Za-z]+(_\{?[\w.]+\}?)?)", r"log(\1)"), (r"k'", "kp"),
         (r"\\times10\^\{(-?\d+)\}", r"e\1"), (r"x\^2", "x**2"), (r"\\sigma", "sigma"),
-        (r"\\,", "*"), (r"_\{?([\w.]+)\}?", lambda found: found[1].replace(".", "")),
+        (r"\\,", "*"), (r"_\{?([\w.]+)\}?", lambda match: match[1].replace(".", "")),
     ):  # fmt: skip
         text = re.sub(name, part, text)
     return text
