@@ -22,20 +22,20 @@ from rbfrag.db.models import save_model
 from rbfrag.exchange.batch import predict_table
 from rbfrag.exchange.block_draws import read_draws
 from rbfrag.exchange.block_table import waiting_blocks, write_block_table
-from rbfrag.exchange.branch_weights import realization_weights
 from rbfrag.exchange.fragility_function import (
     FragilityFunction,
-    IntensityType,
     discrete_function,
     lognormal_function,
 )
-from rbfrag.exchange.hazard_curves import read_hazard_curves
 from rbfrag.exchange.mesh_file import block_from_mesh
 from rbfrag.exchange.nrml import nrml_text, read_nrml
 from rbfrag.exchange.openquake_events import FILES, JobFiles, read_events
 from rbfrag.exchange.pelicun_table import pelicun_text, read_pelicun
 from rbfrag.exchange.shakemap import read_shakemap
+from rbfrag.hazards.branch_weights import realization_weights
 from rbfrag.hazards.curve import hazard_curve
+from rbfrag.hazards.curve_file import read_hazard_curves
+from rbfrag.hazards.measure_type import IntensityType
 from rbfrag.motions.formats.delimited_text import INDEX
 from rbfrag.motions.metadata import read_metadata
 from rbfrag.motions.recognise import read_motions

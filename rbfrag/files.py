@@ -35,6 +35,24 @@ def packed_as(start: bytes) -> str | None:
     return next((name for magic, name in _ARCHIVES if start.startswith(magic)), None)
 
 
+def as_path(given: object, name: str, what: str) -> Path:
+    """Return the path that an argument gives.
+
+    Args:
+        given: a text or a path.
+        name: of the argument, for the message.
+        what: what the file holds, for the message.
+
+    Raises:
+        InputError: something else.
+    """
+    if isinstance(given, str | os.PathLike):
+        return Path(given)
+    raise InputError(
+        f"{name} is of type {type(given).__name__}: give the path of {what}, as text or Path"
+    )
+
+
 @contextmanager
 def reading(source: Path, what: str) -> Iterator[None]:
     """Say in words why a file cannot be read.
@@ -76,7 +94,7 @@ def source_text(path: str | os.PathLike[str], what: str, most_bytes: int = MOST_
     Raises:
         InputError: the file cannot be read, is empty, too large or not text (UTF-8).
     """
-    source = Path(path)
+    source = as_path(path, "path", f"a file with {what}")
     with reading(source, what):
         size = source.stat().st_size
         if size > most_bytes:

@@ -41,6 +41,7 @@ from rbfrag.db.queries import Vertical
 from rbfrag.db.responses import insert_responses
 from rbfrag.db.spectra import store_spectrum
 from rbfrag.errors import InputError, StoppedError, WorkFailedError
+from rbfrag.frames import Tabular
 from rbfrag.solver.kind import Case
 from rbfrag.solver.kinds import models
 from rbfrag.solver.quantity import positive
@@ -83,8 +84,8 @@ class CampaignProgress:
         return (self.total - self.done) / self.rate_per_s if self.rate_per_s else None
 
 
-@dataclass(frozen=True)
-class CampaignSummary:
+@dataclass(frozen=True, repr=False)
+class CampaignSummary(Tabular):
     """What a finished campaign reports.
 
     Args:

@@ -75,7 +75,7 @@ def test_a_class_of_blocks_with_uncertainty(shell: Shell, grid: Path) -> None:
     )  # fmt: skip
     assert told["uncertainty_integrated"]
     assert "probability of toppling" in Path("a.svg").read_text()
-    note = "values of the map taken as certain"
+    note = "the uncertainty of the map's values is left out"
     assert note not in Path("a.svg").read_text()
     shell("shakemap", grid, "--p2", "3", "--kr", "0.1", "--out", "b.csv", "--plot", "b.svg")
     assert note in Path("b.svg").read_text()

@@ -185,7 +185,7 @@ def shakemap(
         plot_shakemap(
             lon, lat, columns["probability"], plot,
             title=f"{name}{size}\n{_what(class_blocks, own)}; model {chosen.name}"
-            + ("" if shaking.integrated else "\nvalues of the map taken as certain"),
+            + ("" if shaking.integrated else "\nthe uncertainty of the map's values is left out"),
             epicentre=None if event.lon is None or event.lat is None else (event.lon, event.lat),
             shape=(shaken.rows, shaken.columns) if shaken.is_whole and not own else None,
         )  # fmt: skip

@@ -54,15 +54,23 @@ def realization_weights(
     return [None if number is None else weights[number] for number in numbers]
 
 
-def stated_weights(text: str, curves: Sequence[HazardCurve]) -> list[float | None]:
-    """Return the weight of each curve as an option states them.
+Weights = Sequence[float | None] | str | os.PathLike[str]
+"""Weights of branches in the order of the curves, or OpenQuake's file of them."""
+
+
+def stated_weights(
+    given: Weights | None, curves: Sequence[HazardCurve]
+) -> Sequence[float | None] | None:
+    """Return the weight of each curve, None where none are given.
 
     Args:
-        text: numbers in the order of the curves, as 0.5,0.3,0.2, or the name of a file of
-            realizations.
+        given: numbers in the order of the curves, also as text: 0.5,0.3,0.2; or the name of a file
+            of realizations.
         curves: the curves.
     """
+    if not isinstance(given, str | os.PathLike):
+        return given
     try:
-        return [float(part) for part in text.split(",")]
+        return [float(part) for part in os.fspath(given).split(",")]
     except ValueError:
-        return realization_weights(text, curves)
+        return realization_weights(given, curves)
