@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV ?= .venv
 
 FLOORS ?= .venv-floors
+RELEASE ?= .venv-release
 CORE := tests/cli tests/db tests/exchange tests/fragility tests/hazards tests/motions tests/plots \
   tests/rockmasses tests/solver
 
@@ -14,7 +15,7 @@ PIP := $(RUN) pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test lint types docs unit floors format cli-reference wheel clean
+.PHONY: help demo test lint types docs unit floors release-check format cli-reference wheel clean
 
 help:  ## this list
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 16
@@ -53,6 +54,13 @@ floors:  ## the core of the tests with the lowest versions that are allowed
 	  '.[plot,postgres,parquet,gis,dask,mesh,service]' pytest pytest-xdist hypothesis httpx2
 	MPLCONFIGDIR="$$(cd $(FLOORS) && pwd)/matplotlib" $(FLOORS)/bin/python -m pytest \
 	  -o filterwarnings=default --disable-warnings -n auto $(CORE)
+
+# Not part of .ci/run either: ten minutes of installing. Uploading is then one command: twine upload dist/*
+release-check:  ## is the last commit fit for a package index: distributions, files, versions, licences, bare environments
+	$(PYTHON) -m venv --clear $(RELEASE)
+	$(RELEASE)/bin/python -m pip install --quiet --disable-pip-version-check $$($(PYTHON) -c \
+	  "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['optional-dependencies']['release'])")
+	$(RELEASE)/bin/python -m benchmarks.release_check --python $(PYTHON)
 
 format: $(VENV)/.installed-dev  ## put the source in the style that lint asks for
 	$(RUN) ruff check --fix .

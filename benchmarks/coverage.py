@@ -4,8 +4,8 @@ Each fitted model is taken for the truth. Outcomes of all blocks of the grid are
 what blocks of one earthquake share (the copula of docs/theory/joint-failures.md), the model is
 fitted to them, and the intervals of blocks drawn at random are compared with the P that is known.
 The copula is that of an earlier estimate, or with --estimated of this project's.
-The reference that is shipped has all that is read. Two minutes of processor time. With --write the
-table of docs/theory/model-choice.md is replaced.
+The reference that is shipped has all that is read. Two minutes of processor time. --write keeps the
+table beside those of docs/evidence/model-choice.md.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from scipy.special import stdtrit
 from benchmarks.held_out import MODELS, Outcomes, Study, read, studied
 from benchmarks.joint_failures import PUBLISHED, dependence_columns
 from benchmarks.model_acceptance import Mark, acceptance_table
-from benchmarks.page import ROOT, parser, replaced
+from benchmarks.page import ROOT, parser, write_table
 from rbfrag.bench.tables import markdown
 from rbfrag.db.location import REFERENCE
 from rbfrag.fragility.dependence import Dependence
@@ -33,7 +33,7 @@ from rbfrag.fragility.methods import arrays
 
 FloatArray = NDArray[np.float64]
 
-PAGE = ROOT / "docs" / "theory" / "model-choice.md"
+PAGE = ROOT / "docs" / "evidence" / "model-choice.md"
 
 LEVEL = 0.95
 SETS = 300
@@ -173,8 +173,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     table = f"{coverage_table(result)}\n\n{acceptance_table(marks(result))}"
     print(table, flush=True)
     if chosen.write:
-        page = replaced(PAGE.read_text(encoding="utf-8"), "coverage", table)
-        PAGE.write_text(page, encoding="utf-8")
+        write_table(PAGE, "coverage", table)
 
 
 def coverage_table(result: dict[str, Coverage]) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 
-TOOLS = ("dev", "docs", "bench", "samples")
+TOOLS = ("dev", "docs", "bench", "release", "samples")
 """Extras that no user of the package needs: their bounds are not promised."""
 
 _BOUND = re.compile(r"([A-Za-z0-9._-]+)(?:\[[^\]]*\])?\s*>=\s*([0-9.]+)")

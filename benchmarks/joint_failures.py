@@ -3,7 +3,7 @@
 Estimates the copula of failures from predictions of held-out earthquakes, and tests it on
 portfolios of blocks in earthquakes that neither the probabilities nor the copula were fitted to.
 The reference that is shipped has all that is read. Ten minutes of processor time. With --write
-the tables of docs/evidence/joint-failures.md are replaced. --quadrature only compares P(any) by
+the tables of docs/evidence/joint-failures.md are renewed. --quadrature only compares P(any) by
 quadrature with so many samples, on portfolios at random.
 """
 
@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from benchmarks.held_out import FOLDS, MODELS, STEP, Outcomes, Study, read, studied
 from benchmarks.model_acceptance import Mark, acceptance_table
-from benchmarks.page import ROOT, parser, replaced
+from benchmarks.page import ROOT, parser, write_table
 from rbfrag.bench.tables import markdown
 from rbfrag.db.location import REFERENCE
 from rbfrag.fragility.dependence import Dependence, event_range
@@ -251,8 +251,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         table = quadrature_table(chosen.quadrature)
         print(table)
         if chosen.write:
-            page = PAGE.read_text(encoding="utf-8")
-            PAGE.write_text(replaced(page, "quadrature", table), encoding="utf-8")
+            write_table(PAGE, "quadrature", table)
         return
     source, data = read(chosen.db)
     models = [studied(source, data, name) for name in MODELS]
@@ -277,12 +276,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "cells": cell_table(shares),
         "aims": acceptance_table(marks(lines, shares)),
     }
-    page = PAGE.read_text(encoding="utf-8") if chosen.write else ""
     for name, table in tables.items():
         print(f"## {name}\n\n{table}\n", flush=True)
-        page = replaced(page, name, table) if chosen.write else page
-    if chosen.write:
-        PAGE.write_text(page, encoding="utf-8")
+        if chosen.write:
+            write_table(PAGE, name, table)
 
 
 def likeliest_r(table: PairTable, sign: int, steps: int) -> float:

@@ -3,7 +3,7 @@
 Every method on every measure is judged by earthquakes that it was not fitted to, and beside the
 plain table of what share of the blocks fails at each strength and size. The reference that is
 shipped has all that is read. Two minutes of processor time; --aims prints the aims alone. With
---write the tables of docs/theory/model-choice.md are replaced.
+--write the tables of docs/evidence/model-choice.md are replaced.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks.held_out import MODELS, PUBLISHED, Outcomes, Study, predictions, read, studied
 from benchmarks.model_acceptance import Mark, acceptance_table
-from benchmarks.page import ROOT, parser, replaced
+from benchmarks.page import ROOT, parser, write_table
 from rbfrag.bench.tables import markdown
 from rbfrag.db.location import REFERENCE
 from rbfrag.errors import FitError
@@ -32,7 +32,7 @@ FloatArray = NDArray[np.float64]
 Labels = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-PAGE = ROOT / "docs" / "theory" / "model-choice.md"
+PAGE = ROOT / "docs" / "evidence" / "model-choice.md"
 
 MIDDLE = (Y0_OVER_PGV >= 0.3) & (Y0_OVER_PGV <= 1.5)
 """Strengths of the grid at which outcomes are not nearly decided."""
@@ -445,12 +445,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options.add_argument("--db", default=str(REFERENCE), help="database with outcomes of the grid")
     options.add_argument("--aims", action="store_true", help="only the table of aims")
     chosen = options.parse_args(arguments)
-    page = PAGE.read_text(encoding="utf-8") if chosen.write else ""
     for name, table in study(*read(chosen.db), aims_alone=chosen.aims).items():
         print(f"## {name}\n\n{table}\n", flush=True)
-        page = replaced(page, name, table) if chosen.write else page
-    if chosen.write:
-        PAGE.write_text(page, encoding="utf-8")
+        if chosen.write:
+            write_table(PAGE, name, table)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@
 
 reads the campaigns of a database (toppling, slumping by 2 degrees and past recovery, sliding), fits
 the models, compares them with published regressions, and writes the tables and the figure of
-docs/theory/other-kinds.md. Toppling may be in another database, such as the shipped one. What the
+docs/evidence/other-kinds.md. Toppling may be in another database, such as the shipped one. What the
 blocks of one earthquake share is that of the shipped models.
 """
 
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from sqlalchemy import Connection
 
 from benchmarks.other_kinds_figure import plot_other_kinds
-from benchmarks.page import ROOT, replaced
+from benchmarks.page import ROOT, write_table
 from benchmarks.slide_comparison import comparison
 from rbfrag.bench.tables import markdown
 from rbfrag.db.engine import opened_database
@@ -40,7 +40,7 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]
 
-PAGE = ROOT / "docs" / "theory" / "other-kinds.md"
+PAGE = ROOT / "docs" / "evidence" / "other-kinds.md"
 FIGURE = ROOT / "docs" / "figures" / "other-kinds.svg"
 
 
@@ -224,8 +224,7 @@ def main() -> None:
     for name, table in found.items():
         print(name, table, sep="\n")
         if chosen.write:
-            text = replaced(PAGE.read_text(encoding="utf-8"), name, table)
-            PAGE.write_text(text, encoding="utf-8")
+            write_table(PAGE, name, table)
     if chosen.write:
         plot_other_kinds(
             sliding.report.model, sliding.data, slumping.report.model, slumping.data, FIGURE

@@ -1,4 +1,8 @@
-"""The measured tables of the documentation: each stands between two marks, by one script."""
+"""The measured tables of the documentation, each by one script.
+
+A page shows the few that a reader needs, each between two marks; the others are kept in
+benchmarks/results, in a folder by the name of the page.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +13,9 @@ from pathlib import Path
 from rbfrag.campaign.machine import machine
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "performance.md"
+PAGE = ROOT / "docs" / "evidence" / "performance.md"
 FIGURE = ROOT / "docs" / "figures" / "work-precision.svg"
+RESULTS = ROOT / "benchmarks" / "results"
 
 
 def parser(description: str | None) -> argparse.ArgumentParser:
@@ -20,7 +25,7 @@ def parser(description: str | None) -> argparse.ArgumentParser:
         "--records", help="file or folder of accelerograms (default: as rbfrag bench)"
     )
     made.add_argument("--out", type=Path, help="folder for CSV files")
-    made.add_argument("--write", action="store_true", help="write the table into the documentation")
+    made.add_argument("--write", action="store_true", help="keep the table, in docs or results")
     return made
 
 
@@ -29,16 +34,21 @@ def report(name: str, text: str, *, write: bool, page: Path | None = None) -> No
     text = f"{text}\n\n{machine_sentence()}"
     print(f"\n{text}", flush=True)
     if write:
-        page = PAGE if page is None else page
-        page.write_text(replaced(page.read_text(encoding="utf-8"), name, text), encoding="utf-8")
+        write_table(PAGE if page is None else page, name, text)
 
 
-def replaced(page: str, name: str, text: str) -> str:
-    """Return the page with the text between the marks of `name` exchanged."""
+def write_table(page: Path, name: str, text: str) -> None:
+    """Put a table into its place in the page, or among the results where the page has none."""
     pattern = re.compile(rf"(<!-- {re.escape(name)} -->\n).*?(<!-- end -->)", re.S)
-    if len(pattern.findall(page)) != 1:
-        raise SystemExit(f"{PAGE.name} has no single place marked <!-- {name} --> ... <!-- end -->")
-    return pattern.sub(lambda match: f"{match[1]}\n{text}\n\n{match[2]}", page)
+    shown, places = pattern.subn(
+        lambda match: f"{match[1]}\n{text}\n\n{match[2]}", page.read_text(encoding="utf-8")
+    )
+    if places:
+        page.write_text(shown, encoding="utf-8")
+        return
+    kept = RESULTS / page.stem / f"{name}.md"
+    kept.parent.mkdir(parents=True, exist_ok=True)
+    kept.write_text(f"{text}\n", encoding="utf-8")
 
 
 def machine_sentence() -> str:

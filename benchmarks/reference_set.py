@@ -50,7 +50,7 @@ MOST_BYTES = 8_300_000
 """Greatest size of the file that is shipped: everyone downloads it. What models of slumping and
 rocking blocks are fitted to would be another 20 million bytes."""
 
-PAGE = ROOT / "docs" / "reference" / "reference-data.md"
+PAGE = ROOT / "docs" / "evidence" / "reference-data.md"
 
 SUITE = "reference"
 
@@ -268,7 +268,7 @@ builds the file and this page from the records.
   limit. A fit to the file is exactly the model that is shipped in it.
 - {ends:,} critical blocks.
 - {displacements:,} displacements of sliding blocks, of 23 strengths in both polarities of every
-  horizontal motion ([how](../theory/other-kinds.md)).
+  horizontal motion ([how](other-kinds.md)).
 - {len(added.added) + len(added.known)} motions of {events} earthquakes with their intensity
   measures, the hash of their samples, their earthquake, and what was done to them: uncorrected
   records were filtered as `rbfrag motions add` does it.
@@ -280,8 +280,7 @@ simulate` makes them where the records are.
 
 {markdown((headers, cells))}
 
-The earthquakes are those of the metadata of the collection, one name for each. The records
-themselves belong to the networks that made them and are not passed on here.
+The records themselves belong to the networks that made them and are not passed on here.
 
 ## Identity
 
@@ -310,26 +309,17 @@ def model_section(models: Sequence[FitReport]) -> str:
     if not models:
         return ""
     rows = [
-        [
-            f"`{report.name}`",
-            ", ".join(
-                f"{name} = {value:.4g} ± {report.standard_errors[name]:.2g}"
-                for name, value in report.coefficients.items()
-            ),
-            f"{report.n:,}",
-            f"{report.n_censored:,}",
-            str(report.events),
-        ]
+        [f"`{report.name}`", f"{report.n:,}", f"{report.n_censored:,}", str(report.events)]
         for report in models
     ]
-    columns = ["model", "coefficients ± standard error", "critical values", "censored",
-               "earthquakes"]  # fmt: skip
+    columns = ["model", "critical values", "censored", "earthquakes"]
     return f"""## Models
 
 Fitted without vertical motion ([how](../theory/fragility.md), [how
-well](../theory/model-choice.md), [blocks that slide or slump](../theory/other-kinds.md),
+well](model-choice.md), [blocks that slide or slump](other-kinds.md),
 [free-standing blocks](../theory/rocking.md)) to what is shipped; those of slumping and of rocking
-to grids of blocks whose results are too many to be shipped. The first of each kind is its default.
+to grids of blocks whose results are too many to be shipped. The first of each kind is its default;
+`rbfrag models show` prints the coefficients with their errors, and the domain.
 
 {markdown((columns, rows))}
 

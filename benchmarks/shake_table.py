@@ -20,7 +20,7 @@ from scipy.stats import t as student
 
 import rbfrag
 from benchmarks.model_choice import clustered_mean, log_losses
-from benchmarks.page import ROOT, replaced
+from benchmarks.page import ROOT, write_table
 from benchmarks.shake_table_runs import (
     ALPHA_RAD,
     P2,
@@ -407,8 +407,7 @@ def main(arguments: list[str] | None = None) -> None:
     text, reached = study(trials, outcomes(trials, work=chosen.work, workers=chosen.workers))
     print(text)
     if chosen.write:
-        page = replaced(PAGE.read_text(encoding="utf-8"), "shake-table", text)
-        PAGE.write_text(page, encoding="utf-8")
+        write_table(PAGE, "shake-table", text)
     if not reached:
         raise SystemExit(1)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -26,46 +27,97 @@ What every command has in common:
 - `--db` takes a path or an SQLAlchemy URL; without it `RBFRAG_DB` is used, or else
   `rbfrag.db` in the current folder.
 - `MOTION` is a file, `FILE#INDEX` for one trace of several, or a database id.
+
+## Shared options
+
+Options that mean the same in several commands. Below, each command names those that it takes.
+
 """
 
 
-def commands(app: Any = None) -> Iterator[tuple[tuple[str, ...], Any, str]]:
+def commands(
+    app: Any = None, shared: Collection[tuple[str, str]] = ()
+) -> Iterator[tuple[tuple[str, ...], Any, str]]:
     """Yield every command as (words, command, help), the root first, in the order of `--help`.
 
     Args:
         app: a Typer application; rbfrag's own if None.
+        shared: records of options that the help leaves out.
     """
     import typer.main
 
     if app is None:
         from rbfrag.cli.main import app
-    yield from _walk(("rbfrag",), typer.main.get_command(app), None)
+    yield from _walk(("rbfrag",), typer.main.get_command(app), None, shared)
 
 
 def _walk(
-    words: tuple[str, ...], command: Any, parent: Any
+    words: tuple[str, ...], command: Any, parent: Any, shared: Collection[tuple[str, str]]
 ) -> Iterator[tuple[tuple[str, ...], Any, str]]:
-    context = command.context_class(
+    context = _context(command, words[-1], parent)
+    left_out = [
+        option
+        for option in command.get_params(context)
+        if not option.hidden and option.get_help_record(context) in shared
+    ]
+    for option in left_out:
+        option.hidden = True
+    try:
+        lines = command.get_help(context).splitlines()
+    finally:
+        for option in left_out:
+            option.hidden = False
+    yield words, command, "\n".join(line.rstrip() for line in lines).strip()
+    if hasattr(command, "list_commands"):
+        for name in command.list_commands(context):
+            yield from _walk((*words, name), command.get_command(context, name), context, shared)
+
+
+def _context(command: Any, name: str, parent: Any = None) -> Any:
+    return command.context_class(
         command,
-        info_name=words[-1],
+        info_name=name,
         parent=parent,
         terminal_width=WIDTH,
         max_content_width=WIDTH,
         color=False,
     )
-    lines = command.get_help(context).splitlines()
-    yield words, command, "\n".join(line.rstrip() for line in lines).strip()
-    if hasattr(command, "list_commands"):
-        for name in command.list_commands(context):
-            yield from _walk((*words, name), command.get_command(context, name), context)
+
+
+def records(command: Any) -> list[tuple[str, str]]:
+    """Return name and help of each option of a command, as `--help` prints them."""
+    context = _context(command, "")
+    found = (option.get_help_record(context) for option in command.get_params(context))
+    return [record for record in found if record and record[0].startswith("--")]
+
+
+def shared_options(found: Collection[list[tuple[str, str]]]) -> list[tuple[str, str]]:
+    """Return the options that two commands or more have alike; of one name the most usual.
+
+    Args:
+        found: the records of each command.
+    """
+    times = Counter(record for of_one in found for record in of_one)
+    usual: dict[str, tuple[str, str]] = {}
+    for record, count in times.items():
+        name = record[0].split()[0]
+        if count > 1 and (name not in usual or count > times[usual[name]]):
+            usual[name] = record
+    return list(usual.values())
 
 
 def page() -> str:
     """Return the whole page."""
-    parts = [HEAD]
-    for words, _, text in commands():
+    of_each = {words: records(command) for words, command, _ in commands()}
+    shared = shared_options(of_each.values())
+    parts = [HEAD + "\n".join(f"`{name}`\n: {about}\n" for name, about in shared)]
+    for words, _, text in commands(shared=shared):
         level = "#" * (2 if len(words) <= 2 else 3)
         parts.append(f"{level} `{' '.join(words)}`\n\n```text\n{text}\n```\n")
+        named = [record[0].split()[0] for record in of_each[words] if record in shared]
+        named = [name for name in named if name != "--help"]
+        if named:
+            parts.append(f"Shared: {', '.join(f'`{name}`' for name in named)}.\n")
     return "\n".join(parts)
 
 

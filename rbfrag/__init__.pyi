@@ -10,7 +10,6 @@ from rbfrag.errors import UnknownModelError as UnknownModelError
 from rbfrag.errors import WorkFailedError as WorkFailedError
 from rbfrag.exchange.database_tables import read_table as read_table
 from rbfrag.exchange.event_losses import losses as losses
-from rbfrag.exchange.hazard_curves import read_hazard_curves as read_hazard_curves
 from rbfrag.exchange.mesh_file import block_from_mesh as block_from_mesh
 from rbfrag.fragility.fit.stored import fit as fit
 from rbfrag.fragility.predict import predict as predict
@@ -18,6 +17,7 @@ from rbfrag.hazards.answer import BranchRate as BranchRate
 from rbfrag.hazards.answer import HazardAnswer as HazardAnswer
 from rbfrag.hazards.answer import hazard as hazard
 from rbfrag.hazards.curve import HazardCurve as HazardCurve
+from rbfrag.hazards.curve_file import read_hazard_curves as read_hazard_curves
 from rbfrag.hazards.joint_rate import CountRate as CountRate
 from rbfrag.hazards.joint_rate import JointRate as JointRate
 from rbfrag.hazards.losses import LossAnswer as LossAnswer

@@ -29,10 +29,31 @@ _ARCHIVES = (
 )  # fmt: skip
 """How packed files begin."""
 
+WORKBOOK = ".xlsx"
+"""What Excel workbooks end in: these are zip files."""
+
 
 def packed_as(start: bytes) -> str | None:
     """Return the format of a packed file, of its first bytes; None for another file."""
     return next((name for magic, name in _ARCHIVES if start.startswith(magic)), None)
+
+
+def as_path(given: object, name: str, what: str) -> Path:
+    """Return the path that an argument gives.
+
+    Args:
+        given: a text or a path.
+        name: of the argument, for the message.
+        what: what the file holds, for the message.
+
+    Raises:
+        InputError: something else.
+    """
+    if isinstance(given, str | os.PathLike):
+        return Path(given)
+    raise InputError(
+        f"{name} is of type {type(given).__name__}: give the path of {what}, as text or Path"
+    )
 
 
 @contextmanager
@@ -52,7 +73,8 @@ def reading(source: Path, what: str) -> Iterator[None]:
         if source.is_file():
             with source.open("rb") as file:
                 packed = packed_as(file.read(6))
-            if packed is not None:
+            workbook = source.suffix.lower() == WORKBOOK
+            if packed is not None and not (workbook and packed == "zip"):
                 raise InputError(f"{source} is a {packed} file: unpack it, and name {what} in it")
         yield
     except FileNotFoundError:
@@ -76,7 +98,7 @@ def source_text(path: str | os.PathLike[str], what: str, most_bytes: int = MOST_
     Raises:
         InputError: the file cannot be read, is empty, too large or not text (UTF-8).
     """
-    source = Path(path)
+    source = as_path(path, "path", f"a file with {what}")
     with reading(source, what):
         size = source.stat().st_size
         if size > most_bytes:

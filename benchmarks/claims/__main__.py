@@ -23,7 +23,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import motion_rows, suite_names
 from rbfrag.db.queries import combination_table
 
-PAGE = ROOT / "docs" / "theory" / "claims.md"
+PAGE = ROOT / "docs" / "evidence" / "claims.md"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

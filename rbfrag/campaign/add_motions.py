@@ -7,7 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from sqlalchemy import Connection, Engine
 
 from rbfrag.campaign.traced_file import Trace, missing_files, read_traces
@@ -16,6 +19,7 @@ from rbfrag.db.motions import add_motion, motion_row, same_source
 from rbfrag.db.rows import EarthquakeInfo
 from rbfrag.db.vertical_pairs import recordings_of_mixed_dt
 from rbfrag.errors import InputError, MotionFileError, checked_name
+from rbfrag.frames import Tabular
 from rbfrag.motions.direction import upward
 from rbfrag.motions.formats.delimited_text import INDEX
 from rbfrag.motions.metadata import read_metadata
@@ -42,7 +46,7 @@ class FailedFile:
 
 
 @dataclass(frozen=True)
-class AddReport:
+class AddReport(Tabular):
     """What :func:`add_motions` did.
 
     Args:
@@ -59,6 +63,20 @@ class AddReport:
     processed: tuple[int, ...]
     failed: tuple[FailedFile, ...]
     warnings: tuple[str, ...]
+
+    def table_columns(self) -> dict[str, NDArray[Any]]:
+        """Return id and state of every motion, and the file and reason of each that failed."""
+        states = [
+            *(
+                (number, "processed" if number in self.processed else "added", "", "")
+                for number in self.added
+            ),
+            *((number, "known", "", "") for number in self.known),
+            *((None, "failed", bad.path, bad.reason) for bad in self.failed),
+        ]
+        names = ("motion_id", "state", "file", "reason")
+        rows = np.array(states, dtype=object).reshape(-1, len(names))
+        return dict(zip(names, rows.T, strict=True))
 
     def as_dict(self) -> dict[str, object]:
         """Return the report under the keys of the JSON contract."""
@@ -97,7 +115,7 @@ class _Stored:
 
 
 def add_motions(
-    paths: Sequence[str | os.PathLike[str]],
+    paths: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
     *,
     db: str | os.PathLike[str] | None = None,
     suite: str | None = None,
@@ -116,8 +134,8 @@ def add_motions(
     been read.
 
     Args:
-        paths: files, or folders that are searched with all folders below them, texts about
-            the records (DOCUMENTS) passed over.
+        paths: a file or folder, or several; folders are searched with all folders below them,
+            texts about the records (DOCUMENTS) passed over.
         db: the database (path, URL, or None for the default).
         suite: suite to put the motions into.
         metadata: CSV that states, by file and trace, earthquake, units and direction.
@@ -134,6 +152,12 @@ def add_motions(
         InputError: a path that does not exist, no file at all, metadata that cannot be used.
         DatabaseError: the database cannot be used.
     """
+    if isinstance(paths, str | os.PathLike):
+        paths = [paths]
+    elif not isinstance(paths, Sequence):
+        raise InputError(
+            f"paths is of type {type(paths).__name__}: give a file or folder, or a list of them"
+        )
     if suite is not None and not suite.strip():
         raise InputError("--suite: the name is empty; give one or leave it out")
     checked_name(suite or "", "the suite")

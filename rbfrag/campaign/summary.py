@@ -63,8 +63,8 @@ class SequenceReport(Tabular):
         }
 
 
-@dataclass(frozen=True)
-class CampaignSummary:
+@dataclass(frozen=True, repr=False)
+class CampaignSummary(Tabular):
     """What a finished campaign reports.
 
     Args:

@@ -53,7 +53,8 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 ONE_THREAD = "OPENBLAS_NUM_THREADS"
 """Threads of linear algebra, read where numpy is loaded. The matrices here are too narrow to be
-shared, and threads that wait for one another on a busy machine spin (docs/performance.md)."""
+shared, and threads that wait for one another on a busy machine spin
+(docs/evidence/performance.md)."""
 
 
 def run() -> None:

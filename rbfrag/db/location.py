@@ -46,6 +46,10 @@ def locate(db: str | PathLike[str] | None) -> Path | str:
     """
     if db is None:
         db = os.environ.get("RBFRAG_DB") or DEFAULT_NAME
+    elif not isinstance(db, str | PathLike):
+        raise InputError(
+            f"db is of type {type(db).__name__}: give the database as a path or an SQLAlchemy URL"
+        )
     text = os.fspath(db)
     if not text:
         raise InputError("the database name is empty: give --db a path or an SQLAlchemy URL")

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.fragility_function import FragilityFunction, IntensityType
+from rbfrag.exchange.fragility_function import FragilityFunction
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.predict import Model, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.hazards.measure_type import IntensityType
 
 FloatArray = NDArray[np.float64]
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from rbfrag.exchange.block_table import waiting_blocks
 from rbfrag.exchange.openquake_events import JobFiles, read_events
+from rbfrag.files import as_path
 from rbfrag.fragility.predict import Model
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.losses import LossAnswer, Run, event_losses
@@ -46,8 +47,8 @@ def losses(
     Args:
         folder: folder with the exports of one job (gmf-data, events, sitemesh, realizations and
             ruptures CSV), or None where `files` names them.
-        blocks: table of blocks (.csv, .parquet), or its columns: ``p2_1_s2`` [1/s²] and ``kr``, or
-            ``height_m`` and ``width_m`` [m], with ``site_id`` (text), and, if there are,
+        blocks: table of blocks (.csv, .xlsx, .parquet), or its columns: ``p2_1_s2`` [1/s²] and
+            ``kr``, or ``height_m`` and ``width_m`` [m], with ``site_id`` (text), and, if there are,
             ``block_id``, ``kind``, ``count`` (like blocks, each with an azimuth of its own),
             ``weight`` (what a failure counts, and its loss with it), ``loss`` (in the median) and
             ``loss_sigma`` (standard deviation of its logarithm), ``p2_sigma``, ``kr_sigma`` and
@@ -75,12 +76,14 @@ def losses(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
+    if not isinstance(blocks, Mapping):
+        blocks = as_path(blocks, "blocks", "a table of blocks")
+    job = JobFiles.of(folder, files)
     columns = blocks if isinstance(blocks, Mapping) else waiting_blocks(blocks, kind)
     if "block_id" not in columns:
         names = [str(i + 1) for i in range(len(columns["kr"]))]
         columns = {**columns, "block_id": np.array(names, dtype=object)}
     meaning = component_named("single" if component is None else component)
-    job = JobFiles.of(folder, files)
     events = read_events(job, imts=imt, investigation_time=investigation_time, ses=ses)
     portfolio = Portfolio.of(
         columns, events.site_ids, tuple(events.measures), meaning, kind=kind, model=model, db=db

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, MissingExtraError
-from rbfrag.files import reading
+from rbfrag.files import as_path, reading
 from rbfrag.solver.block.mesh_block import CONTACT_MM, MassProperties, MeshBlock, mesh_block
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def block_from_mesh(
             of mass does not lie above the contacts.
         MissingExtraError: trimesh is not installed.
     """
-    source = Path(path)
+    source = as_path(path, "path", "a mesh")
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)

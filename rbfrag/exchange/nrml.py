@@ -13,12 +13,11 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import (
     FragilityFunction,
-    IntensityType,
     discrete_function,
     lognormal_function,
-    openquake_type,
 )
 from rbfrag.exchange.xml_source import Node, read_xml
+from rbfrag.hazards.measure_type import IntensityType, openquake_type
 
 _UNITS = {"g": 1.0, "cm/s": 0.01, "m/s": 1.0}
 

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.fragility_function import IntensityType, openquake_type
-from rbfrag.files import reading
+from rbfrag.files import as_path, reading
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.hazards.event_set import Duration, EventSet, IntArray, event_weights
+from rbfrag.hazards.measure_type import IntensityType, openquake_type
 
 FloatArray = NDArray[np.float64]
 
@@ -109,7 +109,7 @@ class JobFiles:
         """
         chosen = {name: Path(path) for name, path in (named or {}).items()}
         if folder is not None:
-            place = Path(folder)
+            place = as_path(folder, "folder", "the folder with the exports of one OpenQuake job")
             if not place.is_dir():
                 raise InputError(
                     f"{place} is no folder: name the folder with the exports of one OpenQuake job"

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError, checked_name
 from rbfrag.exchange.fragility_function import (
     FragilityFunction,
-    IntensityType,
     discrete_function,
     lognormal_function,
 )
 from rbfrag.files import csv_rows, source_text
+from rbfrag.hazards.measure_type import IntensityType
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.version import __version__
 

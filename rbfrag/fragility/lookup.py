@@ -119,8 +119,12 @@ def find_model(
         return _suited(tuple(given), db, kind, rotation_deg)[0]
     elif isinstance(model, str):
         chosen = _named(model, db)
+    elif isinstance(model, ModelRow):
+        chosen = _of_row(model)
     else:
-        chosen = _of_row(model)  # type: ignore[arg-type]
+        raise InputError(
+            f"model is of type {type(model).__name__}: give the name of a stored model, or a model"
+        )
     if kind is not None and chosen.row.kind != kind:
         raise InputError(f"model {chosen.name!r} is of kind {chosen.kind}, not {kind}")
     block = chosen.method.block
@@ -352,7 +356,10 @@ def models_in_memory(db: str | PathLike[str] | None = None) -> bool:
 
 def _in_memory(db: str | PathLike[str] | None) -> _Store | None:
     if not _unnamed(db):
-        named = os.environ["RBFRAG_DB"] if db is None else os.fspath(db)
+        try:
+            named = os.environ["RBFRAG_DB"] if db is None else os.fspath(db)
+        except TypeError:
+            return None  # what reads it refuses it
         return _unchanged(named, False)
     if not _stamp(DEFAULT_NAME, False):
         return _unchanged(_SHIPPED, True)

@@ -216,7 +216,7 @@ SINGLE_TERMS = ("pgv", "pga_tm", "pgd_tm")
 """Terms that are one number of the shaking: what the dissertation compares."""
 
 BEST_FIRST = tuple(sorted(TERMS, key=lambda name: -TERMS[name].level))
-"""The terms by falling skill on held-out earthquakes (docs/theory/model-choice.md)."""
+"""The terms by falling skill on held-out earthquakes (docs/evidence/model-choice.md)."""
 
 
 def intensity_term(name: str) -> Term:

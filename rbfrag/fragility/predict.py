@@ -6,7 +6,7 @@ For single numbers neither numpy nor any other library is loaded.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -97,6 +97,10 @@ class Prediction:
         return {**vars(self), "warnings": list(self.warnings)}
 
     # not Tabular: `rbfrag predict` starts without its module
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Yield the one row, so that ``pandas.DataFrame(answer)`` is the table."""
+        yield from self.to_frame().to_dict("records")
+
     def to_frame(self) -> pd.DataFrame:
         """Return the answer as a pandas table of one row."""
         from rbfrag.frames import columns_of, frame_of

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from rbfrag.fragility.methods import Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.fragility.unknown_outcomes import IN_GENERAL, NOTABLE_SHARE
 from rbfrag.frames import Tabular
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T")
@@ -69,6 +72,7 @@ class PredictionArray(Tabular):
             the share that is not known; None where all are known.
         block_sd: standard deviation of P over what each uncertain block may be; None where all are
             certain.
+        index: labels of the rows, of the pandas Series that were given; None without one.
     """
 
     kind: str
@@ -88,6 +92,7 @@ class PredictionArray(Tabular):
     notes: tuple[str, ...] = ()
     unknown_share: FloatArray | None = None
     block_sd: FloatArray | None = None
+    index: pd.Index | None = None
 
     @cached_property
     def reason(self) -> NDArray[np.object_]:
@@ -97,6 +102,11 @@ class PredictionArray(Tabular):
     def table_columns(self) -> dict[str, Any]:
         """Return the columns by name; arrays are flat."""
         return {**super().table_columns(), "reason": self.reason.ravel()}
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the answers as a pandas table, with the index of the Series that were given."""
+        frame = super().to_frame()
+        return frame if self.index is None else frame.set_axis(self.index)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +146,7 @@ def predict_many(
         InputError: arrays that are not numeric or do not broadcast, or, if asked, an
             element that cannot be used.
     """
+    index = _index_of(given)
     values, shape = _flat(given)
     size = int(np.prod(shape))
     ns = arrays()
@@ -187,7 +198,28 @@ def predict_many(
         notes=model.notes,
         unknown_share=None if unknown is None else unknown.reshape(shape),
         block_sd=None if out.block_sd is None else out.block_sd.reshape(shape),
+        index=index if shape == (0 if index is None else len(index),) else None,
     )
+
+
+def _index_of(given: Mapping[str, Any]) -> pd.Index | None:
+    """Return the index of pandas Series; None where none is given.
+
+    Raises:
+        InputError: Series of different indices: pandas would join them by their labels.
+    """
+    series = {name: value for name, value in given.items() if hasattr(value, "iloc")}
+    if not series:
+        return None
+    first, *others = series
+    for name in others:
+        if not series[name].index.equals(series[first].index):
+            raise InputError(
+                f"{first} and {name} are Series of different index: join them first, or give "
+                "arrays (to_numpy()), which go together by their order"
+            )
+    index: pd.Index = series[first].index
+    return index
 
 
 def _in_chunks(work: Callable[[int], T], size: int) -> list[T]:

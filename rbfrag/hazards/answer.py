@@ -16,6 +16,7 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.predict import Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import checked_years, failure_rate, probability_in
+from rbfrag.hazards.branch_weights import Weights, stated_weights
 from rbfrag.hazards.branches import (
     checked_weights,
     curve_name,
@@ -24,6 +25,7 @@ from rbfrag.hazards.branches import (
     weighted_quantiles,
 )
 from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.hazards.joint_rate import MOST_JOINT, USUAL_COUNTS, JointRate
 from rbfrag.hazards.joint_thresholds import JointThresholds
 from rbfrag.hazards.model_blocks import BlockTable, ModelBlocks
@@ -136,11 +138,13 @@ class HazardAnswer(Tabular):
 
 
 def hazard(
-    curve: HazardCurve | Sequence[HazardCurve],
+    curve: CurveLike | Sequence[CurveLike],
     p2: ArrayLike,
     kr: ArrayLike,
     *,
-    weights: Sequence[float | None] | None = None,
+    imt: str | None = None,
+    site: str | None = None,
+    weights: Weights | None = None,
     at_least: Sequence[int] | None = None,
     convert: str | None = None,
     convert_sigma: float | None = None,
@@ -169,11 +173,14 @@ def hazard(
 
     Args:
         curve: hazard curve of PGV, PGA or a spectral acceleration at 0.3, 1, 2 or 3 s, or of one
-            that `convert` is for; or several curves of one site and measure.
+            that `convert` is for, or its file (OpenQuake CSV, USGS NSHM JSON, two columns); or
+            several of one site and measure.
         p2: frequency parameters p² [1/s²], scalar or shape (m,).
         kr: toppling yield acceleration coefficients, scalar or shape (m,).
-        weights: weight of each curve as a branch of a logic tree, None for one that is no branch;
-            they sum to 1.
+        imt: measure of the curve to take of a file that holds several, such as SA(1.0).
+        site: its site, by number or name, likewise.
+        weights: weight of each curve as a branch of a logic tree, None for one that is no branch,
+            or OpenQuake's file of realizations; they sum to 1.
         at_least: numbers of failures in one earthquake whose rates are wanted, from 1 to m; None
             for usual ones.
         convert: name of a published conversion from spectral acceleration to PGV, whose scatter
@@ -198,9 +205,9 @@ def hazard(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    curves = [curve] if isinstance(curve, HazardCurve) else list(curve)
+    curves = as_curves(curve, imt=imt, site=site, convert=convert)
     refuse_unlike(curves)
-    weight = checked_weights(weights, len(curves))
+    weight = checked_weights(stated_weights(weights, curves), len(curves))
     p2s, krs = (np.ravel(values) for values in np.broadcast_arrays(p2, kr))
     checked_years(years)
     counts = _checked_counts(at_least, p2s.size)
@@ -216,8 +223,8 @@ def hazard(
         warnings.extend(quantile_warning(one, "a rate"))
     if chosen.term.advice:
         warnings.append(chosen.term.advice)
-    site = _Site.of(p2s, krs, stated, reading, chosen, level, curves, counts, one_class=one_class)
-    each = [site.under(one, years) for one in curves]
+    blocks = _Site.of(p2s, krs, stated, reading, chosen, level, curves, counts, one_class=one_class)
+    each = [blocks.under(one, years) for one in curves]
     parts = (
         each[:1]
         if weight is None
@@ -232,14 +239,14 @@ def hazard(
     )
     widest = max(parts, key=lambda part: part.edges.size)
     contribution = _contribution(parts, shares, widest.edges)
-    warnings.extend(site.domain_warnings(widest.edges, contribution, mean["annual_rate"]))
+    warnings.extend(blocks.domain_warnings(widest.edges, contribution, mean["annual_rate"]))
     joints = [part.joint for part in parts if part.joint is not None]
     if joints:
         warnings.append(
             f"annual_rate_any: all {p2s.size} blocks are taken as those of one site, of unknown "
             "azimuth"
         )
-    if joints and site.thresholds is None:
+    if joints and blocks.thresholds is None:
         why = (
             "what the blocks share in one earthquake is not known to this model"
             if chosen.dependence is None

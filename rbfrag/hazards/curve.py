@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import SPECTRAL
+from rbfrag.frames import Tabular
 
 FloatArray = NDArray[np.float64]
 
@@ -21,8 +22,8 @@ ANSWERED = ", ".join(["PGV", "PGA", *(f"SA({period:g})" for period in SPECTRAL)]
 """The measures whose curves are answered, each by a model of that very measure."""
 
 
-@dataclass(frozen=True, eq=False)
-class HazardCurve:
+@dataclass(frozen=True, eq=False, repr=False)
+class HazardCurve(Tabular):
     """Annual rates of exceedance at rising levels of one measure of shaking.
 
     Args:

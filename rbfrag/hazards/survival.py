@@ -14,6 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.predict import Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import Fragility
+from rbfrag.hazards.branch_weights import Weights, stated_weights
 from rbfrag.hazards.branches import (
     checked_weights,
     curve_name,
@@ -21,6 +22,7 @@ from rbfrag.hazards.branches import (
     refuse_unlike,
 )
 from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.hazards.model_blocks import ModelBlocks
 from rbfrag.hazards.shaking import NOTABLE, Shaking
 from rbfrag.hazards.standing import Age, Standing, weights_given_standing
@@ -133,13 +135,15 @@ class SurvivalAnswer(Tabular):
 
 
 def survival(
-    curves: HazardCurve | Sequence[HazardCurve],
+    curves: CurveLike | Sequence[CurveLike],
     p2: ArrayLike | None = None,
     kr: ArrayLike | None = None,
     *,
     age_years: float,
     age_sd_years: float = 0.0,
-    weights: Sequence[float | None] | None = None,
+    imt: str | None = None,
+    site: str | None = None,
+    weights: Weights | None = None,
     p2_sigma: ArrayLike = 0.0,
     kr_sigma: ArrayLike = 0.0,
     restitution: ArrayLike | None = None,
@@ -167,14 +171,16 @@ def survival(
     against the hazard, and both bounds are given.
 
     Args:
-        curves: hazard curves of one site and one measure: a mean, quantiles, branches.
+        curves: hazard curves of one site and one measure, or their files: a mean, quantiles,
+            branches.
         p2: frequency parameters p² [1/s²] of the blocks, medians, scalar or shape (m,).
         kr: toppling yield acceleration coefficients, medians, scalar or shape (m,).
         age_years: how long the blocks have stood in this position [a], the mean of a lognormal
             law (:class:`rbfrag.hazards.standing.Age`).
         age_sd_years: its standard deviation [a].
-        weights: weight of each curve as a branch of a logic tree, None for one that is no branch;
-            they sum to 1.
+        imt: as in :func:`rbfrag.hazard`, like `site` and `weights`.
+        site: see there.
+        weights: see there.
         p2_sigma: standard deviations of ln p², independent of block to block, as `p2`.
         kr_sigma: the same of ln k_r.
         restitution: of blocks that rock: speed after an impact over that before it; None, or NaN
@@ -199,9 +205,9 @@ def survival(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    each = [curves] if isinstance(curves, HazardCurve) else list(curves)
+    each = as_curves(curves, imt=imt, site=site, convert=convert)
     refuse_unlike(each)
-    weight = checked_weights(weights, len(each))
+    weight = checked_weights(stated_weights(weights, each), len(each))
     age = Age.of(age_years, age_sd_years)
     known: ModelBlocks | None = None
     if fragility is None:

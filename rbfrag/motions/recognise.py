@@ -10,6 +10,7 @@ from types import ModuleType
 from typing import Any, TypeAlias
 
 from rbfrag.errors import InputError, MotionFileError, UnknownFormatError
+from rbfrag.files import as_path
 from rbfrag.motions.direction import azimuth_deg, is_vertical_name
 from rbfrag.motions.formats import (
     bhrc_v1,
@@ -91,7 +92,7 @@ def read_motions(
         UnknownFormatError: no reader recognises its content.
         InputError: an unknown unit, or a dt that is not positive.
     """
-    file = Path(path)
+    file = as_path(path, "path", "a file of an accelerogram")
     _check_stated(units, dt_s)
     return _read_whole(file, read_text(file), units, dt_s, allow_partial=allow_partial)
 

@@ -164,7 +164,7 @@ class QueryRoute(APIRoute):
     """A route that is asked by the model of a query alone, which pydantic reads at once.
 
     FastAPI inspects every field of such a model anew for each request: with the names of
-    `/v1/predict` that takes longer than all the rest of the answer (docs/performance.md).
+    `/v1/predict` that takes longer than all the rest of the answer (docs/evidence/performance.md).
     """
 
     def get_route_handler(self) -> Handler:

@@ -136,9 +136,9 @@ def critical(body: bytes, query: CriticalQuery) -> bytes:
 
 def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     """Return what `rbfrag hazard --json` prints."""
-    from rbfrag.exchange.hazard_curves import hazard_curves_in, suited_curves
     from rbfrag.hazards.answer import hazard as answer
     from rbfrag.hazards.conversions import velocity_conversion
+    from rbfrag.hazards.curve_file import hazard_curves_in, suited_curves
     from rbfrag.hazards.report import as_dict
 
     block, remarks = query.toppling("p2", "kr", kind=query.kind)

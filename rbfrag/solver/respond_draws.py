@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import POLARITIES
+from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.solver.excitation import excitation, motion_remarks
 from rbfrag.solver.kind import RunEnd
 from rbfrag.solver.quantity import not_negative, positive
@@ -33,8 +34,8 @@ _FRACTIONS = {"restitution"}
 _FAILS_BY = "displacement_m"
 
 
-@dataclass(frozen=True)
-class DrawnResponses:
+@dataclass(frozen=True, repr=False)
+class DrawnResponses(Tabular):
     """What one motion did to the draws of one block.
 
     Args:
@@ -72,7 +73,7 @@ class DrawnResponses:
 
 
 def respond_draws(
-    motion: GroundMotion,
+    motion: MotionLike,
     *,
     p2: ArrayLike | None = None,
     kr: ArrayLike | None = None,
@@ -85,7 +86,7 @@ def respond_draws(
     restitution_sigma: float = 0.0,
     weights: ArrayLike | None = None,
     displacement_m: float | None = None,
-    vertical: GroundMotion | None = None,
+    vertical: MotionLike | None = None,
     polarity: Literal["forward", "reverse", "both"] = "forward",
     kind: str | None = None,
     two_way: bool = False,
@@ -101,7 +102,7 @@ def respond_draws(
     more than ten parameters, because scripts name each quantity that a user states.
 
     Args:
-        motion: horizontal ground motion.
+        motion: horizontal ground motion or its file.
         p2: frequency parameter p² [1/s²]: its median, or draws of shape (k,).
         kr: rocking acceleration coefficient k_r, likewise.
         ky: yield acceleration coefficient of sliding, likewise.
@@ -138,6 +139,8 @@ def respond_draws(
     ways = POLARITIES if polarity == "both" else (polarity,)
     if not set(ways) <= set(POLARITIES):
         raise InputError(f"polarity = {polarity!r}: use 'forward', 'reverse' or 'both'")
+    motion = as_motion(motion)
+    vertical = None if vertical is None else as_motion(vertical, "vertical")
     excited = [excitation(motion, vertical, way) for way in ways]
     limit_m = None if displacement_m is None else positive(displacement_m, _FAILS_BY, "m")
     settings = {"two_way": two_way or None, "horizontal": horizontal or None}

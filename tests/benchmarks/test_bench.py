@@ -6,7 +6,6 @@ import csv
 import importlib
 import json
 import math
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -55,10 +54,6 @@ from tests.solver.rocking_reference import integrate as integrate_rocking
 from tests.synthetic import shaking, write_at2
 
 FILES = 4
-
-
-def published() -> str:
-    return page.PAGE.read_text(encoding="utf-8")
 
 
 @pytest.fixture
@@ -260,32 +255,26 @@ def test_scripts_run_and_fill_their_places_in_the_page(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    copy = tmp_path / "performance.md"
-    empty = re.sub(r" -->\n.*?<!-- end -->", " -->\n<!-- end -->", published(), flags=re.S)
-    copy.write_text(empty, encoding="utf-8")
     module = importlib.import_module(script.__module__)
-    monkeypatch.setattr(page, "PAGE", copy)
+    monkeypatch.setattr(page, "RESULTS", tmp_path / "results")
     if hasattr(module, "FIGURE"):
         monkeypatch.setattr(module, "FIGURE", tmp_path / "figure.svg")
     script([*arguments, "--records", str(folder), "--out", str(tmp_path), "--write"])
-    filled = re.findall(r"<!-- ([a-z-]+) -->\n\n\|", copy.read_text(encoding="utf-8"))
-    assert filled == places
+    kept = list((tmp_path / "results" / "performance").iterdir())
+    assert {path.stem for path in kept} == set(places)
+    assert all(path.read_text(encoding="utf-8").startswith("|") for path in kept)
 
 
-def test_every_place_in_the_page_holds_a_table() -> None:
-    text = published()
-    for name in (
-        "work-precision", "work-precision-rocking", "critical-search", "record-length", "workers",
-        "main-job", "start-up",
-        "campaign-default", "campaign-memory", "campaign-insert", "campaign-dissertation",
-    ):  # fmt: skip
-        between = text.split(f"<!-- {name} -->")[1].split("<!-- end -->")[0]
-        assert between.count("\n|") >= 4, name
-    assert page.replaced("a\n<!-- x -->\nold\n<!-- end -->\nb", "x", "new") == (
-        "a\n<!-- x -->\n\nnew\n\n<!-- end -->\nb"
-    )
-    with pytest.raises(SystemExit):
-        page.replaced(text, "no such place", "")
+def test_a_table_goes_to_its_place_in_the_page_or_to_the_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(page, "RESULTS", tmp_path / "results")
+    shown = tmp_path / "shown.md"
+    shown.write_text("a\n<!-- x -->\nold\n<!-- end -->\nb", encoding="utf-8")
+    for name in ("x", "y"):
+        page.write_table(shown, name, "new")
+    assert shown.read_text(encoding="utf-8") == "a\n<!-- x -->\n\nnew\n\n<!-- end -->\nb"
+    assert (tmp_path / "results" / "shown" / "y.md").read_text(encoding="utf-8") == "new\n"
 
 
 def test_numbers_are_short() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.hazard_curves import read_hazard_curves, suited_curves
+from rbfrag.hazards.curve_file import read_hazard_curves, suited_curves
 
 OPENQUAKE = (
     "#,,,,,\"generated_by='OpenQuake engine 3.16', kind='mean', "

@@ -11,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.fragility_function import IntensityType, discrete_function, lognormal_function
+from rbfrag.exchange.fragility_function import discrete_function, lognormal_function
 from rbfrag.exchange.nrml import nrml_text, read_nrml
+from rbfrag.hazards.measure_type import IntensityType
 
 PGV = IntensityType("pgv_m_s", 0.01)
 PGA = IntensityType("pga_g", 1.0)

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.fragility_function import IntensityType, discrete_function, lognormal_function
+from rbfrag.exchange.fragility_function import discrete_function, lognormal_function
 from rbfrag.exchange.pelicun_table import (
     metadata_text,
     pelicun_text,
     read_pelicun,
     without_dashes,
 )
+from rbfrag.hazards.measure_type import IntensityType
 
 PGV = IntensityType("pgv_m_s", 0.01)
 

@@ -14,10 +14,10 @@ from scipy.special import ndtr
 
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
-from rbfrag.exchange.hazard_curves import read_hazard_curves
 from rbfrag.hazards.annual_rate import failure_rate
 from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
+from rbfrag.hazards.curve_file import read_hazard_curves
 from rbfrag.hazards.standing import Age, Standing, weights_given_standing
 from rbfrag.hazards.survival import survival
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G

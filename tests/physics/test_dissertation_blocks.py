@@ -1,6 +1,6 @@
 """Numbers of Gibson's dissertation on block geometry and yield, each with where it stands.
 
-What the text prints wrongly is stated with the right value; docs/what-differs.md lists it.
+What the text prints wrongly is stated with the right value; docs/evidence/what-differs.md lists it.
 """
 
 from __future__ import annotations

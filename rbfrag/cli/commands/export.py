@@ -84,9 +84,9 @@ class FunctionOptions(BlocksOptions):
 
     def measure(self) -> str:
         """Return the measure that the functions are of, as `predict` calls it."""
-        from rbfrag.exchange.fragility_function import openquake_type
         from rbfrag.fragility.measures import SPECTRAL
         from rbfrag.hazards.curve import ANSWERED
+        from rbfrag.hazards.measure_type import openquake_type
 
         kind = openquake_type(self.imt, "--imt")
         measure = kind.measure if kind.period_s is None else SPECTRAL.get(kind.period_s)

@@ -99,7 +99,7 @@ def hazard(
     meaning: CurveOptions,
     answering: options.Answering,
     wanted: RateOptions,
-    out: str | None = option("Write one row a block and site (.csv, .parquet)."),
+    out: str | None = option("Write one row a block and site (.csv, .xlsx, .parquet)."),
     excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option(
         "Draw which shaking the rate of one block comes from (.png, .pdf, .svg)."
@@ -116,20 +116,15 @@ def hazard(
     are branches of a logic tree: the mean of the rates, and how they are distributed. The block is
     backed by a slope; a free-standing one fails at weaker shaking: --kind rocking.
     """
-    from rbfrag.exchange.branch_weights import stated_weights
-    from rbfrag.exchange.hazard_curves import read_hazard_curves, suited_curves
     from rbfrag.exchange.site_rates import blocks_at_sites, rate_columns
     from rbfrag.hazards.answer import hazard as answer
-    from rbfrag.hazards.conversions import velocity_conversion
+    from rbfrag.hazards.curve_file import suited_in
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot)
-    table, is_class, remarks = blocks.toppling_blocks(standing)
-    period = None if meaning.convert is None else velocity_conversion(meaning.convert).period_s
+    (table, is_class, remarks), refused = blocks.blocks_and_refused(standing)
     files = [
-        suited_curves(
-            read_hazard_curves(path, imt=meaning.imt, site=meaning.site), converted_period_s=period
-        )
+        suited_in(path, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
         for path in curve
     ]
     sites, joined = blocks_at_sites(files, table, site_chosen=meaning.site is not None)
@@ -141,9 +136,8 @@ def hazard(
     answers = [
         answer(
             one.curves, one.columns["p2_1_s2"], one.columns["kr"],
-            weights=None if wanted.weights is None else stated_weights(wanted.weights, one.curves),
-            at_least=wanted.counts(len(one.names), most), convert=meaning.convert,
-            convert_sigma=meaning.convert_sigma,
+            weights=wanted.weights, at_least=wanted.counts(len(one.names), most),
+            convert=meaning.convert, convert_sigma=meaning.convert_sigma,
             component=meaning.component, years=wanted.years, model=answering.model,
             level=answering.level, db=answering.db, one_class=is_class, kind=standing.kind,
             restitution=one.columns.get("restitution"),
@@ -151,7 +145,7 @@ def hazard(
         for one in sites
     ]  # fmt: skip
     if out is not None:
-        write_table(rate_columns(sites, answers), out, excel_text=excel_text)
+        write_table(rate_columns(sites, answers, refused), out, excel_text=excel_text)
     first = [one.curves[0] for one in sites]
     if plot is not None:
         from rbfrag.plots.hazard import plot_contribution

@@ -10,10 +10,8 @@ from rbfrag.cli.output import cell, check_files, print_json, print_table, print_
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import StandingOptions, TableOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
-from rbfrag.errors import InputError
 
 if TYPE_CHECKING:
-    from rbfrag.hazards.curve import HazardCurve
     from rbfrag.hazards.survival import SurvivalAnswer
 
 EXAMPLE = (
@@ -70,16 +68,15 @@ def survival(
     at which the blocks stand with 5 % and 50 %. With --weights the branches of a logic tree are
     weighted again by what the standing blocks say of each.
     """
-    from rbfrag.exchange.branch_weights import stated_weights
+    from rbfrag.hazards.curve_file import as_curves
     from rbfrag.hazards.survival import survival as answered
 
     check_files(plot=plot)
     table, _, remarks = blocks.toppling_blocks(standing)
-    read = [_one_curve(path, meaning) for path in curves]
+    read = as_curves(curves, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
     answer = answered(
         read, table["p2_1_s2"], table["kr"], age_years=known.age, age_sd_years=known.age_sd,
-        weights=None if weights is None else stated_weights(weights, read),
-        p2_sigma=table.get("p2_sigma", known.p2_sigma),
+        weights=weights, p2_sigma=table.get("p2_sigma", known.p2_sigma),
         kr_sigma=table.get("kr_sigma", known.kr_sigma), restitution=table.get("restitution"),
         restitution_sigma=known.restitution_sigma, kind=standing.kind, convert=meaning.convert,
         convert_sigma=meaning.convert_sigma, component=meaning.component, model=answering.model,
@@ -94,21 +91,6 @@ def survival(
         print_json(answer.as_dict())
         return
     _print(answer)
-
-
-def _one_curve(path: str, meaning: CurveOptions) -> HazardCurve:
-    from rbfrag.exchange.hazard_curves import read_hazard_curves, suited_curves
-    from rbfrag.hazards.conversions import velocity_conversion
-
-    period = None if meaning.convert is None else velocity_conversion(meaning.convert).period_s
-    suited = suited_curves(
-        read_hazard_curves(path, imt=meaning.imt, site=meaning.site), converted_period_s=period
-    )
-    if len(suited) > 1:
-        raise InputError(
-            f"{path} has {len(suited)} sites, and the blocks stand at one: choose it with --site"
-        )
-    return suited[0]
 
 
 def _print(answer: SurvivalAnswer) -> None:

@@ -13,12 +13,13 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.fit.line import clustered_line
 from rbfrag.fragility.measures import SINGLE_TERMS, TERMS
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.frames import Tabular
 
 _FIELDS = ("standard_errors", "n", "n_censored", "events", "scores", "warnings")
 
 
-@dataclass(frozen=True)
-class FitReport:
+@dataclass(frozen=True, repr=False)
+class FitReport(Tabular):
     """A fitted model with all that is said about it.
 
     Args:
@@ -71,6 +72,19 @@ class FitReport:
             details={key: value for key, value in diagnostics.items() if key not in _FIELDS},
             model=model,
         )
+
+    def table_columns(self) -> dict[str, Any]:
+        """Return the parameters, one row each, with their standard errors."""
+        errors = [self.standard_errors.get(name, math.nan) for name in self.coefficients]
+        return {
+            "model": self.name,
+            "kind": self.kind,
+            "term": self.term,
+            "method": self.method,
+            "parameter": np.array([*self.coefficients], dtype=object),
+            "coefficient": np.array([*self.coefficients.values()], dtype=np.float64),
+            "standard_error": np.array(errors, dtype=np.float64),
+        }
 
     def as_dict(self) -> dict[str, object]:
         """Return the report under the keys of the JSON contract, and more."""

@@ -10,6 +10,7 @@ from rbfrag.db.models import save_model
 from rbfrag.errors import InputError
 from rbfrag.fragility.fit.fitting import fit as fit_model
 from rbfrag.fragility.fit.report import FitReport
+from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ def fit(
     db: str | PathLike[str] | None = None,
     *,
     kind: str = "toppling",
-    term: str,
+    term: str | None = None,
     method: str | None = None,
     suite: str | None = None,
     vertical: Vertical = "without",
@@ -40,7 +41,7 @@ def fit(
         db: the database: a path or URL; None for ``RBFRAG_DB`` or ``rbfrag.db`` in the current
             folder.
         kind: what the blocks do: any kind that campaigns store.
-        term: name of the intensity term, such as ``pgv``, ``sa10`` or ``xp``.
+        term: name of the intensity term, such as ``pgv``, ``sa10`` or ``xp``; there is no default.
         method: method of fitting (docs/theory/fragility.md); None for ``wls``, or the only one
             that there is for the kind.
         suite: suite of motions to fit; None for all motions.
@@ -68,6 +69,11 @@ def fit(
         raise InputError(
             f"db = {type(db).__name__}: give a path or URL; what stores nothing and takes a "
             "connection or a table is rbfrag.fragility.fit.fitting.fit"
+        )
+    if term is None:
+        raise InputError(
+            "term is missing: name the measure that the model reads, as fit(db, term='pgv'): one "
+            f"of {', '.join(TERMS)}"
         )
     # reading takes no lock, so that a campaign may go on meanwhile
     report = fit_model(

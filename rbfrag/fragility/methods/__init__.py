@@ -315,7 +315,7 @@ class Form:
         formula: eta before the size factor and its slopes, from the parameters, values by name and
             functions.
         rank: place among the methods on this measure by falling skill on held-out earthquakes
-            (docs/theory/model-choice.md).
+            (docs/evidence/model-choice.md).
         bounds: what mechanics forbids.
         start: where the search for the likeliest parameters begins; empty where none is needed.
         size_factor: what eta is multiplied by; None for nothing.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.frames import Tabular
 from rbfrag.solver.block.formulas import (
     array_elementwise,
     cot_gamma,
@@ -92,8 +93,8 @@ REASONS = (
 _NOT_FINITE, _ANGLE, _LENGTH, _NO_BLOCK = 1, 2, 3, 4
 
 
-@dataclass(frozen=True, eq=False)
-class BlockArray:
+@dataclass(frozen=True, eq=False, repr=False)
+class BlockArray(Tabular):
     """Parallelogram blocks of any number; elements that are no block are NaN with a reason.
 
     Args:

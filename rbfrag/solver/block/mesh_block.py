@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.frames import Tabular
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.quantity import positive
 
@@ -190,8 +191,8 @@ class ContactHull:
         return normals, np.einsum("ki,ki->k", normals, self.corners_m)
 
 
-@dataclass(frozen=True)
-class MeshBlock:
+@dataclass(frozen=True, repr=False)
+class MeshBlock(Tabular):
     """A free-standing block measured as a closed mesh; make one with `rbfrag.block_from_mesh`.
 
     Args:
@@ -255,6 +256,10 @@ class MeshBlock:
             "restitution_forward": rocking.restitution_forward,
             "restitution_backward": rocking.restitution_backward,
         }
+
+    def table_columns(self) -> dict[str, NDArray[Any]]:
+        """Return the columns of :meth:`columns`."""
+        return self.columns()
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer of `rbfrag block --mesh --json`; k_r and p² of the weakest azimuth."""

@@ -214,7 +214,7 @@ def record_of(excitation: Excitation) -> Record:
 @within
 def line_at(record: Record, node: int, free_s: float, free_h: float) -> Line:
     """Return the interval after a node, or `free_h` seconds of rest after the record."""
-    # after its last sample the ground is at rest (docs/units-and-signs.md)
+    # after its last sample the ground is at rest (docs/reference/units-and-signs.md)
     if node >= record.last:
         return Line(record.time_s[-1] + free_s, free_h, 0.0, 0.0, 1.0, 1.0)
     k_h, w = record.k_h, record.w

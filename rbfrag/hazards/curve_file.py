@@ -1,0 +1,421 @@
+"""Hazard curves out of a file: OpenQuake CSV, USGS NSHM JSON, or two columns."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from rbfrag.errors import InputError
+from rbfrag.files import csv_rows, is_number, json_document, source_text
+from rbfrag.hazards.conversions import velocity_conversion
+from rbfrag.hazards.curve import ANSWERED, HazardCurve, hazard_curve, rates_from_probabilities
+from rbfrag.hazards.measure_type import openquake_type
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+CurveLike = HazardCurve | str | os.PathLike[str]
+"""A curve, or the file that holds it."""
+
+
+def as_curves(
+    given: CurveLike | Sequence[CurveLike],
+    *,
+    imt: str | None = None,
+    site: str | None = None,
+    convert: str | None = None,
+) -> list[HazardCurve]:
+    """Return the curves that an argument gives, of each file the one that it means.
+
+    Args:
+        given: a curve or a file of one, or several of them.
+        imt: measure of the curves of a file that holds several.
+        site: site of them, by its number or name.
+        convert: name of the conversion to PGV that is asked for, if any.
+
+    Raises:
+        InputError: something else, or a file that holds curves of several sites.
+    """
+    if isinstance(given, str | os.PathLike):
+        return [_one_curve(given, imt, site, convert)]
+    if isinstance(given, HazardCurve):
+        return [given]
+    if not isinstance(given, Sequence):
+        raise InputError(
+            f"curve is of type {type(given).__name__}: give a HazardCurve, the path of its file, "
+            "or a list of them"
+        )
+    return [
+        curve for each in given for curve in as_curves(each, imt=imt, site=site, convert=convert)
+    ]
+
+
+def _one_curve(
+    path: str | os.PathLike[str], imt: str | None, site: str | None, convert: str | None
+) -> HazardCurve:
+    curves = suited_in(path, imt=imt, site=site, convert=convert)
+    if len(curves) > 1:
+        raise InputError(
+            f"{path} has {len(curves)} sites, and the blocks stand at one: choose it with --site"
+        )
+    return curves[0]
+
+
+def suited_in(
+    path: str | os.PathLike[str],
+    *,
+    imt: str | None = None,
+    site: str | None = None,
+    convert: str | None = None,
+) -> list[HazardCurve]:
+    """Return the curves of a file that models can answer for, one a site; see :func:`as_curves`."""
+    period = None if convert is None else velocity_conversion(convert).period_s
+    return suited_curves(read_hazard_curves(path, imt=imt, site=site), converted_period_s=period)
+
+
+def read_hazard_curves(
+    path: str | os.PathLike[str], *, imt: str | None = None, site: str | None = None
+) -> list[HazardCurve]:
+    """Return the hazard curves of a file: OpenQuake CSV, USGS NSHM JSON, or two columns.
+
+    Args:
+        path: the file.
+        imt: only curves of this intensity measure: PGA, PGV, SA(0.5).
+        site: only the curve of this site: its number in the file from 1 on, or its name.
+
+    Raises:
+        InputError: the file cannot be used, or holds no such curve; the message names the
+            line or the element.
+    """
+    return hazard_curves_in(source_text(path, "a hazard curve"), str(path), imt=imt, site=site)
+
+
+def hazard_curves_in(
+    text: str, source: str, *, imt: str | None = None, site: str | None = None
+) -> list[HazardCurve]:
+    """Return the hazard curves of a file's text.
+
+    Args:
+        text: what the file holds.
+        source: what messages call it.
+        imt: as for :func:`read_hazard_curves`.
+        site: as for :func:`read_hazard_curves`.
+    """
+    if is_openquake_curve(text):
+        curves = openquake_curves(text, source)
+    elif is_nshm_curve(text):
+        curves = nshm_curves(text, source)
+    else:
+        curves = table_curves(text, source)
+    if imt is not None:
+        curves = _of_imt(curves, imt, source)
+    if site is not None:
+        curves = _of_site(curves, site, source)
+    return curves
+
+
+def _of_imt(curves: list[HazardCurve], imt: str, source: str) -> list[HazardCurve]:
+    kind = openquake_type(imt, "--imt")
+    selected = [
+        curve
+        for curve in curves
+        if curve.measure == kind.measure and (kind.period_s is None or curve.is_of(kind.period_s))
+    ]
+    if not selected:
+        have = ", ".join(dict.fromkeys(curve.imt for curve in curves))
+        raise InputError(f"{source}: there is no curve of {imt}; there are {have}")
+    return selected
+
+
+def _of_site(curves: list[HazardCurve], site: str, source: str) -> list[HazardCurve]:
+    named = [curve for curve in curves if curve.site == site]
+    if named:
+        return named
+    places = list(dict.fromkeys((curve.site, curve.lon, curve.lat) for curve in curves))
+    if site.isdigit() and 1 <= int(site) <= len(places):
+        place = places[int(site) - 1]
+        return [curve for curve in curves if (curve.site, curve.lon, curve.lat) == place]
+    raise InputError(
+        f"{source}: there is no site {site!r}; give a number from 1 to {len(places)}, or a name"
+    )
+
+
+BEST_FIRST = ("pgv_m_s", "sa10_g", "sa20_g", "sa30_g", "sa03_g", "pga_g")
+"""Measures by falling skill of the models that read them alone (docs/evidence/model-choice.md)."""
+
+
+def suited_curves(
+    curves: list[HazardCurve], *, converted_period_s: float | None = None
+) -> list[HazardCurve]:
+    """Return the curves of one measure, that of which a model alone knows most.
+
+    Args:
+        curves: curves of a file, one or more measures.
+        converted_period_s: period of the spectral acceleration that a conversion to PGV has been
+            asked for, or None.
+
+    Raises:
+        InputError: curves of several measures, none of which a model reads.
+    """
+    names = list(dict.fromkeys(curve.imt for curve in curves))
+    if len(names) == 1:
+        return curves
+    if converted_period_s is not None:
+        chosen = [curve for curve in curves if curve.is_of(converted_period_s)]
+        if chosen:
+            return chosen
+    else:
+        for name in BEST_FIRST:
+            chosen = [curve for curve in curves if curve.known_as == name]
+            if chosen:
+                return [_with_choice(curve, names) for curve in chosen]
+    wanted = ANSWERED if converted_period_s is None else f"SA({converted_period_s:g})"
+    raise InputError(f"the file has curves of {', '.join(names)}; wanted is one of {wanted}")
+
+
+def _with_choice(curve: HazardCurve, names: list[str]) -> HazardCurve:
+    text = (
+        f"of {', '.join(names)} the curve of {curve.imt} is taken, the measure that tells most of "
+        "toppling by itself: choose another with --imt"
+    )
+    return replace(curve, warnings=(*curve.warnings, text))
+
+
+_SPECTRAL = re.compile(r"([0-9.]+) Second Spectral Acceleration", re.IGNORECASE)
+
+
+def is_nshm_curve(text: str) -> bool:
+    """Whether the text is a JSON object."""
+    return text.lstrip().startswith("{")
+
+
+def nshm_curves(text: str, source: str) -> list[HazardCurve]:
+    """Return one curve for each intensity measure of the file.
+
+    Each measure holds ``xs``, the natural logarithms of acceleration in g (or of velocity in
+    cm/s for the peak ground velocity), and ``ys``, annual rates of exceedance.
+    """
+    try:
+        document = json_document(text)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from None
+    if not isinstance(document, dict) or not document:
+        raise InputError(f"{source}: a JSON object with one member a measure is wanted")
+    return [_curve(name, member, f"{source}, {name!r}") for name, member in document.items()]
+
+
+def _curve(name: str, member: Any, where: str) -> HazardCurve:
+    measure, factor, period = _meaning(name, where)
+    if not isinstance(member, dict):
+        raise InputError(f"{where}: an object with xs and ys is wanted")
+    x, y = (_numbers(member.get(key), key, where) for key in ("xs", "ys"))
+    with np.errstate(over="ignore"):
+        levels = factor * np.exp(x)
+    return hazard_curve(measure, levels, y, source=where, period_s=period)
+
+
+def _meaning(name: str, where: str) -> tuple[str, float, float | None]:
+    if name.lower() == "peak ground acceleration":
+        return "pga_g", 1.0, None
+    if name.lower() == "peak ground velocity":
+        return "pgv_m_s", 0.01, None
+    match = _SPECTRAL.fullmatch(name)
+    if match:
+        return "sa_g", 1.0, float(match.group(1))
+    raise InputError(
+        f"{where}: the measure is not known: Peak Ground Acceleration, Peak Ground Velocity and "
+        f"'T Second Spectral Acceleration' are; answered are {ANSWERED}"
+    )
+
+
+def _numbers(value: Any, key: str, where: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    if not isinstance(value, list) or not value:
+        raise InputError(f"{where}: {key} is not a list of numbers")
+    for i, item in enumerate(value):
+        if not is_number(item):
+            raise InputError(f"{where}: {key}[{i}] = {item!r} is not a number")
+    return np.array(value, dtype=np.float64)
+
+
+_LEVEL = re.compile(r"poe-(.+)")
+_SITE_COLUMNS = ("lon", "lat", "depth", "custom_site_id", "site_id")
+
+
+def is_openquake_curve(text: str) -> bool:
+    """Whether the text is such a file: a first line with # that names investigation_time."""
+    first = text.lstrip().split("\n", 1)[0]
+    return first.startswith("#") and "investigation_time" in first
+
+
+def openquake_curves(text: str, source: str) -> list[HazardCurve]:
+    """Return one curve for each site of the file.
+
+    The first line holds kind, investigation_time [years] and imt; the columns are lon, lat,
+    depth and ``poe-LEVEL``, levels in g (PGA, SA) or cm/s (PGV), values probabilities of
+    exceedance in the investigation time: λ = -ln(1 - poe)/time.
+
+    Raises:
+        InputError: a header or a row that does not say what it should, with its line.
+    """
+    rows = [cells for _, cells in csv_rows(text, source)]
+    head = ",".join(rows[0])
+    years = _number(_stated("investigation_time", head, source), f"{source}, line 1")
+    if not years > 0.0:
+        raise InputError(f"{source}, line 1: investigation_time = {years:g}: give years above zero")
+    kind = openquake_type(_stated("imt", head, source), f"{source}, line 1")
+    statistic = _stated("kind", head, source, "")
+    if len(rows) < 2:
+        raise InputError(f"{source}: ends after line 1, before the names of the columns")
+    names = [name.strip() for name in rows[1]]
+    levels, places = [], []
+    for place, name in enumerate(names):
+        match = _LEVEL.fullmatch(name)
+        if match:
+            levels.append(kind.factor * _number(match.group(1), f"{source}, line 2"))
+            places.append(place)
+        elif name not in _SITE_COLUMNS:
+            raise InputError(
+                f"{source}, line 2: column {name!r} is none of {', '.join(_SITE_COLUMNS)} and "
+                "poe-LEVEL"
+            )
+    if not places:
+        raise InputError(f"{source}, line 2: there is no column poe-LEVEL")
+    curves = []
+    for line, row in enumerate(rows[2:], start=3):
+        if not row:
+            continue
+        where = f"{source}, line {line}"
+        if len(row) != len(names):
+            raise InputError(f"{where}: {len(row)} cells under {len(names)} columns")
+        poe = np.array([_number(row[place], where) for place in places])
+        wrong = ~((poe >= 0.0) & (poe <= 1.0))
+        if wrong.any():
+            raise InputError(
+                f"{where}: {poe[wrong][0]:g} is no probability: poe lies between 0 and 1"
+            )
+        place_of = {name: row[i].strip() for i, name in enumerate(names)}
+        with np.errstate(divide="ignore", over="ignore"):
+            rates = rates_from_probabilities(poe, years)
+        curves.append(
+            hazard_curve(
+                kind.measure,
+                levels,
+                rates,
+                source=where,
+                period_s=kind.period_s,
+                site=place_of.get("custom_site_id", place_of.get("site_id", "")),
+                lon=_coordinate(place_of, "lon", 180.0, where),
+                lat=_coordinate(place_of, "lat", 90.0, where),
+                statistic=statistic,
+            )
+        )
+    if not curves:
+        raise InputError(f"{source}: there is no site below line 2")
+    return curves
+
+
+def _stated(name: str, head: str, source: str, default: str | None = None) -> str:
+    match = re.search(rf"\b{name}\s*=\s*(?:'([^']*)'|\"+([^\"]*)\"+|([^,\s]+))", head)
+    if match is None:
+        if default is not None:
+            return default
+        raise InputError(f"{source}, line 1: {name} is not stated")
+    return next(group for group in match.groups() if group is not None)
+
+
+def _number(text: str, where: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{where}: {text!r} is not a number") from None
+
+
+def _coordinate(cells: dict[str, str], name: str, limit: float, where: str) -> float | None:
+    if name not in cells:
+        return None
+    value = _number(cells[name], where)
+    if not abs(value) <= limit:
+        raise InputError(f"{where}: {name} = {value:g} lies off the map (-{limit:g} to {limit:g})")
+    return value
+
+
+_LEVELS = {
+    "pga_g": ("pga_g", 1.0),
+    "pga_m_s2": ("pga_g", 1.0 / STANDARD_GRAVITY_M_S2),
+    "pgv_m_s": ("pgv_m_s", 1.0),
+    "pgv_cm_s": ("pgv_m_s", 0.01),
+}
+_SPECTRAL_COLUMN = re.compile(r"sa\(([0-9.]+)\)_g")
+_POE = re.compile(r"poe_([0-9.]+)_years?")
+
+HEADER_HELP = (
+    "the first line names both columns with their unit: pga_g, pga_m_s2, pgv_m_s, pgv_cm_s or "
+    f"sa(PERIOD)_g, and annual_rate or poe_YEARS_years, such as  pgv_m_s,annual_rate; answered are "
+    f"{ANSWERED}"
+)
+
+
+def table_curves(text: str, source: str) -> list[HazardCurve]:
+    """Return the curve of a two-column CSV file, as a list of one.
+
+    The header says what the numbers are: levels ``pga_g``, ``pga_m_s2``, ``pgv_m_s``,
+    ``pgv_cm_s`` or ``sa(0.5)_g``; and ``annual_rate`` [1/a] or ``poe_50_years``, the
+    probability of exceedance in 50 years.
+    """
+    rows = [
+        (number, [cell.strip() for cell in row])
+        for number, row in csv_rows(text, source)
+        if row and not row[0].lstrip().startswith("#")
+    ]
+    if not rows:
+        raise InputError(f"{source}: there is no curve: {HEADER_HELP}")
+    line, header = rows[0]
+    if len(header) != 2:
+        raise InputError(f"{source}, line {line}: {len(header)} columns, not two: {HEADER_HELP}")
+    measure, factor, period = _levels(header[0].lower(), f"{source}, line {line}")
+    years = _years(header[1].lower(), f"{source}, line {line}")
+    levels, values = [], []
+    for number, row in rows[1:]:
+        if len(row) != 2:
+            raise InputError(f"{source}, line {number}: {len(row)} cells, not two")
+        try:
+            levels.append(factor * float(row[0]))
+            values.append(float(row[1]))
+        except ValueError:
+            raise InputError(
+                f"{source}, line {number}: {','.join(row)!r} are not two numbers"
+            ) from None
+        if years is not None and not 0.0 <= values[-1] <= 1.0:
+            raise InputError(
+                f"{source}, line {number}: {values[-1]:g} is no probability: {header[1]} lies "
+                "between 0 and 1"
+            )
+    rates = np.array(values)
+    if years is not None:
+        with np.errstate(divide="ignore", over="ignore"):
+            rates = rates_from_probabilities(rates, years)
+    return [hazard_curve(measure, levels, rates, source=source, period_s=period)]
+
+
+def _levels(name: str, where: str) -> tuple[str, float, float | None]:
+    if name in _LEVELS:
+        return *_LEVELS[name], None
+    match = _SPECTRAL_COLUMN.fullmatch(name)
+    if match:
+        return "sa_g", 1.0, float(match.group(1))
+    raise InputError(f"{where}: column {name!r} is not known: {HEADER_HELP}")
+
+
+def _years(name: str, where: str) -> float | None:
+    if name == "annual_rate":
+        return None
+    match = _POE.fullmatch(name)
+    if match and float(match.group(1)) > 0.0:
+        return float(match.group(1))
+    raise InputError(
+        f"{where}: column {name!r} does not say whether it is a rate or a probability: "
+        + HEADER_HELP
+    )

@@ -1,0 +1,51 @@
+"""Intensity measure types as OpenQuake names them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from rbfrag.errors import InputError
+
+_SA = re.compile(r"SA\s*\(\s*([0-9.]+)\s*\)", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class IntensityType:
+    """What the levels of a file measure.
+
+    Args:
+        measure: ``pga_g``, ``pgv_m_s`` or ``sa_g``.
+        factor: what a level of the file is multiplied by to be in that unit.
+        period_s: oscillator period of a spectral acceleration [s].
+    """
+
+    measure: str
+    factor: float
+    period_s: float | None = None
+
+    @property
+    def imt(self) -> str:
+        """The name as OpenQuake writes it."""
+        return {"pga_g": "PGA", "pgv_m_s": "PGV"}.get(self.measure, f"SA({self.period_s})")
+
+
+def openquake_type(imt: str, where: str) -> IntensityType:
+    """Return the meaning of an OpenQuake intensity measure type: PGA [g], PGV [cm/s], SA(T) [g]."""
+    name = imt.strip()
+    if name.upper() == "PGA":
+        return IntensityType("pga_g", 1.0)
+    if name.upper() == "PGV":
+        return IntensityType("pgv_m_s", 0.01)
+    match = _SA.fullmatch(name)
+    if match:
+        try:
+            period = float(match.group(1))
+        except ValueError:
+            period = 0.0
+        if period > 0.0:
+            return IntensityType("sa_g", 1.0, period)
+    raise InputError(
+        f"{where}: intensity measure {imt!r} is not known: PGA [g], PGV [cm/s] and "
+        "SA(period) [g] are"
+    )
