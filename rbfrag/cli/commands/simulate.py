@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, cast
 
+from rbfrag.cli.hazard_sentences import campaign_in_words
 from rbfrag.cli.output import (
     ProgressBar,
     check_files,
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from rbfrag.fragility.conditional import ConditionalShare
 
 EXAMPLE = "Example:  rbfrag simulate --p2 30,10,3,1,0.3,0.1 --vertical both --grid 23"
+
+SHORT = ("certified", "reentrant", "without_vertical", "runs", "responses", "seconds")
+"""Numbers that are shown without --verbose where they are not zero."""
 
 RECOVERY = "recovery"
 """What stands for failure past recovery in a list of rotations."""
@@ -113,7 +117,7 @@ def simulate(
     ),
     sequence: Sequence,
     db: options.Db = None,
-    json: options.Json = False,
+    printing: options.Printing,
 ) -> None:
     """Store critical values and outcomes of every motion and block.
 
@@ -165,30 +169,27 @@ def simulate(
             stopped=stopped,
         )
     report = summary.as_dict()
-    shown = summary.sequence
-    if shown is not None and sequence.out is not None:
-        write_table(shown.table_columns(), sequence.out, excel_text=False)
-    if json:
+    pairs = summary.sequence
+    if pairs is not None and sequence.out is not None:
+        write_table(pairs.table_columns(), sequence.out, excel_text=False)
+    if printing.json:
         print_json(report)
         return
     print_warnings(summary.warnings)
-    if shown is None:
-        del report["warnings"]
-        print_pairs(report)
+    if pairs is not None:
+        print(
+            f"{summary.combinations} sequences of {summary.kind} blocks are stored, "
+            f"{summary.resumed} of them from before: {pairs.station_pairs} pairs of shocks of one "
+            f"station and {pairs.drawn_pairs} drawn pairs."
+        )
+        print()
+        print_table(_CONDITIONAL, map(_conditional_cells, pairs.conditional))
         return
-    print_pairs(
-        {
-            "kind": summary.kind,
-            "sequences": summary.combinations,
-            "pairs of one station": shown.station_pairs,
-            "drawn pairs": shown.drawn_pairs,
-            "runs": summary.runs,
-            "seconds": summary.seconds,
-            "resumed": summary.resumed,
-        }
-    )
+    del report["warnings"]
+    print(campaign_in_words(report))
     print()
-    print_table(_CONDITIONAL, map(_conditional_cells, shown.conditional))
+    shown = report if printing.verbose else {name: report[name] for name in SHORT if report[name]}
+    print_pairs(shown)
 
 
 _CONDITIONAL = (
