@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rbfrag.cli.sentences import once_in, rate_in_words, rounded
+from rbfrag.cli.sentences import rounded
+from rbfrag.hazards.words import once_in, rate_in_words
 
 
 @pytest.mark.parametrize(

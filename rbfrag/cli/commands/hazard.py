@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.output import (
     check_files,
-    percent,
     print_json,
     print_pairs,
     print_table,
@@ -17,8 +16,9 @@ from rbfrag.cli.output import (
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
 from rbfrag.cli.parameters.stack import argument, option, stacked
-from rbfrag.cli.sentences import once_in, rate_in_words
 from rbfrag.errors import InputError
+from rbfrag.fragility.words import percent
+from rbfrag.hazards.words import once_in, rate_in_words
 
 if TYPE_CHECKING:
     from rbfrag.hazards.answer import HazardAnswer
