@@ -12,7 +12,7 @@ import pytest
 import rbfrag
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
-from rbfrag.hazards.words import once_in
+from rbfrag.hazards.report import once_in
 from tests.cli.conftest import Refuses, Shell
 from tests.fragility.conftest import model_row
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rbfrag.cli.sentences import rounded
-from rbfrag.hazards.words import once_in, rate_in_words
+from rbfrag.hazards.report import once_in, rate_in_words
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.fragility.words import percent
-from rbfrag.hazards.words import once_in, rate_in_words
+from rbfrag.hazards.report import once_in, rate_in_words
 
 if TYPE_CHECKING:
     from rbfrag.hazards.answer import HazardAnswer
