@@ -14,6 +14,7 @@ import rbfrag
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
+from rbfrag.exchange.block_table import read_columns
 from tests.cli.conftest import Refuses, Shell
 from tests.exchange.test_shakemap_grid import GRID, UNCERTAINTY
 from tests.fragility.conftest import model_row
@@ -64,6 +65,27 @@ def test_blocks_at_their_places(shell: Shell, grid: Path) -> None:
     Path("b.geojson").write_text(json.dumps(points))
     same = shell.json("shakemap", grid, "--blocks", "b.geojson", "--out", "a.csv", *SINGLE)
     assert same["expected_failures"] == told["expected_failures"]
+
+
+def test_rows_that_are_no_blocks_have_their_reason(
+    shell: Shell, grid: Path, refuses: Refuses
+) -> None:
+    rows = "A,3,0.1,20.0,40.5\nB,3,x,20.0,40.5\nC,3,0.1,30.0,40.5\nD,3,0.1,999,40.5\n"
+    Path("b.csv").write_text(f"block_id,p2_1_s2,kr,lon,lat\n{rows}")
+    told = shell.json("shakemap", grid, "--blocks", "b.csv", "--out", "a.xlsx", *SINGLE)
+    found = read_columns("a.xlsx", ("probability",), texts=("block_id", "reason"))
+    assert found["block_id"].tolist() == ["A", "B", "C", "D"]
+    assert np.isfinite(found["probability"]).tolist() == [True, False, False, False]
+    assert found["reason"].tolist()[:3] == [
+        "", "kr = 'x' is not a number", "the block lies off the map",
+    ]  # fmt: skip
+    assert "lon = 999" in found["reason"][3]
+    assert "2 of 4 rows are no block" in " ".join(told["warnings"])
+    shell("shakemap", grid, "--blocks", "b.csv", "--out", "a.geojson", *SINGLE)
+    assert len(json.loads(Path("a.geojson").read_text())["features"]) == 2
+    Path("c.csv").write_text("p2_1_s2,kr\n3,0.1\n3,x\n")
+    message = refuses("shakemap", grid, "--blocks", "c.csv", "--out", "c.csv", *SINGLE)
+    assert "1 of 2 rows is no block" in message
 
 
 def test_a_class_of_blocks_with_uncertainty(shell: Shell, grid: Path) -> None:

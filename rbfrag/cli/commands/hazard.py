@@ -15,6 +15,7 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
+from rbfrag.cli.parameters.curve import CurveOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.fragility.words import percent
@@ -31,25 +32,6 @@ SHORT = (
 """Values that are shown without --verbose."""
 
 EXAMPLE = "Example:  rbfrag hazard pgv-curve.csv --p2 3 --kr 0.1 --component rotd50 --years 50"
-
-
-@dataclass(frozen=True, kw_only=True)
-class CurveOptions:
-    """What a hazard curve means."""
-
-    imt: str | None = option("Intensity measure of the curve: PGV, PGA, 'SA(1.0)'.")
-    site: str | None = option("Site of the file: its number from 1 on, or its name.")
-    convert: str | None = option(
-        "Published conversion of a spectral acceleration to PGV: newmark_hall_1982 "
-        "(SA(1)) or bommer_alarcon_2006 (SA(0.5)); its scatter is integrated."
-    )
-    convert_sigma: float | None = option(
-        "Standard deviation of ln PGV about the conversion. Default: that of the reference's "
-        "motions."
-    )
-    component: str | None = option(
-        "What the curve's horizontal component means: single, geometric_mean, rotd50 or larger."
-    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +81,7 @@ def hazard(
     meaning: CurveOptions,
     answering: options.Answering,
     wanted: RateOptions,
-    out: str | None = option("Write one row a block and site (.csv, .parquet)."),
+    out: str | None = option("Write one row a block and site (.csv, .xlsx, .parquet)."),
     excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option(
         "Draw which shaking the rate of one block comes from (.png, .pdf, .svg)."
@@ -122,7 +104,7 @@ def hazard(
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot)
-    table, is_class, remarks = blocks.toppling_blocks(standing)
+    (table, is_class, remarks), refused = blocks.blocks_and_refused(standing)
     files = [
         suited_in(path, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
         for path in curve
@@ -145,7 +127,7 @@ def hazard(
         for one in sites
     ]  # fmt: skip
     if out is not None:
-        write_table(rate_columns(sites, answers), out, excel_text=excel_text)
+        write_table(rate_columns(sites, answers, refused), out, excel_text=excel_text)
     first = [one.curves[0] for one in sites]
     if plot is not None:
         from rbfrag.plots.hazard import plot_contribution
