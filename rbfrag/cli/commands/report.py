@@ -35,7 +35,7 @@ class Hazard:
 @stacked
 def report(
     *,
-    out: str = option("File to write: .pdf (a page of A4) or .html (one file).", ...),
+    out: str = option("File to write: .pdf or .png (a page of A4), or .html (one file).", ...),
     block: BlockOptions,
     standing: StandingOptions,
     measures: options.Measures,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.cli.commands.hazard import CurveOptions
 from rbfrag.cli.output import cell, check_files, print_json, print_table, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import StandingOptions, TableOptions
+from rbfrag.cli.parameters.curve import CurveOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 
 if TYPE_CHECKING:

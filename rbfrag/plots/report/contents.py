@@ -173,10 +173,6 @@ def contents_of(
     answered = _rate(numbers, kind, rate, level, db)
     block, stands, drawn = _drawn(described, numbers, free=model_of_kind(kind).free_standing)
     warnings = [*document["warnings"], *(answered.document["warnings"] if answered else ())]
-    # of a URL its last part, never what is before it
-    data = "the one at hand" if db is None else Path(str(db)).name
-    if FROM_REFERENCE in warnings:
-        data = "the reference that is shipped"
     return Contents(
         sentences=(
             *prediction_in_words(document),
@@ -185,7 +181,7 @@ def contents_of(
         ),
         tables=tuple(_tables(described, kind, numbers, measures, document, answered)),
         remarks=tuple(dict.fromkeys(text for text in warnings if text != FROM_REFERENCE)),
-        versions=tuple(_versions(chosen, answered, data)),
+        versions=tuple(_versions(chosen, answered, data_name(db, warnings))),
         block=block,
         stability=stands,
         drawn=drawn,
@@ -311,6 +307,18 @@ def _hazard_rows(rate: Rate, level: str) -> Rows:
         ("on average", once_in(document["annual_rate"])),
         (f"probability in {document['years']:g} years", percent(document["probability"])),
     )
+
+
+def data_name(db: str | PathLike[str] | None, warnings: Sequence[str]) -> str:
+    """Return what a page calls the database of the models: of a URL its last part alone.
+
+    Args:
+        db: the database that was named; None for the one at hand.
+        warnings: those of the answer, which say whether the reference gave it.
+    """
+    if FROM_REFERENCE in warnings:
+        return "the reference that is shipped"
+    return "the one at hand" if db is None else Path(str(db)).name
 
 
 def _versions(model: FragilityModel, rate: Rate | None, data: str) -> Sequence[str]:

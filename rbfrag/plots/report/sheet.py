@@ -1,4 +1,4 @@
-"""A report as one page of A4 in PDF."""
+"""A report as one page of A4."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ _STEP_IN = 0.158
 _TALLEST_ROW_IN = 3.7
 """Of pictures: two rows of them are spread over the page, one is not."""
 
-_WIDE, _NARROW = 104, 76
-"""Letters of small text and of the first sentence that a line holds."""
+_WIDE, _NARROW, _FINE = 104, 80, 136
+"""Letters that a line holds of small text, of the first sentence and of the notes."""
 
 _RC: Any = {"pdf.fonttype": 42, "font.size": 8.5, "axes.titlesize": 9}
 """Letters stay letters, so that the page can be searched and copied from."""
 
 
-def write_pdf(contents: Contents, title: str, date: str, target: Path) -> None:
-    """Write a report as a page of A4.
+def write_sheet(contents: Contents, title: str, date: str, target: Path) -> None:
+    """Write a report as a page of A4, PDF or PNG by the suffix of the file.
 
     Args:
         contents: what it says.
@@ -52,9 +52,12 @@ def write_pdf(contents: Contents, title: str, date: str, target: Path) -> None:
         figure = new_figure(_WIDTH_IN, _HEIGHT_IN)
         _draw(figure, contents, title, date)
         settle_labels(figure)
-        about = {"Title": title, "Creator": f"rbfrag {__version__}", "CreationDate": None}
+        kind = target.suffix.lower()[1:]
+        about: dict[str, str | None] = {"Title": title, "Creator": f"rbfrag {__version__}"}
+        if kind == "pdf":
+            about["CreationDate"] = None
         with written_whole(target, "report") as partial, partial.open("wb") as stream:
-            figure.savefig(stream, format="pdf", metadata=about)
+            figure.savefig(stream, format=kind, metadata=about, dpi=130)
 
 
 def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
@@ -83,14 +86,19 @@ def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
 def _head_lines(contents: Contents) -> list[tuple[str, bool]]:
     first, *others = contents.sentences
     return [
-        *((line, True) for line in wrap(first, _NARROW)),
-        *((line, False) for line in wrap(" ".join(others), _WIDE)),
+        *((line, True) for line in _wrapped(first, _NARROW)),
+        *((line, False) for line in _wrapped(" ".join(others), _WIDE)),
     ]
+
+
+def _wrapped(text: str, letters: int) -> list[str]:
+    """Return the lines of a text, of which none begins with a percent sign."""
+    return wrap(text.replace(" %", "\u00a0%"), letters, break_on_hyphens=False)
 
 
 def _foot_lines(contents: Contents) -> list[str]:
     notes = [f"Note: {remark[:1].upper()}{remark[1:]}." for remark in contents.remarks]
-    return [line for text in (*notes, *contents.versions) for line in wrap(text, int(1.16 * _WIDE))]
+    return [line for text in (*notes, *contents.versions) for line in _wrapped(text, _FINE)]
 
 
 def _lines_of(tables: Sequence[Table]) -> float:

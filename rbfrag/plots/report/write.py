@@ -12,12 +12,12 @@ from rbfrag.fragility.predict import spectral
 from rbfrag.hazards.curve_file import CurveLike
 from rbfrag.plots.canvas import new_figure
 from rbfrag.plots.report.contents import Contents, RateQuestion, contents_of
-from rbfrag.plots.report.sheet import write_pdf
+from rbfrag.plots.report.sheet import write_sheet
 from rbfrag.plots.report.web_page import write_html
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.described import DescribedBlock
 
-SUFFIXES = (".pdf", ".html")
+SUFFIXES = (".pdf", ".png", ".html")
 """Forms of a report."""
 
 TITLE = "Seismic fragility of a rock block"
@@ -57,7 +57,7 @@ def report(
     matplotlib.
 
     Args:
-        out: file to write: .pdf (a page of A4) or .html (one file that needs no other).
+        out: file to write: .pdf or .png (a page of A4), or .html (one file that needs no other).
         p2: frequency parameter p² of the block [1/s²], with kr.
         kr: its rocking acceleration coefficient.
         block: the block by its shape, instead.
@@ -152,6 +152,6 @@ def write_report(
     contents = contents_of(
         described, given, kind=kind, rate=rate or RateQuestion(), model=model, level=level, db=db
     )
-    write = write_pdf if target.suffix.lower() == ".pdf" else write_html
+    write = write_html if target.suffix.lower() == ".html" else write_sheet
     write(contents, title, date, target)
     return contents
