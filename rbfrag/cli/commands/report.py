@@ -67,8 +67,8 @@ def report(
         level=answering.level, db=answering.db,
     )  # fmt: skip
     if json:
-        found = None if contents.rate is None else contents.rate.document
-        print_json({"file": out, **contents.document, "hazard": found})
+        rates = None if contents.rate is None else contents.rate.document
+        print_json({"file": out, **contents.document, "hazard": rates})
         return
     for sentence in contents.sentences:
         print(sentence)

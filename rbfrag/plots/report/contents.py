@@ -197,16 +197,18 @@ def contents_of(
 def _rate(
     numbers: Mapping[str, float],
     kind: str,
-    asked: RateQuestion,
+    question: RateQuestion,
     level: float,
     db: str | PathLike[str] | None,
 ) -> Rate | None:
-    if asked.curve is None:
+    if question.curve is None:
         return None
-    curves = as_curves(asked.curve, imt=asked.imt, site=asked.site, convert=asked.convert)
+    curves = as_curves(
+        question.curve, imt=question.imt, site=question.site, convert=question.convert
+    )
     answer = hazard(
-        curves, numbers["p2"], numbers["kr"], component=asked.component, years=asked.years,
-        convert=asked.convert, convert_sigma=asked.convert_sigma, kind=kind,
+        curves, numbers["p2"], numbers["kr"], component=question.component, years=question.years,
+        convert=question.convert, convert_sigma=question.convert_sigma, kind=kind,
         restitution=numbers.get("restitution"), level=level, db=db,
     )  # fmt: skip
     return Rate(curves[0], answer, as_dict([curves[0]], [[None]], [answer]))

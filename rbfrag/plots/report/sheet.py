@@ -8,7 +8,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.files import written_whole
-from rbfrag.plots.canvas import BLUE, new_figure
+from rbfrag.plots.canvas import BLUE, freeze_layout, new_figure
 from rbfrag.plots.labels import settle_labels
 from rbfrag.plots.report.contents import Contents, Table
 from rbfrag.plots.report.panels import panels_of
@@ -51,6 +51,7 @@ def write_sheet(contents: Contents, title: str, date: str, target: Path) -> None
     with rc_context(_RC):
         figure = new_figure(_WIDTH_IN, _HEIGHT_IN)
         _draw(figure, contents, title, date)
+        freeze_layout(figure)
         settle_labels(figure)
         kind = target.suffix.lower()[1:]
         about: dict[str, str | None] = {"Title": title, "Creator": f"rbfrag {__version__}"}

@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 
 from rbfrag.files import write_text
-from rbfrag.plots.canvas import new_figure
+from rbfrag.plots.canvas import freeze_layout, new_figure
 from rbfrag.plots.labels import settle_labels
 from rbfrag.plots.report.contents import Contents, Table
 from rbfrag.plots.report.panels import Panel, panels_of
@@ -93,6 +93,7 @@ def _svg(panel: Panel) -> str:
     with rc_context({"svg.hashsalt": panel.name, "font.size": 9}):
         figure = new_figure(*_SIZE_IN)
         panel.draw(figure)
+        freeze_layout(figure)
         settle_labels(figure)
         text = io.StringIO()
         figure.savefig(text, format="svg", metadata={"Date": None})
