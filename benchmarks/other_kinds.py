@@ -216,7 +216,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("database")
     options.add_argument("--toppling", help="database of the toppling campaign, if it is another")
-    options.add_argument("--write", action="store_true", help="write page and figure")
+    options.add_argument("--write", action="store_true", help="keep tables, draw the figure")
     chosen = options.parse_args()
     found, (sliding, slumping) = tables(chosen.database, chosen.toppling)
     kinds = ("sliding", "slumping")
