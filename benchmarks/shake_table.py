@@ -2,8 +2,8 @@
 
 Predicts which tests overturn two granite blocks, in folds that never share a base record, by
 measures of the motion and by simulated blocks. FOLDER is described in docs/evidence/shake-table.md;
---write keeps the tables in benchmarks/results, --work keeps the simulated outcomes. The exit status is 1 where a target
-is missed.
+--write keeps the tables in benchmarks/results, --work the simulated outcomes. The exit status is 1
+where a target is missed.
 """
 
 from __future__ import annotations
