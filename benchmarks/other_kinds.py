@@ -4,8 +4,8 @@
 
 reads the campaigns of a database (toppling, slumping by 2 degrees and past recovery, sliding), fits
 the models, compares them with published regressions, and prints the tables; --write keeps them and
-draws the figure of docs/evidence/other-kinds.md. Toppling may be in another database, such as the shipped one. What the
-blocks of one earthquake share is that of the shipped models.
+draws the figure of docs/evidence/other-kinds.md. Toppling may be in another database, such as the
+shipped one. What the blocks of one earthquake share is that of the shipped models.
 """
 
 from __future__ import annotations
