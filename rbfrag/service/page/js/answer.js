@@ -57,7 +57,7 @@ export function showAnswer(answer) {
       `Intensity ${quantity(answer.intensity_m_s, "m/s")}` +
       (answer.y_m_s === null
         ? ""
-        : `, velocity of the block y = k g/p = ${quantity(answer.y_m_s, "m/s")}`) +
+        : `, velocity of the block y${IS}k\u00a0g/p${IS}${quantity(answer.y_m_s, "m/s")}`) +
       ".",
   );
   drawMeter(answer);
