@@ -27,6 +27,7 @@ from rbfrag.service.parameters import (
     SpectrumQuery,
 )
 from rbfrag.service.problem import BUSY, GONE, MalformedError, RequestRefusedError
+from rbfrag.service.request_records import log_as_json
 
 if TYPE_CHECKING:
     from rbfrag.motions.ground_motion import GroundMotion
@@ -269,4 +270,5 @@ async def _disconnected(request: Request) -> None:
 def _begin() -> None:
     # Ctrl-C reaches every process of a terminal; only the one that answers decides what it ends
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    log_as_json()
     warm_up()
