@@ -26,7 +26,13 @@ from rbfrag.service.parameters import (
     RockmassQuery,
     SpectrumQuery,
 )
-from rbfrag.service.problem import BUSY, GONE, MalformedError, RequestRefusedError
+from rbfrag.service.problem import (
+    BUSY,
+    GONE,
+    MalformedError,
+    RequestRefusedError,
+    SeveralTracesError,
+)
 from rbfrag.service.request_records import log_as_json
 
 if TYPE_CHECKING:
@@ -177,7 +183,10 @@ def _motion(body: bytes, query: Reading) -> GroundMotion:
         return traces[trace]
     listed = ", ".join(f"{i} ({each.component})" for i, each in enumerate(traces))
     trouble = f"holds {len(traces)} traces" if trace is None else f"has no trace {trace}"
-    raise InputError(f"{FILE} {trouble}: name one of  {listed}  as trace=0, for example")
+    raise SeveralTracesError(
+        f"{FILE} {trouble}: name one of  {listed}  as trace=0, for example",
+        [each.component for each in traces],
+    )
 
 
 def _text(body: bytes) -> str:
