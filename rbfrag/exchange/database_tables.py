@@ -24,7 +24,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.frames import TABLES, chosen_columns, frames
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.exchange.excel_text import as_text, changed_texts, formula_warnings
-from rbfrag.exchange.table_parts import pyarrow
+from rbfrag.exchange.tables.parts import pyarrow
 
 if TYPE_CHECKING:
     import pandas as pd
