@@ -226,7 +226,7 @@ def read_table(
     Args:
         table: ``earthquake``, ``recording``, ``motion``, ``suite``, ``suite_motion``,
             ``toppling_spectrum``, ``campaign``, ``combination``, ``outcome_interval``,
-            ``simulation``, ``response`` or ``fragility_model``.
+            ``simulation``, ``response``, ``shock_pair`` or ``fragility_model``.
         db: the database (path, URL, or None for the default).
         columns: only these columns.
         arrays: include samples [g] and histories, as one float64 array a row.
