@@ -37,6 +37,7 @@ types: $(VENV)/.installed-dev  ## static types
 docs: $(VENV)/.installed-dev  ## the documentation, into docs/_build/html
 	$(BIN)/python docs/generate_cli_reference.py --check
 	$(BIN)/python docs/generate_data_dictionary.py --check
+	$(BIN)/python docs/generate_gallery.py --check
 	$(BIN)/python docs/locate_rules.py --check
 	$(BIN)/python docs/draw_architecture.py --check
 	$(RUN) sphinx -E -W --keep-going -q -b html docs docs/_build/html
@@ -66,9 +67,10 @@ format: $(VENV)/.installed-dev  ## put the source in the style that lint asks fo
 	$(RUN) ruff check --fix .
 	$(RUN) ruff format .
 
-cli-reference: $(VENV)/.installed-dev  ## write anew what is generated: commands, data dictionary, figure of the packages
+cli-reference: $(VENV)/.installed-dev  ## write anew what is generated: commands, data dictionary, gallery, figure of the packages
 	$(BIN)/python docs/generate_cli_reference.py
 	$(BIN)/python docs/generate_data_dictionary.py
+	$(BIN)/python docs/generate_gallery.py
 	$(BIN)/python docs/locate_rules.py
 	$(BIN)/python docs/draw_architecture.py
 

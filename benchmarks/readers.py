@@ -129,6 +129,7 @@ BLOCKS = (
     b"block_id,p2_1_s2,kr,weight,lon,lat,mode\na,3.0,0.1,1,20.1,40.1,topple\n"
     b'"b, 2",1.5,0.2,2,20.2,40.2,\nc,0.3,0.05,1,20.3,40.3,topple\n',
     b"block_id,height_m,width_m,dip_deg\na,3.0,0.5,5\nb,2.0,0.4,0\n",
+    b"\xef\xbb\xbfblock_id;height_m;width_m\na;3,0;0,5\nb;2,0;0,4\n",
 )
 
 GEOJSON = (
@@ -156,10 +157,10 @@ def _made(suffix: str, write: Callable[[Path], object]) -> bytes:
 
 
 @cache
-def _parquet() -> tuple[bytes, ...]:
+def _blocks(suffix: str) -> tuple[bytes, ...]:
     names = np.array([f"block {i}" for i in range(40)], dtype=object)
     columns = {"block_id": names, "p2_1_s2": np.linspace(0.3, 30.0, 40), "kr": np.full(40, 0.1)}
-    return (_made(".parquet", lambda path: write_block_table(columns, path)),)
+    return (_made(suffix, lambda path: write_block_table(columns, path)),)
 
 
 @cache
@@ -247,11 +248,13 @@ READERS: tuple[Reader, ...] = (
     Reader("ShakeMap", ".xml", lambda: SHAKEMAP, read_shakemap),
     Reader("ShakeMap uncertainty", ".xml", lambda: UNCERTAINTY, _read_uncertainty),
     Reader("blocks CSV", ".csv", lambda: BLOCKS, waiting_blocks),
-    Reader("blocks Parquet", ".parquet", _parquet, waiting_blocks),
+    Reader("blocks Parquet", ".parquet", lambda: _blocks(".parquet"), waiting_blocks),
+    Reader("blocks Excel", ".xlsx", lambda: _blocks(".xlsx"), waiting_blocks),
     Reader("blocks GeoJSON", ".geojson", lambda: GEOJSON, waiting_blocks),
     Reader("block draws", ".csv", lambda: BLOCKS, read_draws),
     Reader("predicted CSV", ".csv", lambda: BLOCKS, _predict),
-    Reader("predicted Parquet", ".parquet", _parquet, _predict),
+    Reader("predicted Parquet", ".parquet", lambda: _blocks(".parquet"), _predict),
+    Reader("predicted Excel", ".xlsx", lambda: _blocks(".xlsx"), _predict),
     Reader("mesh OBJ", ".obj", lambda: _meshes(".obj"), block_from_mesh),
     Reader("mesh PLY", ".ply", lambda: _meshes(".ply"), block_from_mesh),
     Reader("mesh STL", ".stl", lambda: _meshes(".stl"), block_from_mesh),

@@ -29,6 +29,9 @@ _ARCHIVES = (
 )  # fmt: skip
 """How packed files begin."""
 
+WORKBOOK = ".xlsx"
+"""What Excel workbooks end in: these are zip files."""
+
 
 def packed_as(start: bytes) -> str | None:
     """Return the format of a packed file, of its first bytes; None for another file."""
@@ -70,7 +73,8 @@ def reading(source: Path, what: str) -> Iterator[None]:
         if source.is_file():
             with source.open("rb") as file:
                 packed = packed_as(file.read(6))
-            if packed is not None:
+            workbook = source.suffix.lower() == WORKBOOK
+            if packed is not None and not (workbook and packed == "zip"):
                 raise InputError(f"{source} is a {packed} file: unpack it, and name {what} in it")
         yield
     except FileNotFoundError:

@@ -74,7 +74,7 @@ def _say_compiling() -> None:
 def check_files(*, table: str | None = None, plot: str | None = None) -> None:
     """Refuse a table or a figure that cannot be written, before long work."""
     if table is not None:
-        from rbfrag.exchange.block_table import table_path
+        from rbfrag.exchange.table_files import table_path
 
         table_path(table)
     if plot is not None:

@@ -173,3 +173,15 @@ def slides_in_words(document: Mapping[str, Any]) -> Iterator[str]:
     else:
         yield SLIDING_STATUS[first["status"]].format(first["displacement_m"])
     yield "On a base that dips, displacements are cos(phi - beta)/cos(phi) times these."
+
+
+def table_in_words(summary: Mapping[str, Any]) -> str:
+    """Return how many rows of a table of blocks are answered.
+
+    Args:
+        summary: what `rbfrag predict --batch --json` prints.
+    """
+    rows, answered, outside = summary["rows"], summary["answered"], summary["without_answer"]
+    if not outside:
+        return f"All {rows:,} blocks are answered." if rows != 1 else "The block is answered."
+    return f"{answered:,} of {rows:,} blocks are answered; {outside:,} without answer."

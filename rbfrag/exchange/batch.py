@@ -5,30 +5,24 @@ from __future__ import annotations
 import csv
 from collections.abc import Mapping
 from contextlib import ExitStack
+from dataclasses import replace
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.batch_table import (
-    csv_parts,
-    csv_writer,
-    numbers,
-    parquet_parts,
-    parquet_writer,
-)
 from rbfrag.exchange.block_table import (
     BLOCK_COLUMNS,
     NUMBERS,
     RECTANGLE,
     is_of_rectangles,
     rectangle_columns,
-    table_path,
 )
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
+from rbfrag.exchange.table_files import table_parts, table_path, table_source, table_writer
+from rbfrag.exchange.table_parts import Part
 from rbfrag.files import reading, written_whole
 from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.measures import STATED
@@ -71,12 +65,14 @@ def predict_table(
 ) -> dict[str, object]:
     """Answer every block of a table and write the table with the answers.
 
-    A row that cannot be answered keeps an empty probability and says why; a row whose `mode` is
-    another than that of the model's kind is not answered.
+    A row that cannot be answered, as one with a cell that is no number, keeps an empty probability
+    and says why; a row whose `mode` is another than that of the model's kind is not answered.
 
     Args:
-        source: table, ``.csv`` or ``.parquet``, with columns that describe blocks, and measures.
-        target: table to write, of either kind; written whole or not at all.
+        source: table, ``.csv``, ``.xlsx`` or ``.parquet``, with columns that describe blocks, and
+            measures; CSV also with semicolons and decimal commas.
+        target: table to write, of any of these; written whole or not at all. CSV is written as
+            the CSV that was read.
         given: what is the same for all rows, by the names of :func:`rbfrag.predict`.
         model: name of the model; None for the best for what is given.
         level: confidence level of the interval.
@@ -89,41 +85,44 @@ def predict_table(
         Counts: rows, answered, without an answer, in_domain; kind, model, term, method; warnings.
 
     Raises:
-        InputError: a file that cannot be read or written, a missing column, a cell that holds
-            no number; the message names the line.
+        InputError: a file that cannot be read or written, a missing column.
     """
-    origin, goal = Path(source), table_path(target)
-    suffix = origin.suffix.lower()
-    if suffix not in (".csv", ".parquet"):
-        raise InputError(f"{origin}: a block table ends in .csv or .parquet, not {suffix!r}")
+    origin, goal = table_source(source), table_path(target)
     if origin.exists() and goal.exists() and origin.samefile(goal):
         raise InputError(f"--out {goal} is the table itself: name another file")
     try:
         with reading(origin, "a block table"), ExitStack() as stack:
-            opened = csv_parts if suffix == ".csv" else parquet_parts
-            header, parts = opened(origin, NUMERIC, stack)
+            header, parts, dialect = table_parts(origin, NUMERIC, stack, fast=True)
             names = _columns(origin, header, given, kind)
             known = [*_known_names(names), *given]
             chosen = find_model(model, known, db, kind=kind, rotation_deg=rotation_deg)
             partial = stack.enter_context(written_whole(goal))
-            writer = csv_writer if goal.suffix.lower() == ".csv" else parquet_writer
             uncertain = not set(known).isdisjoint(DEVIATIONS)
             answers = (*ANSWERS, OF_UNCERTAIN) if uncertain else ANSWERS
             kept = [name for name in header if name not in (*ANSWERS, OF_UNCERTAIN)]
-            write = writer(partial, kept, answers, NUMERIC, stack)
+            write = table_writer(
+                partial, kept, answers, numeric=NUMERIC, stack=stack, dialect=dialect, fast=True
+            )
             counts = np.zeros(3, dtype=np.int64)
             formulas: list[str] = []
-            for first_line, part in parts:
-                answer = _answer(origin, part, names, first_line, given, chosen, level)
-                for name in (*ANSWERS, OF_UNCERTAIN):
-                    part.pop(name, None)
-                part = changed_texts(part, as_written)
+            first_bad = ""
+            for part in parts:
+                answer = _answer(part, names, given, chosen, level)
+                cells = {
+                    name: cells
+                    for name, cells in part.cells.items()
+                    if name not in (*ANSWERS, OF_UNCERTAIN)
+                }
+                cells = changed_texts(cells, as_written)
                 if goal.suffix.lower() == ".csv" and excel_text:
-                    part = changed_texts(part, as_text)
+                    cells = changed_texts(cells, as_text)
                 elif goal.suffix.lower() == ".csv":
-                    formulas = formulas or formula_warnings(part)
-                write(part, answer)
+                    formulas = formulas or formula_warnings(cells)
+                write(replace(part, cells=cells), answer)
                 finite = np.isfinite(answer["probability"])
+                if not first_bad and not finite.all():
+                    i = int(np.argmin(finite))
+                    first_bad = f"line {part.lines[i]}: {answer['reason'][i]}"
                 counts += [finite.size, int(finite.sum()), int(answer["in_domain"].sum())]
     except csv.Error as error:
         raise InputError(f"{origin}: not a CSV file: {error}") from None
@@ -137,12 +136,23 @@ def predict_table(
         "model": chosen.name,
         "term": chosen.term.name,
         "method": chosen.row.method,
-        "warnings": [*chosen.notes, *formulas],
+        "warnings": [*chosen.notes, *_without(rows - answered, rows, first_bad), *formulas],
     }
 
 
+def _without(missing: int, rows: int, first: str) -> tuple[str, ...]:
+    """Return how many rows have no answer, and the first of them."""
+    if not missing:
+        return ()
+    which, has = ("this is", "has") if missing == 1 else ("the first is", "have")
+    return (
+        f"{missing:,} of {rows:,} rows {has} no answer, and the column reason says why; "
+        f"{which} {first}",
+    )
+
+
 def _columns(
-    origin: Path, header: list[str], given: Mapping[str, float], kind: str | None
+    origin: PathLike[str], header: list[str], given: Mapping[str, float], kind: str | None
 ) -> dict[str, str]:
     """Return what each column of numbers is called in `predict`."""
     block = block_of([*(BLOCK_COLUMNS.get(name, "") for name in header), *given], kind)
@@ -186,15 +196,17 @@ def _known_names(names: Mapping[str, str]) -> list[str]:
 
 
 def _answer(
-    origin: Path,
-    part: dict[str, Any],
+    part: Part,
     names: Mapping[str, str],
-    first_line: int,
     given: Mapping[str, float],
     model: FragilityModel,
     level: float,
 ) -> dict[str, NDArray[Any]]:
-    values = {names[column]: numbers(origin, column, part[column], first_line) for column in names}
+    values: dict[str, NDArray[Any]] = {}
+    faults = dict(part.faults)
+    for column, name in names.items():
+        values[name], others = part.numbers(column)
+        faults = others | faults
     if "height_m" in values:
         free_standing = model_of_kind(model.kind).free_standing
         numbers_of = rectangle_columns(values, free_standing=free_standing)
@@ -212,14 +224,14 @@ def _answer(
     answer[OF_UNCERTAIN] = np.zeros(predicted.probability.shape)
     if predicted.block_sd is not None:
         answer[OF_UNCERTAIN] = predicted.block_sd
-    if "mode" in part:
-        modes = np.array(["" if m is None else str(m).strip() for m in part["mode"]], dtype=object)
-        other = ~np.isin(modes.astype(str), ("", str(model_of_kind(model.kind).mode)))
-        for name in (*NUMBERS_OF_ANSWERS, OF_UNCERTAIN):
-            answer[name][other] = np.nan
-        answer["in_domain"][other] = False
-        for i in np.flatnonzero(other).tolist():
-            answer["reason"][i] = OTHER_MODE.format(
-                mode=str(modes[i]).replace("_", " "), kind=model.kind
-            )
+    for i, mode in enumerate(part.cells.get("mode", ())):
+        text = "" if mode is None else str(mode).strip()
+        if text not in ("", model_of_kind(model.kind).mode):
+            faults[i] = OTHER_MODE.format(mode=text.replace("_", " "), kind=model.kind)
+    bad = [*faults]
+    for name in (*NUMBERS_OF_ANSWERS, OF_UNCERTAIN):
+        answer[name][bad] = np.nan
+    answer["in_domain"][bad] = False
+    for i, reason in faults.items():
+        answer["reason"][i] = reason
     return answer

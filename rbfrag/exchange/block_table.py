@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import math
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,24 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, checked_name
-from rbfrag.exchange.batch_table import (
-    arrow_array,
-    cells_of,
-    csv_rows,
-    numbers,
-    parquet_parts,
-    pyarrow,
-)
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts
 from rbfrag.exchange.points import SUFFIXES as GEOJSON
 from rbfrag.exchange.points import read_points
-from rbfrag.files import is_number, output_path, reading, written_whole
+from rbfrag.exchange.table_files import table_parts, table_path, table_source, table_writer
+from rbfrag.exchange.table_parts import Part, cells_of
+from rbfrag.files import is_number, reading, written_whole
 from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.described import rectangle_numbers
 from rbfrag.solver.kinds import model_of_kind
-
-SUFFIXES = (".csv", ".parquet")
-"""File types of a block table."""
 
 NUMBERS = ("p2_1_s2", "kr")
 """Columns of a block that topples."""
@@ -58,16 +50,6 @@ RECTANGLE = ("height_m", "width_m", "dip_deg")
 PORTFOLIO = ("count", "loss", "loss_sigma")
 """Columns of how many like blocks a row is, what a failure costs, and how that scatters."""
 
-_ROWS = 1 << 14
-
-
-def table_path(path: str | os.PathLike[str]) -> Path:
-    """Return the path if a table can be written there; ask before long work."""
-    target = output_path(path, SUFFIXES, "table")
-    if target.suffix.lower() == ".parquet":
-        pyarrow()
-    return target
-
 
 def write_block_table(
     columns: Mapping[str, NDArray[Any]],
@@ -81,34 +63,17 @@ def write_block_table(
 
     Args:
         columns: arrays of one length by column name, units in the names.
-        path: file to write, ``.csv`` or ``.parquet``; an existing file is replaced.
+        path: file to write, ``.csv``, ``.xlsx`` or ``.parquet``; an existing file is replaced.
         excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
     """
     target = table_path(path)
     if excel_text and target.suffix.lower() == ".csv":
         columns = changed_texts(columns, as_text)
-    with written_whole(target, "table") as partial:
-        if target.suffix.lower() == ".parquet":
-            _write_parquet(columns, partial)
-        else:
-            _write_csv(columns, partial)
-    return target
-
-
-def _write_csv(columns: Mapping[str, NDArray[Any]], place: Path) -> None:
     length = len(next(iter(columns.values())))
-    with place.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        for start in range(0, length, _ROWS):
-            cells = (cells_of(column[start : start + _ROWS]) for column in columns.values())
-            writer.writerows(zip(*cells, strict=True))
-
-
-def _write_parquet(columns: Mapping[str, NDArray[Any]], place: Path) -> None:
-    arrow, parquet = pyarrow()
-    arrays = {name: arrow_array(arrow, column) for name, column in columns.items()}
-    parquet.write_table(arrow.table(arrays), place)
+    with written_whole(target, "table") as partial, ExitStack() as stack:
+        write = table_writer(partial, [*columns], stack=stack)
+        write(Part(range(length), dict(columns)), {})
+    return target
 
 
 def read_columns(
@@ -117,31 +82,28 @@ def read_columns(
     *,
     optional: Sequence[str] = (),
     texts: Sequence[str] = (),
+    faults: dict[int, str] | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Return columns of a block table by name; an empty number is NaN.
 
     Args:
-        path: file ending in ``.csv`` or ``.parquet``.
+        path: file ending in ``.csv``, ``.xlsx`` or ``.parquet``.
         names: columns of numbers that must be there.
         optional: further columns of numbers, where the table has them.
         texts: columns of texts, where the table has them.
+        faults: takes what is wrong with rows, by their index; their numbers are NaN. None refuses
+            a table that has such rows.
 
     Raises:
         InputError: the file cannot be read, lacks a column, or a cell holds no number; the
             message names the line.
-        MissingExtraError: a Parquet file without pyarrow.
+        MissingExtraError: a Parquet file without pyarrow, a workbook without openpyxl.
     """
-    source = Path(path)
-    suffix = source.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise InputError(
-            f"{source}: a block table ends in {' or '.join(SUFFIXES)}, not {source.suffix!r}"
-        )
+    source = table_source(path)
     try:
         with reading(source, "a block table"), ExitStack() as stack:
             wanted = (*names, *optional)
-            opened = csv_rows if suffix == ".csv" else parquet_parts
-            header, parts = opened(source, wanted, stack)
+            header, parts, _ = table_parts(source, wanted, stack)
             for name in names:
                 if name not in header:
                     have = ", ".join(header) or "none"
@@ -151,18 +113,28 @@ def read_columns(
                 for name in (*wanted, *texts)
                 if name in header
             }
-            for first, part in parts:
+            done = 0
+            for part in parts:
+                wrong = dict(part.faults)
                 for name, arrays in collected.items():
                     if name in texts:
                         cells = [
                             checked_name(
                                 as_written(str(cell).strip()), f"{source}: a cell of {name}"
                             )
-                            for cell in cells_of(part[name])
+                            for cell in cells_of(part.cells[name])
                         ]
                         arrays.append(np.array(cells, dtype=object))
                     else:
-                        arrays.append(numbers(source, name, part[name], first))
+                        values, others = part.numbers(name)
+                        wrong = others | wrong
+                        arrays.append(values)
+                if wrong and faults is None:
+                    i = min(wrong)
+                    raise InputError(f"{source}, line {part.lines[i]}: {wrong[i]}")
+                if faults is not None:
+                    faults.update({done + i: fault for i, fault in wrong.items()})
+                done += len(part.lines)
             return {name: np.concatenate(arrays) for name, arrays in collected.items()}
     except csv.Error as error:
         raise InputError(f"{source}: not a CSV file: {error}") from None
@@ -203,7 +175,7 @@ def rectangle_columns(
 def waiting_blocks(
     path: str | os.PathLike[str], kind: str | None = None
 ) -> dict[str, NDArray[Any]]:
-    """Return the blocks of a table (.csv, .parquet) or of GeoJSON points as columns.
+    """Return the blocks of a table (.csv, .xlsx, .parquet) or of GeoJSON points as columns.
 
     Args:
         path: file with ``p2_1_s2`` [1/s²] and ``kr``, or ``height_m`` and ``width_m`` (and
@@ -222,31 +194,91 @@ def waiting_blocks(
             message names it.
         MissingExtraError: a Parquet file without pyarrow.
     """
-    read = _points if str(path).lower().endswith(GEOJSON) else _rows
-    columns = read(path, kind)
+    columns = _points(path, kind) if _is_points(path) else _rows(path, kind, None)
+    reasons = _reasons(columns)
+    bad = np.flatnonzero(reasons != "")
+    if bad.size:
+        others = f"; so it is with {bad.size - 1:,} more rows" if bad.size > 1 else ""
+        block = columns["block_id"][bad[0]]
+        raise InputError(f"{path}: block {block} {reasons[bad[0]]}{others}")
+    return _weighed(columns, path)
+
+
+def blocks_and_refused(
+    path: str | os.PathLike[str], kind: str | None = None
+) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
+    """Return the blocks of a table, and its rows that are none, with their reasons.
+
+    Args:
+        path: as for :func:`waiting_blocks`.
+        kind: likewise.
+
+    Returns:
+        Columns of the blocks, and of the other rows with ``reason``; both with ``row``, the index
+        in the table.
+
+    Raises:
+        InputError: the file cannot be read, or no row of it is a block.
+    """
+    faults: dict[int, str] = {}
+    columns = _points(path, kind) if _is_points(path) else _rows(path, kind, faults)
+    reasons = _reasons(columns)
+    for i, fault in faults.items():
+        reasons[i] = fault
+    columns |= {"row": np.arange(reasons.size), "reason": reasons}
+    sound = np.asarray(reasons == "", dtype=bool)
+    if not sound.any():
+        waiting_blocks(path, kind)  # refuses the first
+    blocks = {name: column[sound] for name, column in columns.items() if name != "reason"}
+    return _weighed(blocks, path), {name: column[~sound] for name, column in columns.items()}
+
+
+def _is_points(path: str | os.PathLike[str]) -> bool:
+    return str(path).lower().endswith(GEOJSON)
+
+
+def _weighed(
+    columns: dict[str, NDArray[Any]], path: str | os.PathLike[str]
+) -> dict[str, NDArray[Any]]:
     if columns["kr"].size == 0:
         raise InputError(f"{path}: there is no block in the file")
-    for i in range(columns["kr"].size):
-        row = {name: column[i] for name, column in columns.items()}
-        block = f"{path}: block {row['block_id']}"
-        a, b = float(row["p2_1_s2"]), float(row["kr"])
-        if not (0.0 < a < math.inf and 0.0 < b < math.inf):
-            raise InputError(
-                f"{block} has p2_1_s2 = {a:g} and kr = {b:g}: a block that waits for an "
-                "earthquake has both above zero (an unstable one has already failed)"
-            )
-        if "lon" in row and not (abs(row["lon"]) <= 180.0 and abs(row["lat"]) <= 90.0):
-            raise InputError(
-                f"{block} at lon = {row['lon']:g}, lat = {row['lat']:g} lies off the map"
-            )
-        for name in SIGMAS:
-            if name in row and not 0.0 <= row[name] < math.inf:
-                raise InputError(f"{block} has {name} = {row[name]:g}: give 0 or more")
-        if "weight" in row and not row["weight"] >= 0.0:
-            raise InputError(f"{block} has a weight below zero")
     if "weight" in columns and not columns["weight"].sum() > 0.0:
         raise InputError(f"{path}: the weights of the blocks sum to zero")
     return columns
+
+
+def _reasons(columns: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
+    """Return why rows are no blocks that wait for an earthquake; empty texts for those that are."""
+    p2, kr = columns["p2_1_s2"], columns["kr"]
+    reasons = np.full(kr.size, "", dtype=object)
+
+    def say(good: NDArray[np.bool_], text: Callable[[int], str]) -> None:
+        for i in np.flatnonzero(~good & (reasons == "")).tolist():
+            reasons[i] = text(i)
+
+    with np.errstate(invalid="ignore"):
+        say(
+            (p2 > 0.0) & (kr > 0.0) & np.isfinite(p2) & np.isfinite(kr),
+            lambda i: (
+                f"has p2_1_s2 = {p2[i]:g} and kr = {kr[i]:g}: a block that waits for an "
+                "earthquake has both above zero (an unstable one has already failed)"
+            ),
+        )
+        if "lon" in columns:
+            lon, lat = columns["lon"], columns["lat"]
+            say(
+                (np.abs(lon) <= 180.0) & (np.abs(lat) <= 90.0),
+                lambda i: f"at lon = {lon[i]:g}, lat = {lat[i]:g} lies off the map",
+            )
+        for name in {*SIGMAS} & {*columns}:
+            sigma = columns[name]
+            say(
+                (sigma >= 0.0) & (sigma < math.inf),
+                partial(_negative, name, sigma),
+            )
+        if "weight" in columns:
+            say(columns["weight"] >= 0.0, lambda _: "has a weight below zero")
+    return reasons
 
 
 def _points(path: str | os.PathLike[str], kind: str | None) -> dict[str, NDArray[Any]]:
@@ -279,12 +311,19 @@ def _numbers(path: str | os.PathLike[str], name: str, values: list[Any]) -> NDAr
     return np.array(values, dtype=np.float64)
 
 
-def _rows(path: str | os.PathLike[str], kind: str | None) -> dict[str, NDArray[Any]]:
+def _negative(name: str, sigma: NDArray[np.float64], i: int) -> str:
+    return f"has {name} = {sigma[i]:g}: give 0 or more"
+
+
+def _rows(
+    path: str | os.PathLike[str], kind: str | None, faults: dict[int, str] | None
+) -> dict[str, NDArray[Any]]:
     columns = read_columns(
         path,
         (),
         optional=(*NUMBERS, *SIGMAS, *RECTANGLE, *PORTFOLIO, "lon", "lat", "weight", "restitution"),
         texts=("block_id", "site_id", "kind"),
+        faults=faults,
     )
     if is_of_rectangles(columns):
         columns |= _rectangles(columns, kind)

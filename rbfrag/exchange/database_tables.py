@@ -22,7 +22,7 @@ from rbfrag.db.data_dictionary import (
 from rbfrag.db.engine import opened_database
 from rbfrag.db.frames import TABLES, chosen_columns, frames
 from rbfrag.errors import InputError, WorkFailedError
-from rbfrag.exchange.batch_table import pyarrow
+from rbfrag.exchange.table_parts import pyarrow
 
 if TYPE_CHECKING:
     import pandas as pd

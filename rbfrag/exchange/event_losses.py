@@ -47,8 +47,8 @@ def losses(
     Args:
         folder: folder with the exports of one job (gmf-data, events, sitemesh, realizations and
             ruptures CSV), or None where `files` names them.
-        blocks: table of blocks (.csv, .parquet), or its columns: ``p2_1_s2`` [1/s²] and ``kr``, or
-            ``height_m`` and ``width_m`` [m], with ``site_id`` (text), and, if there are,
+        blocks: table of blocks (.csv, .xlsx, .parquet), or its columns: ``p2_1_s2`` [1/s²] and
+            ``kr``, or ``height_m`` and ``width_m`` [m], with ``site_id`` (text), and, if there are,
             ``block_id``, ``kind``, ``count`` (like blocks, each with an azimuth of its own),
             ``weight`` (what a failure counts, and its loss with it), ``loss`` (in the median) and
             ``loss_sigma`` (standard deviation of its logarithm), ``p2_sigma``, ``kr_sigma`` and

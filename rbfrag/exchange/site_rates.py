@@ -110,13 +110,17 @@ def _not_joined(has_ids: bool, sites: Sequence[str], blocks: int) -> tuple[str, 
 
 
 def rate_columns(
-    sites: Sequence[SiteBlocks], answers: Sequence[HazardAnswer]
+    sites: Sequence[SiteBlocks],
+    answers: Sequence[HazardAnswer],
+    refused: Mapping[str, Any] | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Return the columns of the table of annual rates, one row a site and block.
 
     Args:
         sites: the sites.
         answers: the answers, one a site.
+        refused: rows of the table of blocks that are none, with their ``reason``. They come last,
+            at one site in the order of the table.
     """
     nothing = float("nan")
     parts: dict[str, list[NDArray[Any]]] = {}
@@ -145,4 +149,22 @@ def rate_columns(
             parts.setdefault(name, []).append(
                 np.broadcast_to(np.asarray(values, dtype=kind), (size,))
             )
-    return {name: np.concatenate(values) for name, values in parts.items()}
+    columns = {name: np.concatenate(values) for name, values in parts.items()}
+    size = columns["block_id"].size
+    columns["reason"] = np.full(size, "", dtype=object)
+    if not refused:
+        return columns
+    more = refused["row"].size
+    own = {
+        "block_id": refused["block_id"], "p2_1_s2": refused["p2_1_s2"], "kr": refused["kr"],
+        "site": refused.get("site_id", np.full(more, "", dtype=object)),
+        "reason": refused["reason"],
+    }  # fmt: skip
+    joined = {
+        name: np.concatenate([column, own.get(name, np.full(more, nothing))])
+        for name, column in columns.items()
+    }
+    if len(sites) > 1:
+        return joined
+    order = np.argsort([*sites[0].columns["row"], *refused["row"]], kind="stable")
+    return {name: column[order] for name, column in joined.items()}

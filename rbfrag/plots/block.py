@@ -17,8 +17,8 @@ from rbfrag.plots.canvas import (
     new_figure,
     plot_path,
     save_figure,
-    write_near,
 )
+from rbfrag.plots.labels import write_near
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.block.polygon import Point
 from rbfrag.solver.stability.single import Stability
@@ -136,15 +136,14 @@ def plot_block(
         axes.plot([0.0, x], [0.0, y], color=_INK, lw=0.6, ls=":", zorder=4)
         axes.plot(x, y, "o", ms=5, mfc="white", mec=_INK, zorder=6)
         outwards = 13.0 / math.hypot(x, y)
-        disc = {"boxstyle": "circle,pad=0.1", "facecolor": "white", "linewidth": 0.0}
         write_near(axes, name, (x, y), (outwards * x, outwards * y), ha="center", va="center",
-                   fontsize=9, bbox=disc, zorder=7)  # fmt: skip
+                   fontsize=9, movable=False)  # fmt: skip
     tip = lines.resultant
     axes.plot([0.0, 1.5 * tip[0]], [0.0, 1.5 * tip[1]], color=_RESULTANT, lw=0.7, ls="--", zorder=4)
     arrow = {"arrowstyle": "-|>", "color": _RESULTANT, "lw": 1.8, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", xy=tip, xytext=(0.0, 0.0), arrowprops=arrow, zorder=5)
     axes.plot(0.0, 0.0, "o", ms=5, color=_INK, zorder=6)
-    write_near(axes, "C", (0.0, 0.0), (-5, 5), ha="right", fontsize=10)
+    write_near(axes, "C", (0.0, 0.0), (-5, 5), fontsize=10)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.04)
     axes.set_xlabel("horizontal distance from the centroid, out of the slope [m]")

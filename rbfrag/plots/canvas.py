@@ -1,4 +1,4 @@
-"""The sheet of a figure and its file, numbers beside axes, labels, shaded clouds, modes.
+"""The sheet of a figure and its file, numbers beside axes, clouds of points, modes.
 
 Every figure refuses a path that cannot be written before it draws (InputError), and says which
 extra brings matplotlib where it is missing (MissingExtraError).
@@ -10,13 +10,14 @@ import math
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import MissingExtraError
 from rbfrag.files import output_path, written_whole
+from rbfrag.plots.labels import settle_labels
 from rbfrag.solver.stability.modes import ModeName
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
         path: file to write, which is returned; an existing file is replaced.
     """
     target = plot_path(path)
+    settle_labels(figure)
     with written_whole(target, "plot file") as partial, partial.open("wb") as stream:
         figure.savefig(stream, format=target.suffix.lower()[1:], dpi=160)
     return target
@@ -101,13 +103,6 @@ def light_grid(*axes: Axes, which: Literal["major", "both"] = "major") -> None:
         each.grid(visible=True, which=which, lw=0.3, alpha=0.6)
 
 
-def write_near(
-    axes: Axes, text: str, at: tuple[float, float], offset: tuple[float, float], **style: Any
-) -> None:
-    """Write a text some points off a place of the data; `style` as matplotlib's annotate."""
-    axes.annotate(text, at, xytext=offset, textcoords="offset points", **style)
-
-
 def open_corner(axes: Axes) -> None:
     """Leave out the frame above and at the right."""
     axes.spines[["top", "right"]].set_visible(False)
@@ -128,6 +123,9 @@ def legend_below(figure: Figure, columns: int) -> None:
     figure.legend(loc="outside lower center", ncols=columns, fontsize=8.5, frameon=False)
 
 
+MOST_DOTS = 500
+"""More points are counted in cells, because dots would cover each other."""
+
 _CELLS_ACROSS = 60
 _CELLS_UP = 25
 """As many as make the hexagons regular on a sheet of ordinary shape."""
@@ -143,7 +141,7 @@ def density(
     *,
     beside: Sequence[Axes] = (),
 ) -> None:
-    """Shade hexagons by the number of points in each, both axes being linear or logarithmic.
+    """Draw dots, or of many points hexagons shaded by their number; axes linear or logarithmic.
 
     Args:
         figure: the sheet.
@@ -158,6 +156,11 @@ def density(
     from matplotlib.colors import ListedColormap, LogNorm
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
+    axes.set_xlim(*across)
+    axes.set_ylim(*up)
+    if x.size <= MOST_DOTS:
+        axes.scatter(x, y, s=14, color="#555555", alpha=0.6, linewidths=0.0)
+        return
     # Neither white for a single block nor so dark that a line disappears.
     greys = ListedColormap(colormaps["Greys"](np.linspace(0.18, 0.72, 256)))
     log = axes.get_xscale() == "log"
@@ -168,7 +171,7 @@ def density(
         xscale=scale, yscale=scale, mincnt=1, cmap=greys, linewidths=0.2,
     )  # fmt: skip
     axes.set_xlim(*across)
-    axes.set_ylim(*up)
+    axes.set_ylim(*up)  # which the cells have widened
     most = max(int(np.asarray(cells.get_array()).max(initial=1)), 2)
     cells.set_norm(LogNorm(1, most))
     key = figure.colorbar(cells, ax=[axes, *beside], label="critical blocks per cell")

@@ -12,7 +12,16 @@ import numpy as np
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.plots.canvas import BLUE, logarithmic, new_figure, plot_path, save_figure, spread_out
+from rbfrag.plots.canvas import (
+    BLUE,
+    RED,
+    logarithmic,
+    new_figure,
+    plot_path,
+    save_figure,
+    spread_out,
+    written_numbers,
+)
 from rbfrag.plots.model_lines import (
     MORE_TERMS,
     HeldMeasures,
@@ -38,8 +47,11 @@ _POINTS = 300
 _NODES = 241
 """Values along each axis at which the chart asks whether it was fitted there."""
 
-_SPAN = 1.6
+_SPAN = 1.25
 """Factor by which the sheet goes beyond the fitted range."""
+
+_KR_AXIS_AT = 1.125
+"""Abscissa of the axis of k_r, beyond the labels, of the width of the sheet."""
 
 _DEFAULT_RANGE = (0.01, 2.0)
 
@@ -49,10 +61,10 @@ def plot_chart(
 ) -> Path:
     """Draw lines of equal probability of toppling over intensity and block.
 
-    The ordinate is the block's toppling velocity k_r g/p. What the model reads beside it and the
-    intensity is held: the size of the block, and PGA and Tm of a model of PGV with PGA, which is
-    drawn over PGV; the caption says at what. Outside the ranges that were fitted the sheet is
-    shaded.
+    The ordinate is the block's toppling velocity k_r g/p, and of blocks of a given size k_r. What
+    the model reads beside it and the intensity is held: the size of the block, and PGA and Tm of a
+    model of PGV with PGA, which is drawn over PGV; the caption says at what. The sheet reaches
+    little beyond the ranges that were fitted, and is shaded there.
 
     Args:
         model: a model of one number, pgv_pga or pgv_pga_tm.
@@ -61,38 +73,102 @@ def plot_chart(
     """
     plot_path(path)
     held = held_measures(model) if held is None else held
-    domain = model.row.domain
-    fitted_x = domain.get("intensity_m_s") or domain.get(model.term.inputs[0]) or _DEFAULT_RANGE
-    low, high = (max(float(edge), 1e-4) for edge in fitted_x)
-    x = np.geomspace(low / _SPAN, _SPAN * high, _POINTS)
-    lines = {p: failure_line(model, x, p, held) for p in CONTOURS}
-    figure = new_figure(7.0, 7.0)
+    figure = new_figure(7.4, 6.6)
     axes = figure.add_subplot()
+    draw_chart(axes, model, held)
+    axes.set_title(_caption(model, held), fontsize=10)
+    return save_figure(figure, path)
+
+
+def draw_chart(
+    axes: Axes,
+    model: FragilityModel,
+    held: HeldMeasures,
+    *,
+    point: tuple[float, float] | None = None,
+) -> None:
+    """Draw the chart of :func:`plot_chart` into axes.
+
+    Args:
+        axes: empty axes.
+        model: the model.
+        held: what is held.
+        point: intensity and toppling velocity of a block to show [m/s], or measure in its unit.
+    """
+    across, up = _known_ranges(model, held)
+    ends = [*across, *([] if point is None else [point[0]])]
+    x = np.geomspace(min(ends) / _SPAN, _SPAN * max(ends), _POINTS)
+    lines = {p: failure_line(model, x, p, held) for p in CONTOURS}
     logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
-    bottom, top = _vertical_range(x, lines[0.99], lines[0.01])
-    axes.set(xlim=(x[0], x[-1]), ylim=(bottom, top), aspect="equal")
+    bottom, top = _vertical_range(lines, up)
+    if point is not None:
+        bottom, top = min(bottom, point[1] / _SPAN), max(top, _SPAN * point[1])
+    axes.set(xlim=(x[0], x[-1]), ylim=(bottom, top))
     for probability, y in lines.items():
         axes.plot(x, y, color=BLUE, lw=1.9 if probability in _BOLD else 0.9)
     _write_beside(axes, x, lines)
     if held.words:
         _shade_where_not_fitted(axes, model, held)
     else:
-        _shade_outside(axes, (low, high), domain.get("y_m_s"))
+        _shade_outside(axes, across, up)
     axes.set_xlabel(TERMS["pgv"].label if model.term.name in MORE_TERMS else model.term.label)
     axes.set_ylabel("toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
     axes.grid(visible=True, which="major", lw=0.6, color="#9a9a9a")
     axes.grid(visible=True, which="minor", lw=0.3, color="#c8c8c8")
     axes.set_axisbelow(True)
-    axes.set_title(_caption(model, held), fontsize=10)
-    return save_figure(figure, path)
+    if held.size_is_given:
+        _draw_kr_axis(axes, held.p2)
+    if point is not None:
+        axes.plot(*point, "o", ms=8, color=RED, mec="white", mew=1.2, zorder=9, label="_point")
+        for xs, ys in (([point[0]] * 2, [bottom, point[1]]), ([x[0], point[0]], [point[1]] * 2)):
+            axes.plot(xs, ys, color=RED, lw=0.9, ls="--", zorder=3, label="_guide")
 
 
-def _vertical_range(x: np.ndarray, weak: np.ndarray, strong: np.ndarray) -> tuple[float, float]:
-    top = 1.3 * float(np.nanmax(strong))
-    known = weak[np.isfinite(weak)]
-    bottom = float(known.min()) if known.size else 0.1 * float(x[0])
-    # a straight line of a model without a bound falls to zero within the sheet
-    return 0.8 * max(bottom, 0.1 * float(x[0])), top
+def _known_ranges(
+    model: FragilityModel, held: HeldMeasures
+) -> tuple[tuple[float, float], tuple[float, float] | None]:
+    """Return the ranges of the intensity and of y that were fitted, with what is held."""
+    domain = model.row.domain
+    fitted_x = domain.get("intensity_m_s") or domain.get(model.term.inputs[0]) or _DEFAULT_RANGE
+    low, high = (max(float(edge), 1e-4) for edge in fitted_x)
+    fitted_y = domain.get("y_m_s")
+    up = None if fitted_y is None else (float(fitted_y[0]), float(fitted_y[1]))
+    if not held.words:
+        return (low, high), up
+    # blocks beyond all lines never fail or always do, which is known of any motion
+    x = np.geomspace(low, high, _NODES)
+    y = np.array([failure_line(model, x, p, held) for p in CONTOURS])
+    inside = _is_fitted(model, held, np.broadcast_to(x, y.shape), y)
+    if not inside.any():
+        return (low, high), up
+    x = x[inside.any(axis=0)]
+    return (float(x[0]), float(x[-1])), (float(y[inside].min()), float(y[inside].max()))
+
+
+def _vertical_range(
+    lines: dict[float, np.ndarray], known: tuple[float, float] | None
+) -> tuple[float, float]:
+    """Return the ordinates that hold the lines, but not far beyond what is known."""
+    drawn = np.concatenate(list(lines.values()))
+    drawn = drawn[np.isfinite(drawn)]
+    bottom, top = 0.8 * float(drawn.min()), 1.25 * float(drawn.max())
+    if known is None:
+        return max(bottom, 1e-4 * top), top
+    return max(bottom, known[0] / _SPAN), min(top, max(_SPAN * known[1], 2.0 * bottom))
+
+
+def _draw_kr_axis(axes: Axes, p2: float) -> None:
+    """Add the axis of k_r for blocks of one size, right of the probabilities."""
+    from matplotlib.ticker import NullLocator
+
+    per_kr = STANDARD_GRAVITY_M_S2 / math.sqrt(p2)
+    beside = axes.secondary_yaxis(
+        _KR_AXIS_AT,
+        functions=(lambda y: np.asarray(y) / per_kr, lambda kr: np.asarray(kr) * per_kr),
+    )
+    written_numbers(beside.yaxis, 1.0, 2.0, 5.0)
+    beside.yaxis.set_minor_locator(NullLocator())
+    beside.set_ylabel(f"rocking coefficient $k_r$ at $p^2$ = {p2:.3g} s$^{{-2}}$")
 
 
 def _write_beside(axes: Axes, x: np.ndarray, lines: dict[float, np.ndarray]) -> None:
@@ -134,11 +210,18 @@ def _shade_outside(axes: Axes, across: tuple[float, float], up: tuple[float, flo
 def _shade_where_not_fitted(axes: Axes, model: FragilityModel, held: HeldMeasures) -> None:
     """Shade where block and motion, with what is held, are not of the fitted ones together."""
     x, y = (np.geomspace(*ends, _NODES) for ends in (axes.get_xlim(), axes.get_ylim()))
-    across, up = np.meshgrid(x, y)
-    kr = up * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
-    inside = model_answers(model, held.p2, kr, held.measures(model, across)).in_domain
-    outside = np.where(inside, 0.0, 1.0)
+    outside = np.where(_is_fitted(model, held, *np.meshgrid(x, y)), 0.0, 1.0)
     axes.contourf(x, y, outside, [0.5, 1.5], colors="#8a8a8a", alpha=0.25, zorder=0.5)
+
+
+def _is_fitted(
+    model: FragilityModel, held: HeldMeasures, x: np.ndarray, y: np.ndarray
+) -> np.ndarray:
+    """Return where intensities x and velocities y, of one shape, are of the fitted ones."""
+    kr = np.nan_to_num(y) * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
+    answers = model_answers(model, held.p2, kr, held.measures(model, x))
+    fitted: np.ndarray = answers.in_domain & np.isfinite(y)
+    return fitted
 
 
 def _caption(model: FragilityModel, held: HeldMeasures) -> str:

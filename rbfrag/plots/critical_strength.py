@@ -25,12 +25,12 @@ from rbfrag.plots.canvas import (
     RED,
     density,
     grey_bars,
+    legend_below,
     light_grid,
     logarithmic,
     new_figure,
     plot_path,
     save_figure,
-    write_near,
 )
 
 FloatArray = NDArray[np.float64]
@@ -112,6 +112,7 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
         )
     x, y = ratio[shown], table.kr_over_pga[shown]
     censored = np.isin(table.status.astype(str), ("below_limit", "no_motion"))
+    below = int(censored.sum())
     limit = float(table.search_limit[shown | censored].min())
     figure = new_figure(7.4, 5.6)
     axes = figure.add_subplot()
@@ -125,12 +126,8 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
         above = int(np.sum(y > lobe_line(name, x)))
         label = f"{name} lobe: {above} above ({100.0 * above / x.size:.1f} %)"
         axes.plot(line_x, lobe_line(name, line_x), style, color=colour, lw=1.8, label=label)
-    if censored.any():
-        axes.axhline(limit, color="black", lw=0.8, ls=":")
-        text = f"search limit; {int(censored.sum())} critical values lie below it"
-        write_near(
-            axes, text, (0.01, limit), (0, 4), xycoords=("axes fraction", "data"), fontsize=8
-        )
+    if below:
+        axes.axhline(limit, color="black", lw=1.0, ls=":", label=f"search limit: {below} below it")
     axes.set_xlabel(r"frequency of the motion over that of the block, $\omega_m/p$")
     axes.set_ylabel(r"critical strength, $k_r/\mathrm{PGA}$")
     events = len(set(table.event_id[shown].tolist()))
@@ -142,7 +139,7 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
     )
     light_grid(axes)
     logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 0.09), fontsize=8.5, frameon=False)
+    legend_below(figure, 2)
     return save_figure(figure, path)
 
 
@@ -199,6 +196,8 @@ def vertical_pairs(without: CombinationTable, with_vertical: CombinationTable) -
 def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
     """Draw the critical k_r/PGA with vertical motion against that without, and their ratio.
 
+    Ratios beyond the edges of the histogram are counted in its outermost bars.
+
     Args:
         pairs: critical values of the same motion, polarity and p².
         path: file to write: .png, .pdf or .svg.
@@ -228,12 +227,8 @@ def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
     beside.set_xlim(-reach, reach)
     beside.set_xlabel("ln (with / without)")
     beside.set_ylabel("critical blocks")
-    outside = int(np.sum(np.abs(d) > reach))
-    beside.set_title(
-        f"mean {d.mean():+.3f}, standard deviation {d.std():.3f}\n"
-        f"{outside} beyond the edges are counted there",
-        fontsize=9,
-    )
+    mean = round(float(d.mean()), 3) + 0.0  # not -0.000
+    beside.set_title(f"mean {mean:+.3f}, standard deviation {d.std():.3f}", fontsize=9)
     events = len(set(pairs.event_id.tolist()))
     figure.suptitle(
         f"{d.size} critical blocks of {events} earthquakes, the same motion, polarity and $p^2$",

@@ -27,7 +27,7 @@ from rbfrag.plots.model_lines import (
     depends_on_size,
     failure_line,
     predicted_strengths,
-    running_medians,
+    smooth_line,
 )
 
 _LINES = (
@@ -53,8 +53,8 @@ def plot_fit(
     line with more than 97.5 %. Histograms at the edges show how the data are distributed.
 
     A model that reads more than one number is drawn over what it expects: the block that each
-    motion topples with 50 % probability. Its other lines are running medians of what it expects
-    of each motion.
+    motion topples with 50 % probability. Its other lines run smoothly through what it expects of
+    each motion.
 
     Args:
         table: the critical values.
@@ -108,9 +108,10 @@ def plot_fit(
         elif probability == 0.5:
             lines.append((line_x, line_x))
         else:
-            there = np.isfinite(expected)
             one = predicted_strengths(model, table, spectrum, probability)
-            lines.append(running_medians(expected[there], one[there]))
+            there = np.isfinite(expected) & np.isfinite(one)
+            reach = line_x[(line_x >= x.min()) & (line_x <= x.max())] if there.any() else line_x[:0]
+            lines.append((reach, smooth_line(expected[there], one[there], reach)))
     # The data fill the sheet; a line far above them may leave it.
     highest = float(np.nanmax(lines[0][1], initial=0.0))
     top = max(float(y.max()), min(highest, 1.3 * float(y.max()))) * 1.05

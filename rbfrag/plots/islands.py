@@ -10,6 +10,7 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.plots.canvas import BLUE, new_figure, save_figure, written_numbers
+from rbfrag.plots.labels import write_near
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.results import CriticalResult
 from rbfrag.solver.toppling_run import runner
@@ -71,9 +72,9 @@ def plot_islands(
     _panel(part, excited, result, low, high, logarithmic=False)
     for edge in (low, high):
         whole.axvline(edge, color="black", lw=0.8, ls=":")
-    whole.annotate(
-        "enlarged below", (np.sqrt(low * high), 1.0), xycoords=("data", "axes fraction"),
-        ha="center", va="bottom", fontsize=8, annotation_clip=False,
+    write_near(
+        whole, "enlarged below", (np.sqrt(low * high), 1.0), (0, 1), movable=False,
+        xycoords=("data", "axes fraction"), fontsize=8, annotation_clip=False,
     )  # fmt: skip
     part.set_xlabel(f"$k_r$/PGA, {what}")
     whole.set_xlabel("$k_r$/PGA")

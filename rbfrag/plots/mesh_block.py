@@ -19,8 +19,8 @@ from rbfrag.plots.canvas import (
     new_figure,
     plot_path,
     save_figure,
-    write_near,
 )
+from rbfrag.plots.labels import write_near
 from rbfrag.solver.block.mesh_block import ContactHull, MeshBlock, Weakest
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def _draw_plan(axes: Axes, block: MeshBlock, weakest: Weakest) -> None:
     axes.annotate("", xy=tip, xytext=(0.0, 0.0), arrowprops=arrow, zorder=4)
     axes.plot(0.0, 0.0, "o", ms=5, color="black", zorder=5)
     write_near(axes, "C", (0.0, 0.0), (-9.0 * math.cos(turn), -9.0 * math.sin(turn)),
-               ha="center", va="center", fontsize=10)  # fmt: skip
+               fontsize=10)  # fmt: skip
     axes.set_aspect("equal", adjustable="datalim")
     first, second = ("xyz"[i] for i in (("xyz".index(block.up) + k) % 3 for k in (1, 2)))
     axes.set_xlabel(f"{first} of the mesh from the centre of mass [m]")

@@ -67,6 +67,7 @@ class HeldMeasures:
         pgv_over_pga_s: PGV/(PGA g) [s] where PGA is in proportion.
         tm_s: mean period [s].
         words: what is held, for the caption; empty where nothing matters.
+        size_is_given: whether the figure is of blocks of this size, and not of any.
     """
 
     p2: float = _ANY_P2
@@ -74,6 +75,7 @@ class HeldMeasures:
     pgv_over_pga_s: float = math.nan
     tm_s: float = _ANY_TM_S
     words: str = ""
+    size_is_given: bool = False
 
     def measures(self, model: FragilityModel, x_m_s: FloatArray) -> dict[str, FloatArray]:
         """Return the measures of motions of some intensities x [m/s], shape (n,)."""
@@ -104,7 +106,8 @@ def held_measures(
     """Return what a figure of a model over one intensity holds.
 
     What is not given is the middle, of the logarithms, of the range that was fitted: p², Tm, and
-    PGV/(PGA g), to which PGA then keeps.
+    PGV/(PGA g), to which PGA then keeps. Of a model that serves all sizes alike p² may be given for
+    the axis of k_r.
 
     Args:
         model: the model that is drawn.
@@ -124,7 +127,7 @@ def held_measures(
             f"{', '.join((*ONE_NUMBER_TERMS, *MORE_TERMS))}"
         )
     more, of_size = name in MORE_TERMS, depends_on_size(model)
-    read = {"p2": of_size, "pga": more, "tm": name == "pgv_pga_tm"}
+    read = {"p2": True, "pga": more, "tm": name == "pgv_pga_tm"}
     for option, value in (("p2", p2), ("pga", pga_g), ("tm", tm_s)):
         if value is None:
             continue
@@ -136,18 +139,18 @@ def held_measures(
         if not 0.0 < value < math.inf:
             raise InputError(f"--{option} = {value:g} is not above zero")
     if not of_size:
-        return HeldMeasures()
+        return HeldMeasures() if p2 is None else HeldMeasures(p2, size_is_given=True)
     size = _middle(model, "p2") if p2 is None else p2
     words = [f"p² = {size:.3g} 1/s²"]
     if not more:
-        return HeldMeasures(size, words=f"at {words[0]}")
+        return HeldMeasures(size, words=f"at {words[0]}", size_is_given=True)
     ratio = _middle(model, "pgv_over_pga_s")
     words.append(f"PGA = {pga_g:g} g" if pga_g is not None else f"PGV/(PGA g) = {ratio:.3g} s")
     period = _ANY_TM_S
     if name == "pgv_pga_tm":
         period = _middle(model, "tm_s") if tm_s is None else tm_s
         words.append(f"Tm = {period:.3g} s")
-    return HeldMeasures(size, pga_g, ratio, period, "at " + ", ".join(words))
+    return HeldMeasures(size, pga_g, ratio, period, "at " + ", ".join(words), size_is_given=True)
 
 
 def depends_on_size(model: FragilityModel) -> bool:
@@ -259,13 +262,31 @@ def predicted_strengths(
     return result
 
 
-def running_medians(
-    x: FloatArray, y: FloatArray, *, bins: int = 24
-) -> tuple[FloatArray, FloatArray]:
-    """Return medians of x and of y in bins of equal count along x, for a line."""
-    order = np.argsort(x, kind="stable")
-    parts = [part for part in np.array_split(order, bins) if part.size]
-    return (
-        np.array([np.median(x[part]) for part in parts]),
-        np.array([np.median(y[part]) for part in parts]),
-    )
+_SMOOTH_OVER = 0.12
+"""Standard deviation of the weights along a smooth line, of the range of its abscissae."""
+
+
+def smooth_line(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
+    """Return a smooth line through positive points, in logarithms of both.
+
+    Each value is that of a straight line fitted about its place with Gaussian weights (Cleveland
+    1979, with another weight).
+
+    Args:
+        x: abscissae of the points, shape (n,).
+        y: their ordinates, shape (n,).
+        at: abscissae of the line, shape (m,).
+
+    Returns:
+        Shape (m,).
+    """
+    ln_x, ln_y, ln_at = np.log(x), np.log(y), np.log(at)
+    width = max(_SMOOTH_OVER * float(np.ptp(ln_x)), 1e-6)
+    off = ln_x - ln_at[:, None]
+    weight = np.exp(-0.5 * (off / width) ** 2)
+    weight /= weight.sum(axis=1, keepdims=True)
+    mean_off, mean = (weight * off).sum(axis=1), weight @ ln_y
+    aside = off - mean_off[:, None]
+    spread = np.maximum((weight * aside**2).sum(axis=1), np.finfo(float).tiny)
+    slope = (weight * aside * ln_y).sum(axis=1) / spread
+    return np.asarray(np.exp(mean - slope * mean_off))

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.plots.canvas import MODE_COLOURS, mode_title, new_figure, plot_path, save_figure
+from rbfrag.plots.labels import halo
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
 from rbfrag.solver.stability.modes import LOCKED, MODES, STABLE, UNSTABLE
@@ -185,6 +186,8 @@ def _draw_yields(chart: _Chart) -> list[Text]:
             colors=MODE_COLOURS[mode], linewidths=1.0, zorder=3,
         )  # fmt: skip
         labels += chart.axes.clabel(lines, fontsize=7.5, fmt="%g", inline_spacing=3)
+    for label in labels:
+        label.set(**halo(1.5))
     return labels
 
 
@@ -206,15 +209,14 @@ def _name_regions(chart: _Chart, back_fracture: bool, covered: NDArray[np.bool_]
             text += f"\n{values[0]:.3f} g"
         name = chart.axes.text(
             chart.nodes[place[1]], chart.nodes[place[0]], text, ha="center", va="center",
-            fontsize=10, zorder=6,
-            bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "alpha": 0.75, "lw": 0},
+            fontsize=10, zorder=6, **halo(3.5),
         )  # fmt: skip
         names.append(name)
     return names
 
 
 def _hide_illegible(axes: Axes, values: list[Text], names: list[Text]) -> None:
-    """Hide the contour values that a region's name or the chart's edge covers."""
+    """Hide the contour values that a region's name, the chart's edge or another value covers."""
     frame = axes.get_window_extent()
     boxes = [name.get_window_extent() for name in names]
     for value in values:
@@ -222,6 +224,8 @@ def _hide_illegible(axes: Axes, values: list[Text], names: list[Text]) -> None:
         inside = frame.contains(*box.min) and frame.contains(*box.max)
         if not inside or any(box.overlaps(other) for other in boxes):
             value.set_visible(False)
+        else:
+            boxes.append(box)
 
 
 def _explain_hatches(chart: _Chart) -> None:

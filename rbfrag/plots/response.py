@@ -10,6 +10,7 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.plots.canvas import BLUE, light_grid, mode_title, new_figure, save_figure
+from rbfrag.plots.labels import write_near
 from rbfrag.solver.results import FloatArray, Outcome, Response, ResponseHistory
 
 if TYPE_CHECKING:
@@ -68,21 +69,29 @@ def plot_response(
     seen = ratio if response.toppled_s is None else ratio[history.time_s <= response.toppled_s]
     tallest = min(max(1.0, float(seen.max(initial=0.0))), TALLEST_SHOWN)
     lower.set_ylim(-0.05 * tallest, 1.15 * tallest)
-    lower.annotate(
-        "balance", (0.005, 1.0), xycoords=("axes fraction", "data"), va="bottom", fontsize=8,
-        color=STRENGTH,
-    )  # fmt: skip
+    _name_balance(lower, 1.0, "balance")
     if response.toppled_s is not None:
         for axes in (upper, lower):
             axes.axvline(response.toppled_s, color="black", lw=0.8, ls=":")
-        lower.annotate(
-            f"toppling inevitable at {response.toppled_s:.2f} s",
-            (response.toppled_s, 0.97), xycoords=("data", "axes fraction"), rotation=90,
-            ha="right", va="top", fontsize=8,
-        )  # fmt: skip
+        _name_time(lower, response.toppled_s, "toppling inevitable", 0.97)
     lower.set_xlim(*_window(history.time_s, ratio, response))
     figure.suptitle(_title(title, reverse, _verdict(response, p2, kr)), fontsize=10)
     save_figure(figure, path)
+
+
+def _name_balance(axes: Axes, ratio: float, name: str) -> None:
+    """Write a name on the line of a rotation."""
+    at = (0.005, ratio)
+    write_near(axes, name, at, (1, 3), ha="left", xycoords=("axes fraction", "data"), fontsize=8,
+               color=STRENGTH, movable=False)  # fmt: skip
+
+
+def _name_time(axes: Axes, time_s: float, what: str, height: float) -> None:
+    """Write beside an upright line what happens there; above its place, or below it in the top."""
+    write_near(
+        axes, f"{what} at {time_s:.2f} s", (time_s, height), (-3, 3 if height < 0.5 else -3),
+        xycoords=("data", "axes fraction"), rotation=90, fontsize=8,
+    )  # fmt: skip
 
 
 def _panels(
@@ -251,20 +260,13 @@ def plot_rocking(
     lower.legend(loc="upper right", fontsize=8, framealpha=0.9)
     for balance, name in ((1.0, "balance on the toe"), (-1.0, "balance on the heel")):
         lower.axhline(balance, color=STRENGTH, lw=0.8, ls="--")
-        lower.annotate(
-            name, (0.005, balance), xycoords=("axes fraction", "data"), va="bottom", fontsize=8,
-            color=STRENGTH,
-        )  # fmt: skip
+        _name_balance(lower, balance, name)
     lower.set_ylabel(r"rotation $\theta/\theta_c$, forward up")
     lower.set_ylim(-1.4, 1.6)
     if response.toppled_s is not None:
         for axes in (upper, lower):
             axes.axvline(response.toppled_s, color="black", lw=0.8, ls=":")
-        lower.annotate(
-            f"overturning certain at {response.toppled_s:.2f} s",
-            (response.toppled_s, 0.03), xycoords=("data", "axes fraction"), rotation=90,
-            ha="right", va="bottom", fontsize=8,
-        )  # fmt: skip
+        _name_time(lower, response.toppled_s, "overturning certain", 0.03)
     lower.set_xlim(*_window(history.time_s, np.abs(ratio), response))
     figure.suptitle(_title(title, reverse, _rocking_verdict(response)), fontsize=10)
     save_figure(figure, path)

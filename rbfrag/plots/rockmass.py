@@ -19,8 +19,8 @@ from rbfrag.plots.canvas import (
     open_corner,
     plot_path,
     save_figure,
-    write_near,
 )
+from rbfrag.plots.labels import write_near
 from rbfrag.rockmasses.counts import (
     Crossing,
     crossings,
@@ -77,7 +77,7 @@ def plot_rockmass(
         axes.plot(crossing.pga_g, crossing.count, "o", ms=6, mfc="white", mec="black", zorder=5)
         axes.plot([crossing.pga_g] * 2, [0.0, crossing.count], color="black", lw=0.7, ls=":")
         at = (crossing.pga_g, crossing.count)
-        write_near(axes, _with_error(crossing), at, (9, -12), fontsize=9, va="top")
+        write_near(axes, _with_error(crossing), at, (9, -12), fontsize=9)
     axes.set_xlim(0.0, right)
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel("peak ground acceleration, PGA [g]")
@@ -91,8 +91,7 @@ def plot_rockmass(
     shares = [100.0 * counts[mode].share for mode in present]
     bars.bar(range(len(shares)), shares, width=0.7, color=[MODE_COLOURS[mode] for mode in present])
     for place, share in enumerate(shares):
-        write_near(bars, f"{share:.1f} %", (place, share), (0, 2), ha="center", va="bottom",
-                   fontsize=8.5)  # fmt: skip
+        write_near(bars, f"{share:.1f} %", (place, share), (0, 2), movable=False, fontsize=8.5)
     _name_bars(bars, present)
     bars.set_ylim(0.0, 1.12 * max(shares))
     bars.set_ylabel("share of the blocks [%]")
@@ -210,8 +209,7 @@ def _draw_bars(axes: Axes, of_scale: ScaleFailures) -> None:
     for place, (_, each) in zip(at, rows, strict=True):
         assert each.of_mode is not None
         text = f"{100.0 * each.of_mode.value:.3g} %\nof {each.count}"
-        write_near(axes, text, (float(place), 100.0), (0, 3), ha="center", va="bottom",
-                   fontsize=8.5)  # fmt: skip
+        write_near(axes, text, (float(place), 100.0), (0, 3), movable=False, fontsize=8.5)
     _name_bars(axes, [mode for mode, _ in rows])
     axes.set_ylim(0.0, 113.0)
     axes.set_yticks([0, 20, 40, 60, 80, 100])

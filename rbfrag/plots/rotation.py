@@ -20,6 +20,7 @@ from rbfrag.plots.canvas import (
     plot_path,
     save_figure,
 )
+from rbfrag.plots.labels import write_near
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.modes import words_of_mode
 from rbfrag.solver.stability.rotated_yield import BY_MODE
@@ -105,9 +106,9 @@ def plot_rotation(
             YieldLine(share, *map(float, (k[0], k[least], theta[least], k[-1], theta[-1])))
         )
     axes.axhline(judged.ky, color="black", lw=0.8, alpha=0.6)
-    axes.annotate(
-        "$k_y$, sliding", (1.0, judged.ky), xycoords=("axes fraction", "data"), xytext=(-4, 3),
-        textcoords="offset points", ha="right", fontsize=8,
+    write_near(
+        axes, "$k_y$, sliding", (1.0, judged.ky), (-4, 3), xycoords=("axes fraction", "data"),
+        fontsize=8,
     )  # fmt: skip
     axes.set_xlim(0.0, None)
     axes.margins(y=0.12)

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure, write_near
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.coast import draw_coast
+from rbfrag.plots.labels import write_near
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +37,7 @@ def plot_shakemap(
     epicentre: tuple[float, float] | None = None,
     shape: tuple[int, int] | None = None,
 ) -> Path:
-    """Draw probabilities at nodes or blocks on a map with colour bar, epicentre and scale.
+    """Draw probabilities at nodes or blocks on a map with coast, colour bar, epicentre and scale.
 
     Args:
         lon: longitudes [deg], shape (n,).
@@ -80,6 +82,7 @@ def plot_shakemap(
         if inside:
             axes.legend(loc="upper right", fontsize=9, framealpha=0.9)
     axes.set(xlim=(west, east), ylim=(south, north), aspect=1.0 / middle)
+    draw_coast(axes, west, east, south, north)
     _scale(axes, west, east, south, north, middle)
     axes.set(xlabel="longitude [°]", ylabel="latitude [°]")
     axes.set_title(title, fontsize=10)
@@ -121,7 +124,4 @@ def _scale(axes: Axes, west: float, east: float, south: float, north: float, cos
     x = west + 0.05 * (east - west)
     y = south + 0.06 * (north - south)
     axes.plot([x, x + width], [y, y], color="black", lw=3.0, solid_capstyle="butt", zorder=5)
-    write_near(
-        axes, f"{length:g} km", (x + 0.5 * width, y), (0, 4), ha="center", va="bottom", fontsize=9,
-        bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "alpha": 0.7, "lw": 0},
-    )  # fmt: skip
+    write_near(axes, f"{length:g} km", (x + 0.5 * width, y), (0, 4), movable=False, fontsize=9)

@@ -25,6 +25,7 @@ from rbfrag.plots.canvas import (
     written_numbers,
 )
 from rbfrag.plots.hazard import measure_title
+from rbfrag.plots.labels import write_near
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -101,10 +102,7 @@ def _draw_survival(axes: Axes, answer: SurvivalAnswer) -> None:
         axes.axhline(percent, color="#888888", lw=0.7, ls=":")
         if factor is not None:
             axes.plot([factor], [percent], "o", color=RED, ms=6, zorder=3)
-            axes.annotate(
-                f"{factor:.3g}", (factor, percent), xytext=(6, 5), textcoords="offset points",
-                color=RED, fontsize=9,
-            )  # fmt: skip
+            write_near(axes, f"{factor:.3g}", (factor, percent), (6, 5), color=RED, fontsize=9)
     axes.set_ylim(0.0, 100.0)
     written_numbers(axes.xaxis, 1.0)
     near = [one for one in (answer.factor_5_percent, answer.factor_50_percent) if one is not None]

@@ -6,7 +6,8 @@ import os
 from collections.abc import Sequence
 from typing import Protocol
 
-from rbfrag.plots.canvas import light_grid, logarithmic, new_figure, save_figure, write_near
+from rbfrag.plots.canvas import light_grid, logarithmic, new_figure, save_figure
+from rbfrag.plots.labels import write_near
 
 ROUNDING = 1e-16
 """Errors below are drawn here: nothing smaller can be told apart."""
@@ -88,7 +89,7 @@ def plot_work_precision(
             write_near(axes, label, (x, y), (4, 4), fontsize=6.5, color=color)
             if p.of_use:
                 axes.scatter([x], [y], s=150, facecolors="none", edgecolors="black", zorder=4)
-                write_near(axes, "as used", (x, y), (0, -15), ha="center", fontsize=8)
+                write_near(axes, "as used", (x, y), (0, -15), fontsize=8)
     logarithmic(axes)
     axes.invert_xaxis()
     axes.set_xlabel("relative error of the peak rotation: median (marker) to worst (bar)")

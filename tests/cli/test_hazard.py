@@ -13,6 +13,7 @@ import rbfrag
 from rbfrag.cli.sentences import once_in
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
+from rbfrag.exchange.block_table import read_columns
 from tests.cli.conftest import Refuses, Shell
 from tests.fragility.conftest import model_row
 
@@ -57,6 +58,27 @@ def test_what_the_component_means(shell: Shell, curve: Path) -> None:
     mean = shell.json("hazard", curve, *block, "--component", "geometric_mean")
     # one component scatters about the mean, which adds to the rate, and lies below the larger one
     assert larger["annual_rate"] < single["annual_rate"] < mean["annual_rate"]
+
+
+@pytest.mark.parametrize("name", ["rates.csv", "rates.xlsx"])
+def test_a_row_that_is_no_block_has_its_reason(shell: Shell, curve: Path, name: str) -> None:
+    Path("blocks.csv").write_text(
+        "block_id,p2_1_s2,kr\nA7,3,0.1\nbad,x,0.1\nB2,10,0.3\nflat,3,-0.1\nshort,3\n"
+    )
+    done = shell("hazard", curve, "--blocks", "blocks.csv", "--out", name)
+    assert "3 of 5 rows are no block that waits for an earthquake" in done.stderr
+    assert "the first: block bad p2_1_s2 = 'x' is not a number" in done.stderr
+    names = ("annual_rate", "block_id", "reason")
+    found = read_columns(name, names[:1], texts=names[1:])
+    assert found["block_id"].tolist() == ["A7", "bad", "B2", "flat", "short"]
+    assert np.isfinite(found["annual_rate"]).tolist() == [True, False, True, False, False]
+    assert found["reason"].tolist()[:3] == ["", "p2_1_s2 = 'x' is not a number", ""]
+    assert "kr = -0.1" in found["reason"][3]
+    assert found["reason"][4] == "2 cells under 3 columns"
+    Path("sound.csv").write_text("block_id,p2_1_s2,kr\nA7,3,0.1\nB2,10,0.3\n")
+    shell("hazard", curve, "--blocks", "sound.csv", "--out", "sound-rates.csv")
+    expected = read_columns("sound-rates.csv", names[:1])["annual_rate"]
+    assert found["annual_rate"][[0, 2]] == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:

@@ -14,6 +14,7 @@ import rbfrag
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
+from rbfrag.exchange.block_table import read_columns
 from tests.cli.conftest import Refuses, Shell
 from tests.exchange.test_shakemap_grid import GRID, UNCERTAINTY
 from tests.fragility.conftest import model_row
@@ -66,6 +67,27 @@ def test_blocks_at_their_places(shell: Shell, grid: Path) -> None:
     assert same["expected_failures"] == told["expected_failures"]
 
 
+def test_rows_that_are_no_blocks_have_their_reason(
+    shell: Shell, grid: Path, refuses: Refuses
+) -> None:
+    rows = "A,3,0.1,20.0,40.5\nB,3,x,20.0,40.5\nC,3,0.1,30.0,40.5\nD,3,0.1,999,40.5\n"
+    Path("b.csv").write_text(f"block_id,p2_1_s2,kr,lon,lat\n{rows}")
+    told = shell.json("shakemap", grid, "--blocks", "b.csv", "--out", "a.xlsx", *SINGLE)
+    found = read_columns("a.xlsx", ("probability",), texts=("block_id", "reason"))
+    assert found["block_id"].tolist() == ["A", "B", "C", "D"]
+    assert np.isfinite(found["probability"]).tolist() == [True, False, False, False]
+    assert found["reason"].tolist()[:3] == [
+        "", "kr = 'x' is not a number", "the block lies off the map",
+    ]  # fmt: skip
+    assert "lon = 999" in found["reason"][3]
+    assert "2 of 4 rows are no block" in " ".join(told["warnings"])
+    shell("shakemap", grid, "--blocks", "b.csv", "--out", "a.geojson", *SINGLE)
+    assert len(json.loads(Path("a.geojson").read_text())["features"]) == 2
+    Path("c.csv").write_text("p2_1_s2,kr\n3,0.1\n3,x\n")
+    message = refuses("shakemap", grid, "--blocks", "c.csv", "--out", "c.csv", *SINGLE)
+    assert "1 of 2 rows is no block" in message
+
+
 def test_a_class_of_blocks_with_uncertainty(shell: Shell, grid: Path) -> None:
     Path("b.csv").write_text("p2_1_s2,kr,weight\n3,0.1,3\n10,0.2,1\n")
     shell("shakemap", grid, "--blocks", "b.csv", "--out", "certain.csv", *SINGLE)
@@ -75,7 +97,7 @@ def test_a_class_of_blocks_with_uncertainty(shell: Shell, grid: Path) -> None:
     )  # fmt: skip
     assert told["uncertainty_integrated"]
     assert "probability of toppling" in Path("a.svg").read_text()
-    note = "values of the map taken as certain"
+    note = "the uncertainty of the map's values is left out"
     assert note not in Path("a.svg").read_text()
     shell("shakemap", grid, "--p2", "3", "--kr", "0.1", "--out", "b.csv", "--plot", "b.svg")
     assert note in Path("b.svg").read_text()

@@ -13,7 +13,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError, MissingExtraError
-from rbfrag.exchange import batch_table
+from rbfrag.exchange import csv_table, table_parts
 from rbfrag.exchange.batch import ANSWERS, predict_table
 from rbfrag.exchange.block_table import read_columns, write_block_table
 from rbfrag.fragility.predict import predict
@@ -35,7 +35,7 @@ def answer(
         def missing() -> None:
             raise MissingExtraError("Parquet files need pyarrow", "parquet")
 
-        monkeypatch.setattr(batch_table, "pyarrow", missing)
+        monkeypatch.setattr(csv_table, "pyarrow", missing)
     database = tmp_path / "model.db"
     with opened_database(str(database), create=True) as engine, engine.begin() as connection:
         save_model(connection, model_row())
@@ -88,7 +88,7 @@ def test_a_range_of_one_earthquake_that_is_not_known_is_an_empty_cell(tmp_path: 
 def test_parts_join_without_a_seam(
     answer: Answer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(batch_table, "ROWS", 7)
+    monkeypatch.setattr(table_parts, "ROWS", 7)
     random = np.random.default_rng(3)
     kr = random.uniform(0.02, 0.3, 40)
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
@@ -130,14 +130,12 @@ def test_old_answers_are_replaced(answer: Answer, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (TABLE.replace("B,10,0.3,", "B,ten,0.3,"), r"line 3: p2_1_s2 = 'ten' is not a number"),
-        (TABLE.replace("B,10,0.3,", "B,10,0.3"), r"line 3: 3 cells under 4 columns"),
         (TABLE.replace("p2_1_s2", "p2"), "there is no column p2_1_s2"),
         (TABLE.replace("block_id", "kr"), "the column kr is there twice"),
         ("", "there is no column p2_1_s2; the columns are none"),
     ],
 )
-def test_bad_tables_name_the_line(answer: Answer, tmp_path: Path, text: str, words: str) -> None:
+def test_bad_tables_are_refused(answer: Answer, tmp_path: Path, text: str, words: str) -> None:
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
     source.write_text(text)
     with pytest.raises(InputError, match=words):
@@ -145,12 +143,20 @@ def test_bad_tables_name_the_line(answer: Answer, tmp_path: Path, text: str, wor
     assert list(tmp_path.glob("*b.csv*")) == []
 
 
-def test_a_bad_cell_far_down_names_its_line(answer: Answer, tmp_path: Path) -> None:
-    source = tmp_path / "a.csv"
-    good = [f"{i},3,0.1,0.6" for i in range(20_000)]
-    source.write_text("\n".join([HEAD, *good, "x,3,?,0.6"]))
-    with pytest.raises(InputError, match=r"line 20002: kr = '\?' is not a number"):
-        answer(source, tmp_path / "b.csv")
+def test_a_bad_row_far_down_is_answered_with_its_reason(answer: Answer, tmp_path: Path) -> None:
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    lines = [f"{i},3,0.1,0.6" for i in range(100_000)]
+    lines[70_000], lines[80_000] = "x,3,?,0.6", "y,3,0.1"
+    source.write_text("\n".join([HEAD, *lines]))
+    told = answer(source, target)
+    assert (told["rows"], told["answered"], told["without_answer"]) == (100_000, 99_998, 2)
+    assert "2 of 100,000 rows have no answer" in str(told["warnings"])
+    assert "line 70002: kr = '?' is not a number" in str(told["warnings"])
+    rows = rows_of(target)
+    assert {row["probability"] for row in rows[:70_000]} == {rows[-1]["probability"]} != {""}
+    assert (rows[70_000]["kr"], rows[70_000]["probability"]) == ("?", "")
+    assert rows[70_000]["reason"] == "kr = '?' is not a number"
+    assert rows[80_000]["reason"] == "3 cells under 4 columns"
 
 
 def test_the_table_itself_is_not_overwritten(answer: Answer, tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ TABLE = {
     "in_domain": np.array([True, False, False]),
     "reason": np.array(["", 'a, "b"', "no block; too thin"], dtype=object),
 }
-KINDS = (".csv", ".parquet")
+KINDS = (".csv", ".xlsx", ".parquet")
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -39,7 +39,10 @@ def test_numbers_come_back_to_the_bit(
     column = np.array(values)
     write_block_table({"kr": column, "other": np.zeros(column.size)}, path)
     found = read_columns(path, ("kr",))["kr"]
-    assert np.array_equal(found, column, equal_nan=True)
+    if kind == ".xlsx":  # 16 digits
+        assert np.allclose(found, column, rtol=1e-15, atol=0.0, equal_nan=True)
+    else:
+        assert np.array_equal(found, column, equal_nan=True)
     fine = ~np.isnan(column)
     assert np.array_equal(np.signbit(found[fine]), np.signbit(column[fine]))
 
@@ -75,19 +78,18 @@ def test_a_failure_keeps_the_older_file(
     path = tmp_path / f"a{kind}"
     path.write_text("older")
 
-    def fail(columns: object, place: Path) -> None:
+    def fail(place: Path, *about: object, **more: object) -> None:
         place.write_text("half")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(block_table, "_write_csv", fail)
-    monkeypatch.setattr(block_table, "_write_parquet", fail)
+    monkeypatch.setattr(block_table, "table_writer", fail)
     with pytest.raises(InputError, match="No space left"):
         write_block_table(TABLE, path)
     assert path.read_text() == "older"
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("name", ["a", "a.xlsx", "none/a.csv"])
+@pytest.mark.parametrize("name", ["a", "a.xls", "none/a.csv"])
 def test_places_that_cannot_be_written(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match="table "):
         write_block_table(TABLE, tmp_path / name)
@@ -104,7 +106,7 @@ def test_places_that_cannot_be_written(tmp_path: Path, name: str) -> None:
         ("a.csv", b"kr\n\xff\n", "not a text file"),
         ("a.csv", b"PK\x03\x04\x14\0", "is a zip file: unpack it"),
         ("a.parquet", b"kr\n0.1\n", "not a Parquet file"),
-        ("a.txt", b"kr\n0.1\n", "ends in .csv or .parquet"),
+        ("a.txt", b"kr\n0.1\n", "ends in .csv, .xlsx or .parquet"),
     ],
 )
 def test_tables_that_cannot_be_read(tmp_path: Path, name: str, content: bytes, words: str) -> None:
@@ -130,7 +132,7 @@ import sys
 sys.modules["pyarrow"] = None
 from rbfrag.errors import MissingExtraError
 from rbfrag.exchange.block_table import read_columns
-from rbfrag.exchange.block_table import table_path
+from rbfrag.exchange.table_files import table_path
 table_path("a.csv")
 for act in (lambda: table_path("a.parquet"), lambda: read_columns("a.parquet", ("kr",))):
     try:

@@ -44,6 +44,11 @@ def table():
     )
 
 
+def repeated(table, times):
+    columns = {name: np.tile(column, times) for name, column in vars(table).items()}
+    return CombinationTable(**columns)
+
+
 @pytest.fixture
 def model():
     return FragilityModel.from_row(
@@ -83,15 +88,21 @@ def test_the_file_is_written(table, model, tmp_path, suffix):
 def test_what_the_figure_says(table, model, tmp_path, drawn):
     plot_fit(table, model, tmp_path / "fit.png")
     figure = drawn[0]
-    axes, above, beside, bar = figure.axes
+    axes, above, beside = figure.axes
     assert axes.get_xlabel() == "peak ground velocity, PGV [m/s]"
     assert "[m/s]" in axes.get_ylabel()
     assert "360 critical blocks of 7 earthquakes" in figure.get_suptitle()
     assert "40 whose critical block lies below the search limit" in figure.get_suptitle()
-    assert bar.get_ylabel() == "critical blocks per cell"
-    assert int(axes.collections[0].get_array().sum()) == 360
+    assert len(axes.collections[0].get_offsets()) == 360
     assert sum(patch.get_height() for patch in above.patches) == 360
     assert sum(patch.get_width() for patch in beside.patches) == 360
+
+
+def test_many_blocks_are_counted_in_cells(table, model, tmp_path, drawn):
+    plot_fit(repeated(table, 2), model, tmp_path / "fit.png")
+    axes, _, _, bar = drawn[0].axes
+    assert bar.get_ylabel() == "critical blocks per cell"
+    assert int(axes.collections[0].get_array().sum()) == 720
 
 
 def test_the_failure_lines_have_their_probabilities(table, model, tmp_path, drawn):
@@ -114,7 +125,7 @@ def test_the_failure_lines_have_their_probabilities(table, model, tmp_path, draw
 def test_nothing_overlaps(table, model, tmp_path, drawn):
     for term in ("pgv", "pga_tm"):
         other = FragilityModel.from_row(replace(model.row, term=term))
-        plot_fit(table, other, tmp_path / "fit.png")
+        plot_fit(repeated(table, 2), other, tmp_path / "fit.png")
         figure = drawn[-1]
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
@@ -141,9 +152,9 @@ def test_nothing_overlaps(table, model, tmp_path, drawn):
 
 def test_logarithmic_axes_show_every_block(table, model, tmp_path, drawn):
     plot_fit(table, model, tmp_path / "fit.png", log=True)
-    axes, above, beside, _ = drawn[0].axes
+    axes, above, beside = drawn[0].axes
     assert axes.get_xscale() == axes.get_yscale() == "log"
-    assert int(axes.collections[0].get_array().sum()) == 360
+    assert len(axes.collections[0].get_offsets()) == 360
     assert sum(patch.get_height() for patch in above.patches) == 360
     assert sum(patch.get_width() for patch in beside.patches) == 360
 

@@ -57,6 +57,18 @@ def test_what_is_not_given_is_the_middle_of_the_fitted_range() -> None:
     assert held_measures(ALONE).words == ""
 
 
+def test_a_size_gives_the_chart_an_axis_of_kr(tmp_path, caught) -> None:
+    figures = caught(chart)
+    plot_chart(ALONE, tmp_path / "chart.png", held_measures(ALONE, p2=4.0))
+    axes = figures[0].axes[0]
+    (beside,) = axes.child_axes
+    assert "$k_r$ at $p^2$ = 4" in beside.get_ylabel()
+    ends = [y * 4.0**0.5 / G for y in axes.get_ylim()]
+    assert beside.get_ylim() == pytest.approx(ends)
+    plot_chart(ALONE, tmp_path / "chart.png")
+    assert not figures[1].axes[0].child_axes
+
+
 @pytest.mark.parametrize("model", [OF_SIZE, WITH_PGA, WITH_TM])
 @pytest.mark.parametrize("pga", [None, 0.5])
 def test_blocks_on_a_line_have_its_probability(model, pga) -> None:
@@ -81,7 +93,6 @@ def test_no_line_reaches_what_pga_cannot_lift() -> None:
 @pytest.mark.parametrize(
     ("model", "given", "words"),
     [
-        (ALONE, {"p2": 3.0}, "--p2 = 3 changes nothing"),
         (OF_SIZE, {"pga_g": 0.3}, "--pga = 0.3 changes nothing"),
         (WITH_PGA, {"tm_s": 0.3}, "--tm = 0.3 changes nothing"),
         (WITH_TM, {"tm_s": 0.0}, "--tm = 0 is not above zero"),

@@ -18,7 +18,7 @@ def images(figure):
 
 
 def names(figure):
-    return [t for t in figure.axes[0].texts if t.get_bbox_patch() is not None]
+    return [t for t in figure.axes[0].texts if t.get_fontsize() == 10.0]
 
 
 @pytest.mark.parametrize("back", [True, False])

@@ -7,7 +7,7 @@ import pytest
 
 from rbfrag.fragility.predict import predict
 from rbfrag.plots.fit import plot_fit
-from rbfrag.plots.model_lines import predicted_strengths, running_medians
+from rbfrag.plots.model_lines import predicted_strengths, smooth_line
 from tests.fragility.outcome_draws import drawn_outcomes
 from tests.plots.test_held_measures import WITH_TM, model_of
 
@@ -40,8 +40,15 @@ def test_models_of_the_record_and_of_free_exponents_are_drawn(tmp_path) -> None:
         assert "at 50 % probability of failure" in path.read_text(encoding="utf-8")
 
 
-def test_running_medians() -> None:
-    x = np.arange(100.0)
-    middle, of = running_medians(x[::-1], 2.0 * x[::-1] + 1.0, bins=10)
-    assert middle.tolist() == [10.0 * i + 4.5 for i in range(10)]
-    assert of.tolist() == [20.0 * i + 10.0 for i in range(10)]
+def test_a_smooth_line_keeps_a_power_law_and_evens_scatter() -> None:
+    random = np.random.default_rng(3)
+    x = np.exp(random.uniform(-4.0, 1.0, 2000))
+    at = np.geomspace(x.min(), x.max(), 50)
+    power = smooth_line(x, 0.7 * x**1.3, at)
+    np.testing.assert_allclose(power, 0.7 * at**1.3, rtol=1e-9)
+    scattered = smooth_line(x, 0.7 * x**1.3 * np.exp(random.normal(0.0, 0.5, x.size)), at)
+    assert np.abs(np.log(scattered / power)).max() < 0.15
+    # no zigzag: a running median of as much scatter turns back many times
+    slopes = np.diff(np.log(scattered)) / np.diff(np.log(at))
+    assert slopes.min() > 0.8
+    assert np.abs(np.diff(slopes)).max() < 0.1

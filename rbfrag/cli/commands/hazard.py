@@ -99,7 +99,7 @@ def hazard(
     meaning: CurveOptions,
     answering: options.Answering,
     wanted: RateOptions,
-    out: str | None = option("Write one row a block and site (.csv, .parquet)."),
+    out: str | None = option("Write one row a block and site (.csv, .xlsx, .parquet)."),
     excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option(
         "Draw which shaking the rate of one block comes from (.png, .pdf, .svg)."
@@ -122,7 +122,7 @@ def hazard(
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot)
-    table, is_class, remarks = blocks.toppling_blocks(standing)
+    (table, is_class, remarks), refused = blocks.blocks_and_refused(standing)
     files = [
         suited_in(path, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
         for path in curve
@@ -145,7 +145,7 @@ def hazard(
         for one in sites
     ]  # fmt: skip
     if out is not None:
-        write_table(rate_columns(sites, answers), out, excel_text=excel_text)
+        write_table(rate_columns(sites, answers, refused), out, excel_text=excel_text)
     first = [one.curves[0] for one in sites]
     if plot is not None:
         from rbfrag.plots.hazard import plot_contribution

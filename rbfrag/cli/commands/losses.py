@@ -97,8 +97,8 @@ def losses(
         metavar="[FOLDER]",
     ),
     blocks: str = option(
-        "Table of blocks (.csv, .parquet) with p2_1_s2 [1/s²] and kr, or height_m and width_m [m], "
-        "site_id, and if wanted count, weight, loss, loss_sigma, kind.",
+        "Table of blocks (.csv, .xlsx, .parquet) with p2_1_s2 [1/s²] and kr, or height_m and "
+        "width_m [m], site_id, and if wanted count, weight, loss, loss_sigma, kind.",
         ...,
         metavar="FILE",
     ),
@@ -108,7 +108,7 @@ def losses(
     meaning: Meaning,
     workers: Workers,
     answering: options.Answering,
-    out: str | None = option("Write the table of events (.csv, .parquet)."),
+    out: str | None = option("Write the table of events (.csv, .xlsx, .parquet)."),
     excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option("Draw how often numbers of failures are reached (.png, .pdf, .svg)."),
     json: options.Json = False,

@@ -290,7 +290,7 @@ def plot_modes(
     ),
     no_back: NoBack = False,
     blocks: str | None = option(
-        "Show the blocks of a table (.csv, .parquet) with alpha1_deg and alpha3_deg, "
+        "Show the blocks of a table (.csv, .xlsx, .parquet) with alpha1_deg and alpha3_deg, "
         "as  rbfrag rockmass --out  writes it.",
         metavar="FILE",
     ),

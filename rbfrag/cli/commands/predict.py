@@ -9,6 +9,7 @@ from rbfrag.cli.output import print_json, print_pairs, print_warnings, show_pred
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import WAYS, BlockOptions, UncertaintyOptions, option_of
 from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.sentences import table_in_words
 from rbfrag.errors import InputError
 from rbfrag.solver.described import kind_of, numbers_of_kind
 
@@ -64,7 +65,7 @@ class Table:
     """A table of blocks, and one of answers."""
 
     batch: str | None = option(
-        "Block table (.csv or .parquet) with columns p2_1_s2 and kr (or height_m and "
+        "Block table (.csv, .xlsx or .parquet) with columns p2_1_s2 and kr (or height_m and "
         "width_m; or ky and displacement_m; or ks and ps2_1_s2), restitution, p2_sigma, kr_sigma "
         "and the like, and any of pgv_m_s, sa03_g, sa10_g, sa20_g, sa30_g, pga_g, tm_s, pgd_m; "
         "what is the same for all rows may be an option.",
@@ -190,5 +191,7 @@ def _show_summary(summary: dict[str, Any], *, json: bool) -> None:
     if json:
         print_json({**summary, "warnings": warnings})
         return
+    print(table_in_words(summary))
+    print()
     print_pairs(summary)
     print_warnings(warnings)

@@ -125,7 +125,7 @@ def rockmass(
     answering: options.Answering,
     reading: options.Reading,
     out: str | None = option(
-        "Write one row a block, with a motion one a block and scale (.csv, .parquet)."
+        "Write one row a block, with a motion one a block and scale (.csv, .xlsx, .parquet)."
     ),
     plot: str | None = option(
         "Draw the cumulative counts of blocks against PGA by mode, with a motion the "

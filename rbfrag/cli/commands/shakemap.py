@@ -13,7 +13,8 @@ from rbfrag.errors import InputError
 
 EXAMPLE = "Example:  rbfrag shakemap grid.xml --p2 3 --kr 0.1 --out map.geojson --plot map.png"
 
-SUFFIXES = (".geojson", ".json", ".csv", ".parquet", ".gpkg")
+TABLES = (".csv", ".xlsx", ".parquet")
+SUFFIXES = (".geojson", ".json", *TABLES, ".gpkg")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +46,9 @@ class DrawOptions:
 def shakemap(
     *,
     grid: str = argument("ShakeMap grid, version 3 or 4.", metavar="GRID.xml"),
-    out: str = option("File to write: .geojson, .csv, .parquet or .gpkg (extra gis).", ...),
+    out: str = option(
+        "File to write: .geojson, .csv, .xlsx (extra excel), .parquet or .gpkg (extra gis).", ...
+    ),
     excel_text: bool = option(options.EXCEL_TEXT, False),
     blocks: BlocksOptions,
     standing: StandingOptions,
@@ -75,12 +78,18 @@ def shakemap(
     target = output_path(out, SUFFIXES, "map")
     check_files(plot=plot)
     component = component_named(meaning.component)
-    class_blocks, _, remarks = blocks.toppling_blocks(standing, n=n)
+    (class_blocks, _, remarks), refused = (
+        (blocks.toppling_blocks(standing, n=n), {})
+        if blocks.blocks is None
+        else blocks.blocks_and_refused(standing)
+    )
     shaken = read_shakemap(
         grid, uncertainty=meaning.uncertainty, allow_partial=meaning.allow_partial
     )
     warnings = [*remarks, *taken_as_medians(class_blocks), *shaken.warnings]
     own = "lon" in class_blocks
+    if refused and not own:
+        raise InputError(f"{blocks.blocks}: {remarks[0]}: the mean needs all of them")
     if own:
         lon, lat = class_blocks["lon"], class_blocks["lat"]
         measures, std_ln, on_map = at_places(shaken, lon, lat)
@@ -141,6 +150,7 @@ def shakemap(
     columns: dict[str, Any] = {}
     if own:
         columns["block_id"] = class_blocks["block_id"]
+        reasons = np.where(on_map, "", "the block lies off the map").astype(object)
     columns |= {
         "lon": lon,
         "lat": lat,
@@ -156,6 +166,8 @@ def shakemap(
         "event_high": placed(answer.event_high),
         "in_domain": placed(answer.in_domain, False),
     }
+    if own:
+        columns["reason"] = reasons
     outside = int((~answer.in_domain & (answer.probability > 1e-4)).sum())
     if outside:
         warnings.append(
@@ -176,7 +188,10 @@ def shakemap(
         "uncertainty_integrated": bool(shaking.integrated),
     }
     document |= {**failures.as_dict(), "seed": drawing.seed}
-    _write(columns, {**document, "warnings": warnings}, target, excel_text=excel_text)
+    written = columns
+    if refused and target.suffix.lower() in TABLES:
+        written = _with_refused(columns, class_blocks["row"], refused)
+    _write(written, {**document, "warnings": warnings}, target, excel_text=excel_text)
     if plot is not None:
         from rbfrag.plots.shakemap import plot_shakemap
 
@@ -185,7 +200,7 @@ def shakemap(
         plot_shakemap(
             lon, lat, columns["probability"], plot,
             title=f"{name}{size}\n{_what(class_blocks, own)}; model {chosen.name}"
-            + ("" if shaking.integrated else "\nvalues of the map taken as certain"),
+            + ("" if shaking.integrated else "\nthe uncertainty of the map's values is left out"),
             epicentre=None if event.lon is None or event.lat is None else (event.lon, event.lat),
             shape=(shaken.rows, shaken.columns) if shaken.is_whole and not own else None,
         )  # fmt: skip
@@ -205,11 +220,26 @@ def shakemap(
     print_warnings(warnings)
 
 
+def _with_refused(columns: dict[str, Any], rows: Any, refused: dict[str, Any]) -> dict[str, Any]:
+    """Return the table with the rows that are no blocks, in the order of the table of blocks."""
+    import numpy as np
+
+    order = np.argsort(np.concatenate([rows, refused["row"]]), kind="stable")
+    size = refused["row"].size
+    empty = {"in_domain": np.zeros(size, dtype=bool)}
+    return {
+        name: np.concatenate([column, refused.get(name, empty.get(name, np.full(size, np.nan)))])[
+            order
+        ]
+        for name, column in columns.items()
+    }
+
+
 def _write(
     columns: dict[str, Any], about: dict[str, Any], target: Any, *, excel_text: bool
 ) -> None:
     suffix = target.suffix.lower()
-    if suffix in (".csv", ".parquet"):
+    if suffix in TABLES:
         write_table(columns, target, excel_text=excel_text)
     elif suffix == ".gpkg":
         from rbfrag.exchange.points import write_geopackage

@@ -26,7 +26,7 @@ def spectrum(
     reading: options.Reading,
     p2: str = option("Frequency parameters p² [1/s²], separated by commas.", "30,10,3,1,0.3,0.1"),
     polarity: options.Polarity = "forward",
-    csv: str | None = option("Write the values (.csv or .parquet)."),
+    csv: str | None = option("Write the values (.csv, .xlsx or .parquet)."),
     plot: str | None = option("Draw the spectra over p², with PGV beside them (.png, .pdf, .svg)."),
     db: options.Db = None,
     json: options.Json = False,

@@ -92,7 +92,7 @@ class MeshOptions:
         "Height above the lowest vertex up to which vertices touch the ground [mm].", 10.0
     )
     out: str | None = option(
-        "Write the table of a mesh's blocks, one row for each azimuth (.csv, .parquet).",
+        "Write the table of a mesh's blocks, one row for each azimuth (.csv, .xlsx, .parquet).",
         metavar="FILE",
     )
 
@@ -116,8 +116,8 @@ class UncertaintyOptions:
     ky_sigma: _Number = option("Standard deviation of ln k_y.")
     restitution_sigma: _Number = option("Standard deviation of the restitution.")
     block_draws: str | None = option(
-        "Table of what the one block may be (.csv, .parquet), a row each, with the columns of a "
-        "block table and weight if they weigh differently.",
+        "Table of what the one block may be (.csv, .xlsx, .parquet), a row each, with the columns "
+        "of a block table and weight if they weigh differently.",
         metavar="FILE",
     )
 
@@ -199,7 +199,7 @@ class TableOptions(BlockOptions):
     """One block, or a table of them."""
 
     blocks: str | None = option(
-        "Table of blocks (.csv, .parquet, .geojson) with p2_1_s2 [1/s²] and kr, or "
+        "Table of blocks (.csv, .xlsx, .parquet, .geojson) with p2_1_s2 [1/s²] and kr, or "
         "height_m and width_m [m] (and dip_deg); one answer a row.",
         metavar="FILE",
     )
@@ -232,6 +232,31 @@ class TableOptions(BlockOptions):
         if standing.restitution is None and "restitution" in values:
             columns["restitution"] = np.array([values["restitution"]])
         return TopplingBlocks(standing.completed(columns), False, remarks)
+
+    def blocks_and_refused(
+        self, standing: StandingOptions
+    ) -> tuple[TopplingBlocks, dict[str, Any]]:
+        """Return the blocks, and the rows of a table that are none, with their reasons.
+
+        Args:
+            standing: how they stand.
+        """
+        if self.blocks is None:
+            return self.toppling_blocks(standing), {}
+        from rbfrag.exchange.block_table import blocks_and_refused
+
+        table, refused = blocks_and_refused(self.blocks, standing.kind)
+        size = refused["row"].size
+        if not size:
+            return TopplingBlocks(standing.completed(table), False, ()), {}
+        rows = (
+            f"{size:,} of {size + table['row'].size:,} rows {'are' if size > 1 else 'is'} no block"
+        )
+        remark = (
+            f"{rows} that waits for an earthquake, and without answer; the first: block "
+            f"{refused['block_id'][0]} {refused['reason'][0]}"
+        )
+        return TopplingBlocks(standing.completed(table), False, (remark,)), refused
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,84 @@
+"""The files that a table of blocks is read from and written to: one reader, one writer."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from rbfrag.errors import InputError
+from rbfrag.exchange.csv_table import Dialect, csv_parts, csv_writer
+from rbfrag.exchange.parquet_table import parquet_parts, parquet_writer
+from rbfrag.exchange.table_parts import Parts, Write, pyarrow
+from rbfrag.exchange.workbook import openpyxl, workbook_parts, workbook_writer
+from rbfrag.files import output_path
+
+SUFFIXES = (".csv", ".xlsx", ".parquet")
+"""File types of a table of blocks."""
+
+
+def table_source(path: str | os.PathLike[str]) -> Path:
+    """Return the path of a table that is to be read, or refuse its name."""
+    source = Path(path)
+    if source.suffix.lower() not in SUFFIXES:
+        raise InputError(
+            f"{source}: a block table ends in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}, not "
+            f"{source.suffix!r}"
+        )
+    return source
+
+
+def table_path(path: str | os.PathLike[str]) -> Path:
+    """Return the path if a table can be written there; ask before long work."""
+    target = output_path(path, SUFFIXES, "table")
+    need = {".parquet": pyarrow, ".xlsx": openpyxl}.get(target.suffix.lower())
+    if need is not None:
+        need()
+    return target
+
+
+def table_parts(
+    source: Path, numeric: Sequence[str], stack: ExitStack, *, fast: bool = False
+) -> tuple[list[str], Parts, Dialect]:
+    """Return the columns of a table, its parts, and how to write CSV that is like it.
+
+    Args:
+        source: the file.
+        numeric: columns that hold numbers.
+        stack: closes the file at the end.
+        fast: read CSV by pyarrow where it is installed, which takes a third of a second to load.
+    """
+    suffix = source.suffix.lower()
+    if suffix == ".csv":
+        return csv_parts(source, numeric, stack, fast=fast)
+    opened = parquet_parts if suffix == ".parquet" else workbook_parts
+    return *opened(source, numeric, stack), Dialect()
+
+
+def table_writer(
+    partial: Path,
+    header: Sequence[str],
+    answers: Sequence[str] = (),
+    *,
+    numeric: Sequence[str] = (),
+    stack: ExitStack,
+    dialect: Dialect | None = None,
+    fast: bool = False,
+) -> Write:
+    """Return a function that writes the parts of a table and their answers.
+
+    Args:
+        partial: the file; what its name ends in says of which type it is.
+        header: columns of the parts that are written.
+        answers: columns of the answers.
+        numeric: columns of the parts that hold numbers.
+        stack: closes the file at the end.
+        dialect: how CSV is written; None for commas and points.
+        fast: write CSV by pyarrow where it is installed.
+    """
+    suffix = partial.suffix.lower()
+    if suffix == ".csv":
+        return csv_writer(partial, header, answers, numeric, stack, dialect or Dialect(), fast=fast)
+    make = parquet_writer if suffix == ".parquet" else workbook_writer
+    return make(partial, header, answers, numeric, stack)

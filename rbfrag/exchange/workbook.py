@@ -1,0 +1,237 @@
+"""A table of blocks as an Excel workbook (.xlsx): its first sheet, names in the first row."""
+
+from __future__ import annotations
+
+import datetime
+import re
+import struct
+import warnings
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import ParseError
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError, MissingExtraError
+from rbfrag.exchange import table_parts
+from rbfrag.exchange.table_parts import Part, Parts, Write, cells_of, columns_to_write
+
+MOST_ROWS = 1 << 20
+"""Rows of a sheet, its first with the names."""
+
+MOST_BYTES = 1 << 30
+"""Workbooks that unpack to more are refused: a sheet of a million rows is smaller."""
+
+DAMAGED = (
+    zipfile.BadZipFile, zlib.error, struct.error, ParseError, EOFError, LookupError, ValueError,
+    TypeError, AttributeError, RuntimeError, ArithmeticError,
+)  # fmt: skip
+"""What openpyxl raises on a damaged workbook."""
+
+_NOT_COMPUTED = re.compile(
+    rb'<c r="([A-Z]{1,3}\d{1,7})"[^>]*>\s*'
+    rb"<f(?:[^>]*/>|[^>]*>[^<]*</f>)\s*(?:<v\s*/>|<v></v>)?\s*</c>"
+)
+
+
+def openpyxl() -> Any:
+    """Return openpyxl, or say which extra brings it."""
+    try:
+        import openpyxl as library
+    except ImportError:
+        raise MissingExtraError("Excel workbooks (.xlsx) need openpyxl", "excel") from None
+    return library
+
+
+def workbook_parts(
+    origin: Path, numeric: Sequence[str], stack: ExitStack
+) -> tuple[list[str], Parts]:
+    """Return the names of the columns of the first sheet, and its parts.
+
+    Formulas are read as the values that Excel has computed and stored; rows without any cell are
+    passed over.
+
+    Raises:
+        InputError: no workbook, or one with a formula that was never computed.
+    """
+    library = openpyxl()
+    with _damage(origin):
+        _check(origin)
+        book = library.load_workbook(origin, read_only=True, data_only=True, keep_links=False)
+        stack.callback(book.close)
+        if not book.worksheets:
+            raise InputError(f"{origin}: the workbook has no sheet")
+        sheet = book.worksheets[0]
+        sheet.reset_dimensions()  # what programs state there is not always so
+        rows = enumerate(sheet.iter_rows(values_only=True), 1)
+        names = next((row for _, row in rows if _is_filled(row)), ())
+    header = ["" if name is None else str(name).strip() for name in _filled(names)]
+    return header, _parts(origin, header, rows, numeric)
+
+
+@contextmanager
+def _damage(origin: Path) -> Iterator[None]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of styles and validations, which are no concern here
+        try:
+            yield
+        except InputError:
+            raise
+        except DAMAGED as error:
+            raise InputError(
+                f"{origin}: not an Excel workbook (.xlsx), or a damaged one: {error}; save it anew"
+            ) from None
+
+
+def _check(origin: Path) -> None:
+    """Refuse a workbook that is too large, or that holds formulas without values."""
+    with zipfile.ZipFile(origin) as archive:
+        members = archive.infolist()
+        if sum(member.file_size for member in members) > MOST_BYTES:
+            raise InputError(f"{origin}: it unpacks to more than a table of blocks can be")
+        for member in members:
+            if not member.filename.startswith("xl/worksheets/sheet"):
+                continue
+            with archive.open(member) as file:
+                before = b""
+                while more := file.read(1 << 20):
+                    match = _NOT_COMPUTED.search(before + more)
+                    if match is not None:
+                        raise InputError(
+                            f"{origin}: the formula in cell {match[1].decode()} was never "
+                            "computed: open the workbook in Excel and save it"
+                        )
+                    before = more[-4096:]
+
+
+def _parts(origin: Path, header: list[str], rows: Any, numeric: Sequence[str]) -> Parts:
+    width = len(header)
+    texts = [i for i, name in enumerate(header) if name not in numeric]
+    with _damage(origin):
+        ended = not width
+        while not ended:
+            kept: list[list[Any]] = []
+            lines: list[int] = []
+            faults: dict[int, str] = {}
+            ended = True
+            for number, row in rows:
+                if not _is_filled(row):
+                    continue
+                cells = list(row)
+                if _is_filled(cells[width:]):
+                    faults[len(kept)] = f"{len(_filled(cells))} cells under {width} columns"
+                cells = [*cells[:width], *[None] * (width - len(cells))]
+                for i in texts:
+                    cells[i] = _text(cells[i])
+                kept.append(cells)
+                lines.append(number)
+                if len(kept) == table_parts.ROWS:
+                    ended = False
+                    break
+            if kept:
+                columns = map(list, zip(*kept, strict=True))
+                yield Part(lines, dict(zip(header, columns, strict=True)), faults)
+
+
+def _is_filled(row: Sequence[Any]) -> bool:
+    return any(cell is not None for cell in row)
+
+
+def _filled(row: Sequence[Any]) -> Sequence[Any]:
+    """Return a row without the empty cells at its end."""
+    size = len(row)
+    while size and row[size - 1] is None:
+        size -= 1
+    return row[:size]
+
+
+def _text(cell: Any) -> str:
+    if cell is None:
+        return ""
+    if isinstance(cell, bool):
+        return "true" if cell else "false"
+    if isinstance(cell, float) and cell.is_integer() and abs(cell) < 1e15:
+        return str(int(cell))
+    if isinstance(cell, datetime.datetime) and cell.time() == datetime.time():
+        cell = cell.date()
+    return str(cell)
+
+
+def workbook_writer(
+    partial: Path,
+    header: Sequence[str],
+    answers: Sequence[str],
+    numeric: Sequence[str],
+    stack: ExitStack,
+) -> Write:
+    """Return a function that writes parts into the one sheet of a workbook.
+
+    Texts stay texts, also those that begin with =, unless they are numbers as Excel itself would
+    write them; NaN is an empty cell. Numbers are written with 16 digits.
+    """
+    library = openpyxl()
+    from openpyxl.cell import WriteOnlyCell
+    from openpyxl.cell.cell import ILLEGAL_CHARACTERS_RE
+
+    book = library.Workbook(write_only=True)
+    sheet = book.create_sheet("blocks")
+    sheet.freeze_panes = "A2"
+    written = [1]
+
+    def cell_of(value: Any) -> Any:
+        if isinstance(value, float):
+            return value if abs(value) < 1e308 else str(value)  # Excel knows no infinity
+        if not isinstance(value, str):
+            return value
+        if not value:
+            return None
+        if (number := _own_number(value)) is not None:
+            return number
+        text = ILLEGAL_CHARACTERS_RE.sub("", value)
+        if text[:1] != "=":
+            return text
+        cell = WriteOnlyCell(sheet, text)
+        cell.data_type = "s"
+        return cell
+
+    def write(part: Part, answer: Mapping[str, NDArray[Any]]) -> None:
+        arrays = [column for _, column in columns_to_write(part, header, numeric)]
+        arrays += [answer[name] for name in answers]
+        columns = [
+            column.tolist() if getattr(column, "dtype", None) == np.bool_ else cells_of(column)
+            for column in arrays
+        ]
+        written[0] += len(columns[0]) if columns else 0
+        if written[0] > MOST_ROWS:
+            raise InputError(
+                f"a sheet of Excel has {MOST_ROWS - 1:,} rows below its names, and the table has "
+                "more: write .csv or .parquet"
+            )
+        for row in zip(*columns, strict=True):
+            sheet.append([cell_of(value) for value in row])
+
+    def close(kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            book.save(partial)
+        else:
+            sheet.close()  # it holds a file open
+
+    sheet.append([*header, *answers])
+    stack.push(close)
+    return write
+
+
+def _own_number(text: str) -> int | float | None:
+    """Return the number that a text is to the letter, or nothing: 007 and 1.50 stay texts."""
+    if not text[-1].isdigit() or len(text) > 24:
+        return None
+    try:
+        number: int | float = int(text) if text.lstrip("-").isdigit() else float(text)
+    except ValueError:
+        return None
+    return number if str(number) == text and abs(number) < 1e15 else None

@@ -1,0 +1,188 @@
+"""Tables of blocks in Excel workbooks, and in the CSV that spreadsheets of decimal commas write."""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pytest
+
+from rbfrag.errors import InputError
+from rbfrag.exchange import workbook
+from rbfrag.exchange.batch import predict_table
+from rbfrag.exchange.block_table import read_columns, waiting_blocks, write_block_table
+
+HEAD = ("block_id", "p2_1_s2", "kr", "pgv_m_s", "remark")
+
+
+def save(path: Path, *rows: tuple[object, ...]) -> Path:
+    book = openpyxl.Workbook()
+    for row in rows:
+        book.active.append(row)
+    book.create_sheet("notes").append(["not read"])
+    book.save(path)
+    return path
+
+
+def answer(source: Path, target: Path, **given: float) -> dict[str, object]:
+    return predict_table(source, target, given=given, model=None, level=0.95, db=None)
+
+
+def rows_of(path: Path) -> list[dict[str, object]]:
+    head, *rows = openpyxl.load_workbook(path).active.iter_rows(values_only=True)
+    return [dict(zip(map(str, head), row, strict=True)) for row in rows]
+
+
+def test_a_workbook_is_answered_row_by_row_as_csv_is(tmp_path: Path) -> None:
+    source = save(
+        tmp_path / "blocks.xlsx",
+        HEAD,
+        (1, 3, 0.1, 0.6, "=1+1"),
+        (2, 3.0, datetime.datetime(2024, 3, 1), 0.6, None),
+        (3, "3", "0,1", 0.6, "007"),
+        (None,) * 5,
+        ("d", 3, True, 0.6, 2.5),
+        ("e", 3, 0.1, None, None),
+        ("f", 3, 0.1, 0.6, None, "beside"),
+    )
+    book = openpyxl.load_workbook(source)
+    book.active["E2"].data_type = "s"  # a text, as our own writer has it, not a formula
+    book.save(source)
+    told = answer(source, tmp_path / "out.xlsx")
+    assert (told["rows"], told["answered"]) == (6, 1)
+    assert "5 of 6 rows have no answer" in str(told["warnings"])
+    assert "line 3: kr is the date 2024-03-01" in str(told["warnings"])
+    rows = rows_of(tmp_path / "out.xlsx")
+    plain = tmp_path / "plain.csv"
+    plain.write_text("p2_1_s2,kr,pgv_m_s\n3,0.1,0.6\n")
+    answer(plain, tmp_path / "plain-out.csv")
+    with (tmp_path / "plain-out.csv").open(newline="") as file:
+        (expected,) = csv.DictReader(file)
+    assert rows[0]["probability"] == pytest.approx(float(expected["probability"]), rel=1e-12)
+    assert rows[0]["in_domain"] is True
+    assert (rows[0]["block_id"], rows[0]["remark"], rows[3]["remark"]) == (1, "=1+1", 2.5)
+    assert rows[2]["remark"] == "007"
+    assert [row["probability"] for row in rows[1:]] == [None] * 5
+    reasons = [str(row["reason"]) for row in rows]
+    assert reasons[0] == "None"
+    assert "kr is the date 2024-03-01 00:00:00, not a number" in reasons[1]
+    assert "kr = '0,1' is not a number: a decimal comma" in reasons[2]
+    assert "kr is TRUE, not a number" in reasons[3]
+    assert "pgv_m_s" in reasons[4]
+    assert "6 cells under 5 columns" in reasons[5]
+    for name in ("out.csv", "out.parquet"):
+        answer(source, tmp_path / name)
+        found = read_columns(tmp_path / name, ("probability",), texts=("reason",))
+        assert np.isfinite(found["probability"]).tolist() == [True] + [False] * 5
+        assert found["reason"].tolist()[1:] == reasons[1:]
+    again = answer(tmp_path / "out.xlsx", tmp_path / "again.xlsx")
+    assert (again["rows"], again["answered"]) == (6, 2)  # the cell beside the table is gone
+
+
+def test_formulas_are_read_as_their_values(tmp_path: Path) -> None:
+    source = save(tmp_path / "a.xlsx", ("p2_1_s2", "kr"), (3, "=0.05*2"))
+    with pytest.raises(InputError, match=r"formula in cell B2 was never computed: open the"):
+        waiting_blocks(source)
+    computed = tmp_path / "b.xlsx"
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(computed, "w") as new:
+        for member in old.infolist():
+            text = old.read(member)
+            if member.filename == "xl/worksheets/sheet1.xml":
+                assert b"<f>0.05*2</f><v" in text
+                text = text.replace(b"<v />", b"<v>0.1</v>").replace(b"<v></v>", b"<v>0.1</v>")
+            new.writestr(member, text)
+    assert waiting_blocks(computed)["kr"].tolist() == [0.1]
+
+
+@pytest.mark.parametrize("mark", ["", "\ufeff"])
+@pytest.mark.parametrize(("delimiter", "decimal"), [(";", ","), (";", "."), ("\t", ",")])
+def test_csv_is_answered_as_it_is_written(
+    tmp_path: Path, mark: str, delimiter: str, decimal: str
+) -> None:
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    table = "Größe,p2_1_s2,kr,pgv_m_s\nä,3,0.1,0.6\nb,3,1e-1,0.6\nc,3,x,0.6\n"
+    written = table.replace(",", delimiter).replace(".", decimal)
+    source.write_text(mark + written, encoding="utf-8")
+    assert answer(source, target)["answered"] == 2
+    text = target.read_text(encoding="utf-8")
+    assert text.startswith(f"{mark}Größe{delimiter}")
+    head, first, second, third = text.removeprefix(mark).splitlines()
+    assert first.startswith(written.splitlines()[1])
+    cells = dict(zip(head.split(delimiter), first.split(delimiter), strict=True))
+    plain = tmp_path / "plain.csv"
+    plain.write_text(table)
+    answer(plain, tmp_path / "plain-out.csv")
+    expected = read_columns(tmp_path / "plain-out.csv", ("probability",))["probability"]
+    assert float(cells["probability"].replace(decimal, ".")) == pytest.approx(expected[0])
+    assert read_columns(target, ("probability",))["probability"][1] == pytest.approx(expected[1])
+    assert third.endswith("kr = 'x' is not a number")
+    assert second
+
+
+def test_a_point_among_decimal_commas_is_not_guessed_at(tmp_path: Path) -> None:
+    source = tmp_path / "a.csv"
+    source.write_text("p2_1_s2;kr;pgv_m_s\n3;0,1;0,6\n3;1.234;0,6\n")
+    told = answer(source, tmp_path / "b.csv")
+    assert told["answered"] == 1
+    assert "kr = '1.234' has a decimal point, and the table has decimal commas" in str(told)
+    source.write_text('p2_1_s2,kr\n3,"0,1"\n')
+    with pytest.raises(InputError, match="line 2: kr = '0,1' is not a number: a decimal comma"):
+        waiting_blocks(source)
+
+
+def test_a_hundred_thousand_rows_and_one_bad_one(tmp_path: Path) -> None:
+    size = 100_000
+    kr = np.full(size, "0.1", dtype=object)
+    kr[54_321] = "?"
+    source, target = tmp_path / "a.xlsx", tmp_path / "b.csv"
+    write_block_table({"p2_1_s2": np.full(size, 3.0), "kr": kr}, source)
+    told = answer(source, target, pgv_m_s=0.6)
+    assert (told["rows"], told["without_answer"]) == (size, 1)
+    assert "1 of 100,000 rows has no answer" in str(told["warnings"])
+    assert "line 54323: kr = '?' is not a number" in str(told["warnings"])
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"PK\x03\x04 no archive", b"p2_1_s2,kr\n3,0.1\n", b"\xd0\xcf\x11\xe0 old"]
+)
+def test_other_files_are_refused_in_one_sentence(tmp_path: Path, content: bytes) -> None:
+    source = tmp_path / "a.xlsx"
+    source.write_bytes(content)
+    with pytest.raises(InputError, match="not an Excel workbook"):
+        waiting_blocks(source)
+
+
+def test_what_no_sheet_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    columns = {"kr": np.full(9, 0.1)}
+    monkeypatch.setattr(workbook, "MOST_ROWS", 9)
+    with pytest.raises(InputError, match="a sheet of Excel has 8 rows below its names"):
+        write_block_table(columns, tmp_path / "a.xlsx")
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.setattr(workbook, "MOST_BYTES", 100)
+    with pytest.raises(InputError, match="unpacks to more"):
+        waiting_blocks(save(tmp_path / "b.xlsx", ("p2_1_s2", "kr"), (3, 0.1)))
+
+
+def test_without_openpyxl_the_extra_is_named(tmp_path: Path) -> None:
+    program = """
+import sys
+sys.modules["openpyxl"] = None
+from rbfrag.errors import MissingExtraError
+from rbfrag.exchange.block_table import waiting_blocks
+from rbfrag.exchange.table_files import table_path
+for act in (lambda: table_path("a.xlsx"), lambda: waiting_blocks("a.xlsx")):
+    try:
+        act()
+    except MissingExtraError as error:
+        print(error)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False, cwd=tmp_path
+    )
+    assert done.stdout.count("pip install 'rbfrag[excel]'") == 2, done.stderr
