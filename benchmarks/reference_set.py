@@ -14,6 +14,7 @@ import hashlib
 import os
 import sqlite3
 import sys
+import textwrap
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -308,20 +309,24 @@ def model_section(models: Sequence[FitReport]) -> str:
     """Return the part of the page on the models, empty without any."""
     if not models:
         return ""
-    rows = [
-        [f"`{report.name}`", f"{report.n:,}", f"{report.n_censored:,}", str(report.events)]
-        for report in models
-    ]
-    columns = ["model", "critical values", "censored", "earthquakes"]
+    names = textwrap.fill(", ".join(f"`{report.name}`" for report in models), 120)
     return f"""## Models
 
+<<<<<<< HEAD
 Fitted without vertical motion ([how](../theory/fragility.md), [how
 well](model-choice.md), [blocks that slide or slump](other-kinds.md),
 [free-standing blocks](../theory/rocking.md)) to what is shipped; those of slumping and of rocking
 to grids of blocks whose results are too many to be shipped. One of each kind is the default;
 `rbfrag models show` prints the coefficients with their errors, and the domain.
+=======
+Fitted without vertical motion ([how](../theory/fragility.md), [how well](model-choice.md), [blocks
+that slide or slump](other-kinds.md), [free-standing blocks](../theory/rocking.md)) to what is
+shipped, of {models[0].events} earthquakes; those of slumping and of rocking to grids of blocks
+whose results are too many to be shipped. The first of each kind is its default. `rbfrag models
+show` prints coefficients, errors and domain.
+>>>>>>> main
 
-{markdown((columns, rows))}
+{names}
 
 """
 

@@ -30,7 +30,8 @@ What every command has in common:
 
 ## Shared options
 
-Options that mean the same in several commands. Below, each command names those that it takes.
+Options that mean the same in several commands. Below, each command names those that it takes, of
+this list from first to last.
 
 """
 
@@ -114,11 +115,21 @@ def page() -> str:
     for words, _, text in commands(shared=shared):
         level = "#" * (2 if len(words) <= 2 else 3)
         parts.append(f"{level} `{' '.join(words)}`\n\n```text\n{text}\n```\n")
-        named = [record[0].split()[0] for record in of_each[words] if record in shared]
-        named = [name for name in named if name != "--help"]
-        if named:
-            parts.append(f"Shared: {', '.join(f'`{name}`' for name in named)}.\n")
+        runs = runs_of(shared, of_each[words])
+        if runs:
+            parts.append(f"Shared: {', '.join(runs)}.\n")
     return "\n".join(parts)
+
+
+def runs_of(shared: list[tuple[str, str]], taken: list[tuple[str, str]]) -> list[str]:
+    """Return the shared options that a command takes; three or more in a row as first to last."""
+    runs: list[list[str]] = [[]]
+    for record in shared:
+        if record in taken and record[0] != "--help":
+            runs[-1].append(f"`{record[0].split()[0]}`")
+        elif runs[-1]:
+            runs.append([])
+    return [name for run in runs for name in ([f"{run[0]} to {run[-1]}"] if len(run) > 2 else run)]
 
 
 def main(arguments: list[str]) -> int:

@@ -18,8 +18,8 @@ HEAD = """\
 
 <!-- Written by docs/generate_gallery.py from the captions of the pages; change those. -->
 
-Every figure of these pages and the line that draws it. `FOLDER`, `RECORDS` and `DATABASE` are
-yours; motions given by number are those of the database of `make demo`.
+Every figure of these pages, linked to its page, and the line that draws it. `FOLDER`, `RECORDS`
+and `DATABASE` are yours; motions given by number are those of the database of `make demo`.
 """
 
 _FIGURE = re.compile(
@@ -49,12 +49,9 @@ def page() -> str:
         for source in sorted((DOCS / folder).glob("*.md")):
             if source.name in {PAGE.name, "index.md"}:
                 continue
-            title = source.read_text(encoding="utf-8").split("\n", 1)[0].removeprefix("# ")
             where = source.relative_to(DOCS).as_posix()
             for name, about, line in figures(source):
-                parts.append(
-                    f"![{about}](figures/{name})\n\n[{title}]({where})\n\n```sh\n{line}\n```\n"
-                )
+                parts.append(f"[![{about}](figures/{name})]({where})\n\n```sh\n{line}\n```\n")
     return "\n".join(parts)
 
 

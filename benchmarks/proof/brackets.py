@@ -1,0 +1,190 @@
+"""Brackets of critical values, proven: their ends, and that no stronger block topples."""
+
+from __future__ import annotations
+
+import csv
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.certify.recordings import Combination, Recording
+from benchmarks.proof.above import nothing_above
+from benchmarks.proof.enclosed_run import STABLE, TOPPLED, Enclosure, enclose
+from rbfrag.solver.results import DEFAULT_P2, POLARITIES
+from rbfrag.solver.search.critical import critical
+
+DISTANCE = 1e-6
+"""Relative distance from the bracket at which blocks are proven to topple and to stay."""
+
+EVERY_VERTICAL = 4
+"""Each so many-th combination has its vertical."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One combination; widths in rad (past recovery, energy) or s (last impact).
+
+    The ends are those of the bracket itself (`at`) and blocks at `DISTANCE` from it (`off`); what
+    begins with `above` is of all blocks from its upper end on.
+    """
+
+    motion: str
+    polarity: str
+    vertical: bool
+    p2: float
+    lower_kr: float
+    upper_kr: float
+    k_up: float
+    certified: bool
+    topples_off: str
+    topples_at: str
+    stays_at: str
+    stays_off: str
+    topples_by: str
+    topples_width: float
+    stays_by: str
+    stays_width: float
+    bits: int
+    steps: int
+    seconds: float
+    above_reason: str
+    above_undecided: float
+    above_intervals: int
+    above_seconds: float
+
+    @property
+    def key(self) -> tuple[str, str, bool, float]:
+        return self.motion, self.polarity, self.vertical, self.p2
+
+    @property
+    def off_proven(self) -> bool:
+        return (self.topples_off, self.stays_off) == (TOPPLED, STABLE)
+
+    @property
+    def at_proven(self) -> bool:
+        return (self.topples_at, self.stays_at) == (TOPPLED, STABLE)
+
+    @property
+    def above_proven(self) -> bool:
+        return not self.above_reason
+
+
+def draw(known: Sequence[Recording], rng: np.random.Generator) -> Iterator[Combination]:
+    """Combinations without end: p² in turn, recording and polarity at random."""
+    upright = [recording for recording in known if recording.vertical is not None]
+    number = 0
+    while True:
+        up = number % EVERY_VERTICAL == EVERY_VERTICAL - 1
+        among = upright if up else known
+        yield Combination(
+            among[int(rng.integers(len(among)))],
+            POLARITIES[int(rng.integers(2))],
+            DEFAULT_P2[number % len(DEFAULT_P2)],
+            up,
+        )
+        number += 1
+
+
+def prove(one: Combination, seconds: float) -> Row | None:
+    """Search one combination and prove its bracket; None where no block topples or w <= 0.
+
+    Args:
+        one: the combination.
+        seconds: processor time after which the proof of all stronger blocks is given up.
+    """
+    result = critical(one.recording.motion, p2=one.p2, vertical=one.vertical, polarity=one.polarity)
+    if result.status != "found" or result.lower is None or result.upper is None:
+        return None
+    drive = one.drive()
+    lower, upper = result.lower * drive.pga_g, result.upper * drive.pga_g
+    k_up = (result.k_up_over_pga or np.nan) * drive.pga_g
+    started = time.process_time()
+    ends: list[Enclosure] = [
+        enclose(drive, p2=one.p2, kr=kr)
+        for kr in (lower * (1.0 - DISTANCE), lower, upper, upper * (1.0 + DISTANCE))
+    ]
+    took = time.process_time() - started
+    above = nothing_above(drive, p2=one.p2, kr=upper, k_up=k_up, seconds=seconds)
+    return Row(
+        motion=one.recording.name,
+        polarity=one.polarity,
+        vertical=one.with_vertical,
+        p2=one.p2,
+        lower_kr=lower,
+        upper_kr=upper,
+        k_up=k_up,
+        certified=result.certified,
+        topples_off=ends[0].outcome,
+        topples_at=ends[1].outcome,
+        stays_at=ends[2].outcome,
+        stays_off=ends[3].outcome,
+        topples_by=ends[0].decided_by or ends[0].reason,
+        topples_width=ends[0].width,
+        stays_by=ends[3].decided_by or ends[3].reason,
+        stays_width=ends[3].width,
+        bits=max(end.bits for end in ends),
+        steps=sum(end.steps for end in ends),
+        seconds=took,
+        above_reason=above.reason,
+        above_undecided=above.undecided,
+        above_intervals=above.intervals,
+        above_seconds=above.seconds,
+    )
+
+
+def study(
+    known: Sequence[Recording], wanted: int, seed: int, rows: Path, seconds: float
+) -> list[Row]:
+    """Prove the brackets of `wanted` combinations; those in the file of rows are not repeated.
+
+    Args:
+        known: recordings to draw from.
+        wanted: combinations with a bracket.
+        seed: draws.
+        rows: CSV file to which each row is written as it is known.
+        seconds: processor time for all stronger blocks of one combination.
+    """
+    before = {row.key: row for row in read(rows)} if rows.is_file() else {}
+    found: list[Row] = []
+    seen = set()
+    for one in draw(known, np.random.default_rng(seed)):
+        if len(found) >= wanted:
+            break
+        key = (one.recording.name, one.polarity, one.with_vertical, one.p2)
+        if key in seen:
+            continue
+        seen.add(key)
+        row = before.get(key)
+        if row is None:
+            row = prove(one, seconds)
+            if row is None:
+                continue
+            write([*before.values(), row], rows)
+            before[key] = row
+        above = row.above_reason or "nothing above topples"
+        print(
+            f"{len(found) + 1:3} {one.name}: {row.topples_at}, {row.stays_at}, {above}", flush=True
+        )
+        found.append(row)
+    return found
+
+
+def write(rows: Sequence[Row], path: Path) -> None:
+    """Write rows as CSV."""
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        table = csv.DictWriter(stream, [field.name for field in fields(Row)], lineterminator="\n")
+        table.writeheader()
+        table.writerows(asdict(row) for row in rows)
+
+
+def read(path: Path) -> list[Row]:
+    """Read rows that `write` wrote."""
+    as_is = {"float": float, "int": int, "bool": lambda text: text == "True", "str": str}
+    with path.open(encoding="utf-8", newline="") as stream:
+        return [
+            Row(**{field.name: as_is[str(field.type)](row[field.name]) for field in fields(Row)})
+            for row in csv.DictReader(stream)
+        ]
