@@ -322,7 +322,7 @@ to grids of blocks whose results are too many to be shipped. One of each kind is
 Fitted without vertical motion ([how](../theory/fragility.md), [how well](model-choice.md), [blocks
 that slide or slump](other-kinds.md), [free-standing blocks](../theory/rocking.md)) to what is
 shipped, of {models[0].events} earthquakes; those of slumping and of rocking to grids of blocks
-whose results are too many to be shipped. The first of each kind is its default. `rbfrag models
+whose results are too many to be shipped. One of each kind is the default. `rbfrag models
 show` prints coefficients, errors and domain.
 >>>>>>> main
 
