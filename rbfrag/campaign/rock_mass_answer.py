@@ -138,6 +138,11 @@ def rockmass(
         stated |= spectral(sa_g)  # type: ignore[arg-type]
     measures = {name: value for name, value in stated.items() if value is not None}
     checked_level(level)
+    if motion is not None and measures:
+        raise InputError(
+            f"motion does not go with {next(iter(measures))}: give the accelerogram, or the "
+            "measures that a fragility model answers for"
+        )
     answer = ran = None
     if measures:
         answer = scenario(

@@ -94,9 +94,9 @@ def nrml(
     target = output_path(out, (".xml",), "NRML file")
     table, measure = given_blocks(p2, kr, blocks), _measure(imt)
     single = one_class or (blocks is None and len(table["kr"]) == 1)
-    told: Sequence[str] = ()
+    notes: Sequence[str] = ()
     if shares is not None:
-        functions, about, told = share_functions(
+        functions, about, notes = share_functions(
             name, table["p2_1_s2"], table["kr"], measure, list(shares), levels=levels, model=model,
             db=db,
         )  # fmt: skip
@@ -107,7 +107,7 @@ def nrml(
         )  # fmt: skip
     what = f"Toppling of rock blocks, model {about[0]} ({about[2]} on {about[1]})"
     write_text(nrml_text(functions, description=what), target)
-    return _answer(str(target), None, functions, about, told)
+    return _answer(str(target), None, functions, about, notes)
 
 
 def pelicun(

@@ -375,7 +375,7 @@ def predict(
     answer = answer_given(first, given, level, nan=nan, interval=interval, weights=weights)
     if type(answer) is not Prediction:
         return answer
-    return _told_apart(answer, [_one_of(each, given, level, weights) for each in others])
+    return _with_disagreement(answer, [_one_of(each, given, level, weights) for each in others])
 
 
 def _candidates(
@@ -400,7 +400,7 @@ def _one_of(
     return answer
 
 
-def _told_apart(first: Prediction, others: Sequence[Prediction]) -> Prediction:
+def _with_disagreement(first: Prediction, others: Sequence[Prediction]) -> Prediction:
     """Return an answer that says which of the other models answer otherwise."""
     apart = [
         other
@@ -719,7 +719,7 @@ def prediction_document(
             _one_of(each, given, level, weights)
             for each in _candidates(given, model, db, kind=kind, rotation_deg=rotation_deg)
         )
-        others = [_told_apart(first, rest), *rest]
+        others = [_with_disagreement(first, rest), *rest]
     recommended = others[0]
     document = recommended.as_dict()
     document["warnings"] = [*remarks, *recommended.warnings]

@@ -326,11 +326,11 @@ def response(
     _checked(out)
     ground = as_motion(motion)
     upward = None if vertical is None else as_motion(vertical, "vertical")
-    found = respond(ground, p2=p2, kr=kr, vertical=upward, polarity=polarity, history=True)
+    shaken = respond(ground, p2=p2, kr=kr, vertical=upward, polarity=polarity, history=True)
     reverse = polarity == "reverse"
     return _drawn(
         out,
-        lambda path: plot_response(found, path, p2=p2, kr=kr, reverse=reverse, title=ground.label),
+        lambda path: plot_response(shaken, path, p2=p2, kr=kr, reverse=reverse, title=ground.label),
     )
 
 

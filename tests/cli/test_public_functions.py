@@ -20,10 +20,15 @@ MASS = Path(__file__).parents[2] / "docs" / "examples" / "rockmass.toml"
 
 def test_a_rock_mass_is_answered_as_by_the_shell(shell: Shell, tmp_path: Path) -> None:
     record = write_at2(tmp_path / "record.AT2", shaking(3))
-    answer = rbfrag.rockmass(MASS, n=60, pgv_m_s=0.6, motion=record, scales=(0.5, 1.0), jobs=1)
-    asked = ["--n", "60", "--pgv", "0.6", "--motion", record, "--scales", "0.5,1", "--jobs", "1"]
+    answer = rbfrag.rockmass(MASS, n=60, motion=record, scales=(0.5, 1.0), jobs=1)
+    asked = ["--n", "60", "--motion", record, "--scales", "0.5,1", "--jobs", "1"]
     assert answer.as_dict() == shell.json("rockmass", MASS, *asked)
     assert len(answer.to_frame()) == 2 * 60
+    answer = rbfrag.rockmass(str(MASS), n=60, pgv_m_s=0.6, sa_g={1.0: 0.4})
+    asked = ["--n", "60", "--pgv", "0.6", "--sa10", "0.4"]
+    assert answer.as_dict() == shell.json("rockmass", MASS, *asked)
+    with pytest.raises(rbfrag.InputError, match="motion does not go with pgv_m_s"):
+        rbfrag.rockmass(MASS, pgv_m_s=0.6, motion=record)
     assert "\n" not in repr(answer)
     with pytest.raises(rbfrag.InputError, match="mass is of type int"):
         rbfrag.rockmass(3)
@@ -74,7 +79,7 @@ def test_figures_are_pictures_without_a_file(tmp_path: Path) -> None:
 def test_asking_for_figures_and_exports_loads_no_matplotlib() -> None:
     program = (
         "import sys, rbfrag; rbfrag.plot; rbfrag.export; rbfrag.shakemap; rbfrag.rockmass;"
-        "print([name for name in ('matplotlib', 'numba', 'pyogrio') if name in sys.modules])"
+        "print([name for name in ('matplotlib', 'pyogrio') if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.stdout.strip() == "[]", done.stderr

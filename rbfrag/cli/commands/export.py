@@ -34,7 +34,7 @@ class FunctionOptions(BlocksOptions):
     model: options.Model = None
     db: options.Db = None
 
-    def asked(self) -> tuple[dict[str, Any], tuple[str, ...]]:
+    def keywords(self) -> tuple[dict[str, Any], tuple[str, ...]]:
         """Return the keywords of `rbfrag.export`, and what is to be said of the blocks."""
         table, is_class, remarks = self.toppling_blocks(name=self.name)
         keywords = {
@@ -59,7 +59,7 @@ def nrml(
     """Write an OpenQuake fragility model, NRML 0.5 (.xml); PGV is in cm/s there."""
     from rbfrag.exchange.export import nrml as written
 
-    keywords, remarks = blocks.asked()
+    keywords, remarks = blocks.keywords()
     wanted = None if shares is None else number_list(shares, "--shares")
     _print(written(out, **keywords, shares=wanted), remarks, json=json)
 
@@ -76,7 +76,7 @@ def pelicun(out: Out, blocks: FunctionOptions, json: options.Json = False) -> No
     """
     from rbfrag.exchange.export import pelicun as written
 
-    keywords, remarks = blocks.asked()
+    keywords, remarks = blocks.keywords()
     _print(written(out, **keywords), remarks, json=json)
 
 
