@@ -39,6 +39,11 @@ class _Store:
     models: dict[str, FragilityModel] = field(default_factory=dict)
     suited: dict[tuple[object, ...], list[FragilityModel]] = field(default_factory=dict)
 
+    @property
+    def data(self) -> str:
+        """What answers say of where they come from: its name, without the folder or server."""
+        return SHIPPED if self.place == SHIPPED else self.place.rpartition("/")[2]
+
     def row(self, name: str) -> ModelRow:
         """Return one of its models as it is stored."""
         for row in self.rows:
@@ -51,7 +56,7 @@ class _Store:
         """Return one of its models, ready to answer."""
         model = self.models.get(row.name)
         if model is None:
-            model = self.models[row.name] = FragilityModel.from_row(row, self.place)
+            model = self.models[row.name] = FragilityModel.from_row(row, self.data)
         return model
 
 

@@ -36,7 +36,9 @@ def test_a_notebook_prints_what_is_stored_in_it(
     stored = nbformat.read(path, as_version=4)
     before = printed(stored)
     assert any(before)
-    assert any("image/png" in each.get("data", {}) for c in stored.cells for each in c.get("outputs", ()))
+    assert any(
+        "image/png" in each.get("data", {}) for c in stored.cells for each in c.get("outputs", ())
+    )
     NotebookClient(
         stored, timeout=300, resources={"metadata": {"path": str(path.parent)}}
     ).execute()

@@ -14,6 +14,7 @@ from rbfrag.cli.output import (
     print_table,
     print_warnings,
     say_when_compiling,
+    write_table,
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_shaking
@@ -123,6 +124,7 @@ def rockmass(
     out: str | None = option(
         "Write one row a block, with a motion one a block and scale (.csv, .xlsx, .parquet)."
     ),
+    excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option(
         "Draw the cumulative counts of blocks against PGA by mode, with a motion the "
         "shares that fail (.png, .pdf, .svg)."
@@ -136,10 +138,9 @@ def rockmass(
     the blocks of each mode for which there is a fragility model.
     """
     from rbfrag.campaign.rock_mass_answer import rockmass as answered
-    from rbfrag.exchange.block_table import write_block_table
     from rbfrag.fragility.measures import SPECTRAL
 
-    check_files(table=out, plot=plot)
+    check_files(table=out, plot=plot, excel_text=excel_text)
     ground = upward = None
     about: list[str] = []
     if shaken.motion is not None:
@@ -161,7 +162,7 @@ def rockmass(
     document = answer.as_dict()
     document["warnings"] += about
     if out is not None:
-        write_block_table(answer.table_columns(), out)
+        write_table(answer.table_columns(), out, excel_text=excel_text)
     if plot is not None:
         from rbfrag.plots.rockmass import plot_failures, plot_rockmass
 
