@@ -119,6 +119,13 @@ NEEDS = (
         _NAME_IT,
         ("rockmass",),
     ),
+    Need(
+        ("--imt", "--site", "--component", "--convert", "--convert-sigma", "--years"),
+        ("--hazard",),
+        "--hazard",
+        "name the hazard curve, too",
+        ("report",),
+    ),
     Need(("--model",), MEASURES, "a measure of the motion", _MEASURE, ("rockmass",)),
     Need(
         ("--db",),
