@@ -21,6 +21,11 @@ SHIPPED = "the reference that is shipped with rbfrag"
 _Stamp = tuple[int, ...]
 
 
+def data_name(place: str) -> str:
+    """Return what answers call a database: its name, without folder, server or password."""
+    return place if place == SHIPPED else place.partition("?")[0].rpartition("/")[2]
+
+
 @dataclass(frozen=True, eq=False)
 class _Store:
     """The models of one place.
@@ -39,11 +44,6 @@ class _Store:
     models: dict[str, FragilityModel] = field(default_factory=dict)
     suited: dict[tuple[object, ...], list[FragilityModel]] = field(default_factory=dict)
 
-    @property
-    def data(self) -> str:
-        """What answers say of where they come from: its name, without the folder or server."""
-        return SHIPPED if self.place == SHIPPED else self.place.rpartition("/")[2]
-
     def row(self, name: str) -> ModelRow:
         """Return one of its models as it is stored."""
         for row in self.rows:
@@ -56,7 +56,7 @@ class _Store:
         """Return one of its models, ready to answer."""
         model = self.models.get(row.name)
         if model is None:
-            model = self.models[row.name] = FragilityModel.from_row(row, self.data)
+            model = self.models[row.name] = FragilityModel.from_row(row, data_name(self.place))
         return model
 
 
