@@ -100,7 +100,7 @@ def check_files(
             f"--excel-text is about CSV, and {table} is none: its texts are texts without it"
         )
     if table is not None:
-        from rbfrag.exchange.table_files import table_path
+        from rbfrag.exchange.tables.files import table_path
 
         table_path(table)
     if plot is not None:

@@ -124,7 +124,7 @@ def critical_in_words(answer: Mapping[str, Any]) -> str:
     half_width = 0.5 * (answer["upper"] - answer["lower"]) * answer["pga_g"]
     certified = "certified" if answer["certified"] else "not certified"
     return (
-        f"The strongest block of p² = {answer['p2']:g} 1/s² that this motion topples has "
+        f"The strongest block of p² = {answer['p2']:.3g} 1/s² that this motion topples has "
         f"k_r = {rounded(answer['kr'])} (± {half_width:.0e}, {certified}), "
         f"{rounded(answer['kr_over_pga'])} of the PGA of {rounded(answer['pga_g'])} g."
     )
