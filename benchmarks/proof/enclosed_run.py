@@ -247,7 +247,6 @@ class Block:
         *,
         lifted: bool,
         stop: Place | None = None,
-        look: bool = True,
     ) -> Flight:
         """Carry one excursion to its impact, its loss, the end of the record, or a place.
 
@@ -257,7 +256,6 @@ class Block:
             rate: its rate.
             lifted: theta >= 0, theta' >= 0 and q >= k_r there: no impact while q >= k_r (lift).
             stop: where to stop.
-            look: look for impacts and for the loss; without, theta may be below zero.
         """
         drive = self.drive
         self.theta, self.rate = theta, rate
@@ -276,7 +274,7 @@ class Block:
             g0, g1 = self.sign(i), self.sign(i + 1)
             if at.is_zero() and (g0 < 0 or (g0 == 0 and g1 < 0)):
                 lifted = False
-            if lifted and look:
+            if lifted:
                 # k_h >= w k_r as far as the downward crossing, or to the end: no impact until then
                 target = limit
                 if g0 > 0 and g1 < 0:
@@ -288,13 +286,13 @@ class Block:
                         raise NotEnclosedError("whether a block is lifted at an impact of another")
                 self._integrate(line, at, target)
                 at = target
-            if not (lifted and look):
-                landing = self._integrate(line, at, limit, look=look)
+            if not lifted:
+                landing = self._integrate(line, at, limit, look=True)
                 if landing is not None:
                     return Flight(IMPACT, Place(i, landing), self.theta, self.rate)
             if stops and stop is not None:
                 return Flight(STOPPED, stop, self.theta, self.rate)
-            if look and self._past_recovery(self.least[i + 1]):
+            if self._past_recovery(self.least[i + 1]):
                 return Flight(LOST, Place(i + 1, arb(0)), self.theta, self.rate)
         end = Place(last, arb(0))
         if stop is not None and stop.interval >= last:
