@@ -50,8 +50,17 @@ class Running:
         return self.process.wait(PATIENCE_S)
 
     def lines(self) -> list[dict[str, Any]]:
-        """Return the lines of its log."""
-        return [json.loads(line) for line in self.log.read_text().splitlines()]
+        """Return the lines of its log.
+
+        Raises:
+            ValueError: a line is no JSON object; with the line and what follows.
+        """
+        written, read = self.log.read_text().splitlines(), []
+        for number, line in enumerate(written):
+            if not line.startswith("{"):
+                raise ValueError("\n".join(["not JSON:", *written[number : number + 40]]))
+            read.append(json.loads(line))
+        return read
 
 
 def free_port() -> int:

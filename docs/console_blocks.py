@@ -122,7 +122,10 @@ def prepare(folder: Path, formats: Path | None) -> None:
     for page in PAGES:
         for body in _BLOCK.findall((ROOT / page).read_text(encoding="utf-8")):
             for name, text in re.findall(r"^\$ cat (\S+)\n(.*?)(?=^\$ )", body, re.M | re.S):
-                (folder / name).write_text(text, encoding="utf-8")
+                if not (folder / name).exists():
+                    (folder / name).write_text(text, encoding="utf-8")
+                elif (folder / name).read_text(encoding="utf-8") != text:
+                    raise RuntimeError(f"{page}: {name} is not what the page prints")
 
 
 def differing(folder: Path) -> Iterator[tuple[Session, str]]:

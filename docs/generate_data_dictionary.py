@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from pathlib import Path
 
-from rbfrag.db.data_dictionary import dictionary_as_markdown
+from rbfrag.db.data_dictionary import columns_as_markdown, data_dictionary
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "reference" / "data-dictionary.md"
@@ -19,12 +20,25 @@ g. A missing value is NULL in the database, null in Parquet, an empty cell in CS
 and data frames. Row numbers hold in one database only: between databases, compare `natural_key`,
 or `samples_sha256` with `dt_s`.
 
+## Columns of several tables
+
 """
 
 
 def page() -> str:
-    """Return the page."""
-    return HEAD + dictionary_as_markdown()
+    """Return the page: what tables have alike, and then each with its own columns."""
+    tables = data_dictionary()
+    times = Counter(column for table in tables for column in table.columns)
+    usual = {column.name: column for column, count in reversed(times.most_common()) if count > 1}
+    common = [column for column in times if column in usual.values()]
+    parts = [HEAD + columns_as_markdown(common)]
+    for table in tables:
+        own = [column for column in table.columns if column not in common]
+        also = ", ".join(f"`{column.name}`" for column in table.columns if column in common)
+        parts.append(f"## {table.name}\n\n{table.meaning}\n")
+        parts += [columns_as_markdown(own)] if own else []
+        parts += [f"Also: {also}.\n"] if also else []
+    return "\n".join(parts)
 
 
 def main(arguments: list[str]) -> int:

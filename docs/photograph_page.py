@@ -1,4 +1,4 @@
-"""Take the picture of the page in docs/figures: python docs/photograph_page.py [CHROMIUM]."""
+"""Take the pictures of the page in docs/figures: python docs/photograph_page.py [CHROMIUM]."""
 
 from __future__ import annotations
 
@@ -10,13 +10,20 @@ import sys
 import time
 import urllib.request
 from pathlib import Path
+from typing import Any
 
 from playwright.sync_api import sync_playwright
 
-FIGURE = Path(__file__).parent / "figures" / "page.png"
-QUERY = "?alpha1=-15&alpha3=24&r3=2.5&beta=18&phi=38&pgv=0.8&pga=0.5"
+FIGURES = Path(__file__).parent / "figures"
 PORT = 8641
-SIZE = {"width": 1360, "height": 960}
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+
+PICTURES: dict[str, dict[str, Any]] = {
+    "page.png": {"viewport": {"width": 1280, "height": 1130}},
+    "page-phone.png": {**PHONE, "color_scheme": "dark", "device_scale_factor": 2},
+}
+"""The windows in which the page is opened, on its own example."""
 
 
 def main() -> None:
@@ -37,16 +44,19 @@ def main() -> None:
                 time.sleep(0.1)
         with sync_playwright() as player:
             browser = player.chromium.launch(executable_path=program, args=["--no-sandbox"])
-            page = browser.new_page(viewport=SIZE)
-            page.goto(address + QUERY)
-            page.wait_for_selector("#main[aria-busy=false]")
-            page.wait_for_load_state("networkidle")
-            page.screenshot(path=FIGURE)
+            for name, window in PICTURES.items():
+                page = browser.new_page(**window)
+                page.goto(address)
+                page.wait_for_selector("#main[aria-busy=false]")
+                page.wait_for_load_state("networkidle")
+                page.wait_for_selector("#curve:not(.stale) .curve")
+                page.screenshot(path=FIGURES / name)
+                page.close()
             browser.close()
     finally:
         service.terminate()
         service.wait(20)
-    print(f"wrote {FIGURE}")
+    print(f"wrote {', '.join(PICTURES)} in {FIGURES}")
 
 
 if __name__ == "__main__":

@@ -41,6 +41,31 @@ COMMANDS = {
 """The modules of `rbfrag/cli/commands`, and the first line of each one's help."""
 
 
+_NEEDS = {
+    "float": "give a number, with a point before its decimals",
+    "int": "give a whole number",
+    "greater_than_equal": "give {ge} or more",
+    "less_than_equal": "give {le} or less",
+}
+"""What to give instead, by how the name of a fault of pydantic begins."""
+
+
+def in_our_words(error: Any) -> str | None:
+    """Return what is wrong with an option's value, with the value; None where there is none.
+
+    Args:
+        error: what typer raises, caused by pydantic, which checks the types of options.
+    """
+    faults = getattr(error.__cause__, "errors", None)
+    if faults is None:
+        return None
+    fault = faults()[0]
+    need = next((text for kind, text in _NEEDS.items() if fault["type"].startswith(kind)), None)
+    if need is None:
+        return None
+    return f"{fault['input']!r} cannot be used: {need.format(**fault.get('ctx', {}))}"
+
+
 _UsageError: Any = typer.BadParameter.__base__
 """What typer raises for a wrong command line; where it stands depends on typer's version."""
 
@@ -77,7 +102,7 @@ class _Commands(TyperGroup):
             print(f"rbfrag: {error}", file=sys.stderr)
             raise typer.Exit(error.exit_status) from None
         except _UsageError as error:
-            error.message = one_paragraph(error.message)
+            error.message = one_paragraph(in_our_words(error) or error.message)
             raise
 
 
@@ -87,7 +112,7 @@ app = typer.Typer(
     help="Seismic fragility of rock blocks: from accelerograms to failure probabilities.\n\n"
     "Units: accelerations in g, velocities in m/s, displacements in m, times in s, "
     "p2 in 1/s2, angles in degrees.",
-    epilog="Example:  rbfrag predict --p2 3 --kr 0.1 --pgv 0.6",
+    epilog="Example:  rbfrag predict --height 2.4 --width 0.5 --dip 3 --pgv 0.6",
     no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,

@@ -10,6 +10,8 @@ from functools import cache
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
+from rbfrag.errors import InputError
+
 if TYPE_CHECKING:
     from rich.progress import Progress as RichProgress
 
@@ -26,8 +28,16 @@ def print_pairs(pairs: Mapping[str, object]) -> None:
         print(f"{name:<{width}}  {cell(value)}")
 
 
-def print_table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Print a table: numbers to the right, text to the left."""
+def print_table(
+    headers: Sequence[str], rows: Iterable[Sequence[object]], *, width: int | None = None
+) -> None:
+    """Print a table: numbers to the right, text to the left.
+
+    Args:
+        headers: names of the columns.
+        rows: their cells.
+        width: characters of a line, to which the longest texts are cut; None for all there is.
+    """
     table = [[cell(value) for value in row] for row in rows]
     numeric = [
         all(_is_number(row[i]) for row in table) and bool(table) for i in range(len(headers))
@@ -35,12 +45,21 @@ def print_table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> Non
     widths = [
         max([len(header), *(len(row[i]) for row in table)]) for i, header in enumerate(headers)
     ]
+    while width is not None and sum(widths) + 2 * (len(widths) - 1) > width:
+        texts = [i for i in range(len(widths)) if not numeric[i] and widths[i] > len(headers[i])]
+        if not texts:
+            break
+        widths[max(texts, key=widths.__getitem__)] -= 1
     for line in [list(headers), *table]:
         fields = (
-            text.rjust(width) if right else text.ljust(width)
-            for text, width, right in zip(line, widths, numeric, strict=True)
+            _cut(text, size).rjust(size) if right else _cut(text, size).ljust(size)
+            for text, size, right in zip(line, widths, numeric, strict=True)
         )
         print("  ".join(fields).rstrip())
+
+
+def _cut(text: str, size: int) -> str:
+    return text if len(text) <= size else f"{text[: size - 1]}…"
 
 
 def print_warnings(warnings: Iterable[str]) -> None:
@@ -71,8 +90,14 @@ def _say_compiling() -> None:
     print("compiling the kernels for this machine; this happens once", file=sys.stderr, flush=True)
 
 
-def check_files(*, table: str | None = None, plot: str | None = None) -> None:
+def check_files(
+    *, table: str | None = None, plot: str | None = None, excel_text: bool = False
+) -> None:
     """Refuse a table or a figure that cannot be written, before long work."""
+    if excel_text and table is not None and not table.lower().endswith(".csv"):
+        raise InputError(
+            f"--excel-text is about CSV, and {table} is none: its texts are texts without it"
+        )
     if table is not None:
         from rbfrag.exchange.table_files import table_path
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from rbfrag.cli.output import percent
@@ -173,6 +173,51 @@ def slides_in_words(document: Mapping[str, Any]) -> Iterator[str]:
     else:
         yield SLIDING_STATUS[first["status"]].format(first["displacement_m"])
     yield "On a base that dips, displacements are cos(phi - beta)/cos(phi) times these."
+
+
+def strongest_kr(spectrum: Mapping[str, Any]) -> list[float]:
+    """Return k_r of the block of each size whose toppling velocity k_r g/p is X(p).
+
+    Args:
+        spectrum: an answer of `rbfrag spectrum` under the keys of the JSON contract.
+    """
+    from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+    pairs = zip(spectrum["p2"], spectrum["x_m_s"], strict=True)
+    return [x * p2**0.5 / STANDARD_GRAVITY_M_S2 for p2, x in pairs]
+
+
+def spectrum_in_words(spectra: Sequence[Mapping[str, Any]]) -> str:
+    """Return what a motion can topple.
+
+    Args:
+        spectra: the answers of `rbfrag spectrum` for one motion, one a polarity.
+    """
+    first = spectra[0]
+    largest = [max(some) for some in zip(*map(strongest_kr, spectra), strict=True)]
+    sizes = [
+        f"{rounded(kr)} at p² = {p2:g} 1/s²" for p2, kr in zip(first["p2"], largest, strict=True)
+    ]
+    ends = sizes[0] if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
+    return (
+        f"{first['name']} (PGV {rounded(first['pgv_m_s'])} m/s) topples no block whose k_r is more "
+        f"than 2 % above that of its size: {ends}."
+    )
+
+
+def motion_in_words(document: Mapping[str, Any], *, flags: int) -> str:
+    """Return how strong and how long a motion is.
+
+    Args:
+        document: an answer of `rbfrag motions show` under the keys of the JSON contract.
+        flags: number of quality flags.
+    """
+    treated = "processed here" if document["processing_applied"] else "as its file has it"
+    marks = "no quality flag" if not flags else f"{flags} quality flag{'s' if flags > 1 else ''}"
+    return (
+        f"{document['name']}: PGA {rounded(document['pga_g'])} g, PGV "
+        f"{rounded(document['pgv_m_s'])} m/s in {document['duration_s']:.4g} s; {treated}, {marks}."
+    )
 
 
 def table_in_words(summary: Mapping[str, Any]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -62,20 +63,24 @@ def dictionary_as_json() -> dict[str, Any]:
 
 def dictionary_as_markdown() -> str:
     """Return the dictionary as Markdown, a section for each table."""
-    parts = []
-    for table in data_dictionary():
-        lines = [f"## {table.name}", "", table.meaning, ""]
-        lines += ["| column | type | unit | meaning |", "| --- | --- | --- | --- |"]
-        for column in table.columns:
-            notes = [column.meaning]
-            if column.refers_to:
-                notes.append(f"refers to {column.refers_to}")
-            if column.may_be_missing and "missing" not in column.meaning:
-                notes.append("may be missing")
-            text = "; ".join(notes).replace("|", "\\|")
-            lines.append(f"| {column.name} | {column.type} | {column.unit or '-'} | {text} |")
-        parts.append("\n".join(lines) + "\n")
-    return "\n".join(parts)
+    return "\n".join(
+        f"## {table.name}\n\n{table.meaning}\n\n{columns_as_markdown(table.columns)}"
+        for table in data_dictionary()
+    )
+
+
+def columns_as_markdown(columns: Iterable[ColumnMeaning]) -> str:
+    """Return the Markdown table of some columns."""
+    lines = ["| column | type | unit | meaning |", "| --- | --- | --- | --- |"]
+    for column in columns:
+        notes = [column.meaning]
+        if column.refers_to:
+            notes.append(f"refers to {column.refers_to}")
+        if column.may_be_missing and "missing" not in column.meaning:
+            notes.append("may be missing")
+        text = "; ".join(notes).replace("|", "\\|")
+        lines.append(f"| {column.name} | {column.type} | {column.unit or '-'} | {text} |")
+    return "\n".join(lines) + "\n"
 
 
 def _column(column: Column[Any]) -> ColumnMeaning:

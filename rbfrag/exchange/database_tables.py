@@ -6,9 +6,10 @@ import json
 import os
 import secrets
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,7 @@ from rbfrag.db.data_dictionary import (
 from rbfrag.db.engine import opened_database
 from rbfrag.db.frames import TABLES, chosen_columns, frames
 from rbfrag.errors import InputError, WorkFailedError
+from rbfrag.exchange.excel_text import as_text, changed_texts, formula_warnings
 from rbfrag.exchange.table_parts import pyarrow
 
 if TYPE_CHECKING:
@@ -42,15 +44,17 @@ class ExportReport:
         folder: the folder.
         format: ``parquet`` or ``csv``.
         rows: number of rows by table.
+        warnings: what is to be said of it.
     """
 
     folder: str
     format: str
     rows: dict[str, int]
+    warnings: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, object]:
         """Return the report under the keys of the JSON contract."""
-        return asdict(self)
+        return {"folder": self.folder, "format": self.format, "rows": self.rows}
 
 
 def export_database(
@@ -60,6 +64,7 @@ def export_database(
     format: str = "parquet",
     tables: Sequence[str] | None = None,
     arrays: bool = False,
+    excel_text: bool = False,
 ) -> ExportReport:
     """Write the tables of a database into a folder, one file each, with a data dictionary.
 
@@ -72,10 +77,11 @@ def export_database(
         format: ``parquet`` or ``csv``.
         tables: only these tables; None for all.
         arrays: include samples and histories (Parquet only): lists of float64.
+        excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
 
     Raises:
         InputError: an unknown format or table; a folder that holds files or cannot be made;
-            arrays in CSV.
+            arrays in CSV, apostrophes in Parquet.
         MissingExtraError: Parquet without pyarrow.
         DatabaseError: the database cannot be used.
         WorkFailedError: the disk is full.
@@ -84,13 +90,20 @@ def export_database(
         raise InputError(f"--format {format}: choose one of {', '.join(FORMATS)}")
     if arrays and format == "csv":
         raise InputError("--arrays: a CSV cell holds no array; use --format parquet")
+    if excel_text and format != "csv":
+        raise InputError("--excel-text: only CSV is computed by spreadsheets; use --format csv")
     if format == "parquet":
         pyarrow()
     names = list(dict.fromkeys(TABLES if tables is None else tables))
     if not names:
         raise InputError("--tables: name at least one table")
     chosen = {name: chosen_columns(name, arrays=arrays) for name in names}
-    write = _write_parquet if format == "parquet" else _write_csv
+    formulas: list[str] = []
+    write: Callable[[Connection, str, Sequence[ColumnMeaning], Path], int] = (
+        _write_parquet
+        if format == "parquet"
+        else partial(_write_csv, excel_text=excel_text, formulas=formulas)
+    )
     folder = Path(out)
     with opened_database(db, read_only=True) as engine, ExitStack() as stack:
         draft = _draft_folder(folder)
@@ -110,7 +123,7 @@ def export_database(
                 f"the export to {folder} was given up: {error.strerror or error}; nothing of it "
                 "was kept"
             ) from error
-    return ExportReport(folder=str(folder), format=format, rows=rows)
+    return ExportReport(str(folder), format, rows, tuple(formulas[:1]))
 
 
 def _draft_folder(folder: Path) -> Path:
@@ -139,7 +152,13 @@ def _write_dictionary(folder: Path) -> None:
 
 
 def _write_csv(
-    connection: Connection, table: str, columns: Sequence[ColumnMeaning], file: Path
+    connection: Connection,
+    table: str,
+    columns: Sequence[ColumnMeaning],
+    file: Path,
+    *,
+    excel_text: bool,
+    formulas: list[str],
 ) -> int:
     rows = 0
     words = {True: "true", False: "false"}
@@ -147,6 +166,12 @@ def _write_csv(
         for column in columns:
             if column.type == "true/false":
                 frame[column.name] = frame[column.name].map(words)
+        texts = {each.name: list(frame[each.name]) for each in columns if each.type == "text"}
+        if excel_text:
+            for name, cells in changed_texts(texts, as_text).items():
+                frame[name] = cells
+        else:
+            formulas += formula_warnings(texts)
         frame.to_csv(
             file, mode="a", header=not rows, index=False, lineterminator="\n", encoding="utf-8"
         )

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.db.rows import CombinationTable
 from rbfrag.errors import InputError
-from rbfrag.fragility.methods import TOPPLING_BLOCK
+from rbfrag.fragility.fit.line import Bins, bin_variances
+from rbfrag.fragility.methods import TOPPLING_BLOCK, FittedVariance
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.plots.canvas import (
     RED,
@@ -23,12 +25,16 @@ from rbfrag.plots.canvas import (
     plot_path,
     save_figure,
 )
+from rbfrag.plots.equation import equation_lines
 from rbfrag.plots.model_lines import (
     depends_on_size,
     failure_line,
     predicted_strengths,
     smooth_line,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _LINES = (
     (0.025, "--", RED, "2.5 % probability of failure"),
@@ -50,7 +56,9 @@ def plot_fit(
     """Draw critical toppling velocities against intensity with the lines of a model.
 
     A block above the upper line fails with less than 2.5 % probability, one below the lower
-    line with more than 97.5 %. Histograms at the edges show how the data are distributed.
+    line with more than 97.5 %. Histograms at the edges show how the data are distributed. The
+    equation of the model stands above. A method that fits a variance has a panel of it below, with
+    the variances in the bins that it was fitted to.
 
     A model that reads more than one number is drawn over what it expects: the block that each
     motion topples with 50 % probability. Its other lines run smoothly through what it expects of
@@ -96,7 +104,9 @@ def plot_fit(
         raise InputError(
             f"there is no critical value with the term {term.name} to draw: run  rbfrag simulate"
         )
-    figure = new_figure(7.6, 6.0)
+    fitted = model.method.fitted_variance if alone else None
+    binned = fitted is not None
+    figure = new_figure(7.6, 7.6 if binned else 6.2)
     expected = x
     x, y = x[shown], table.y_m_s[shown]
     left, right = (0.9 * float(x.min()), 1.1 * float(x.max())) if log else (0.0, 1.03 * x.max())
@@ -117,7 +127,10 @@ def plot_fit(
     top = max(float(y.max()), min(highest, 1.3 * float(y.max()))) * 1.05
     bottom = 0.8 * float(y.min()) if log else 0.0
 
-    grid = figure.add_gridspec(2, 2, width_ratios=[1.0, 0.16], height_ratios=[0.16, 1.0])
+    grid = figure.add_gridspec(
+        3 if binned else 2, 2, width_ratios=[1.0, 0.16],
+        height_ratios=[0.16, 1.0, 0.36] if binned else [0.16, 1.0],
+    )  # fmt: skip
     axes = figure.add_subplot(grid[1, 0])
     above = figure.add_subplot(grid[0, 0], sharex=axes)
     beside = figure.add_subplot(grid[1, 1], sharey=axes)
@@ -129,9 +142,12 @@ def plot_fit(
     for (_, style, colour, label), (line_x, line) in zip(_LINES, lines, strict=True):
         label += "" if np.isfinite(line).any() else "\n(below zero)"
         axes.plot(line_x, line, style, color=colour, linewidth=1.8, label=label)
-    axes.set_xlabel(
-        term.label if alone else "expected of the motion: $y$ at 50 % probability of failure [m/s]"
-    )
+    if not binned:
+        axes.set_xlabel(
+            term.label
+            if alone
+            else "expected of the motion: $y$ at 50 % probability of failure [m/s]"
+        )
     axes.set_ylabel("critical toppling velocity of the block, $y = k_r\\,g/p$ [m/s]")
     spaced = np.geomspace if log else np.linspace
     grey_bars(above, x, spaced(left, right, _BARS + 1))
@@ -142,12 +158,45 @@ def plot_fit(
     beside.tick_params(labelleft=False, labelsize=8)
     for edge in (above, beside):
         open_corner(edge)
+    if fitted is not None:
+        _draw_variance(figure.add_subplot(grid[2, 0], sharex=axes), model, fitted, x, y)
+        axes.tick_params(labelbottom=False)
     n_events = len(set(table.event_id[shown].tolist()))
     n_censored = int(np.isin(table.status.astype(str), ("below_limit", "no_motion")).sum())
     figure.suptitle(
         f"{model.name}: {x.size} critical blocks of {n_events} earthquakes\n"
-        f"not shown: {n_censored} whose critical block lies below the search limit",
+        f"not shown: {n_censored} whose critical block lies below the search limit\n"
+        + "\n".join(equation_lines(model)),
         fontsize=10,
     )
     legend_below(figure, len(_LINES))
     return save_figure(figure, path)
+
+
+def _draw_variance(
+    axes: Axes,
+    model: FragilityModel,
+    fitted: FittedVariance,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+) -> None:
+    """Draw the variances of y about the line in the bins of the fit, and the fitted variance."""
+    order = np.argsort(x, kind="stable")
+    bins = Bins.equal_count(x[order])
+    residuals = y[order] - fitted.mean_m_s(model.parameters, bins.x)
+    binned = bin_variances(bins, residuals**2, np.ones(x.size))
+    log = axes.get_xscale() == "log"
+    left, right = axes.get_xlim()
+    line_x = np.geomspace(left, right, 400) if log else np.linspace(0.0, right, 400)
+    line = np.asarray(fitted.variance_m2_s2(model.parameters, line_x))
+    (dots,) = axes.plot(binned.centre, binned.variance, "o", color="#555555", markersize=5.0)
+    (curve,) = axes.plot(line_x, line, "-", color="black", linewidth=1.8)
+    if log:
+        logarithmic(axes, (1.0, 2.0, 5.0), (1.0,))
+    else:
+        axes.set_ylim(0.0, 1.15 * max(float(binned.variance.max()), float(line[-1])))
+    axes.set_xlim(left, right)
+    axes.set_xlabel(model.term.label)
+    axes.set_ylabel("variance of $y$\nabout the line [m²/s²]")
+    labels = [f"{binned.counts.size} bins of equal count", "fitted variance"]
+    axes.legend([dots, curve], labels, loc="upper left", fontsize=8, frameon=False)

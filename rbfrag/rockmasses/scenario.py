@@ -308,12 +308,21 @@ def _average(
     )
 
 
+NO_MODEL = ", because there is no fragility model for this mode"
+
+UNANSWERED = {
+    "slide": ": --displacement (displacement_m), how far is too far [m], gives them one",
+    "slump": ": --displacement (displacement_m), how far is too far for slides [m], gives them one",
+}
+"""What gives an answer to blocks of a mode that has none."""
+
+
 def _warnings(
     missing: Mapping[ModeName, float], reason: NDArray[np.object_], modelled: set[ModeName]
 ) -> list[str]:
     warnings = [
         f"{mode.replace('_', ' ')}: {100 * share:.3g} % of the blocks have no answer"
-        + ("" if mode in modelled else ", because there is no fragility model for this mode")
+        + ("" if mode in modelled else UNANSWERED.get(mode, NO_MODEL))
         for mode, share in missing.items()
     ]
     texts, counts = np.unique(reason.astype(str), return_counts=True)

@@ -27,7 +27,7 @@ FloatArray = NDArray[np.float64]
 
 OUTCOMES = (
     "at_rest", "stays", "fails", "unstable", "locked",
-    "undetermined", "contact_lost", "seated_with_gap", "indeterminate", "jump",
+    "undetermined", "contact_lost", "seated_with_gap", "indeterminate", "jump", "bond_breaks",
 )  # fmt: skip
 """What may become of a block, by its code:
 
@@ -35,14 +35,18 @@ OUTCOMES = (
 rest, whatever the motion; ``locked``: no horizontal acceleration moves it in its mode;
 ``undetermined``: closer to failure than the error of its run; ``seated_with_gap``: back on its base
 with a gap at its heel, rocked and slid on from there; ``contact_lost``, ``indeterminate`` and
-``jump``: the model ended before the block did, for the reason of that outcome.
+``jump``: the model ended before the block did, for the reason of that outcome; ``bond_breaks``: the
+motion exceeds the yield of a base with cohesion, whose bond the first slip breaks.
 """
 
 AT_REST, STAYS, FAILS, UNSTABLE, LOCKED, UNDETERMINED = range(6)
+BOND_BREAKS = OUTCOMES.index("bond_breaks")
 NO_BLOCK = -1
 """Code of a realisation that is no block."""
 
-OPEN = ("undetermined", "contact_lost", "seated_with_gap", "indeterminate", "jump")
+OPEN = (
+    "undetermined", "contact_lost", "seated_with_gap", "indeterminate", "jump", "bond_breaks",
+)  # fmt: skip
 """Outcomes that leave open whether the block fails."""
 
 DISPLACEMENT_M = 0.05
@@ -368,6 +372,10 @@ def plan_shaking(
         code[i, locked] = LOCKED
         if one.jump_node < one.w.size:
             code[i, (stable & ~moves[i]) | locked] = OUTCOMES.index("jump")
+        # a topple turns about its toe whatever the bond; of the others it is known when it breaks
+        breaks = moves[i] & realisations.bonded & (stability.mode_code != TOPPLE)
+        code[i, breaks] = BOND_BREAKS
+        moves[i] &= ~breaks
         code[i, ~is_block] = NO_BLOCK
     return ShakingPlan(
         realisations=realisations,
@@ -376,7 +384,21 @@ def plan_shaking(
         code=code,
         moves=moves,
         pga_g=np.array([one.pga_g for one in excitations]),
-        warnings=_about_motion(motion, vertical, excitations[0].warnings),
+        warnings=(
+            *_about_motion(motion, vertical, excitations[0].warnings),
+            *_about_bonds(code == BOND_BREAKS),
+        ),
+    )
+
+
+def _about_bonds(breaks: NDArray[np.bool_]) -> tuple[str, ...]:
+    count = int(np.count_nonzero(breaks.any(axis=0)))
+    if not count:
+        return ()
+    return (
+        f"{count} blocks with cohesion are driven beyond their yield: the first slip breaks the "
+        "bond, and what they do after it no model describes (outcome bond_breaks); without "
+        "friction.cohesion_pa in its file the rock mass is run as if all bonds were broken before",
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -25,6 +26,7 @@ from rbfrag.service.reading import Bodies, BoundedRoute
 from rbfrag.service.request_records import CONTENT_TYPE, Metrics
 from rbfrag.service.settings import Settings
 from rbfrag.service.work import WorkerPool
+from rbfrag.solver.kinds import models as models_of_blocks
 from rbfrag.version import __version__
 
 FOLDER = Path(__file__).parent / "page"
@@ -71,7 +73,11 @@ def make_app(settings: Settings) -> FastAPI:
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:  # noqa: ARG001
         if settings.early:
             pool.open().schedule(work.warm_up)
+            # so that the first block of a page does not wait for its libraries
+            loading = asyncio.ensure_future(asyncio.to_thread(models_of_blocks))
         yield
+        if settings.early:
+            await loading
         await run_in_threadpool(pool.close)
 
     async def on_error(request: Request, error: Exception) -> Response:

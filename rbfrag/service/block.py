@@ -41,29 +41,20 @@ def add_routes(routes: APIRouter) -> None:
         responses=READ,
     )
     async def drawing(query: Annotated[DrawingQuery, Query()]) -> Any:
-        """Return a block to scale.
+        """Return a block to scale, how it fails, and what predictions read of it.
 
         It is described as for /v1/block, or by p2 and kr alone: then it is the rectangle on level
-        ground that has them. Points are (out of the slope, up) from the centroid [m].
+        ground that has them. A rectangle without phi is taken to be rough enough to topple.
         """
         from rbfrag.plots.block import block_lines
-        from rbfrag.solver.stability.single import level_rectangle, rectangle_r3_m
+        from rbfrag.solver.stability.single import rectangle_r3_m, stability_as_dict
 
-        others = query.model_dump(exclude_defaults=True).keys() - {"p2", "kr"}
-        if query.p2 is None and query.kr is None and others:
-            body, result = _on_planes(query)
-        else:
-            if others:
-                raise InputError(
-                    f"{min(others)} does not go with p2 and kr: a block is these two numbers, or a "
-                    "shape with its beta and phi"
-                )
-            numbers, _ = query.toppling("p2", "kr")
-            body, result = level_rectangle(numbers["p2"], numbers["kr"])
+        body, result, kind, numbers = _drawn(query)
         lines = block_lines(body, result)
         return {
-            "mode": result.mode,
-            "r3_m": body.r3_m,
+            "kind": kind,
+            "numbers": numbers,
+            "block": stability_as_dict(body, result),
             "rectangle_r3_m": rectangle_r3_m(body.p2),
             "outline_m": lines.outline,
             "contacts_m": lines.contacts,
@@ -71,6 +62,39 @@ def add_routes(routes: APIRouter) -> None:
             "rock_m": lines.rock,
             "resultant_m": lines.resultant,
         }
+
+
+def _drawn(query: DrawingQuery) -> tuple[Block, Stability, str, dict[str, float] | None]:
+    """Return a block, how it stands, the kind of its failure and what a prediction reads of it."""
+    from rbfrag.solver.described import numbers_of_kind
+    from rbfrag.solver.kinds import model_of_mode
+    from rbfrag.solver.stability.single import level_rectangle, rough_deg, stability
+
+    def kind_of(result: Stability) -> str:
+        return model_of_mode(result.mode, back_fracture=not query.no_back).kind
+
+    others = query.model_dump(exclude_defaults=True).keys() - {"p2", "kr", "no_back"}
+    if query.p2 is not None or query.kr is not None or not others:
+        if others:
+            raise InputError(
+                f"{min(others)} does not go with p2 and kr: a block is these two numbers, or a "
+                "shape with its beta and phi"
+            )
+        numbers, _ = query.model_copy(update={"no_back": False}).toppling("p2", "kr")
+        body, result = level_rectangle(numbers["p2"], numbers["kr"])
+        return body, result, kind_of(result), numbers
+    described = query.described()
+    if described is None:
+        raise InputError(f"there is no block: describe it by {WAYS}")
+    body, conditions = described.block, dict(described.conditions)
+    if described.only_topples:
+        conditions["phi_deg"] = rough_deg(body)
+    result = stability(body, **conditions)
+    kind = kind_of(result)
+    try:
+        return body, result, kind, numbers_of_kind(described, kind)[0]
+    except InputError:  # no earthquake decides about it, or no model answers
+        return body, result, kind, None
 
 
 def _on_planes(query: Shape) -> tuple[Block, Stability]:

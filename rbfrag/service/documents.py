@@ -16,12 +16,13 @@ Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 class Problem(_Document):
-    """Problem details (RFC 9457)."""
+    """Problem details (RFC 9457); `traces` are those of a file of which one is to be named."""
 
     type: str
     title: str
     status: int
     detail: str
+    traces: list[str] | None = None
 
 
 class _Fitted(_Document):
@@ -135,10 +136,16 @@ class BlockAnswer(_Document):
 
 
 class DrawingAnswer(_Document):
-    """A block to scale; points are (out of the slope, up) from the centroid [m]."""
+    """A block to scale; points are (out of the slope, up) from the centroid [m].
 
-    mode: str
-    r3_m: float
+    `kind` is how it fails, `numbers` what predictions of that kind read of it, null where no
+    earthquake decides about it or no model answers. A rectangle whose friction is not known is
+    taken to be rough: its `ky` means nothing.
+    """
+
+    kind: str
+    numbers: dict[str, float] | None
+    block: BlockAnswer
     rectangle_r3_m: float
     outline_m: list[Pair]
     contacts_m: dict[str, Pair]

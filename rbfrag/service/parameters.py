@@ -49,6 +49,7 @@ KY = _words("Sliding: yield acceleration coefficient tan(phi - beta).")
 DISPLACEMENT = _words("Sliding: the displacement that is too far [m].")
 KS = _words("Slumping: yield acceleration coefficient k_s.")
 PS2 = _words("Slumping: frequency parameter p_s² at rest [1/s²].")
+LEAVES = _words("Slumping: acceleration at which the block leaves its back plane [g].")
 ROTATION = _words("Slumping: rotation that is too far [deg]. Default: failure past recovery.")
 RESTITUTION = _words(
     "Rocking: speed after an impact over that before it, above 0 and up to 1. Default: what "
@@ -78,7 +79,9 @@ MEASURES = {
     "pgv": "pgv_m_s", "pga": "pga_g", "tm": "tm_s", "pgd": "pgd_m",
     **{name: name for name in SPECTRAL.values()},
 }  # fmt: skip
-NUMBERS = {"p2": "p2", "kr": "kr", "ky": "ky", "ks": "ks", "ps2": "ps2"}
+NUMBERS = {
+    "p2": "p2", "kr": "kr", "ky": "ky", "ks": "ks", "ps2": "ps2", "leaves_g": "leaves_g",
+}  # fmt: skip
 SLIDING = {"displacement": "displacement_m", "beta": "beta_deg"}
 UNCERTAIN = {
     name: name
@@ -273,6 +276,7 @@ class PredictRows(Parameters):
     beta: Annotated[Column | None, BETA] = None
     ks: Annotated[Column | None, KS] = None
     ps2: Annotated[Column | None, PS2] = None
+    leaves_g: Annotated[Column | None, LEAVES] = None
     restitution: Annotated[Column | None, RESTITUTION] = None
     p2_sigma: Annotated[Column | None, P2_SIGMA] = None
     kr_sigma: Annotated[Column | None, KR_SIGMA] = None

@@ -29,6 +29,23 @@ class MalformedError(InputError):
     """A body that is not what its type says."""
 
 
+class SeveralTracesError(InputError):
+    """A file of several traces of which none is named.
+
+    Args:
+        words: what is wrong and what to do.
+        traces: names of the traces, in the order of the file.
+    """
+
+    def __init__(self, words: str, traces: Sequence[str]) -> None:
+        super().__init__(words)
+        self.traces = list(traces)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        # it comes from another process
+        return type(self), (str(self), self.traces)
+
+
 class RequestRefusedError(HTTPException):
     """A request that the service does not take; see :func:`problem`."""
 
@@ -68,7 +85,11 @@ SENT = documented(400, 401, 408, 413, 415, 422, 503)
 
 
 def problem(
-    status: int, kind: str, detail: str, headers: Mapping[str, str] | None = None
+    status: int,
+    kind: str,
+    detail: str,
+    headers: Mapping[str, str] | None = None,
+    **more: object,
 ) -> Response:
     """Return an answer that says what was wrong.
 
@@ -77,12 +98,14 @@ def problem(
         kind: what kind of trouble, for programs: ``input``, ``unknown-model``.
         detail: one paragraph for a person.
         headers: further headers.
+        more: further members of the document.
     """
     document = {
         "type": f"urn:rbfrag:problem:{kind}",
         "title": HTTPStatus(status).phrase,
         "status": status,
         "detail": detail,
+        **more,
     }
     body = json.dumps(document, ensure_ascii=False).encode("utf-8", "replace")
     return Response(body, status, dict(headers or {}), MEDIA_TYPE)
@@ -111,6 +134,8 @@ def answer_error(request: Request, error: Exception, settings: Settings) -> Resp
         detail = in_parameters(str(error), settings)
         if isinstance(error, MalformedError):
             return problem(400, "malformed", detail)
+        if isinstance(error, SeveralTracesError):
+            return problem(422, "several-traces", detail, traces=error.traces)
         kind = "unknown-model" if isinstance(error, UnknownModelError) else "input"
         return problem(422, kind, detail)
     words = "a mistake in rbfrag itself; what happened is in the log of the service"

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from json.encoder import encode_basestring_ascii as _quoted
+from logging.config import dictConfig
 from typing import Any
 
 from prometheus_client import (
@@ -116,3 +117,9 @@ CONFIGURATION: dict[str, Any] = {
     "root": {"handlers": ["stderr"], "level": "INFO"},
 }
 """Configuration of the logging library."""
+
+
+def log_as_json() -> None:
+    """Write messages, and warnings of libraries, as lines of JSON in this process."""
+    dictConfig(CONFIGURATION)
+    logging.captureWarnings(True)

@@ -95,7 +95,9 @@ def listener(host: str, port: int) -> socket.socket:
 def app() -> FastAPI:
     """Return the application that the environment describes."""
     from rbfrag.service.app import make_app
+    from rbfrag.service.request_records import log_as_json
 
+    log_as_json()
     return make_app(_settings())
 
 

@@ -26,7 +26,14 @@ from rbfrag.service.parameters import (
     RockmassQuery,
     SpectrumQuery,
 )
-from rbfrag.service.problem import BUSY, GONE, MalformedError, RequestRefusedError
+from rbfrag.service.problem import (
+    BUSY,
+    GONE,
+    MalformedError,
+    RequestRefusedError,
+    SeveralTracesError,
+)
+from rbfrag.service.request_records import log_as_json
 
 if TYPE_CHECKING:
     from rbfrag.motions.ground_motion import GroundMotion
@@ -176,7 +183,10 @@ def _motion(body: bytes, query: Reading) -> GroundMotion:
         return traces[trace]
     listed = ", ".join(f"{i} ({each.component})" for i, each in enumerate(traces))
     trouble = f"holds {len(traces)} traces" if trace is None else f"has no trace {trace}"
-    raise InputError(f"{FILE} {trouble}: name one of  {listed}  as trace=0, for example")
+    raise SeveralTracesError(
+        f"{FILE} {trouble}: name one of  {listed}  as trace=0, for example",
+        [each.component for each in traces],
+    )
 
 
 def _text(body: bytes) -> str:
@@ -269,4 +279,5 @@ async def _disconnected(request: Request) -> None:
 def _begin() -> None:
     # Ctrl-C reaches every process of a terminal; only the one that answers decides what it ends
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    log_as_json()
     warm_up()

@@ -27,13 +27,12 @@ from rbfrag.solver.integrator.free_body import (
     ROWS,
     THROWN,
     TOE,
-    Corners,
     Frame,
     FreeRun,
     Motion,
     run_free,
-    work_of,
 )
+from rbfrag.solver.integrator.impulses import Corners, work_of
 from rbfrag.solver.integrator.one_freedom.equation import Pose
 from rbfrag.solver.integrator.one_freedom.state import record_of
 from rbfrag.solver.kind import BlockOnPlanes
@@ -217,7 +216,8 @@ def _run(
     record = record_of(excited)
     size = 4 * excited.time_s.size + 200_000
     while True:
-        rows = np.empty((ROWS, size))
+        # what is kept at one time lies together: a run touches little of the memory
+        rows = np.empty((size, ROWS)).T
         run = run_free(
             record, corners, frame, release.time_s, start, step_s, at_landing, work_of(corners),
             rows,

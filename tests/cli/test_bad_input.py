@@ -167,3 +167,20 @@ def test_suspicious_dt_is_answered_with_a_warning(shell: Shell, tmp_path: Path) 
     slow = write_at2(tmp_path / "slow.AT2", shaking(3), dt_s=5.0)
     answer = shell.json("respond", slow, "--p2", "3", "--kr", "0.1")
     assert any("dt of 5 s" in sentence for sentence in answer["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (("predict", "--p2", "abc"), "--p2': 'abc' cannot be used: give a number, with a point"),
+        (("predict", "--p2", "0,5"), "'0,5' cannot be used: give a number, with a point before"),
+        (("db", "check", "--sample", "1.5"), "'1.5' cannot be used: give a whole number"),
+        (("db", "check", "--sample", "-3"), "'-3' cannot be used: give 0 or more"),
+    ],
+)
+def test_values_of_another_type_in_our_words(
+    shell: Shell, command: tuple[str, ...], words: str
+) -> None:
+    message = shell(*command, expect=2).stderr
+    assert words in " ".join(message.split())
+    assert "Input should be" not in message

@@ -77,7 +77,7 @@ def test_the_page_lists_the_columns_of_the_table(shell: Shell) -> None:
         (("--up", "y"), "not its resting pose"),
         (("--contact-mm", "0"), "contact_mm = 0 is not above zero"),
         (("--density", "0"), "density_kg_m3 = 0"),
-        (("--out", "blocks.xlsx"), "blocks.xlsx"),
+        (("--out", "blocks.xls"), "blocks.xls"),
         (("--plot", "block.jpg"), "block.jpg"),
     ],
 )

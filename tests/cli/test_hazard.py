@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from rbfrag.cli.sentences import once_in
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.exchange.block_table import read_columns
+from rbfrag.hazards import report
 from tests.cli.conftest import Refuses, Shell
 from tests.fragility.conftest import model_row
 
@@ -308,3 +310,11 @@ def test_a_standing_rock_is_uncertain_in_its_restitution_too(shell: Shell) -> No
     told = shell.json(*asked, "--restitution-sigma", "0.05")
     assert told["probability_standing"] == pytest.approx(mean, rel=2e-3)
     assert told["probability_standing"] != certain["probability_standing"]
+
+
+def test_a_warning_of_one_site_of_three_names_it() -> None:
+    sites = [SimpleNamespace(place=name) for name in ("A", "B", "C")]
+    texts = (("coarse", "of all"), ("of all", "steep"), ("of all", "coarse"))
+    answers = [SimpleNamespace(warnings=each) for each in texts]
+    named = report._warnings(sites, answers)  # type: ignore[arg-type]
+    assert named == ["A: coarse", "of all", "B: steep", "C: coarse"]

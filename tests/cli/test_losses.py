@@ -129,6 +129,9 @@ def test_bounds_are_printed_and_drawn(shell: Shell, job: Path) -> None:
     about = ("--blocks", "blocks.csv", "--db", "other.db", "--plot", "curve.svg")
     printed = shell("losses", job, *about).stdout
     assert "annual_rate_any_independent" in printed
+    every = shell("losses", job, *about, "--verbose").stdout
+    assert "seed" in every
+    assert "seed" not in printed
 
 
 def test_workers_give_the_same_answer(

@@ -128,3 +128,21 @@ def test_pgd_of_a_drifting_record_is_left_out_of_fits(shell: Shell, tmp_path: Pa
     assert any("PGD in doubt" in warning for warning in without["warnings"])
     for name in ("a", "b"):
         assert shell("plot", "fit", "--model", name, "--out", f"{name}.png").stderr == ""
+
+
+def test_the_list_fits_into_a_hundred_columns(shell: Shell, tmp_path: Path) -> None:
+    records = tmp_path / "records"
+    records.mkdir()
+    for i in range(2):
+        station = f"A STATION OF A VERY LONG NAME BESIDE THE RIVER {i}"
+        write_at2(records / f"{i}.AT2", shaking(i), event="A VERY LONG NAME " * 5, station=station)
+    rows = "0.AT2,e0,corrected\n1.AT2,e1,uncorrected\n"
+    (records / "META.csv").write_text(f"file,event_id,processing\n{rows}")
+    shell("motions", "add", records, "--metadata", records / "META.csv")
+    first, _, head, *lines = shell("motions", "list").stdout.splitlines()
+    assert first.startswith("2 motions of 2 earthquakes; 1 processed here, ")
+    assert max(map(len, (head, *lines))) <= 100
+    at = head.index("processed")
+    assert [line[at : at + 3].strip() for line in lines] == ["no", "yes"]
+    assert all("…" in line for line in lines)
+    assert shell.json("motions", "list")[1]["processing_applied"] is not None

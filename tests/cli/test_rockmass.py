@@ -104,7 +104,8 @@ def test_scenario_covers_what_it_says(shell: Shell, steep: Path) -> None:
     assert found["uncovered_share"].keys() >= {"slide"}
     result = shell("rockmass", steep, "--pgv", "1.0")
     assert "covered blocks only" in result.stdout
-    assert "no fragility model for this mode" in result.stderr
+    assert "slide: " in result.stderr
+    assert "--displacement (displacement_m), how far is too far [m], gives them" in result.stderr
 
 
 @pytest.mark.usefixtures("stored_model")
@@ -161,7 +162,7 @@ def test_a_block_is_drawn(shell: Shell) -> None:
         (("mass.toml", "--model", "line"), "--model goes with a measure of the motion"),
         (("mass.toml", "--db", "a.db"), "--db goes with a motion or a measure of it"),
         (("mass.toml", "--pgv", "1", "--level", "2"), "level = 2.0"),
-        (("mass.toml", "--out", "a.xlsx"), "none of .csv, .parquet"),
+        (("mass.toml", "--out", "a.xls"), "none of .csv, .xlsx, .parquet"),
         (("mass.toml", "--out", "none/a.csv"), "there is no folder none"),
         (("mass.toml", "--plot", "a.gif"), "none of .png"),
         (("none.toml",), "no such file"),

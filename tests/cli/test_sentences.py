@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from rbfrag.cli.sentences import once_in, rate_in_words, rounded
+from rbfrag.cli.hazard_sentences import campaign_in_words, with_error
+from rbfrag.cli.sentences import once_in, rate_in_words, rounded, table_in_words
 
 
 @pytest.mark.parametrize(
@@ -38,3 +39,47 @@ def test_a_rate_with_its_interval_from_the_shorter_time_to_the_longer() -> None:
 )
 def test_three_digits(value: float, said: str) -> None:
     assert rounded(value) == said
+
+
+@pytest.mark.parametrize(
+    ("mean", "error", "said"),
+    [
+        (0.0051714, 0.00177519, "0.0052 ± 0.0018"),
+        (66.595, 22.7811, "67 ± 23"),
+        (12345.6, 987.6, "12,346 ± 988"),
+        (3.21e-9, 1.2e-9, "3.2e-09 ± 1e-09"),
+        (2.5, 0.0, "2.50"),
+    ],
+)
+def test_a_mean_has_as_many_digits_as_its_error(mean: float, error: float, said: str) -> None:
+    assert with_error(mean, error) == said
+
+
+@pytest.mark.parametrize(
+    ("report", "said"),
+    [
+        (
+            {"found": 20, "below_limit": 4, "resumed": 0},
+            "24 combinations of kind toppling are stored: 20 with a critical value, 4 of which "
+            "nothing fails down to the search limit.",
+        ),
+        (
+            {"found": 24, "below_limit": 0, "resumed": 12},
+            "24 combinations of kind toppling are stored, 12 of them before: 24 with a critical "
+            "value.",
+        ),
+    ],
+)
+def test_what_a_campaign_has_stored(report: dict[str, int], said: str) -> None:
+    others = dict.fromkeys(("no_motion", "outside_model", "not_searched"), 0)
+    whole = {"kind": "toppling", "combinations": 24, **others, **report}
+    assert campaign_in_words(whole) == said
+
+
+def test_how_many_rows_are_answered() -> None:
+    assert table_in_words({"rows": 100_000, "answered": 99_999, "without_answer": 1}) == (
+        "99,999 of 100,000 blocks are answered; 1 without answer."
+    )
+    assert table_in_words({"rows": 3, "answered": 3, "without_answer": 0}) == (
+        "All 3 blocks are answered."
+    )

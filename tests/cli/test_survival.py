@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -50,7 +51,10 @@ def test_one_block(shell: Shell, curve: str) -> None:
 
 def test_a_sentence_goes_before_the_numbers(shell: Shell, curve: str) -> None:
     first, second, *_ = shell("survival", curve, *BLOCK, "--age", "5000").stdout.splitlines()
-    assert first.startswith("If the hazard is right, the block stands for 5000 years with")
+    assert first.startswith("If the hazard is right, the block stands for 5,000 years with")
+    assert re.search(
+        r"a probability of [\d.]+ % \([\d.]+ % to [\d.]+ %\); it fails once in [\d,]+ years", first
+    )
     assert "if all rates of the hazard were multiplied by" in second
     calm = shell("survival", curve, *BLOCK, "--age", "50").stdout
     assert "Standing does not contradict it" in calm

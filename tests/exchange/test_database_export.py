@@ -124,11 +124,11 @@ def test_all_tables_are_of_one_moment(
     copy = tmp_path / "b.db"
     copy.write_bytes(database.read_bytes())
 
-    def meanwhile(connection: Connection, table: str, *rest: object) -> int:
+    def meanwhile(connection: Connection, table: str, *rest: object, **about: object) -> int:
         if table == "recording":
             with opened_database(copy) as other, other.begin() as writer:
                 writer.execute(update(schema.motion).values(component="late"))
-        return write(connection, table, *rest)  # type: ignore[arg-type]
+        return write(connection, table, *rest, **about)  # type: ignore[arg-type]
 
     monkeypatch.setattr(database_export, "_write_csv", meanwhile)
     export_database(tmp_path / "out", db=copy, format="csv")
@@ -141,10 +141,10 @@ def test_a_full_disk_leaves_nothing(
 ) -> None:
     write = database_export._write_csv
 
-    def full(connection: Connection, table: str, *rest: object) -> int:
+    def full(connection: Connection, table: str, *rest: object, **about: object) -> int:
         if table == "combination":
             raise OSError(28, "No space left on device")
-        return write(connection, table, *rest)  # type: ignore[arg-type]
+        return write(connection, table, *rest, **about)  # type: ignore[arg-type]
 
     monkeypatch.setattr(database_export, "_write_csv", full)
     with pytest.raises(WorkFailedError, match="No space left on device; nothing of it was kept"):

@@ -10,6 +10,8 @@ import pytest
 from rbfrag.exchange.batch import predict_table
 from rbfrag.exchange.block_table import waiting_blocks, write_block_table
 from rbfrag.exchange.excel_text import as_text, as_written, formula_warnings
+from tests.cli.conftest import Shell
+from tests.synthetic import shaking, write_at2
 
 TEXTS = [
     "=1+1",
@@ -66,3 +68,26 @@ def test_answers_of_a_table(tmp_path: Path, excel_text: bool) -> None:
     warnings = summary["warnings"]
     assert isinstance(warnings, list)
     assert any("--excel-text" in text for text in warnings) is not excel_text
+
+
+def test_every_writer_of_csv_has_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the database, of a rock mass, of a spectrum; refused where it would do nothing."""
+    monkeypatch.chdir(tmp_path)
+    shell = Shell()
+    record = write_at2(tmp_path / "=1+1.AT2", shaking(3), station="=1+1")
+    shell("motions", "add", record)
+    told = shell("db", "export", "--out", "plain", "--format", "csv", "--tables", "motion")
+    assert "--excel-text" in told.stderr
+    assert ",'=1+1" not in Path("plain/motion.csv").read_text()
+    shell("db", "export", "--out", "text", "--format", "csv", "--tables", "motion", "--excel-text")
+    assert ",'=1+1" in Path("text/motion.csv").read_text()
+    shell("db", "export", "--out", "none", "--excel-text", expect=2)
+    for words in ([], ["--excel-text"]):
+        shell("spectrum", "=1+1.AT2", "--p2", "3", "--csv", "x.csv", *words)
+        assert Path("x.csv").read_text().splitlines()[1].startswith("'=" if words else "=")
+    assert "goes with --csv" in shell("spectrum", "1", "--excel-text", expect=2).stderr
+    mass = Path(__file__).parents[2] / "docs" / "examples" / "rockmass.toml"
+    shell("rockmass", mass, "--n", "20", "--out", "blocks.csv", "--excel-text")
+    for name in ("blocks.xlsx", "blocks.parquet"):
+        told = shell("rockmass", mass, "--n", "20", "--out", name, "--excel-text", expect=2)
+        assert f"--excel-text is about CSV, and {name} is none" in told.stderr

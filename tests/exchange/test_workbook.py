@@ -136,16 +136,16 @@ def test_a_point_among_decimal_commas_is_not_guessed_at(tmp_path: Path) -> None:
         waiting_blocks(source)
 
 
-def test_a_hundred_thousand_rows_and_one_bad_one(tmp_path: Path) -> None:
-    size = 100_000
+def test_one_bad_row_of_many(tmp_path: Path) -> None:
+    size = 10_000
     kr = np.full(size, "0.1", dtype=object)
-    kr[54_321] = "?"
+    kr[5_432] = "?"
     source, target = tmp_path / "a.xlsx", tmp_path / "b.csv"
     write_block_table({"p2_1_s2": np.full(size, 3.0), "kr": kr}, source)
     told = answer(source, target, pgv_m_s=0.6)
     assert (told["rows"], told["without_answer"]) == (size, 1)
-    assert "1 of 100,000 rows has no answer" in str(told["warnings"])
-    assert "line 54323: kr = '?' is not a number" in str(told["warnings"])
+    assert "1 of 10,000 rows has no answer" in str(told["warnings"])
+    assert "line 5434: kr = '?' is not a number" in str(told["warnings"])
 
 
 @pytest.mark.parametrize(

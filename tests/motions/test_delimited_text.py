@@ -259,3 +259,11 @@ def test_a_missing_row_is_always_noticed(
     with pytest.raises(MotionFileError) as caught:
         sampling_interval(Path("record.csv"), tokens, numbers, lines, None)
     assert caught.value.line == gone + 2
+
+
+@pytest.mark.parametrize("tokens", [("0", "9.5e307", "1.79e308"), ("1e300", "9e307", "1.75e308")])
+def test_times_near_the_largest_number_are_judged_without_overflow(tokens: tuple[str, ...]) -> None:
+    # a warning is an error in these tests, and a line that is no JSON in the log of a service
+    times = np.array([float(token) for token in tokens])
+    with pytest.raises(MotionFileError, match=r"r\.csv"):
+        sampling_interval(Path("r.csv"), tokens, times, [1, 2, 3], None)

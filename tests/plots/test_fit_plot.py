@@ -88,8 +88,9 @@ def test_the_file_is_written(table, model, tmp_path, suffix):
 def test_what_the_figure_says(table, model, tmp_path, drawn):
     plot_fit(table, model, tmp_path / "fit.png")
     figure = drawn[0]
-    axes, above, beside = figure.axes
-    assert axes.get_xlabel() == "peak ground velocity, PGV [m/s]"
+    axes, above, beside, variance = figure.axes
+    assert variance.get_shared_x_axes().joined(axes, variance)
+    assert variance.get_xlabel() == "peak ground velocity, PGV [m/s]"
     assert "[m/s]" in axes.get_ylabel()
     assert "360 critical blocks of 7 earthquakes" in figure.get_suptitle()
     assert "40 whose critical block lies below the search limit" in figure.get_suptitle()
@@ -100,9 +101,33 @@ def test_what_the_figure_says(table, model, tmp_path, drawn):
 
 def test_many_blocks_are_counted_in_cells(table, model, tmp_path, drawn):
     plot_fit(repeated(table, 2), model, tmp_path / "fit.png")
-    axes, _, _, bar = drawn[0].axes
+    axes, _, _, bar, _ = drawn[0].axes
     assert bar.get_ylabel() == "critical blocks per cell"
     assert int(axes.collections[0].get_array().sum()) == 720
+
+
+def test_the_variance_panel_shows_the_bins_of_the_fit(table, model, tmp_path, drawn):
+    plot_fit(table, model, tmp_path / "fit.png")
+    dots, line = drawn[0].axes[3].lines
+    x, variance = line.get_data()
+    assert variance == pytest.approx(1e-4 + 2e-3 * x)
+    found = np.isfinite(table.y_m_s)
+    order = np.argsort(table.pgv_m_s[found])
+    x, y = table.pgv_m_s[found][order], table.y_m_s[found][order]
+    # 360 points in 18 bins, and two parameters of the line
+    residual = (y - 0.002 - 0.72 * x).reshape(18, 20)
+    expected = (residual**2).mean(axis=1) * 360.0 / 358.0
+    assert dots.get_ydata() == pytest.approx(expected)
+    assert dots.get_xdata() == pytest.approx(x.reshape(18, 20).mean(axis=1))
+    assert expected == pytest.approx(1e-4 + 2e-3 * dots.get_xdata(), rel=1.2)
+
+
+def test_the_equation_is_in_the_title(table, model, tmp_path, drawn):
+    plot_fit(table, model, tmp_path / "fit.png")
+    title = drawn[0].get_suptitle()
+    assert r"(0.00200 + 0.720\,x - y)/\sigma" in title
+    assert r"\sigma^2 = 1.00\times10^{-4} + 0.00200\,x\ \mathrm{[m^2/s^2]}" in title
+    assert "$x$ = PGV [m/s]" in title
 
 
 def test_the_failure_lines_have_their_probabilities(table, model, tmp_path, drawn):
@@ -130,14 +155,16 @@ def test_nothing_overlaps(table, model, tmp_path, drawn):
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
         renderer = canvas.get_renderer()
-        axes, above, beside, bar = figure.axes
+        axes, above, beside, bar, variance = figure.axes
         boxes = [
             figure._suptitle.get_window_extent(renderer),
             above.get_window_extent(renderer),
             above.yaxis.label.get_window_extent(renderer),
             beside.get_window_extent(renderer),
             beside.xaxis.label.get_window_extent(renderer),
-            axes.xaxis.label.get_window_extent(renderer),
+            variance.get_window_extent(renderer),
+            variance.xaxis.label.get_window_extent(renderer),
+            variance.yaxis.label.get_window_extent(renderer),
             axes.yaxis.label.get_window_extent(renderer),
             axes.get_window_extent(renderer),
             bar.get_window_extent(renderer),
@@ -152,8 +179,9 @@ def test_nothing_overlaps(table, model, tmp_path, drawn):
 
 def test_logarithmic_axes_show_every_block(table, model, tmp_path, drawn):
     plot_fit(table, model, tmp_path / "fit.png", log=True)
-    axes, above, beside = drawn[0].axes
-    assert axes.get_xscale() == axes.get_yscale() == "log"
+    axes, above, beside, variance = drawn[0].axes
+    for each in (axes, variance):
+        assert each.get_xscale() == each.get_yscale() == "log"
     assert len(axes.collections[0].get_offsets()) == 360
     assert sum(patch.get_height() for patch in above.patches) == 360
     assert sum(patch.get_width() for patch in beside.patches) == 360

@@ -11,12 +11,14 @@ from rbfrag.cli.parameters.block import charted_blocks
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.rockmasses.counts import mode_counts
+from rbfrag.rockmasses.failures import failures
 from rbfrag.rockmasses.file import rock_mass_of_toml
 from rbfrag.rockmasses.joint_sets import IMPOSSIBLE, Realisations, RockMass
 from rbfrag.rockmasses.report import as_dict, block_columns
 from rbfrag.rockmasses.scenario import BONDED, scenario
-from rbfrag.rockmasses.shaking import plan_shaking, run_blocks
+from rbfrag.rockmasses.shaking import AT_REST, BOND_BREAKS, plan_shaking, run_blocks
 from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.stability.modes import STABLE, TOPPLE
 from rbfrag.solver.stability.single import stability
 
 TOML = """
@@ -87,10 +89,28 @@ def test_a_toe_that_lifts_before_the_bond_breaks_is_told() -> None:
     assert any(text.startswith(f"{lifts} confined topples") for text in warnings)
 
 
-def test_only_topples_with_a_bond_are_shaken() -> None:
-    (work,) = plan_shaking(drawn(TOML + COHESION, 60), LEVEL).work()
-    with pytest.raises(InputError, match=r"block \d+: cohesion_pa does not go with"):
-        run_blocks(work)
+def test_a_bond_holds_up_to_its_yield_and_its_break_is_counted() -> None:
+    many = drawn(TOML + COHESION, 60)
+    plan = plan_shaking(many, LEVEL, scales=(0.2, 1.0))
+    known = many.bonded & (many.stability.state_code == STABLE) & many.is_block
+    known &= (many.stability.mode_code != TOPPLE) & (many.stability.yield_acceleration > 0.0)
+    assert not plan.moves[:, known].any()
+    for code, peak_g in zip(plan.code[:, known], (0.4, 2.0), strict=True):
+        breaks = many.stability.yield_acceleration[known] < peak_g
+        assert breaks.any()
+        assert not breaks.all()
+        assert np.array_equal(code == BOND_BREAKS, breaks)
+        assert (code[~breaks] == AT_REST).all()
+    count = int((plan.code[1] == BOND_BREAKS).sum())
+    assert any(text.startswith(f"{count} blocks with cohesion") for text in plan.warnings)
+    shaken = plan.gathered(run_blocks(work) for work in plan.work())
+    assert np.isnan(shaken.displacement_m[1, shaken.code[1] == BOND_BREAKS]).all()
+    total = failures(shaken)[1].total
+    assert total.outcomes["bond_breaks"] == count <= total.open
+    assert sum(total.outcomes.values()) == many.n_blocks
+
+
+def test_topples_with_a_bond_are_shaken_as_without() -> None:
     alone = {
         "base.dip_deg": 5.0, "base.spacing_m": 1.0, "back.dip_deg": 85.0, "back.spacing_m": 0.4,
         "friction.phi_deg": 40.0,

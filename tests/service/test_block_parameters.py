@@ -106,4 +106,4 @@ def test_block_and_drawing_take_a_rectangle(client):
     query = {**RECTANGLE, "phi": 40}
     found = client.get("/v1/block", params=query).json()
     assert (found["p2"], found["kr"]) == pytest.approx(numbers_of(RECTANGLE), rel=1e-9)
-    assert client.get("/v1/drawing", params=query).json()["mode"] == found["mode"]
+    assert client.get("/v1/drawing", params=query).json()["block"] == found

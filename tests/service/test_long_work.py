@@ -129,9 +129,9 @@ def test_one_trace_of_several_is_asked_for_by_its_number(client, tmp_path):
     motions = [GroundMotion(rng.normal(0.0, 0.1, 400), 0.01, component=c) for c in ("N", "E")]
     export_motions(motions, tmp_path / "two.csv")
     body = (tmp_path / "two.csv").read_bytes()
-    assert "holds 2 traces: name one of  0 (N), 1 (E)" in refusal(
-        client.post("/v1/spectrum", content=body)
-    )
+    refused = client.post("/v1/spectrum", content=body)
+    assert "holds 2 traces: name one of  0 (N), 1 (E)" in refusal(refused)
+    assert refused.json()["traces"] == ["N", "E"]
     for i, motion in enumerate(motions):
         found = client.post(f"/v1/spectrum?trace={i}", content=body).json()
         assert found["pgv_m_s"] == motion.pgv_m_s

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rbfrag.cli.output import check_files, print_json, print_pairs, print_table, print_warnings
+from rbfrag.cli.output import (
+    check_files,
+    print_json,
+    print_pairs,
+    print_table,
+    print_warnings,
+    write_table,
+)
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import WAYS, MeshOptions, ShapeOptions
 from rbfrag.cli.parameters.stack import option, stacked
@@ -17,7 +24,7 @@ FREE_STANDING = (
     "says how probable it is that it overturns, rbfrag respond --kind rocking  what a record does"
 )
 
-EXAMPLE = "Example:  rbfrag block --s1 1 --s2 0.6 --gamma 25 --beta 20 --phi 40"
+EXAMPLE = "Example:  rbfrag block --height 2.4 --width 0.5 --dip 3 --phi 35"
 
 
 SHORT = ("mode", "p2", "kr", "ky", "ks", "kct", "alpha1_deg", "alpha3_deg", "gamma_deg")
@@ -103,12 +110,10 @@ def _mesh(
     """Answer for a mesh: its weakest azimuth, and what the height of contact changes."""
     from rbfrag.exchange.mesh_file import block_from_mesh
 
-    check_files(table=about.out, plot=plot)
+    check_files(table=about.out, plot=plot, excel_text=about.excel_text)
     body = block_from_mesh(path, up=about.up, contact_mm=about.contact_mm, density_kg_m3=density)
     if about.out is not None:
-        from rbfrag.exchange.block_table import write_block_table
-
-        write_block_table(body.columns(), about.out)
+        write_table(body.columns(), about.out, excel_text=about.excel_text)
     if plot is not None:
         from rbfrag.plots.mesh_block import plot_mesh_block
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rbfrag.solver.kind import Kind
     from rbfrag.solver.results import Polarity
 
-EXAMPLE = "Example:  rbfrag critical record.AT2 --p2 3 --json"
+EXAMPLE = "Example:  rbfrag critical record.AT2 --height 2.4 --width 0.5"
 
 FINE_ENOUGH_TO_DRAW = 1e-7
 """Width of k_r/PGA to which the map of a figure is made, borders being thin lines."""

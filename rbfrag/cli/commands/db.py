@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from rbfrag.cli.output import print_json, print_pairs, print_table, say_when_compiling
+from rbfrag.cli.hazard_sentences import several
+from rbfrag.cli.output import (
+    print_json,
+    print_pairs,
+    print_table,
+    print_warnings,
+    say_when_compiling,
+)
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import argument, command_group, option, stacked
 from rbfrag.errors import InputError
@@ -62,6 +69,14 @@ def _print_info(content: DatabaseInfo, *, json: bool) -> None:
     if json:
         print_json(asdict(content))
         return
+    rows = content.rows
+    print(
+        f"{several(rows.get('motion', 0), 'motion')} of "
+        f"{several(rows.get('earthquake', 0), 'earthquake')}, "
+        f"{several(rows.get('combination', 0), 'combination')} and "
+        f"{several(rows.get('fragility_model', 0), 'fitted model')}."
+    )
+    print()
     print_pairs(
         {
             "schema": content.revision,
@@ -156,18 +171,22 @@ def export(
     format: str = option("parquet or csv.", "parquet"),
     tables: str | None = option("Only these, with commas between."),
     arrays: bool = option("Include samples [g] and histories (Parquet only).", False),
+    excel_text: bool = option(options.EXCEL_TEXT, False),
     json: options.Json = False,
 ) -> None:
     """Write the tables as Parquet or CSV, with a data dictionary of every column and unit."""
     from rbfrag.exchange.database_tables import export_database
 
     names = None if tables is None else [name.strip() for name in tables.split(",") if name.strip()]
-    report = export_database(out, db=db, format=format, tables=names, arrays=arrays)
+    report = export_database(
+        out, db=db, format=format, tables=names, arrays=arrays, excel_text=excel_text
+    )
     if json:
         print_json(report.as_dict())
     else:
         print_table(("table", "rows"), report.rows.items())
         print(f"written to {report.folder}")
+    print_warnings(report.warnings)
 
 
 @app.command("merge", epilog="Example:  rbfrag db merge theirs.db --db ours.db")

@@ -16,7 +16,7 @@ from rbfrag.errors import InputError
 
 app = command_group(
     "Write fragility functions for other tools.",
-    "Example:  rbfrag export nrml --p2 3 --kr 0.1 --out block.xml",
+    "Example:  rbfrag export nrml --height 2.4 --width 0.5 --out block.xml",
 )
 
 Out = Annotated[str, typer.Option("--out", help="File to write.")]
@@ -95,7 +95,7 @@ class FunctionOptions(BlocksOptions):
         return measure
 
 
-@app.command("nrml", epilog="Example:  rbfrag export nrml --blocks blocks.csv --out blocks.xml")
+@app.command("nrml", epilog="Example:  rbfrag export nrml --height 2.4 --width 0.5 --out block.xml")
 @stacked
 def nrml(
     out: Out,
@@ -122,7 +122,7 @@ def nrml(
 
 
 @app.command(
-    "pelicun", epilog="Example:  rbfrag export pelicun --p2 3 --kr 0.1 --out fragility.csv"
+    "pelicun", epilog="Example:  rbfrag export pelicun --height 2.4 --width 0.5 --out fragility.csv"
 )
 @stacked
 def pelicun(out: Out, blocks: FunctionOptions, json: options.Json = False) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.output import cell, print_json, print_pairs, print_table, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
+from rbfrag.cli.sentences import rounded
 
 if TYPE_CHECKING:
     from rbfrag.fragility.fit.report import FitReport
@@ -64,7 +65,7 @@ def fit(
     seed: int = option("Seed of the bootstrap by earthquake.", 0),
     replace: bool = option("Replace a stored model of the same name.", False),
     db: options.Db = None,
-    json: options.Json = False,
+    printing: options.Printing,
 ) -> None:
     """Fit a fragility model to stored critical values or outcomes.
 
@@ -87,18 +88,53 @@ def fit(
         rotation_deg=rotation,
         replace=replace,
     )
-    print_report(report, json=json)
+    print_report(report, printing)
 
 
-def print_report(report: FitReport, *, json: bool) -> None:
+def print_report(report: FitReport, printing: options.Printing) -> None:
     """Print the report of a fitted model."""
-    if json:
+    if printing.json:
         print_json(report.as_dict())
         return
-    details: dict[str, Any] = dict(report.details)
+    for sentence in fit_in_words(report):
+        print(sentence)
+    print()
+    if printing.verbose:
+        _print_all(report)
+    else:
+        rows = [
+            (name, rounded(value), _rounded(report.standard_errors.get(name)))
+            for name, value in report.coefficients.items()
+        ]
+        print_table(("parameter", "value", "standard error"), rows)
+    print_warnings(report.warnings)
+
+
+def fit_in_words(report: FitReport) -> Iterator[str]:
+    """Yield what a model says, and how it does on earthquakes that it has not seen."""
     default = f", the default of {report.kind}" if report.model.row.is_default else ""
-    print(f"model {report.name}: {report.method} on {report.term}{default}")
-    print(f"says: {report.model.meaning}")
+    yield (
+        f"Model {report.name} ({report.method} on {report.term}{default}) says the "
+        f"{report.model.meaning}."
+    )
+    outcomes: Any = report.details.get("n_outcomes")
+    what = f"{report.n:,} critical values" if outcomes is None else f"{outcomes:,} outcomes"
+    data = f"It is fitted on {what} of {report.events:,} earthquakes"
+    score = report.scores.get("log_loss_held_out")
+    around = (dict[str, Any](report.details).get("score_intervals") or {}).get("log_loss_held_out")
+    if score is None:
+        yield f"{data}."
+        return
+    ends = f" ({rounded(around[0])} to {rounded(around[1])} by earthquakes)" if around else ""
+    yield f"{data}; on those left out its log loss is {rounded(score)}{ends}, the less the better."
+
+
+def _rounded(value: float | None) -> str | None:
+    return None if value is None else rounded(value)
+
+
+def _print_all(report: FitReport) -> None:
+    details: dict[str, Any] = dict(report.details)
     kinds = details.get("standard_error_kinds") or {}
     bootstrap = (details.get("bootstrap") or {}).get("standard_errors", {})
     naive = details.get("naive_standard_errors") or {}
@@ -151,7 +187,6 @@ def print_report(report: FitReport, *, json: bool) -> None:
         around = intervals.get(name)
         ends = f"  ({cell(around[0])} to {cell(around[1])} by earthquakes)" if around else ""
         print(f"  {name}: {cell(value)}{ends}")
-    print_warnings(report.warnings)
 
 
 def print_dependence(dependence: Mapping[str, Any] | None) -> None:

@@ -30,7 +30,9 @@ SHORT = (
 )  # fmt: skip
 """Values that are shown without --verbose."""
 
-EXAMPLE = "Example:  rbfrag hazard pgv-curve.csv --p2 3 --kr 0.1 --component rotd50 --years 50"
+EXAMPLE = (
+    "Example:  rbfrag hazard pgv-curve.csv --height 2.4 --width 0.5 --dip 3 --component rotd50"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,7 +123,7 @@ def hazard(
     from rbfrag.hazards.curve_file import suited_in
     from rbfrag.hazards.report import as_dict
 
-    check_files(table=out, plot=plot)
+    check_files(table=out, plot=plot, excel_text=excel_text)
     (table, is_class, remarks), refused = blocks.blocks_and_refused(standing)
     files = [
         suited_in(path, imt=meaning.imt, site=meaning.site, convert=meaning.convert)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.commands.simulate import Workers
+from rbfrag.cli.hazard_sentences import losses_in_words, rounded_values
 from rbfrag.cli.output import (
     ProgressBar,
     check_files,
@@ -28,6 +29,15 @@ EXAMPLE = "Example:  rbfrag losses FOLDER --blocks blocks.csv --component rotd50
 
 MOST_ROWS = 12
 """Rows of a curve that people are shown; JSON has all."""
+
+SHORT = (
+    "events", "average_annual", "annual_rate_any", "expected_", "probability_any",
+    "effective_years", "model", "component",
+)  # fmt: skip
+"""How the names of the values begin that are shown without --verbose."""
+
+OF_YEARS = ("largest_of_year", "sum_of_year", "beyond_effective_time")
+"""Columns of a curve that are left out without --verbose."""
 
 AFTER_A_DEATH = "run the same command again"
 """What to do when a worker process has died: nothing is stored."""
@@ -111,7 +121,7 @@ def losses(
     out: str | None = option("Write the table of events (.csv, .xlsx, .parquet)."),
     excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option("Draw how often numbers of failures are reached (.png, .pdf, .svg)."),
-    json: options.Json = False,
+    printing: options.Printing,
 ) -> None:
     """Count failures and losses in the earthquakes of an event set.
 
@@ -123,7 +133,7 @@ def losses(
     """
     from rbfrag.exchange.event_losses import losses as answered
 
-    check_files(table=out, plot=plot)
+    check_files(table=out, plot=plot, excel_text=excel_text)
     with ProgressBar("losses", "events") as bar:
         answer = answered(
             folder, blocks, files=files.named(), samples=sampling.samples,
@@ -139,10 +149,10 @@ def losses(
         from rbfrag.plots.losses import plot_losses
 
         plot_losses(answer, plot)
-    if json:
+    if printing.json:
         print_json(answer.as_dict())
         return
-    _print(answer)
+    _print(answer, verbose=printing.verbose)
 
 
 class _Workers:
@@ -164,11 +174,11 @@ class _Workers:
             yield from execute(parts, number)
 
 
-def _print(answer: LossAnswer) -> None:
+def _print(answer: LossAnswer, *, verbose: bool) -> None:
     """Print sentences, the numbers, the curve and the rows of the blocks."""
     document: dict[str, Any] = answer.as_dict()
     warnings, rows = document.pop("warnings"), document.pop("blocks")
-    for sentence in _in_words(answer):
+    for sentence in losses_in_words(answer):
         print(sentence)
     print()
     curves = {
@@ -178,33 +188,18 @@ def _print(answer: LossAnswer) -> None:
     }
     for law, bound in document.pop("bounds").items():
         document |= {f"{name}_{law}": value for name, value in bound.items()}
-    print_pairs({name: value for name, value in document.items() if value is not None})
+    known = {name: value for name, value in document.items() if value is not None}
+    short = {name: known[name] for name in known if name.startswith(SHORT)}
+    print_pairs(known if verbose else rounded_values(short))
     for curve in curves.values():
         for part in curve.values() if isinstance(curve, dict) else [curve]:
             if part:
                 print()
                 thin = part[:: math.ceil(len(part) / MOST_ROWS)]
-                print_table(list(part[0]), [list(row.values()) for row in thin])
+                names = [name for name in part[0] if verbose or name not in OF_YEARS]
+                shown = [row if verbose else rounded_values(row) for row in thin]
+                print_table(names, [[row[name] for name in names] for row in shown])
     print()
-    print_table(list(rows[0]), [list(row.values()) for row in rows])
+    shown = [row if verbose else rounded_values(row) for row in rows]
+    print_table(list(rows[0]), [list(row.values()) for row in shown])
     print_warnings(warnings)
-
-
-def _in_words(answer: LossAnswer) -> Iterator[str]:
-    mean, error = answer.average_annual_failures, answer.error(answer.failures)
-    if answer.events.is_scenario:
-        yield f"{mean:.4g} ± {error:.2g} of {answer.portfolio.size} blocks are expected to fail."
-        if answer.annual_rate_any is not None:
-            yield f"At least one fails with a probability of {100 * answer.annual_rate_any:.3g} %."
-        return
-    yield (
-        f"{mean:.4g} ± {error:.2g} failures a year are expected of {answer.portfolio.size} blocks; "
-        f"the events cover {answer.events.effective_years:.6g} years."
-    )
-    rate = answer.annual_rate_any
-    if rate is not None:
-        often = f"once in {1.0 / rate:.4g} years on average" if rate > 0.0 else "never"
-        yield f"An earthquake fails at least one of them {often}."
-    if answer.average_annual_loss is not None:
-        loss_error = answer.error(answer.loss)
-        yield f"The average annual loss is {answer.average_annual_loss:.4g} ± {loss_error:.2g}."

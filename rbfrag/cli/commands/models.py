@@ -6,16 +6,20 @@ from typing import Annotated
 
 import typer
 
+from rbfrag.cli.hazard_sentences import several
 from rbfrag.cli.output import print_json, print_table
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.stack import command_group
+from rbfrag.cli.parameters.completion import model_names
+from rbfrag.cli.parameters.stack import command_group, stacked
 
 app = command_group(
     "List, show and choose fitted fragility models.",
     "Example:  rbfrag models show wls-pgv",
 )
 
-Name = Annotated[str, typer.Argument(metavar="NAME", help="Name of the model.")]
+Name = Annotated[
+    str, typer.Argument(metavar="NAME", help="Name of the model.", autocompletion=model_names)
+]
 
 
 @app.command("list", epilog="Example:  rbfrag models list --json")
@@ -32,6 +36,12 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
     if json:
         print_json(listed)
         return
+    default = ", ".join(f"{each['name']} ({each['kind']})" for each in listed if each["is_default"])
+    print(
+        f"{several(len(listed), 'fitted model')}; where none is named, the default of a kind goes "
+        f"first: {default or 'none'}."
+    )
+    print()
     shown = ("name", "kind", "term", "method", "is_default", "log_loss", "events", "created")
     print_table(
         ("name", "kind", "term", "method", "default", "log_loss", "earthquakes", "fitted"),
@@ -40,7 +50,8 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
 
 
 @app.command("show", epilog="Example:  rbfrag models show wls-pgv")
-def show_model(name: Name, db: options.Db = None, json: options.Json = False) -> None:
+@stacked
+def show_model(name: Name, printing: options.Printing, db: options.Db = None) -> None:
     """Print the report of a fitted model from its stored row."""
     from rbfrag.cli.commands.fit import print_report
     from rbfrag.fragility.fit.report import FitReport
@@ -48,7 +59,7 @@ def show_model(name: Name, db: options.Db = None, json: options.Json = False) ->
     from rbfrag.fragility.model import FragilityModel
 
     row = stored_row(name, db)
-    print_report(FitReport.from_model(FragilityModel.from_row(row)), json=json)
+    print_report(FitReport.from_model(FragilityModel.from_row(row)), printing)
 
 
 @app.command("default", epilog="Example:  rbfrag models default wls-pgv")

@@ -8,13 +8,24 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from rbfrag.cli.hazard_sentences import several
 from rbfrag.cli.output import ProgressBar, print_json, print_pairs, print_table, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion, stored_row
 from rbfrag.cli.parameters.stack import argument, command_group, option, stacked
+from rbfrag.cli.sentences import motion_in_words
 
 if TYPE_CHECKING:
     from rbfrag.db.rows import MotionRow
+
+WIDTH = 100
+"""Characters of a line of the list."""
+
+SHORT = (
+    "id", "event", "event_id", "station", "component", "is_vertical", "dt_s", "npts", "pga_g",
+    "pgv_m_s", "pgd_m", "tm_s", "sa10_g", "flags",
+)  # fmt: skip
+"""Values of one motion that are shown without --verbose."""
 
 STORED_LABELS = (
     "id", "event_id", "event_guessed", "magnitude", "is_vertical", "processing", "flags",
@@ -23,7 +34,7 @@ STORED_LABELS = (
 
 app = command_group(
     "Add, list, show and export accelerograms.",
-    "Example:  rbfrag motions add records/ --metadata records/MANIFEST.csv",
+    "Example:  rbfrag motions add records/ --metadata records/META.csv",
 )
 
 
@@ -94,7 +105,10 @@ def add(
 def list_motions(
     suite: options.Suite = None, db: options.Db = None, json: options.Json = False
 ) -> None:
-    """List the stored motions with their intensity measures and quality flags."""
+    """List the stored motions with their intensity measures and quality flags.
+
+    Long names are cut; --json has all, and every measure.
+    """
     from rbfrag.db.engine import opened_database
     from rbfrag.db.motions import motion_rows
 
@@ -103,16 +117,24 @@ def list_motions(
     if json:
         print_json([_as_dict(row) for row in rows])
         return
+    processed = sum(row.processing_applied is not None for row in rows)
+    flagged = sum(bool(row.flags) for row in rows)
+    print(
+        f"{several(len(rows), 'motion')} of "
+        f"{several(len({row.event_id for row in rows}), 'earthquake')}; {processed} processed "
+        f"here, {flagged} with a quality flag."
+    )
+    print()
     print_table(
-        ("id", "motion", "event", "vert.", "dt [s]", "npts", "PGA [g]", "PGV [m/s]", "PGD [m]",
-         "Tm [s]", "SA(1.0) [g]", "flags"),
+        ("id", "motion", "event", "vert.", "dt [s]", "PGA [g]", "PGV [m/s]", "Tm [s]",
+         "processed", "flags"),
         [
-            (row.id, row.name, row.event_id, row.is_vertical, row.dt_s, row.npts,
-             round(row.pga_g, 4), round(row.pgv_m_s, 4), round(row.pgd_m, 4),
-             None if row.tm_s is None else round(row.tm_s, 3),
-             None if row.sa10_g is None else round(row.sa10_g, 4), row.flags)
+            (row.id, row.name, row.event_id, row.is_vertical, row.dt_s, round(row.pga_g, 4),
+             round(row.pgv_m_s, 4), None if row.tm_s is None else round(row.tm_s, 3),
+             row.processing_applied is not None, row.flags)
             for row in rows
         ],
+        width=WIDTH,
     )  # fmt: skip
 
 
@@ -123,7 +145,8 @@ def show(
     reading: options.Reading,
     allow_partial: options.AllowPartial = False,
     db: options.Db = None,
-    json: options.Json = False,
+    *,
+    printing: options.Printing,
 ) -> None:
     """Show one motion: a file as it is, or a stored one by its id."""
     from rbfrag.motions.quality import quality_flags
@@ -161,11 +184,16 @@ def show(
         document = {**document, **{name: kept[name] for name in STORED_LABELS}}
         document["vertical_id"] = None if pair is None else pair.vertical_id
         document["vertical_remark"] = None if pair is None else pair.reason or pair.remark or None
-    if json:
+    if printing.json:
         print_json(document)
         return
     remarks = document.pop("remarks")
-    print_pairs({name: value for name, value in document.items() if value is not None})
+    print(motion_in_words(document, flags=len(document["flags"])))
+    print()
+    known = {name: value for name, value in document.items() if value is not None}
+    print_pairs(
+        known if printing.verbose else {name: known[name] for name in SHORT if name in known}
+    )
     print_warnings([*remarks, *(flag.sentence for flag in flags)])
 
 

@@ -81,7 +81,7 @@ def plot_fit(
 
 @app.command(
     "chart",
-    epilog="Example:  rbfrag plot chart --model bounded-pgv_pga --p2 3 --pga 0.4 --out chart.pdf",
+    epilog="Example:  rbfrag plot chart --p2 3 --out chart.pdf",
 )
 @stacked
 def plot_chart(
@@ -109,7 +109,7 @@ def plot_chart(
 
 
 @app.command(
-    "curve", epilog="Example:  rbfrag plot curve --p2 3 --kr 0.1 --pga 0.4 --out curve.png"
+    "curve", epilog="Example:  rbfrag plot curve --height 2.4 --width 0.5 --pga 0.4 --out curve.png"
 )
 @stacked
 def plot_curve(
@@ -249,7 +249,9 @@ def plot_spectrum(
     print(out)
 
 
-@app.command("response", epilog="Example:  rbfrag plot response 1 --p2 3 --kr 0.1 --out a.png")
+@app.command(
+    "response", epilog="Example:  rbfrag plot response 1 --height 2 --width 0.4 --out a.png"
+)
 @stacked
 def plot_response(
     motion: options.Motion,

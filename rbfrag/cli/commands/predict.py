@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from rbfrag.cli.output import print_json, print_pairs, print_warnings, show_prediction
+from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings, show_prediction
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import WAYS, BlockOptions, UncertaintyOptions, option_of
 from rbfrag.cli.parameters.stack import option, stacked
@@ -13,7 +13,7 @@ from rbfrag.cli.sentences import table_in_words
 from rbfrag.errors import InputError
 from rbfrag.solver.described import kind_of, numbers_of_kind
 
-EXAMPLE = "Example:  rbfrag predict --p2 3 --kr 0.1 --pgv 0.6 --json"
+EXAMPLE = "Example:  rbfrag predict --height 2.4 --width 0.5 --dip 3 --pgv 0.6"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +120,7 @@ def predict(
     if table.batch is not None and table.out is not None:
         from rbfrag.exchange.batch import predict_table
 
+        check_files(table=table.out, excel_text=table.excel_text)
         if block.beta is not None:
             given["beta_deg"] = block.beta
         summary = predict_table(

@@ -38,7 +38,7 @@ SHORT = (
 )  # fmt: skip
 """Values that are shown without --verbose."""
 
-EXAMPLE = "Example:  rbfrag respond record.AT2 --p2 3 --kr 0.1 --plot response.png"
+EXAMPLE = "Example:  rbfrag respond record.AT2 --height 2.4 --width 0.5 --plot response.png"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,6 +14,7 @@ from rbfrag.cli.output import (
     print_table,
     print_warnings,
     say_when_compiling,
+    write_table,
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_shaking
@@ -127,6 +128,7 @@ def rockmass(
     out: str | None = option(
         "Write one row a block, with a motion one a block and scale (.csv, .xlsx, .parquet)."
     ),
+    excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option(
         "Draw the cumulative counts of blocks against PGA by mode, with a motion the "
         "shares that fail (.png, .pdf, .svg)."
@@ -139,7 +141,6 @@ def rockmass(
     mode. With a measure of the motion (--pgv ...), the probability of failure is averaged over
     the blocks of each mode for which there is a fragility model.
     """
-    from rbfrag.exchange.block_table import write_block_table
     from rbfrag.fragility.intervals import checked_level
     from rbfrag.rockmasses.counts import crossings, mode_counts
     from rbfrag.rockmasses.failures import (
@@ -151,7 +152,7 @@ def rockmass(
     from rbfrag.rockmasses.report import as_dict, block_columns
     from rbfrag.rockmasses.scenario import scenario
 
-    check_files(table=out, plot=plot)
+    check_files(table=out, plot=plot, excel_text=excel_text)
     blocks = read_rock_mass(file).realise(drawn.n, drawn.seed)
     answer = outcomes = failed = None
     about: list[str] = []
@@ -168,7 +169,7 @@ def rockmass(
     document["warnings"] += about
     if out is not None:
         columns = block_columns(blocks, answer) if outcomes is None else outcome_columns(outcomes)
-        write_block_table(columns, out)
+        write_table(columns, out, excel_text=excel_text)
     if plot is not None:
         if outcomes is None:
             from rbfrag.plots.rockmass import plot_rockmass

@@ -5,16 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from rbfrag.cli.hazard_sentences import map_in_words, rounded_values
 from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings, write_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 
-EXAMPLE = "Example:  rbfrag shakemap grid.xml --p2 3 --kr 0.1 --out map.geojson --plot map.png"
+EXAMPLE = (
+    "Example:  rbfrag shakemap grid.xml --height 2.4 --width 0.5 --out map.geojson --plot map.png"
+)
 
 TABLES = (".csv", ".xlsx", ".parquet")
 SUFFIXES = (".geojson", ".json", *TABLES, ".gpkg")
+
+SHORT = (
+    "event", "magnitude", "expected_failures", "probability_any", "places", "model", "file",
+)  # fmt: skip
+"""Values that are shown without --verbose."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +65,7 @@ def shakemap(
     answering: options.Answering,
     n: int = option("Number of realisations of the rock mass.", 200),
     plot: str | None = option("Draw the map (.png, .pdf, .svg)."),
-    json: options.Json = False,
+    printing: options.Printing,
 ) -> None:
     """Write the probability that blocks topple across a ShakeMap.
 
@@ -76,7 +84,7 @@ def shakemap(
     from rbfrag.hazards.site_probability import site_probability
 
     target = output_path(out, SUFFIXES, "map")
-    check_files(plot=plot)
+    check_files(table=out if excel_text else None, plot=plot, excel_text=excel_text)
     component = component_named(meaning.component)
     (class_blocks, _, remarks), refused = (
         (blocks.toppling_blocks(standing, n=n), {})
@@ -213,10 +221,14 @@ def shakemap(
         "largest_at_lon": float(lon[best]),
         "largest_at_lat": float(lat[best]),
     }
-    if json:
+    if printing.json:
         print_json({**document, "warnings": warnings})
         return
-    print_pairs(document)
+    for sentence in map_in_words(document, own=own):
+        print(sentence)
+    print()
+    short = rounded_values({name: document[name] for name in SHORT})
+    print_pairs(document if printing.verbose else short)
     print_warnings(warnings)
 
 

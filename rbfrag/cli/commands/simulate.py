@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, cast
 
+from rbfrag.cli.hazard_sentences import campaign_in_words
 from rbfrag.cli.output import (
     ProgressBar,
     print_json,
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     from rbfrag.db.queries import Vertical
 
 EXAMPLE = "Example:  rbfrag simulate --p2 30,10,3,1,0.3,0.1 --vertical both --grid 23"
+
+SHORT = ("certified", "reentrant", "without_vertical", "runs", "responses", "seconds")
+"""Numbers that are shown without --verbose where they are not zero."""
 
 RECOVERY = "recovery"
 """What stands for failure past recovery in a list of rotations."""
@@ -88,7 +92,7 @@ def simulate(
         metavar="LIST",
     ),
     db: options.Db = None,
-    json: options.Json = False,
+    printing: options.Printing,
 ) -> None:
     """Store critical values and outcomes of every motion and block.
 
@@ -129,12 +133,15 @@ def simulate(
             stopped=stopped,
         )
     report = summary.as_dict()
-    if json:
+    if printing.json:
         print_json(report)
         return
     print_warnings(summary.warnings)
     del report["warnings"]
-    print_pairs(report)
+    print(campaign_in_words(report))
+    print()
+    shown = report if printing.verbose else {name: report[name] for name in SHORT if report[name]}
+    print_pairs(shown)
 
 
 def _numbers(text: str | None, option: str) -> list[float] | None:

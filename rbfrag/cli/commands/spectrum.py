@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.cli.output import check_files, print_json, print_table, print_warnings
+from rbfrag.cli.output import (
+    check_files,
+    print_json,
+    print_table,
+    print_warnings,
+    write_table,
+)
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.cli.parameters.values import number_list
 from rbfrag.cli.parameters.values import polarities as polarities_of
+from rbfrag.cli.sentences import rounded, spectrum_in_words, strongest_kr
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,6 +34,7 @@ def spectrum(
     p2: str = option("Frequency parameters p² [1/s²], separated by commas.", "30,10,3,1,0.3,0.1"),
     polarity: options.Polarity = "forward",
     csv: str | None = option("Write the values (.csv, .xlsx or .parquet)."),
+    excel_text: bool = option(options.EXCEL_TEXT, False),
     plot: str | None = option("Draw the spectra over p², with PGV beside them (.png, .pdf, .svg)."),
     db: options.Db = None,
     json: options.Json = False,
@@ -36,11 +44,10 @@ def spectrum(
     X(p) is in m/s. No block with a toppling velocity k_r g/p more than 2 % above X(p) topples.
     With --json, one motion in one polarity is an object, several are a list of such objects.
     """
-    from rbfrag.exchange.block_table import write_block_table
     from rbfrag.motions.toppling_spectrum import spectrum_as_dict as as_dict
 
     sizes, polarities = number_list(p2, "--p2"), polarities_of(polarity)
-    check_files(table=csv, plot=plot)
+    check_files(table=csv, plot=plot, excel_text=excel_text)
     records = [find_motion(text, db=db, reading=reading) for text in motions]
     answers = [
         as_dict(text, ground, sizes, each)
@@ -48,7 +55,7 @@ def spectrum(
         for each in polarities
     ]
     if csv is not None:
-        write_block_table(_columns(answers), csv)
+        write_table(_columns(answers), csv, excel_text=excel_text)
     if plot is not None:
         from rbfrag.plots.spectrum import plot_spectrum
 
@@ -58,9 +65,16 @@ def spectrum(
         return
     for first in range(0, len(answers), len(polarities)):
         mine = answers[first : first + len(polarities)]
-        print(f"{mine[0]['name']}: PGV {mine[0]['pgv_m_s']:.6g} m/s, X(p) in m/s")
-        columns = [one["x_m_s"] for one in mine]
-        print_table(("p2", *polarities), zip(sizes, *columns, strict=True))
+        if first:
+            print()
+        print(spectrum_in_words(mine))
+        print()
+        columns: list[list[Any]] = [sizes]
+        for one in mine:
+            columns.append([rounded(x) for x in one["x_m_s"]])
+            columns.append([rounded(k) for k in strongest_kr(one)])
+        heads = [f"{name}{end}" for end in polarities for name in ("X [m/s] ", "k_r ")]
+        print_table(("p2", *heads), zip(*columns, strict=True))
     print_warnings(
         dict.fromkeys(f"{one['motion']}: {word}" for one in answers for word in one["warnings"])
     )

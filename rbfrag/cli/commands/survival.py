@@ -2,22 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.commands.hazard import CurveOptions
-from rbfrag.cli.output import cell, check_files, print_json, print_table, print_warnings
+from rbfrag.cli.hazard_sentences import survival_in_words
+from rbfrag.cli.output import (
+    cell,
+    check_files,
+    print_json,
+    print_pairs,
+    print_table,
+    print_warnings,
+)
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import StandingOptions, TableOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
+from rbfrag.cli.sentences import rounded
 
 if TYPE_CHECKING:
     from rbfrag.hazards.survival import SurvivalAnswer
 
 EXAMPLE = (
-    "Example:  rbfrag survival pgv-curve.csv --p2 18 --kr 0.25 --age 10000 --age-sd 2000 "
-    "--kr-sigma 0.1 --component rotd50"
+    "Example:  rbfrag survival pgv-curve.csv --height 1 --width 0.25 --kr-sigma 0.1 "
+    "--age 10000 --age-sd 2000 --component rotd50"
 )
+
+BRANCH = ("name", "weight", "weight_given_standing", "probability_standing", "factor_5_percent")
+"""What is shown of a branch without --verbose."""
+
+PRINTED = (
+    "probability_standing", "ci_low", "ci_high", "factor_5_percent", "factor_5_percent_ci",
+    "factor_50_percent", "factor_50_percent_ci", "bounds", "branches", "warnings",
+)  # fmt: skip
+"""Values that stand in sentences and tables."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +79,7 @@ def survival(
     plot: str | None = option(
         "Draw the curves, survival over the factor on their rates, and weights (.png, .pdf, .svg)."
     ),
-    json: options.Json = False,
+    printing: options.Printing,
 ) -> None:
     """Print how likely standing blocks are under a seismic hazard.
 
@@ -87,25 +106,18 @@ def survival(
         from rbfrag.plots.survival import plot_survival
 
         plot_survival(read, answer, plot)
-    if json:
+    if printing.json:
         print_json(answer.as_dict())
         return
-    _print(answer)
+    _print(answer, verbose=printing.verbose)
 
 
-def _print(answer: SurvivalAnswer) -> None:
-    """Print a sentence, the numbers with their intervals, and a table of several curves."""
-    who = "the block stands" if answer.blocks == 1 else f"all {answer.blocks} blocks stand"
-    sd = f" (standard deviation {answer.age_sd_years:g})" if answer.age_sd_years else ""
-    rate = answer.annual_rate_any
-    often = "never fails" if rate == 0.0 else f"fails once in {1.0 / rate:.4g} years on average"
-    print(
-        f"{_condition(answer)}, {who} for {answer.age_years:g} years{sd} with a "
-        f"probability of {answer.probability_standing:.3g}; "
-        f"{'it' if answer.blocks == 1 else 'one of them'} {often}."
-    )
-    print(_verdict(answer))
+def _print(answer: SurvivalAnswer, *, verbose: bool) -> None:
+    """Print sentences, the numbers with their intervals, and a table of several curves."""
+    for sentence in survival_in_words(answer):
+        print(sentence)
     print()
+    shown: Callable[[Any], Any] = cell if verbose else _rounded
     ends = {
         "probability_standing": (answer.ci_low, answer.ci_high),
         "factor_5_percent": answer.factor_5_percent_ci,
@@ -113,35 +125,22 @@ def _print(answer: SurvivalAnswer) -> None:
     }
     print_table(
         ("", "value", "ci_low", "ci_high"),
-        [(name, getattr(answer, name), *both) for name, both in ends.items()],
+        [(name, *map(shown, (getattr(answer, name), *both))) for name, both in ends.items()],
     )
     for name, bound in (answer.bounds or {}).items():
-        values = ", ".join(f"{key} {cell(value)}" for key, value in bound.items())
+        values = ", ".join(f"{key} {cell(shown(value))}" for key, value in bound.items())
         print(f"{name.replace('_', ' ')}: {values}")
     if len(answer.branches) > 1:
         print()
-        columns = list(answer.branches[0].as_dict())
-        print_table(columns, [list(one.as_dict().values()) for one in answer.branches])
+        columns = [*answer.branches[0].as_dict()] if verbose else [*BRANCH]
+        rows = [one.as_dict() for one in answer.branches]
+        print_table(columns, [[shown(row[name]) for name in columns] for row in rows])
+    if verbose:
+        print()
+        others = answer.as_dict()
+        print_pairs({name: others[name] for name in others if name not in PRINTED})
     print_warnings(answer.warnings)
 
 
-def _verdict(answer: SurvivalAnswer) -> str:
-    five: Any = answer.factor_5_percent
-    if five is None:
-        return "No factor on its rates makes that improbable: the blocks say nothing against it."
-    if five < 1.0:
-        return (
-            f"That is less than 5 %: it would be 5 % if all rates of the hazard were multiplied by "
-            f"{five:.3g}."
-        )
-    return (
-        f"Standing does not contradict it: all rates of the hazard would have to be {five:.3g} "
-        "times as high to leave 5 %."
-    )
-
-
-def _condition(answer: SurvivalAnswer) -> str:
-    if len(answer.branches) == 1:
-        return "If the hazard is right"
-    weighted = answer.branches[0].name != answer.hazard
-    return f"Over {answer.hazard}" if weighted else f"If the hazard of {answer.hazard} is right"
+def _rounded(value: Any) -> Any:
+    return rounded(value) if isinstance(value, float) else value

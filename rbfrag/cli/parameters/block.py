@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from rbfrag.cli.parameters.options import EXCEL_TEXT
 from rbfrag.cli.parameters.stack import option
 from rbfrag.errors import InputError
 from rbfrag.solver.described import DescribedBlock, describe, numbers_of_kind
@@ -95,6 +96,7 @@ class MeshOptions:
         "Write the table of a mesh's blocks, one row for each azimuth (.csv, .xlsx, .parquet).",
         metavar="FILE",
     )
+    excel_text: bool = option(EXCEL_TEXT, False)
 
 
 @dataclass(frozen=True, kw_only=True)

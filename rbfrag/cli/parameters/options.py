@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from rbfrag.cli.parameters.completion import model_names, motion_ids
 from rbfrag.cli.parameters.stack import option
 
 EXCEL_TEXT = (
@@ -32,6 +33,7 @@ Motion = Annotated[
     str,
     typer.Argument(
         metavar="MOTION",
+        autocompletion=motion_ids,
         help="Accelerogram: a file, FILE#INDEX for one trace of several, or a database id.",
     ),
 ]
@@ -40,6 +42,7 @@ Motions = Annotated[
     list[str],
     typer.Argument(
         metavar="MOTION...",
+        autocompletion=motion_ids,
         help="Accelerograms: files, FILE#INDEX for one trace of several, or database ids.",
     ),
 ]
@@ -75,6 +78,7 @@ Model = Annotated[
     str | None,
     typer.Option(
         "--model",
+        autocompletion=model_names,
         help="Name of a stored model. Default: the database's default if the given "
         "measures suffice for it, else the best that they suffice for.",
     ),

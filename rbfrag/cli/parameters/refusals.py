@@ -98,6 +98,7 @@ NEEDS = (
     Need(("--batch",), ("--out",), "--out", "--out FILE names the table of answers"),
     Need(("--out",), ("--batch",), "--batch", "--batch FILE names the table of blocks"),
     Need(("--excel-text",), ("--out",), "--out", "--out FILE names the table that it is about"),
+    Need(("--excel-text",), ("--csv",), "--csv", "--csv FILE names the table that it is about"),
     Need(
         ("--vertical", "--reverse", "--scales", "--jobs", "--units", "--dt", "--polarity"),
         ("--motion",),

@@ -76,6 +76,41 @@ class Bins:
         return result
 
 
+class BinVariances(NamedTuple):
+    """Variances of residuals in the bins that hold points, shape (m,).
+
+    Args:
+        counts: points in each.
+        centre: their mean intensity [m/s].
+        variance: mean square of their residuals, with the two parameters of the line taken off the
+            degrees of freedom [m²/s²].
+    """
+
+    counts: FloatArray
+    centre: FloatArray
+    variance: FloatArray
+
+
+def bin_variances(
+    bins: Bins, squared_residuals: FloatArray, multiplicity: FloatArray
+) -> BinVariances:
+    """Return the variances of the residuals in bins.
+
+    Args:
+        bins: the bins.
+        squared_residuals: r² [m²/s²] of each point, in the order of ``bins.x``.
+        multiplicity: how many times each point counts.
+    """
+    counts = bins.sums(multiplicity)
+    used = counts > 0.0
+    counts = counts[used]
+    centres = bins.sums(multiplicity * bins.x)[used] / counts
+    spread = bins.sums(multiplicity * squared_residuals)[used] / counts
+    # Least squares takes two parameters from the residuals.
+    spread = spread * (counts.sum() / max(counts.sum() - 2.0, 1.0))
+    return BinVariances(counts, centres, spread)
+
+
 def powers(x: FloatArray, degree: int) -> FloatArray:
     """Return the columns 1, x, …, x^degree, shape (n, degree + 1)."""
     return np.vander(x, degree + 1, increasing=True)
@@ -103,13 +138,7 @@ def fit_variance(
     """
     from scipy.optimize import nnls
 
-    counts = bins.sums(multiplicity)
-    used = counts > 0.0
-    counts = counts[used]
-    centres = bins.sums(multiplicity * bins.x)[used] / counts
-    spread = bins.sums(multiplicity * squared_residuals)[used] / counts
-    # Least squares takes two parameters from the residuals.
-    spread = spread * (counts.sum() / max(counts.sum() - 2.0, 1.0))
+    counts, centres, spread = bin_variances(bins, squared_residuals, multiplicity)
     columns = powers(centres, degree)
     floor = FLOOR_FRACTION * spread[spread > 0.0].min()
     scale = spread if previous is None else columns @ previous

@@ -114,12 +114,14 @@ class Link(NamedTuple):
         probability: F(eta, functions).
         density: F'(eta, functions).
         quantile: eta of a probability between 0 and 1, from it and functions.
+        formula: P of eta as mathtext.
     """
 
     name: str
     probability: Callable[[Any, Numbers], Any]
     density: Callable[[Any, Numbers], Any]
     quantile: Callable[[Any, Numbers], Any]
+    formula: str
 
 
 NORMAL = Link(
@@ -127,24 +129,28 @@ NORMAL = Link(
     lambda eta, ns: ns.ndtr(eta),
     lambda eta, ns: ns.exp(-0.5 * eta * eta) / math.sqrt(2.0 * math.pi),
     lambda p, ns: ns.ndtri(p),
+    r"\Phi(\eta)",
 )
 LOGIT = Link(
     "logit",
     lambda eta, ns: 1.0 / (1.0 + ns.exp(-eta)),
     lambda eta, ns: ns.exp(-abs(eta)) / (1.0 + ns.exp(-abs(eta))) ** 2,
     lambda p, ns: ns.log(p / (1.0 - p)),
+    r"1/(1 + e^{-\eta})",
 )
 LOGLOG = Link(
     "loglog",
     lambda eta, ns: ns.exp(-ns.exp(-eta)),
     lambda eta, ns: ns.exp(-eta - ns.exp(-eta)),
     lambda p, ns: -ns.log(-ns.log(p)),
+    r"\exp(-e^{-\eta})",
 )
 COMPLEMENT = Link(
     "complement",
     lambda eta, ns: -ns.expm1(-ns.maximum(eta, 0.0)),
     lambda eta, ns: ns.exp(-ns.maximum(eta, 0.0)) * (eta > 0.0),
     lambda p, ns: -ns.log(1.0 - p),
+    r"1 - e^{-\eta}",
 )
 
 
@@ -296,6 +302,13 @@ class SizeFactor(NamedTuple):
     a: float
     b: float = 0.0
 
+    @property
+    def formula(self) -> str:
+        """h as mathtext."""
+        if not self.b:
+            return rf"p^{{{self.a:g}}}"
+        return rf"\exp({self.a:g}\,\ln p - {self.b:g}\,\ln^2 p)"
+
     def of(self, p: Any, ns: Numbers) -> Any:
         """Return h of the frequency parameter p [1/s]."""
         l = ns.log(ns.minimum(ns.maximum(p, _LEAST_P), _GREATEST_P))  # noqa: E741  as in the formula
@@ -321,6 +334,11 @@ class Form:
         size_factor: what eta is multiplied by; None for nothing.
         wide: fitted to the whole grid, on which the decided blocks are that PGV tells apart, and
             judged on the part of it that the other forms read and are judged on too.
+        terms: what each parameter multiplies in the sum that the formula is of, as mathtext; "1"
+            for nothing, empty for a parameter beside the sum.
+        equation: eta before the size factor of that sum, <sum>, and of parameters <name>,
+            <+name> with their sign, <exp name>, as mathtext.
+        where: what the symbols mean, likewise.
     """
 
     parameters: tuple[str, ...]
@@ -330,6 +348,9 @@ class Form:
     start: tuple[float, ...] = ()
     size_factor: SizeFactor | None = None
     wide: bool = False
+    terms: tuple[str, ...] = ()
+    equation: str = "<sum>"
+    where: str = ""
 
     def unscaled(
         self, parameters: Sequence[float], values: Mapping[str, Any], ns: Numbers
@@ -351,6 +372,18 @@ class Form:
         return unscaled._replace(eta=h * unscaled.eta, slopes=slopes)
 
 
+class FittedVariance(NamedTuple):
+    """Mean and variance of the critical velocity, of a method that fits the variance in bins.
+
+    Args:
+        mean_m_s: mean from the parameters and the intensity [m/s].
+        variance_m2_s2: variance [m²/s²] from them.
+    """
+
+    mean_m_s: Callable[[Sequence[float], Any], Any]
+    variance_m2_s2: Callable[[Sequence[float], Any], Any]
+
+
 @dataclass(frozen=True)
 class Method:
     """One method of fitting.
@@ -369,6 +402,7 @@ class Method:
         median_of: name of the block's parameter whose median is told beside the probability.
         doubts: yields (holds, name of the value, text) where the model makes no sense, from
             parameters, values and functions.
+        fitted_variance: mean and variance where the variance is fitted in bins; None elsewhere.
     """
 
     name: str
@@ -385,6 +419,7 @@ class Method:
         Callable[[Sequence[float], Mapping[str, Any], Numbers], Iterator[tuple[Any, str, str]]]
         | None
     ) = None
+    fitted_variance: FittedVariance | None = None
 
     def fitter(self) -> Callable[..., Any]:
         """Return the function that fits it; numpy is loaded only here."""

@@ -93,15 +93,25 @@ def _with_spectrum(*periods: str) -> Callable[[Sequence[float], Mapping[str, Any
 
 def _of_pga(a: float, *periods: str) -> Form:
     names = [f"b_ln_q{period}{by}" for period in periods for by in ("", "_ln_p")]
+    terms = [
+        rf"\ln Q_{{{_PERIOD_S[f'sa{period}_g']:g}}}{by}"
+        for period in periods
+        for by in ("", r"\,\ln p")
+    ]
     return Form(
         ("b0", "b_ln_p", "b_ln_p_squared", "b_ln_r", *names), _with_spectrum(*periods), 0,
         (NOT_LIFTED,), size_factor=SizeFactor(a), wide=True,
+        terms=("1", r"\ln p", r"\ln^2 p", r"\ln(1/r)", *terms),
+        where=_OF_PGA + (r",\ Q_T = \mathrm{SA}(T)\,T/(2\pi\,\mathrm{PGA})" if periods else ""),
     )  # fmt: skip
 
 
+_OF_PGA, _OF_VELOCITY = r"r = k_r/\mathrm{PGA}", "v = y/2x"
 _PERIOD_S = {measure: period_s for period_s, measure in SPECTRAL.items()}
 _BOUNDS = (NOT_LIFTED, ABOVE_TWICE_PGV)
 _OF_SIZE = SizeFactor(0.18, 0.06)
+_TERMS = ("1", r"\ln(1/r)", r"\ln(1 - r)", r"\ln(1 - v)", r"\ln z")
+_WHERE = rf"{_OF_PGA},\ {_OF_VELOCITY},\ z = p\,x/(\mathrm{{PGA}}\,g)"
 _NAMES = ("b0", "b_ln_r", "b_ln_1_minus_r", "b_ln_1_minus_share", "b_ln_z")
 
 METHOD = Method(
@@ -112,16 +122,24 @@ METHOD = Method(
         "pgv": Form(
             ("b0", "b_ln_share", "b_ln_1_minus_share", "b_ln_p", "b_ln_p_squared"),
             _pgv, 0, (ABOVE_TWICE_PGV,), size_factor=_OF_SIZE,
+            terms=("1", r"\ln(1/v)", r"\ln(1 - v)", r"\ln p", r"\ln^2 p"), where=_OF_VELOCITY,
         ),
         "pgv_kr": Form(
             ("b0", "b_ln_p", "b_ln_p_squared", "b_ln_share", "b_ln_1_minus_share", "b_strength"),
             _pgv_kr, 0, (ABOVE_TWICE_PGV,), size_factor=SizeFactor(0.15), wide=True,
+            terms=("1", r"\ln p", r"\ln^2 p", r"\ln(1/v)", r"\ln(1 - v)", "k'"),
+            where=_OF_VELOCITY + r",\ k' = \ln(1 + k_r/0.3)",
         ),
         "pga": _of_pga(0.22),
         "pga_sa10": _of_pga(0.29, "10"),
         "pga_sa03_sa10_sa30": _of_pga(0.27, "03", "10", "30"),
-        "pgv_pga": Form(_NAMES, _pgv_pga, 0, _BOUNDS, size_factor=_OF_SIZE),
-        "pgv_pga_tm": Form((*_NAMES, "b_ln_zt"), _pgv_pga_tm, 0, _BOUNDS, size_factor=_OF_SIZE),
+        "pgv_pga": Form(
+            _NAMES, _pgv_pga, 0, _BOUNDS, size_factor=_OF_SIZE, terms=_TERMS, where=_WHERE
+        ),
+        "pgv_pga_tm": Form(
+            (*_NAMES, "b_ln_zt"), _pgv_pga_tm, 0, _BOUNDS, size_factor=_OF_SIZE,
+            terms=(*_TERMS, r"\ln z_T"), where=_WHERE + r",\ z_T = p\,T_m/2\pi",
+        ),
     },
     reads="outcomes",
     meaning=OF_OUTCOME,

@@ -49,11 +49,18 @@ _SPECTRAL = ("b0", "b_size", "b_size_squared", "b_ln_x_over_y", "b_ln_x", "b_str
 
 
 def _of_period(a: float) -> Form:
-    return Form(_SPECTRAL, _spectral, 0, size_factor=SizeFactor(a), wide=True)
+    return Form(
+        _SPECTRAL, _spectral, 0, size_factor=SizeFactor(a), wide=True,
+        terms=("1", r"\ln p", r"\ln^2 p", r"\ln(x/y)", r"\ln x", "k'"),
+        where=r"k' = \ln(1 + k_r/0.3)",
+    )  # fmt: skip
 
 
 def _form(size_factor: SizeFactor | None) -> Form:
-    return Form(("b0", "b_ln_x_over_y", "b_ln_p"), _eta, 4, size_factor=size_factor)
+    return Form(
+        ("b0", "b_ln_x_over_y", "b_ln_p"), _eta, 4, size_factor=size_factor,
+        terms=("1", r"\ln(x/y)", r"\ln p"),
+    )  # fmt: skip
 
 
 _OF_SIZE = SizeFactor(0.18, 0.06)

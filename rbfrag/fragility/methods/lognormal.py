@@ -25,7 +25,10 @@ def _eta(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
     return Eta(eta, (per, log_x * per, -eta, log_p * per), b[2], (0.0, 0.0, 1.0, 0.0))
 
 
-_FORM = Form(("ln_median", "slope", "ln_sigma", "m_minus_1"), _eta, 5)
+_FORM = Form(
+    ("ln_median", "slope", "ln_sigma", "m_minus_1"), _eta, 5,
+    terms=("1", r"\ln x", "", r"\ln p"), equation=r"(<sum> - \ln y)/<exp ln_sigma>",
+)  # fmt: skip
 
 METHOD = Method(
     name="lognormal",

@@ -35,7 +35,12 @@ METHOD = Method(
     link=COMPLEMENT,
     forms={
         "xp": Form(
-            ("b0", "b_ln_xp_over_y"), _eta, 3, (ABOVE_SPECTRUM,), size_factor=SizeFactor(0.30)
+            ("b0", "b_ln_xp_over_y"),
+            _eta,
+            3,
+            (ABOVE_SPECTRUM,),
+            size_factor=SizeFactor(0.30),
+            terms=("1", r"\ln(x/y)"),
         )
     },
     reads="outcomes",

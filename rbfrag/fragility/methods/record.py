@@ -41,6 +41,7 @@ METHOD = Method(
         "xp": Form(
             ("b0", "b_ln_xp_over_y", "b_ln_s"), _eta, 0, (ABOVE_SPECTRUM, NOT_LIFTED),
             size_factor=SizeFactor(0.30),
+            terms=("1", r"\ln(x/y)", r"\ln s"), where=r"s = p\,x/(\mathrm{PGA}\,g)",
         )
     },
     reads="outcomes",

@@ -50,6 +50,8 @@ def _pgv_pga_tm(b: Sequence[float], v: Mapping[str, Any], ns: Numbers) -> Eta:
 
 
 _OF_SIZE = SizeFactor(0.18, 0.06)
+_TERMS = ("1", r"\ln\frac{1 - r}{r}", r"\ln z")
+_WHERE = r"r = k_r/\mathrm{PGA},\ z = p\,x/(\mathrm{PGA}\,g)"
 
 METHOD = Method(
     name="weibull",
@@ -57,14 +59,17 @@ METHOD = Method(
     link=LOGLOG,
     forms={
         "pgv": Form(
-            ("b0", "b_logit_share"), _pgv, 1, (ABOVE_TWICE_PGV,), size_factor=_OF_SIZE
+            ("b0", "b_logit_share"), _pgv, 1, (ABOVE_TWICE_PGV,), size_factor=_OF_SIZE,
+            terms=("1", r"\ln\frac{1 - v}{v}"), where="v = y/2x",
         ),
         "pgv_pga": Form(
-            ("b0", "b_logit_r", "b_ln_z"), _pgv_pga, 1, (NOT_LIFTED,), size_factor=_OF_SIZE
+            ("b0", "b_logit_r", "b_ln_z"), _pgv_pga, 1, (NOT_LIFTED,), size_factor=_OF_SIZE,
+            terms=_TERMS, where=_WHERE,
         ),
         "pgv_pga_tm": Form(
             ("b0", "b_logit_r", "b_ln_z", "b_ln_zt"), _pgv_pga_tm, 1, (NOT_LIFTED,),
-            size_factor=_OF_SIZE,
+            size_factor=_OF_SIZE, terms=(*_TERMS, r"\ln z_T"),
+            where=_WHERE + r",\ z_T = p\,T_m/2\pi",
         ),
     },
     reads="outcomes",

@@ -11,7 +11,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from rbfrag.fragility.methods import NORMAL, OF_CRITICAL, TOPPLING_BLOCK, Eta, Form, Method, Numbers
+from rbfrag.fragility.methods import (
+    NORMAL,
+    OF_CRITICAL,
+    TOPPLING_BLOCK,
+    Eta,
+    FittedVariance,
+    Form,
+    Method,
+    Numbers,
+)
 
 NEGATIVE_LIMIT = 0.025
 """Probability of a negative critical velocity above which a straight line is doubted."""
@@ -67,8 +76,15 @@ def _doubts(
     )
 
 
-_LINE = Form(("c0", "c1", "v0", "v1"), _eta, 6)
-_QUADRATIC = Form(("c0", "c1", "v0", "v1", "v2"), _eta, 6)
+_LINE = Form(
+    ("c0", "c1", "v0", "v1"), _eta, 6,
+    terms=("1", "x", "", ""), equation=r"(<sum> - y)/\sigma", where=r"\sigma^2 = <v0><+v1>\,x",
+)  # fmt: skip
+_QUADRATIC = Form(
+    ("c0", "c1", "v0", "v1", "v2"), _eta, 6,
+    terms=("1", "x", "", "", ""), equation=r"(<sum> - y)/\sigma",
+    where=r"\sigma^2 = <v0><+v1>\,x<+v2>\,x^2",
+)  # fmt: skip
 
 METHOD = Method(
     name="wls",
@@ -79,4 +95,5 @@ METHOD = Method(
     meaning=OF_CRITICAL,
     fit="rbfrag.fragility.fit.line:fit_wls",
     doubts=_doubts,
+    fitted_variance=FittedVariance(mean_m_s, variance_m2_s2),
 )

@@ -176,7 +176,7 @@ class _Column:
         for digits in range(MOST_DIGITS):
             for near in (mean, 0.5 * (lowest + highest)):
                 candidate = float(f"{near:.{digits}e}")
-                if candidate > 0.0 and self.reproduced_by(candidate):
+                if 0.0 < candidate < np.inf and self.reproduced_by(candidate):
                     return candidate
         return None
 
@@ -189,7 +189,10 @@ class _Column:
         return float(np.max((since - slack) / number)), float(np.min((since + slack) / number))
 
     def reproduced_by(self, dt_s: float) -> bool:
-        start = self.times_s - dt_s * np.arange(self.times_s.size)
+        with np.errstate(
+            over="ignore"
+        ):  # times near the largest number: infinite is not reproduced
+            start = self.times_s - dt_s * np.arange(self.times_s.size)
         if self.start_is_exact:
             return bool(np.all(np.abs(start - self.times_s[0]) <= self.tolerance_s))
         return bool(np.max(start - self.tolerance_s) <= np.min(start + self.tolerance_s))

@@ -4,9 +4,8 @@ Where a block has left the contacts of its mechanism, which corner touches which
 the question. A step of length h looks for the impulses of all corners that may touch within it:
 of each corner that ends on its plane one that pushes, without rebound and with Coulomb friction
 (Stewart and Trinkle 1996, International Journal for Numerical Methods in Engineering 39,
-2673-2691; Moreau 1988). Impulses are found by Gauss-Seidel sweeps from
-zero. A block at rest costs one look a sample: the loads that its contacts bear are a convex
-set, so that what both ends of a straight line leave at rest, the whole of it does.
+2673-2691; Moreau 1988). A block at rest costs next to nothing: the loads that its contacts bear
+are a convex cone, so that it stays at rest under all that lies between two loads that leave it so.
 """
 
 from __future__ import annotations
@@ -14,10 +13,15 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel
+from rbfrag.solver.integrator.impulses import (
+    CONVERGED,
+    Corners,
+    Velocity,
+    Work,
+    after_impulses,
+)
 from rbfrag.solver.integrator.one_freedom.state import Record
 from rbfrag.solver.results import FloatArray
 
@@ -35,36 +39,8 @@ LANDING_M_S = 1e-3
 FREE_MOST_S = 60.0
 """Time after the record for which a motion that does not end is followed [s]."""
 
-SWEEPS_MAX = 400
-"""Gauss-Seidel sweeps of one step."""
-
-CONVERGED = 1e-10
-"""Change of velocity in a sweep, over g h, at which the impulses are found."""
-
 STANDSTILL = 1e-8
 """Velocity over g h below which a block is at rest."""
-
-
-class Corners(NamedTuple):
-    """The pairs of corner and plane that may touch; all arrays have shape (m,).
-
-    Args:
-        arm_x: from the centroid to the corner, block not turned, along the base [m].
-        arm_y: the same normal to the base [m].
-        normal_x: unit normal of the plane, into the block.
-        normal_y: the other component.
-        off_m: distance of the plane from the origin along its normal [m].
-        friction: tangent of its friction angle.
-        bit: what it means where they touch: `HEEL`, `TOE`, `ON_BASE` or `ON_BACK`.
-    """
-
-    arm_x: FloatArray
-    arm_y: FloatArray
-    normal_x: FloatArray
-    normal_y: FloatArray
-    off_m: FloatArray
-    friction: FloatArray
-    bit: FloatArray
 
 
 class Frame(NamedTuple):
@@ -130,7 +106,7 @@ def one_step(
     h: float,
     a: float,
     w: float,
-    work: FloatArray,
+    work: Work,
 ) -> tuple[Motion, int]:
     """Take one step; return where it leads and what touched, as bits.
 
@@ -141,15 +117,15 @@ def one_step(
         h: length of the step [s].
         a: driving acceleration in its middle [g].
         w: 1 + k_v there.
-        work: shape (9, m). Impulses begin at zero, not where the last step left them: planes that
-            could hold the block by friction alone do so only where something presses it on them.
+        work: what the step writes to. Impulses begin at zero, not where the last step left them:
+            planes that could hold the block by friction alone do so only where something presses
+            it on them.
     """
     g = STANDARD_GRAVITY_M_S2
     vx = at.vx + h * g * (w * frame.sine + a * frame.cosine)
     vy = at.vy + h * g * (a * frame.sine - w * frame.cosine)
     spin = at.spin
     c, s = math.cos(at.turned), math.sin(at.turned)
-    across, along = work[0], work[1]
     active = 0
     for i in range(corners.arm_x.size):
         rx = corners.arm_x[i] * c - corners.arm_y[i] * s
@@ -159,56 +135,31 @@ def one_step(
         # the greatest approach of a corner within the step, with its speed before and after
         fastest = min((vx - spin * ry) * nx + (vy + spin * rx) * ny,
                       (at.vx - spin * ry) * nx + (at.vy + spin * rx) * ny)  # fmt: skip
-        across[i] = 0.0
-        along[i] = 0.0
+        work.across[i] = 0.0
+        work.along[i] = 0.0
         if gap + 2.0 * h * fastest > 0.0 and gap > 1e-9:
             continue
         k = active
         active += 1
-        work[2, k] = i
+        work.pair[k] = i
         # moments of a unit impulse along the normal, and along (n_y, -n_x) down the plane
-        work[3, k] = rx * ny - ry * nx
-        work[4, k] = -rx * nx - ry * ny
-        work[8, k] = -((at.vx - at.spin * ry) * nx + (at.vy + at.spin * rx) * ny)
-        work[5, k] = 1.0 / (1.0 + work[3, k] * work[3, k] / frame.inertia_m2)
-        work[6, k] = 1.0 / (1.0 + work[4, k] * work[4, k] / frame.inertia_m2)
+        work.moment_n[k] = rx * ny - ry * nx
+        work.moment_t[k] = -rx * nx - ry * ny
+        work.approach[k] = -((at.vx - at.spin * ry) * nx + (at.vy + at.spin * rx) * ny)
         # a corner above its plane may come down to it; one that rounding put below it is let out
-        work[7, k] = -gap / h if gap > 0.0 else -0.2 * gap / h
-    tolerance = CONVERGED * g * h
-    for _ in range(SWEEPS_MAX):
-        change = 0.0
-        for k in range(active):
-            i = int(work[2, k])
-            nx, ny = corners.normal_x[i], corners.normal_y[i]
-            mn, mt = work[3, k], work[4, k]
-            speed = vx * nx + vy * ny + spin * mn
-            push = max(across[i] - (speed - work[7, k]) * work[5, k], 0.0)
-            part = push - across[i]
-            across[i] = push
-            vx += part * nx
-            vy += part * ny
-            spin += part * mn / frame.inertia_m2
-            change = max(change, abs(part))
-            speed = vx * ny - vy * nx + spin * mt
-            limit = corners.friction[i] * push
-            grip = min(max(along[i] - speed * work[6, k], -limit), limit)
-            part = grip - along[i]
-            along[i] = grip
-            vx += part * ny
-            vy -= part * nx
-            spin += part * mt / frame.inertia_m2
-            change = max(change, abs(part))
-        if change <= tolerance:
-            break
+        work.least[k] = -gap / h if gap > 0.0 else -0.2 * gap / h
+    vx, vy, spin = after_impulses(
+        corners, work, active, 1.0 / frame.inertia_m2, Velocity(vx, vy, spin), CONVERGED * g * h
+    )
     touch = on_base = 0
     hardest = 0.0
     for k in range(active):
-        i = int(work[2, k])
-        if across[i] > 0.0:
+        i = int(work.pair[k])
+        if work.across[i] > 0.0:
             touch |= int(corners.bit[i])
             if corners.bit[i] != ON_BACK:
                 on_base += 1
-                hardest = max(hardest, work[8, k])
+                hardest = max(hardest, work.approach[k])
     if on_base > 1 and hardest > LANDING_M_S:
         touch |= LANDS
     return Motion(at.x + h * vx, at.y + h * vy, at.turned + h * spin, vx, vy, spin), touch
@@ -216,7 +167,7 @@ def one_step(
 
 @inner_kernel
 def rests(
-    corners: Corners, frame: Frame, at: Motion, h: float, a: float, w: float, work: FloatArray
+    corners: Corners, frame: Frame, at: Motion, h: float, a: float, w: float, work: Work
 ) -> bool:
     """Whether a block at rest stays so under two accelerations [g]."""
     after, _ = one_step(corners, frame, at, h, a, w, work)
@@ -240,7 +191,7 @@ def run_free(
     at: Motion,
     h: float,
     stop_at_landing: bool,
-    work: FloatArray,
+    work: Work,
     history: FloatArray,
 ) -> FreeRun:
     """Run a block from a time of the record until nothing moves it any more.
@@ -253,7 +204,7 @@ def run_free(
         at: motion there.
         h: greatest step [s].
         stop_at_landing: whether an impact of the whole base ends the run.
-        work: shape (9, m).
+        work: what the steps write to.
         history: shape (8, k) for what is kept; (8, 0) for nothing.
     """
     time_s, k_h, w, last = record.time_s, record.k_h, record.w, record.last
@@ -265,6 +216,8 @@ def run_free(
     resting = at_standstill(at, frame, h)
     end_s = time_s[-1]
     every = 0
+    # the block stays at rest where k_h/(1 + k_v) is between these
+    low, high = math.inf, -math.inf
     while True:
         free = node >= last
         if free and last < time_s.size - 1:
@@ -283,13 +236,19 @@ def run_free(
                 continue
         if resting:
             part = (now - begin) / length
-            if rests(corners, frame, at, h, a0 + part * (a1 - a0), w0 + part * (w1 - w0), work):
+            a, w_now = a0 + part * (a1 - a0), w0 + part * (w1 - w0)
+            q = a / w_now
+            if low <= q <= high or rests(corners, frame, at, h, a, w_now, work):
                 if free:
                     return FreeRun(AT_REST, stopped_s, at, steps, filled, moved_s, landed_s)
-                if rests(corners, frame, at, h, a1, w1, work):
+                low, high = min(low, q), max(high, q)
+                q = a1 / w1
+                if low <= q <= high or rests(corners, frame, at, h, a1, w1, work):
+                    low, high = min(low, q), max(high, q)
                     node += 1
                     now = time_s[node]
                     continue
+        low, high = math.inf, -math.inf
         parts = max(1, math.ceil((begin + length - now) / h - 1e-9))
         size = (begin + length - now) / parts
         first = now
@@ -331,8 +290,3 @@ def run_free(
 
 KEEP = 5
 """Steps between states that are kept."""
-
-
-def work_of(corners: Corners) -> FloatArray:
-    """Return the work arrays of a run."""
-    return np.zeros((9, corners.arm_x.size))

@@ -283,8 +283,13 @@ def level_rectangle(p2: float, kr: float) -> tuple[Block, Stability]:
     """
     slender_deg = math.degrees(math.atan(positive(kr, "kr", "")))
     block = Block.from_angles(-slender_deg, slender_deg, rectangle_r3_m(p2))
-    rough_deg = 0.5 * (slender_deg + 90.0)
-    return block, stability(block, beta_deg=0.0, phi_deg=rough_deg, back_fracture=False)
+    rough = rough_deg(block)
+    return block, stability(block, beta_deg=0.0, phi_deg=rough, back_fracture=False)
+
+
+def rough_deg(block: Block) -> float:
+    """Return a friction angle [deg] at which a block topples rather than slides."""
+    return 0.5 * (block.alpha3_deg + 90.0)
 
 
 def stability_as_dict(block: Block, stability: Stability) -> dict[str, Any]:

@@ -38,6 +38,9 @@ FLAGS = (
 
 PATIENCE_MS = 20_000
 
+NUMBERS = "?p2=3&kr=0.1&pgv=0.6"
+"""A block of two numbers, and a shaking; an empty query opens the page's own example."""
+
 DESKTOP = {"width": 1366, "height": 900}
 
 
@@ -123,7 +126,8 @@ class Opened:
         """Wait until what is shown answers the fields; return the page."""
         self.page.wait_for_function(
             "() => document.querySelector('#main').ariaBusy === 'false'"
-            " && !document.querySelector('#chart.stale, #curve.stale')"
+            " && ![...document.querySelectorAll('#chart.stale, #curve.stale')]"
+            "   .some((each) => each.checkVisibility())"
             " && document.querySelector('#probability').dataset.state"
         )
         return self.page
@@ -138,7 +142,7 @@ def open_page(browser: Browser, service: str) -> Iterator[Callable[..., Opened]]
     contexts = []
     every = []
 
-    def opening(query: str = "", *, settle: bool = True, **window: Any) -> Opened:
+    def opening(query: str = NUMBERS, *, settle: bool = True, **window: Any) -> Opened:
         context = browser.new_context(**{"viewport": DESKTOP, **window})
         context.set_default_timeout(PATIENCE_MS)
         contexts.append(context)

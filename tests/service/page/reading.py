@@ -15,7 +15,7 @@ PERCENT = re.compile(r"([<>]?)\s*([\d.]+)\s*%")
 
 
 FIRST_ANSWER = f"{100.0 * predict(3.0, 0.1, pgv_m_s=0.6, db=REFERENCE).probability:.2g} %"
-"""What the page shows when it is opened: p² = 3 1/s², k_r = 0.1, PGV 0.6 m/s."""
+"""What the page shows of p² = 3 1/s², k_r = 0.1, PGV 0.6 m/s."""
 
 
 def probability_shown(page: Page) -> str:

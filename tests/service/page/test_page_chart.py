@@ -17,6 +17,7 @@ def field(page, name):
 
 
 def on_screen(page, place):
+    page.locator("#chart").scroll_into_view_if_needed()
     box = page.locator("#chart svg").bounding_box()
     return box["x"] + place[0], box["y"] + place[1]
 
@@ -85,7 +86,7 @@ def test_the_point_is_dragged(open_page, ask):
     page.mouse.up()
     assert field(page, "pgv") == pytest.approx(1.2, rel=0.02)
     assert field(page, "kr") == pytest.approx(kr_at(0.3), rel=0.02)
-    expect(page.locator("#about")).to_contain_text(f"intensity {field(page, 'pgv'):g}")
+    expect(page.locator("#about")).to_contain_text(f"Intensity {field(page, 'pgv'):g}")
     opened.settled()
     answer = ask("v1/predict", p2=3, kr=page.input_value("#kr"), pgv=page.input_value("#pgv"))
     assert agrees(probability_shown(page), answer["probability"])
@@ -117,7 +118,6 @@ def test_a_click_moves_the_point(open_page):
 def test_a_finger_moves_the_point(open_page):
     opened = open_page(**PHONE)
     page = opened.page
-    page.locator("#chart").scroll_into_view_if_needed()
     plane = plane_of(page)
     touch = page.context.new_cdp_session(page)
 
@@ -140,13 +140,13 @@ def test_a_finger_moves_the_point(open_page):
 def test_a_block_of_a_shape_moves_along_the_shaking_only(open_page):
     opened = open_page("?alpha1=-15&alpha3=24&r3=2.5&beta=18&phi=38&pgv=0.6")
     page = opened.page
-    before = page.text_content("#block-numbers")
+    before = page.text_content("#taken")
     page.focus(".point")
     page.keyboard.press("ArrowUp")
     page.keyboard.press("ArrowRight")
     opened.settled()
     assert field(page, "pgv") == pytest.approx(0.612)
-    assert page.text_content("#block-numbers") == before
+    assert page.text_content("#taken") == before
 
 
 def test_another_measure_runs_across_where_pgv_is_not_known(open_page, ask):
@@ -195,3 +195,73 @@ def test_both_bands_of_the_curve_are_the_services(open_page, ask):
             edges = sorted(1.0 - (py - top) / height for x, py in outline if x == px)
             answer = ask("v1/predict", p2=3, kr=0.1, pgv=0.05 * 60.0 ** ((px - left) / width))
             assert [edges[0], edges[-1]] == pytest.approx([answer[name] for name in ends], abs=3e-3)
+
+
+def ticks(page, axis):
+    """Numbers written along an axis of the design chart, the first below it."""
+    return page.locator("#chart .axis").nth(axis).locator(".tick").all_text_contents()
+
+
+def test_the_ranges_follow_the_inputs_back(open_page):
+    opened = open_page("")
+    page = opened.page
+    usual = [ticks(page, axis) for axis in range(3)]
+    for name, mistaken, meant in (("pgv", "600", "0.6"), ("width", "50", "0.5")):
+        page.fill(f"#{name}", mistaken)
+        opened.settled()
+        assert [ticks(page, axis) for axis in range(3)] != usual
+        page.fill(f"#{name}", meant)
+        opened.settled()
+        assert [ticks(page, axis) for axis in range(3)] == usual
+
+
+def test_a_point_that_is_moved_finds_the_ranges_where_they_were(open_page):
+    opened = open_page("?p2=3&kr=0.1&pgv=20")
+    page = opened.page
+    wide = ticks(page, 0)
+    assert "20" in wide
+    page.focus(".point")
+    for _ in range(25):
+        page.keyboard.press("Shift+ArrowLeft")
+    opened.settled()
+    assert field(page, "pgv") < 3.0
+    assert ticks(page, 0) == wide
+    page.fill("#pgv", "1")
+    opened.settled()
+    assert "20" not in ticks(page, 0)
+
+
+OVERLAPS = """(id) => {
+  const all = [...document.querySelectorAll(`#${id} text`)].filter((each) =>
+    each.checkVisibility() && each.textContent.trim() && !each.closest('[display=none]'));
+  const boxes = all.map((each) => [each.textContent, each.getBoundingClientRect()]);
+  return boxes.flatMap(([a, p], i) => boxes.slice(i + 1)
+    .filter(([, q]) => p.left < q.right && q.left < p.right
+      && p.top + 3 < q.bottom && q.top + 3 < p.bottom)
+    .map(([b]) => `${a} over ${b}`));
+}"""
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "",
+        "?p2=3&kr=0.1&pgv=0.6",
+        "?p2=3&kr=0.1&pgv=2.9",
+        "?p2=3&kr=0.02&pgv=0.3&kind=rocking",
+        "?p2=20&kr=0.3&pga=0.5&sa10_g=0.4",
+    ],
+)
+def test_no_label_lies_over_another(open_page, query):
+    opened = open_page(query)
+    page = opened.page
+    for width in (390, 800, 1280):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_timeout(100)
+        for figure in ("chart", "curve"):
+            assert page.evaluate(OVERLAPS, figure) == [], width
+    label = page.locator(".point text")
+    assert label.text_content().replace("\u00a0", " ") == probability_shown(page)
+    dot, text = page.locator(".point .dot").bounding_box(), label.bounding_box()
+    assert abs(dot["y"] + dot["height"] / 2 - text["y"] - text["height"] / 2) < 4.0  # beside
+    assert text["x"] > dot["x"] + dot["width"] or text["x"] + text["width"] < dot["x"]

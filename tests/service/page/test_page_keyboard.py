@@ -39,11 +39,11 @@ def walk(page):
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_everything_is_reached_and_shows_its_focus(open_page, scheme):
-    opened = open_page("?p2=3&kr=0.1&pgv=0.6&pga=0.5", color_scheme=scheme)
+    opened = open_page("?p2=3&kr=0.1&pgv=0.6&pga=0.5&tm=0.5&level=0.9", color_scheme=scheme)
     reached, unseen = walk(opened.page)
     for name in ("copy-link", "print", "p2", "kr", "pgv", "pga", "tm", "pgd", "model", "level"):
         assert name in reached
-    for name in ("point", "record-file", "units", "dt", "summary"):
+    for name in ("point", "record-file", "example-record", "summary"):
         assert name in reached
     assert unseen == []
 
@@ -71,7 +71,8 @@ def test_the_way_a_block_is_given_is_chosen_by_arrows(open_page):
     opened = open_page()
     page = opened.page
     page.focus("input[value=numbers]")
-    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("ArrowLeft")
     expect(page.locator("#alpha1")).to_be_visible()
     expect(page.locator("#p2")).to_be_hidden()
 

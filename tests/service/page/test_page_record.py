@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect
 
+from rbfrag.motions.export import export_motions
+from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from tests.service.page.reading import points_of
 from tests.service.page.test_page_answers import forgive
@@ -90,7 +92,8 @@ def test_a_dropped_record_shows_its_spectrum(open_page, tmp_path):
         assert len(drawn) > 40
         for p2, x in drawn[::5]:
             assert x == pytest.approx(toppling_spectrum(motion, p2, polarity), rel=0.01)
-    expect(page.locator("#record-name")).to_contain_text("PGV")
+    expect(page.locator("#record-name")).to_have_text("pulse.csv")
+    expect(page.locator("#spectrum-words")).to_contain_text("Its PGV is")
     expect(page.locator("#spectrum .dot")).to_have_count(1)
 
 
@@ -166,6 +169,56 @@ def test_a_unit_that_the_file_leaves_open_is_asked_for(open_page):
     forgive(opened, "Failed to load resource")
 
 
+def test_the_traces_of_a_file_are_listed(open_page, tmp_path):
+    motions = [
+        GroundMotion(scale * np.sin(np.linspace(0.0, 6.3, 120)), 0.01, component=name)
+        for name, scale in (("N", 0.2), ("E", 0.4))
+    ]
+    export_motions(motions, tmp_path / "two.csv")
+    opened = open_page()
+    page = opened.page
+    drop(page, "two.csv", (tmp_path / "two.csv").read_text(encoding="utf-8"))
+    traces = page.locator("#trace option")
+    expect(traces).to_have_text(["1: N", "2: E"])
+    expect(page.locator("#record-name")).to_have_text("two.csv, trace 1: N")
+    for i, motion in enumerate(motions):
+        page.select_option("#trace", str(i))
+        expect(page.locator("#spectrum-words")).to_contain_text(f"PGV is {motion.pgv_m_s:.3g}")
+    expect(page.locator("#record-name")).to_have_text("two.csv, trace 2: E")
+    drop(page, "pulse.csv", pulse())
+    expect(page.locator("#record-name")).to_have_text("pulse.csv")
+    expect(page.locator("#trace")).to_be_hidden()
+    forgive(opened, "Failed to load resource")
+
+
+def test_there_is_a_record_to_try_and_it_says_what_it_is(open_page):
+    opened = open_page("")
+    page = opened.page
+    page.click("#example-record")
+    expect(page.locator("#record-name")).to_have_text(
+        "synthetic pulse, one sine of 0.35 g and 0.8 s"
+    )
+    # the velocity gained over half a sine: a g T/π
+    pgv = 0.35 * STANDARD_GRAVITY * 0.8 / math.pi
+    expect(page.locator("#spectrum-words")).to_contain_text(f"Its PGV is {pgv:.3g}")
+
+
+def test_the_link_on_paper_holds_the_record_too(open_page):
+    opened = open_page()
+    page = opened.page
+    drop(page, "pulse.csv", pulse())
+    expect(page.locator("#spectrum-part")).to_be_visible()
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.emulate_media(media="print")
+    expect(page.locator("#spectrum svg")).to_be_visible()
+    link = page.text_content("#paper-link")
+    assert page.get_attribute("#paper-link", "href") == link
+    parts = urlsplit(link)
+    again = open_page(f"?{parts.query}#{parts.fragment}")
+    assert again.text("#spectrum-words") == opened.text("#spectrum-words")
+    assert again.text("#probability") == opened.text("#probability")
+
+
 def test_a_link_holds_the_spectrum(open_page):
     opened = open_page("?p2=3&kr=0.02&pgv=0.6")
     page = opened.page
@@ -195,6 +248,7 @@ def test_a_recorded_accelerogram(open_page, records_dir):
     opened = open_page("?p2=3&kr=0.01&pgv=0.6")
     page = opened.page
     page.set_input_files("#record-file", path)
-    expect(page.locator("#record-name")).to_contain_text("PGV 0.109")
+    expect(page.locator("#record-name")).to_have_text("Coyote_Lake_1979_G02-050.csv")
+    expect(page.locator("#spectrum-words")).to_contain_text("Its PGV is 0.109")
     expect(page.locator("#spectrum-words")).to_contain_text("0.0839")
     expect(page.locator("#spectrum-words")).to_contain_text("may topple")

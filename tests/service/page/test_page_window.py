@@ -11,6 +11,8 @@ NARROW = {"viewport": {"width": 390, "height": 844}, "has_touch": True, "is_mobi
 
 QUERIES = [
     "",
+    "?p2=3&kr=0.1&pgv=0.6",
+    "?height=1&width=1&dip=20&phi=30&pgv=0.6",
     "?alpha1=-15&alpha3=24&r3=2.5&beta=18&phi=38&pgv=0.6&pga=0.5&tm=0.4",
     "?p2=40&kr=0.1&pgv=6",
 ]
@@ -60,6 +62,7 @@ def test_nothing_sticks_out_of_the_window(open_page, query):
         page.set_viewport_size({"width": width, "height": 844})
         page.wait_for_function(
             """() => [...document.querySelectorAll('#chart, #curve, #block')].every((each) =>
+              !each.checkVisibility() ||
               each.querySelector('svg').getAttribute('width') == Math.floor(each.clientWidth))"""
         )
         check_that_nothing_sticks_out(page, width)
@@ -101,7 +104,7 @@ def test_text_stands_out_from_what_is_behind_it(open_page, query):
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
         contrasts = page.evaluate(CONTRASTS)
-        assert len(contrasts) > 60
+        assert len(contrasts) > 50
         assert [each for each in contrasts if each[0] < 4.5] == []
 
 
@@ -110,7 +113,7 @@ def test_on_paper_are_the_answer_the_charts_and_the_link(open_page):
     page = opened.page
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     page.emulate_media(media="print", color_scheme="dark")
-    for hidden in (".tools", "#drop", "#chart-hint .screen", ".record"):
+    for hidden in (".tools", "#drop", ".hint.screen", ".record", ".help >> nth=0"):
         expect(page.locator(hidden)).to_be_hidden()
     for shown in ("#probability", "#chart svg", "#curve svg", "#block svg", "#warnings li"):
         expect(page.locator(shown).first).to_be_visible()
@@ -127,6 +130,8 @@ def test_nothing_is_asked_of_another_host(open_page, service):
     page = opened.page
     page.fill("#pgv", "1.1")
     opened.settled()
+    page.click("#example-record")
+    expect(page.locator("#spectrum-part")).to_be_visible()
     page.get_by_label("angles", exact=True).check()
     opened.settled()
     assert len(opened.requests) > 20

@@ -41,26 +41,35 @@ def test_percent_agrees_with_the_probability(run):
 def test_words_count_what_the_numbers_say(run):
     answers = [
         {
-            **{"probability": p, "ci_low": low, "ci_high": high, "level": 0.95},
+            **{"kind": kind, "probability": p, "ci_low": low, "ci_high": high, "level": 0.95},
             **{"event_low": least, "event_high": greatest},
         }
-        for p, low, high, least, greatest in [
-            (0.12, 0.08, 0.17, 0.05, 0.4),
-            (0.004, 0.001, 0.02, None, None),
-            (0.9996, 0.9, 0.99999, 0.8, 1),
-            (0, 0, 0, 0, 0),
+        for kind, p, low, high, least, greatest in [
+            ("toppling", 0.12, 0.08, 0.17, 0.05, 0.4),
+            ("rocking", 0.004, 0.001, 0.02, None, None),
+            ("sliding", 0.9996, 0.9, 0.99999, 0.8, 1),
+            ("slumping", 1e-7, 1e-9, 1e-6, 1e-12, 1e-6),
+            ("toppling", 0, 0, 0, 0, 0),
         ]
     ]
-    twelve, few, most, none = run("percent.js", "inWords", [[each] for each in answers])
-    assert "Of 100 such blocks about 12 topple, over all earthquakes and sites" in twelve
-    assert "as far as the data tell it, between 8 and 17." in twelve
-    assert "In one single earthquake, between 5 and 40 topple." in twelve
-    assert "Of 1\u202f000" in few
-    assert "about 4 topple" in few
-    assert "single earthquake" not in few
-    assert "9\u202f996" in most
-    assert "almost all" in most
+    twelve, few, most, hardly, none = run("percent.js", "inOneSentence", [[a] for a in answers])
+    assert twelve.startswith("Of 100 such blocks about 12 topple in shaking like this")
+    assert few.startswith("Of 1\u202f000 such blocks about 4 overturn")
+    assert most.startswith("Of 10\u202f000 such blocks about 9\u202f996 slide too far")
+    assert hardly.startswith("Of 10\u202f000 such blocks fewer than 1 slump")
     assert none.startswith("No earthquake motion")
+    twelve, few, most, hardly, none = run("percent.js", "ranges", [[a] for a in answers])
+    assert "it is between 8 and 17. In one single earthquake it may be between 5 and 40." in twelve
+    assert "single earthquake" not in few
+    assert "almost all" in most
+    assert hardly.startswith("As far as the data tell, it is fewer than 1.")
+    assert none == ""
+
+
+def test_a_decimal_comma_is_read_and_nothing_else_is_changed(run):
+    texts = ["0,1", " 12,5 ", ",5", "\u22125", "1e-3", "1,5e-3", "1,000,000", "0.1,2", "abc", "1,a"]
+    read = ["0.1", "12.5", ".5", "-5", "1e-3", "1.5e-3", "1,000,000", "0.1,2", "abc", "1,a"]
+    assert run("numbers.js", "plain", [[text] for text in texts]) == read
 
 
 def test_readable_numbers_keep_their_value(run):

@@ -4,7 +4,7 @@ import { d3 } from "./d3.js";
 import { afterPause } from "./latest.js";
 import { quantity, readable } from "./numbers.js";
 import { byId } from "./page.js";
-import { inWords, percent } from "./percent.js";
+import { inOneSentence, percent, ranges, verbOf } from "./percent.js";
 import { writeText } from "./subscripts.js";
 
 const SPOKEN_AFTER_MS = 700;
@@ -26,6 +26,15 @@ const KNOWS = {
   pga_sa03_sa10_sa30: "PGA, SA(0.3, 1, 3 s)",
 };
 
+/** How the sentence begins that says where the models come from. */
+const OF_THE_REFERENCE = "answered by the reference model";
+
+/** Sentences of the service that the page says in its own place. */
+const SAID = new RegExp(`^(${OF_THE_REFERENCE}|no friction angle is given)`);
+
+/** An equals sign that does not part from what stands beside it. */
+const IS = "\u00a0=\u00a0";
+
 const speak = afterPause(SPOKEN_AFTER_MS, (/** @type {string} */ text) => {
   byId("live").textContent = text;
 });
@@ -39,29 +48,59 @@ export function showAnswer(answer) {
   const range = answer.in_domain
     ? "within the fitted range"
     : "outside the fitted range: an extrapolation";
+  const reference = answer.warnings.some((/** @type {string} */ each) =>
+    each.startsWith(OF_THE_REFERENCE),
+  );
   byId("probability").textContent = percent(answer.probability);
-  byId("interval").textContent = `${interval}, ${percent(answer.level)} interval`;
-  byId("in-words").textContent = inWords(answer);
+  byId("sentence").textContent = inOneSentence(answer);
+  byId("in-words").textContent = ranges(answer);
   const domain = byId("domain");
   domain.textContent = range;
   domain.dataset.inside = String(answer.in_domain);
   writeText(
     byId("about"),
-    `Model ${answer.model}. Toppling velocity of the block y = k_r g/p = ` +
-      `${quantity(answer.y_m_s, "m/s")}; intensity ${quantity(answer.intensity_m_s, "m/s")}.`,
+    `Model ${answer.model}. Intensity ${quantity(answer.intensity_m_s, "m/s")}` +
+      (answer.y_m_s === null
+        ? ""
+        : `, velocity of the block y = k g/p = ${quantity(answer.y_m_s, "m/s")}`) +
+      `. ${reference ? "It is shipped with rbfrag." : "It comes from the database of this service."}`,
   );
   drawMeter(answer);
-  showWarnings(byId("warnings"), answer.warnings);
+  showWarnings(
+    byId("warnings"),
+    answer.warnings.filter((/** @type {string} */ each) => !SAID.test(each)),
+  );
   showOthers(answer.answers);
-  byId("strip").textContent = `${percent(answer.probability)} (${interval})`;
+  byId("strip").textContent = `${percent(answer.probability)} ${verbOf(answer)} (${interval})`;
   mark("known");
   const event =
     answer.event_low === null
       ? ""
       : ` In one single earthquake ${percent(answer.event_low)} to ${percent(answer.event_high)}.`;
-  const failure = `Probability of ${answer.failure}`;
+  const failure = `Probability of ${answer.failure.replace("permanent displacement above", "sliding more than")}`;
   byId("answer-title").textContent = failure;
   speak(`${failure} ${percent(answer.probability)}, ${interval}, ${range}.${event}`);
+}
+
+/**
+ * Say what is taken of a block that has an answer.
+ * @param {import("./question.js").Question} question
+ * @param {any} found answer of /v1/drawing
+ */
+export function sayOfBlock({ shape, values }, { numbers }) {
+  const { p2, kr, ky, ks, ps2 } = numbers;
+  const strength =
+    kr !== undefined
+      ? `p²${IS}${quantity(p2, "1/s²")} and k_r${IS}${quantity(kr, "g")}`
+      : ky !== undefined
+        ? `k_y${IS}${quantity(ky, "g")}`
+        : `p_s²${IS}${quantity(ps2, "1/s²")} and k_s${IS}${quantity(ks, "g")}`;
+  const verb = ky === undefined ? "follow" : "follows";
+  const rough = shape === "rectangle" && values.phi === "" ? ", and rough enough not to slide" : "";
+  const stands = `The block is taken as ${values.kind ? "free-standing" : "backed by a slope"}${rough}`;
+  const from = shape === "rectangle" ? "height, width and dip" : shape;
+  const words = shape === "numbers" ? `, with ${strength}.` : `; from its ${from} ${verb} ${strength}.`;
+  writeText(byId("taken"), stands + words);
 }
 
 /**
@@ -76,15 +115,16 @@ export function sayOfModel(sentence) {
 /**
  * Show that there is no answer, and why.
  * @param {string} why
+ * @param {string[]} [warnings] about the block
  */
-export function showNoAnswer(why) {
+export function showNoAnswer(why, warnings = []) {
   byId("probability").textContent = "\u2013";
-  byId("interval").textContent = "no answer";
-  byId("in-words").textContent = why;
-  for (const id of ["domain", "about"]) byId(id).textContent = "";
+  byId("answer-title").textContent = "No probability";
+  byId("sentence").textContent = why;
+  for (const id of ["in-words", "taken", "domain", "about"]) byId(id).textContent = "";
   delete byId("domain").dataset.inside;
   d3.select("#meter").selectAll("*").remove();
-  showWarnings(byId("warnings"), []);
+  showWarnings(byId("warnings"), warnings);
   byId("others").hidden = true;
   byId("strip").textContent = "no answer";
   mark("none");
@@ -152,7 +192,7 @@ function drawMeter(answer) {
 /** @param {any[]} answers */
 function showOthers(answers) {
   const list = answers ?? [];
-  byId("others").hidden = list.length < 2;
+  byId("others").hidden = false;
   d3.select("#other-answers")
     .selectAll("tr")
     .data(list)

@@ -19,11 +19,13 @@ export function useToken(text) {
 export class Refusal extends Error {
   /**
    * @param {number} status
-   * @param {{title?: string, detail?: string}} problem
+   * @param {{title?: string, detail?: string, traces?: string[]}} problem
    */
   constructor(status, problem) {
     super(problem.detail || problem.title || `the service answered with status ${status}`);
     this.status = status;
+    /** Names of the traces of a file of which one is to be named. */
+    this.traces = problem.traces;
   }
 }
 

@@ -4,19 +4,25 @@ import { d3 } from "./d3.js";
 import { readable } from "./numbers.js";
 import { writeSvgText } from "./subscripts.js";
 
-/** Width below which only one number a decade is written, in pixels a decade. */
-const ROOMY = 130;
+/** Numbers of a decade that may be written, the most first. */
+const DIGITS = [[1, 2, 3, 5, 7], [1, 2, 5], [1, 3], [1]];
+
+/** Room that a number takes along an axis, in pixels. */
+const ROOM = { across: 38, up: 18 };
 
 /**
  * The numbers that are written on a logarithmic axis.
  * @param {any} scale
+ * @param {number} room that a number takes along the axis, in pixels
  * @returns {number[]}
  */
-export function marks(scale) {
+function marks(scale, room) {
   const [low, high] = scale.domain();
   const [a, b] = scale.range();
   const decade = Math.abs(b - a) / Math.abs(Math.log10(high / low));
-  const digits = decade > ROOMY ? [1, 2, 3, 5, 7] : decade > ROOMY / 2 ? [1, 2, 5] : [1, 3];
+  const fits = (/** @type {number[]} */ digits) =>
+    digits.every((digit, i) => decade * Math.log10((digits[i + 1] ?? 10) / digit) >= room);
+  const digits = DIGITS.find(fits) ?? [1];
   return withinDecades(Math.min(low, high), Math.max(low, high), digits);
 }
 
@@ -40,7 +46,8 @@ export function gridLines(scale) {
  */
 export function drawAxis(group, side, scale, title, how = {}) {
   const axis = { bottom: d3.axisBottom, top: d3.axisTop, left: d3.axisLeft, right: d3.axisRight };
-  const values = how.values ?? marks(scale);
+  const room = side === "left" || side === "right" ? ROOM.up : ROOM.across;
+  const values = how.values ?? marks(scale, room);
   const text = how.text ?? ((/** @type {number} */ value) => readable(value));
   group
     .attr("class", "axis")

@@ -1,6 +1,5 @@
 /** The block drawn to scale on its planes, with its mode named. */
 
-import { showWarnings } from "./answer.js";
 import { d3 } from "./d3.js";
 import { quantity, readable } from "./numbers.js";
 import { byId } from "./page.js";
@@ -21,13 +20,23 @@ const DOES = {
  * How a block fails, in one sentence.
  * @param {any} block answer of /v1/block
  */
-export function blockInWords(block) {
+function inWords(block) {
   const does = DOES[/** @type {keyof typeof DOES} */ (block.mode)];
   if (block.state === "locked")
     return `Locked: no horizontal acceleration moves it; else it ${does}.`;
   if (block.state === "unstable") return `Unstable: it ${does} at rest, without an earthquake.`;
-  const from = quantity(block.yield_acceleration, "g", 4);
+  const from = quantity(block.yield_acceleration, "g");
   return `It ${does}, from a horizontal acceleration of ${from}.`;
+}
+
+/**
+ * Why a block has no probability; empty where it has one.
+ * @param {any} found answer of /v1/drawing
+ */
+export function whyNoAnswer({ block, numbers }) {
+  if (numbers) return "";
+  const words = inWords(block);
+  return block.state === "stable" ? `${words} No fragility model answers for it.` : words;
 }
 
 /**
@@ -41,7 +50,7 @@ export function blockDrawing(place) {
     place,
     "The block on its planes",
     MARGINS,
-    (w) => Math.min(0.85 * w, 330),
+    (w) => Math.min(0.95 * w, 300),
     draw,
   );
   const { svg, plot } = sheet();
@@ -71,7 +80,7 @@ export function blockDrawing(place) {
     plot.append("path").attr("class", "planes").attr("d", path(lines.planes_m));
     plot
       .append("path")
-      .attr("class", `outline ${lines.mode}`)
+      .attr("class", `outline ${lines.block.mode}`)
       .attr("d", `${path(lines.outline_m)}Z`);
     for (const [number, contact] of Object.entries(lines.contacts_m)) {
       const [cx, cy] = at(/** @type {number[]} */ (contact));
@@ -103,16 +112,14 @@ export function blockDrawing(place) {
   return {
     /**
      * @param {any} drawing answer of /v1/drawing
-     * @param {any} block answer of /v1/block, or null where the block is two numbers
+     * @param {import("./question.js").Question} question
      */
-    show(drawing, block) {
+    show(drawing, { shape }) {
       lines = drawing;
       draw();
-      const words = block ? blockInWords(block) : rectangle(drawing);
+      const words = shape === "numbers" ? rectangle(drawing.block) : inWords(drawing.block);
       svg.attr("aria-label", `The block on its planes. ${words.replaceAll("_", "")}`);
       writeText(byId("block-words"), words);
-      showWarnings(byId("block-warnings"), block?.warnings ?? []);
-      showNumbers(block);
       this.upToDate(true);
     },
     /** @param {boolean} is whether what is drawn is the present block */
@@ -122,44 +129,12 @@ export function blockDrawing(place) {
   };
 }
 
-/** @param {any} drawing */
-function rectangle(drawing) {
-  return (
-    "Two numbers are known of this block, not its shape. Drawn is the rectangle on level ground " +
-    `that has them (r_3 = ${quantity(drawing.r3_m, "m")}); any other block with the same ` +
-    "p² and k_r has the same probability."
-  );
-}
-
 /** @param {any} block */
-function showNumbers(block) {
-  const rows = block
-    ? [
-        ["mode", block.mode.replace("_", " ")],
-        ["state", block.state],
-        ["p²", quantity(block.p2, "1/s²")],
-        ["k_r", block.kr === null ? "does not apply" : quantity(block.kr, "g")],
-        ["sliding k_y", block.ky === null ? "none" : quantity(block.ky, "g")],
-        ["r_3", quantity(block.r3_m, "m")],
-        ["γ", quantity(block.gamma_deg, "°")],
-        ["area", quantity(block.area_m2, "m²")],
-      ]
-    : [];
-  d3.select("#block-numbers")
-    .selectAll("div")
-    .data(rows)
-    .join((/** @type {any} */ enter) => {
-      const row = enter.append("div");
-      row.append("dt");
-      row.append("dd");
-      return row;
-    })
-    .each(function (/** @type {string[]} */ [name, value]) {
-      // @ts-ignore: `this` is the element, by D3's convention
-      const row = d3.select(this);
-      writeText(row.select("dt").node(), name);
-      row.select("dd").text(value);
-    });
+function rectangle(block) {
+  return (
+    "Its shape is not known. Drawn is the rectangle on level ground with these numbers " +
+    `(r_3 = ${quantity(block.r3_m, "m")}); all blocks that share them have the same probability.`
+  );
 }
 
 /**

@@ -1,13 +1,16 @@
 /** The design chart: probability of toppling over shaking and block, with the reader's point. */
 
 import { drawAxis, drawGrid, gridLines } from "./axes.js";
-import { areaOutside, areasAbove, BOLD, labelsOf } from "./contours.js";
+import { areaOutside, areasAbove, BOLD, LABEL, labelsOf, touch } from "./contours.js";
 import { d3 } from "./d3.js";
 import { quantity, readable } from "./numbers.js";
 import { percent } from "./percent.js";
 import { labelOf } from "./plane.js";
 import { movable } from "./point.js";
 import { sheetIn } from "./sheet.js";
+
+/** How far from the point the middle of its label stands, in pixels. */
+const BESIDE = 34;
 
 export const MARGINS = { left: 62, right: 58, top: 10, bottom: 44 };
 
@@ -30,11 +33,10 @@ export function designChart(place, moved) {
   /** @type {import("./contours.js").Grid | null} */
   let grid = null;
   const name = "Design chart: probability of toppling over shaking and toppling velocity";
-  const sheet = sheetIn(place, name, MARGINS, (w) => Math.min(Math.max(0.78 * w, 300), 540), draw);
+  const sheet = sheetIn(place, name, MARGINS, (w) => Math.min(Math.max(0.62 * w, 320), 480), draw);
   const { svg, plot } = sheet();
   svg.attr("role", "group");
   const clip = svg.append("clipPath").attr("id", "chart-clip").append("rect");
-  hatch(svg);
   plot.append("rect").attr("class", "area");
   const inside = plot.append("g").attr("clip-path", "url(#chart-clip)");
   const parts = {
@@ -53,6 +55,7 @@ export function designChart(place, moved) {
   parts.point.append("circle").attr("class", "reach").attr("r", 22);
   parts.point.append("circle").attr("class", "ring").attr("r", 12);
   parts.point.append("circle").attr("class", "dot").attr("r", 7);
+  parts.point.append("text").attr("dy", "0.34em");
   parts.point
     .attr("tabindex", 0)
     .attr("role", "slider")
@@ -75,6 +78,7 @@ export function designChart(place, moved) {
     ([byX, byY]) => {
       if (spot) moved.by(byX, spot.yIsFree ? byY : 1);
     },
+    keepAnswerInSize,
   );
 
   function draw() {
@@ -99,12 +103,11 @@ export function designChart(place, moved) {
     drawAxis(parts.bottom, "bottom", x, labelOf(plane.across).title);
     drawAxis(parts.left, "left", y, "toppling velocity y = k_r g/p [m/s]");
     drawAxis(parts.right, "right", kr, `k_r [g] at p² = ${readable(plane.p2)} 1/s²`);
-    drawField(x, y);
-    drawPoint(x, y);
+    drawField(x, y, drawPoint(x, y));
   }
 
-  /** @type {(x: any, y: any) => void} */
-  function drawField(x, y) {
+  /** @type {(x: any, y: any, free: (at: number[]) => boolean) => void} */
+  function drawField(x, y, free) {
     const areas = grid ? areasAbove(grid, x, y) : [];
     parts.bands
       .selectAll("path")
@@ -120,7 +123,7 @@ export function designChart(place, moved) {
       .attr("d", (/** @type {any} */ d) => d.path);
     parts.labels
       .selectAll("text")
-      .data(labelsOf(areas, x, y))
+      .data(labelsOf(areas, x, y, free))
       .join("text")
       .attr("class", "on-line")
       .attr("x", (/** @type {any} */ d) => d.at[0])
@@ -131,13 +134,17 @@ export function designChart(place, moved) {
     parts.outside.attr("d", path);
   }
 
-  /** @type {(x: any, y: any) => void} */
+  /** Draw the point; return whether nothing of it is at a place.
+   * @type {(x: any, y: any) => (at: number[]) => boolean} */
   function drawPoint(x, y) {
     const { plane, kr, yIsFree, probability } = /** @type {Spot} */ (spot);
     const [px, py] = [x(/** @type {Spot} */ (spot).x), y(kr * plane.perKr)];
     const shown = Number.isFinite(px) && Number.isFinite(py);
     parts.point.attr("display", shown ? null : "none");
-    if (!shown) return void parts.guides.selectAll("line").remove();
+    if (!shown) {
+      parts.guides.selectAll("line").remove();
+      return () => true;
+    }
     const [left, bottom] = [x.range()[0], y.range()[0]];
     parts.guides
       .selectAll("line")
@@ -168,6 +175,18 @@ export function designChart(place, moved) {
         "aria-roledescription",
         yIsFree ? "point in two directions" : "point along the shaking",
       );
+    const side = px + BESIDE + LABEL[0] < x.range()[1] ? 1 : -1;
+    parts.point
+      .select("text")
+      .attr("class", side > 0 ? "beside" : "beside before")
+      .attr("x", side * 14)
+      .text(probability === null ? "" : percent(probability));
+    const beside = [px + side * BESIDE, py];
+    return (at) =>
+      !touch(at, [px, py]) &&
+      !touch(at, beside) &&
+      !(at[1] > py && Math.abs(at[0] - px) < LABEL[0] / 2) &&
+      !(at[0] < px && Math.abs(at[1] - py) < LABEL[1] / 2);
   }
 
   return {
@@ -201,22 +220,20 @@ export function designChart(place, moved) {
 }
 
 /**
+ * While the point is dragged the answer above the chart keeps its height, else the chart would move
+ * away under the hand.
+ * @param {boolean} is
+ */
+function keepAnswerInSize(is) {
+  const answer = /** @type {HTMLElement} */ (document.querySelector(".answer"));
+  answer.style.height = is ? `${answer.offsetHeight}px` : "";
+  answer.style.overflow = is ? "hidden" : "";
+}
+
+/**
  * @param {number} value
  * @param {[number, number]} range
  */
 function within(value, [low, high]) {
   return Math.min(high, Math.max(low, value));
-}
-
-/** @param {any} svg */
-function hatch(svg) {
-  const pattern = svg
-    .append("pattern")
-    .attr("id", "hatch")
-    .attr("width", 8)
-    .attr("height", 8)
-    .attr("patternUnits", "userSpaceOnUse")
-    .attr("patternTransform", "rotate(45)");
-  pattern.append("rect").attr("class", "hatch-ground").attr("width", 8).attr("height", 8);
-  pattern.append("line").attr("class", "hatch").attr("y2", 8);
 }

@@ -15,7 +15,7 @@ const CUT = 12;
 const DIAGONALS = [0.62, 0.86, 1.1, 1.34];
 
 /** Room that a label takes, in pixels. */
-const LABEL = [36, 15];
+export const LABEL = [38, 16];
 
 /**
  * @typedef {{xs: number[], ys: number[], probability: (number | null)[], in_domain: boolean[]}} Grid
@@ -51,13 +51,14 @@ export function areaOutside(grid, x, y) {
 
 /**
  * Where the labels stand: where a level's line crosses a falling diagonal of the plot. A label that
- * would touch another is left out; the bold lines have theirs first.
+ * would touch another stands on another diagonal, or is left out; the bold lines have theirs first.
  * @param {{level: number, points: number[][]}[]} areas
  * @param {any} x scale
  * @param {any} y scale
+ * @param {(at: number[]) => boolean} free whether nothing else is drawn at a place
  * @returns {{level: number, at: number[]}[]}
  */
-export function labelsOf(areas, x, y) {
+export function labelsOf(areas, x, y, free) {
   const [left, right] = x.range();
   const [bottom, top] = y.range();
   const order = [...areas.entries()].sort(
@@ -66,7 +67,18 @@ export function labelsOf(areas, x, y) {
   /** @type {{level: number, at: number[]}[]} */
   const found = [];
   for (const [number, { level, points }] of order) {
-    const wanted = DIAGONALS[number % DIAGONALS.length];
+    for (let turn = 0; turn < DIAGONALS.length; turn += 1) {
+      const wanted = DIAGONALS[(number + turn) % DIAGONALS.length];
+      const at = crossing(points, wanted);
+      if (!at || !free(at) || found.some((each) => touch(at, each.at))) continue;
+      found.push({ level, at });
+      break;
+    }
+  }
+  return found;
+
+  /** @type {(points: number[][], wanted: number) => number[] | null} */
+  function crossing(points, wanted) {
     let best = null;
     let least = 0.05;
     for (const [px, py] of points) {
@@ -76,13 +88,16 @@ export function labelsOf(areas, x, y) {
       const beside = Math.abs(across + up - wanted);
       if (beside < least) [least, best] = [beside, [px, py]];
     }
-    const [px, py] = best ?? [NaN, NaN];
-    const touches = found.some(
-      ({ at }) => Math.abs(at[0] - px) < LABEL[0] && Math.abs(at[1] - py) < LABEL[1],
-    );
-    if (best && !touches) found.push({ level, at: best });
+    return best;
   }
-  return found;
+}
+
+/**
+ * Whether two labels with these centres would touch.
+ * @type {(a: number[], b: number[]) => boolean}
+ */
+export function touch(a, b) {
+  return Math.abs(a[0] - b[0]) < LABEL[0] && Math.abs(a[1] - b[1]) < LABEL[1];
 }
 
 /** @param {number} p */

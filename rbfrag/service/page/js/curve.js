@@ -111,6 +111,16 @@ export function fragilityCurve(place) {
       .attr("r", 5)
       .attr("cx", (/** @type {any} */ d) => x(d.x))
       .attr("cy", (/** @type {any} */ d) => y(d.probability));
+    // the curve rises: below it on its right, and above it on its left, there is room
+    const [left, right] = x.range();
+    const before = (/** @type {any} */ d) => x(d.x) > left + 0.8 * (right - left);
+    const low = (/** @type {any} */ d) => d.probability < 0.15;
+    group
+      .append("text")
+      .attr("class", (/** @type {any} */ d) => (before(d) ? "beside before" : "beside"))
+      .attr("x", (/** @type {any} */ d) => x(d.x) + (before(d) ? -10 : 10))
+      .attr("y", (/** @type {any} */ d) => y(d.probability) + (before(d) || low(d) ? -9 : 14))
+      .text((/** @type {any} */ d) => percent(d.probability));
   }
 
   return {

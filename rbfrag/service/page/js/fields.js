@@ -1,7 +1,8 @@
 /** The fields of the form: texts in, texts out, and what is wrong beside the field. */
 
+import { plain } from "./numbers.js";
 import { byId } from "./page.js";
-import { MEASURES, SPECTRAL } from "./question.js";
+import { BLOCK_FIELDS, DEFAULTS, FURTHER, MEASURES, MODEL_FIELDS } from "./question.js";
 
 /**
  * @typedef {import("./question.js").Question} Question
@@ -9,12 +10,14 @@ import { MEASURES, SPECTRAL } from "./question.js";
  */
 
 const NAMES = [
-  ...["p2", "kr", "restitution", "alpha1", "alpha3", "r3", "s1", "s2", "gamma", "beta", "phi"],
-  ...[...MEASURES, "model", "level", "units", "dt", "trace"],
+  ...[...Object.values(BLOCK_FIELDS).flat(), "restitution", "displacement"],
+  ...[...MEASURES, ...MODEL_FIELDS, "units", "dt", "trace"],
 ];
 
 /** Fields of which no 0 is answered. */
-const ABOVE_ZERO = new Set(["p2", "kr", "restitution", "r3", "s1", "s2", "tm", "level"]);
+const ABOVE_ZERO = new Set(
+  "height width p2 kr restitution displacement r3 s1 s2 tm level".split(" "),
+);
 
 /** Names of fields as they stand in the service's sentences, with or without their unit. */
 const NAMED = new RegExp(`(?<![\\w.])(${NAMES.join("|")})(?:_m_s|_deg|_g|_s|_m)?(?!\\w)`, "g");
@@ -31,14 +34,14 @@ export function formFields(form, changed) {
   const radios = (/** @type {string} */ name) =>
     /** @type {HTMLInputElement[]} */ ([...form.querySelectorAll(`input[name=${name}]`)]);
   /** @type {Shape} */
-  let shape = "numbers";
+  let shape = "rectangle";
 
   /** @returns {Question} */
   function read() {
     const values = Object.fromEntries(
       inputs().map((input) => [
         input.id,
-        input.type === "checkbox" ? (input.checked ? "true" : "") : input.value.trim(),
+        input instanceof HTMLSelectElement ? input.value : plain(input.value),
       ]),
     );
     values.kind = radios("kind").find((radio) => radio.checked)?.value ?? "";
@@ -50,12 +53,11 @@ export function formFields(form, changed) {
     shape = question.shape;
     for (const input of inputs()) {
       const text = question.values[input.id] ?? "";
-      if (input.type === "checkbox") input.checked = text === "true";
-      else if (input.value.trim() !== text) offer(input, text);
+      if (plain(input.value) !== text) offer(input, text);
     }
-    if (SPECTRAL.some((name) => question.values[name])) {
-      byId("spectral").toggleAttribute("open", true);
-    }
+    const { values } = question;
+    if (FURTHER.some((name) => values[name])) open(byId("more-shaking"));
+    if (values.model || values.level !== DEFAULTS.level) open(byId("model-part"));
     const { kind } = question.values;
     for (const radio of radios("shape")) radio.checked = radio.value === shape;
     for (const radio of radios("kind")) radio.checked = radio.value === kind;
@@ -67,13 +69,18 @@ export function formFields(form, changed) {
   }
 
   form.addEventListener("submit", (event) => event.preventDefault());
+  let half = false;
   form.addEventListener("input", (event) => {
     const from = /** @type {HTMLInputElement} */ (event.target);
     const was = shape;
     if (from.name === "shape") shape = /** @type {Shape} */ (from.value);
-    changed(read(), was, !isHalfTyped(from));
+    half = isHalfTyped(from);
+    changed(read(), was, !half);
   });
-  form.addEventListener("change", () => changed(read(), shape, true));
+  form.addEventListener("change", () => {
+    if (half) changed(read(), shape, true);
+    half = false;
+  });
   return { read, show };
 }
 
@@ -84,7 +91,8 @@ export function formFields(form, changed) {
 function isHalfTyped(input) {
   if (document.activeElement !== input || input.inputMode === "") return false;
   const text = input.value.trim();
-  return /[e+-]$/i.test(text) || (ABOVE_ZERO.has(input.id) && /^\+?(0+\.?0*|\.0*)$/.test(text));
+  const nothing = ABOVE_ZERO.has(input.id) && /^\+?(0+[.,]?0*|[.,]0*)$/.test(text);
+  return nothing || /[e+,-]$/i.test(text);
 }
 
 /**
@@ -107,7 +115,7 @@ function offer(input, text) {
 export function fieldNamedIn(sentence) {
   for (const [, name] of sentence.matchAll(NAMED)) {
     const input = document.getElementById(name);
-    if (input && input.offsetParent !== null) return input;
+    if (input && !input.closest("[hidden]")) return input;
   }
   return null;
 }
@@ -121,7 +129,16 @@ export function sayWrong(sentence, elsewhere) {
   const input = fieldNamedIn(sentence);
   const place = (input && document.getElementById(`${input.id}-error`)) ?? elsewhere;
   place.textContent = sentence;
+  if (input) open(input);
   input?.setAttribute("aria-invalid", "true");
+}
+
+/**
+ * Open what an element stands in.
+ * @param {HTMLElement} element
+ */
+function open(element) {
+  element.closest("details")?.toggleAttribute("open", true);
 }
 
 /**

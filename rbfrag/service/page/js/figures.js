@@ -18,7 +18,8 @@ import { writeText } from "./subscripts.js";
  * @typedef {import("./question.js").Question} Question
  * @typedef {import("./plane.js").Plane} Plane
  * @typedef {import("./plane.js").Across} Across
- * @typedef {{question: Question, answer: any, plane: Plane, kr: number,
+ * @typedef {import("./service.js").Failing} Failing
+ * @typedef {{question: Question, answer: any, plane: Plane, failing: Failing,
  *   present: () => boolean}} Answered
  */
 
@@ -41,6 +42,8 @@ const UNITS = {
 export function figures(moved, failed) {
   /** @type {Plane | null} */
   let plane = null;
+  /** While the point is moved, the chart stays where it is. */
+  let held = false;
   let gridShown = "";
   const chart = designChart(byId("chart"), {
     to: (x, kr) => plane && moved.to(plane.across, x, kr),
@@ -49,13 +52,13 @@ export function figures(moved, failed) {
   const curve = fragilityCurve(byId("curve"));
 
   const drawGrid = latest(
-    async (/** @type {Answered} */ { question, answer, plane: on, present }) => {
-      const held = ["restitution", ...MEASURES]
+    async (/** @type {Answered} */ { question, answer, plane: on, failing, present }) => {
+      const others = ["restitution", ...MEASURES]
         .filter((name) => name !== on.across)
         .map((name) => question.values[name]);
-      const key = JSON.stringify([answer.model, on, held]);
+      const key = JSON.stringify([answer.model, on, failing.numbers.restitution, others]);
       try {
-        if (key !== gridShown) chart.showGrid(await askGrid(on, answer.model, question));
+        if (key !== gridShown) chart.showGrid(await askGrid(on, answer.model, failing, question));
         gridShown = key;
         chart.upToDate(present());
       } catch (error) {
@@ -65,9 +68,9 @@ export function figures(moved, failed) {
   );
 
   const drawCurve = latest(async (/** @type {Answered} */ asked) => {
-    const { question, answer, plane: on, kr, present } = asked;
+    const { question, answer, plane: on, failing, present } = asked;
     try {
-      curve.showCurve(await askCurve(on, answer.model, kr, question));
+      curve.showCurve(await askCurve(on, answer.model, failing, question));
       curve.upToDate(present());
     } catch (error) {
       notDrawn(error, "curve-caption");
@@ -89,28 +92,35 @@ export function figures(moved, failed) {
      * Show an answer, and ask for what surrounds it.
      * @param {Question} question
      * @param {any} answer of /v1/predict
-     * @param {{p2: number, kr: number}} block
+     * @param {Failing} failing
      * @param {() => boolean} present whether the reader still asks this
      */
-    async show(question, answer, block, present) {
+    async show(question, answer, failing, present) {
       const model = await modelNamed(answer.model);
       if (model?.sensitive_share) sayOfModel(sensitivity(model.sensitive_share));
-      plane = planeOf(answer, block, question.values, model?.domain ?? {}, plane);
+      const { numbers } = failing;
+      const domain = model?.domain ?? {};
+      plane = planeOf(answer, numbers, question.values, domain, held ? plane : null);
       const x = fromField(question.values[plane.across]);
-      const { kr } = block;
-      if (present()) {
-        const yIsFree = question.shape === "numbers";
-        chart.showPoint({ plane, x, kr, yIsFree, probability: answer.probability });
+      const { kr } = numbers;
+      const { probability } = answer;
+      // the chart is about strength in rotation
+      const hasChart = kr !== undefined;
+      byId("chart-part").hidden = !hasChart;
+      byId("curve-part").hidden = false;
+      if (hasChart && present()) {
+        chart.showPoint({ plane, x, kr, yIsFree: question.shape === "numbers", probability });
       }
       curve.showSpot({ x, ...answer });
-      drawGrid({ question, answer, plane, kr, present });
-      drawCurve({ question, answer, plane, kr, present });
-      writeText(byId("chart-caption"), chartCaption(question, answer, plane));
+      const asked = { question, answer, plane, failing, present };
+      if (hasChart) drawGrid(asked);
+      else chart.upToDate(true);
+      drawCurve(asked);
+      if (hasChart) writeText(byId("chart-caption"), chartCaption(question, answer, plane));
       byId("curve-caption").textContent =
-        `Share of such blocks that ${verbOf(answer)}, against ${labelOf(plane.across).name}. Dark band: its ` +
-        `interval, as far as the data tell it.` +
-        (answer.event_low === null ? "" : " Light band: the share in one single earthquake.") +
-        ` Both ${percent(answer.level)}.`;
+        `Share of such blocks that ${verbOf(answer)}. Dark band: as far as the data tell it.` +
+        (answer.event_low === null ? "" : " Light band: in one single earthquake.") +
+        ` (Each ${percent(answer.level)}.)`;
     },
     /**
      * Show the point where the reader has moved it, before there is an answer.
@@ -118,19 +128,27 @@ export function figures(moved, failed) {
      * @param {number | null} kr null where it stays as it is
      */
     movePoint(x, kr) {
+      held = true;
       chart.movePoint(x, kr);
+    },
+    /** The point is no longer moved: the ranges follow the fields again. */
+    letGo() {
+      held = false;
     },
     /** Show that the figures do not answer the present question. */
     stale() {
       chart.upToDate(false);
       curve.upToDate(false);
     },
-    /** Show that the present block has no place in them. */
-    showNoBlock() {
+    /** Show that what is asked has no answer. */
+    showNoAnswer() {
       this.stale();
       chart.hidePoint();
       curve.showSpot(null);
-      if (!plane) byId("chart-caption").textContent = "Drawn once the block has an answer.";
+    },
+    /** Take them away: no earthquake decides about the present block. */
+    hide() {
+      for (const id of ["chart-part", "curve-part"]) byId(id).hidden = true;
     },
   };
 }
@@ -153,7 +171,7 @@ function chartCaption(question, answer, plane) {
     .map((name) => `${NAMES[name]} = ${quantity(fromField(question.values[name]), UNITS[name])}`);
   const all = [`p² = ${quantity(plane.p2, "1/s²")}`, ...held].join(", ");
   return (
-    `Lines of equal probability of ${answer.failure} by model ${answer.model}, with ${all} held. ` +
+    `Lines of equal probability of ${answer.failure} at ${all}. ` +
     "Hatched: outside the fitted range, where answers are extrapolations."
   );
 }

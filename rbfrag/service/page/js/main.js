@@ -1,8 +1,8 @@
 /** The page: what the reader asks, what the service answers, and who shows it. */
 
-import { showAnswer, showNoAnswer } from "./answer.js";
+import { sayOfBlock, showAnswer, showNoAnswer } from "./answer.js";
 import { Refusal, Unreachable } from "./ask.js";
-import { blockDrawing, blockInWords } from "./block.js";
+import { blockDrawing, whyNoAnswer } from "./block.js";
 import { formFields, nothingWrong, sayWrong } from "./fields.js";
 import { figures } from "./figures.js";
 import { afterPause, latest } from "./latest.js";
@@ -10,6 +10,7 @@ import { addressOf, fromAddress, showAddress } from "./link.js";
 import { offerModelsOf } from "./models.js";
 import { forField, fromField } from "./numbers.js";
 import { byId } from "./page.js";
+import { USUAL_PHI } from "./question.js";
 import { recordPanel } from "./record_panel.js";
 import * as service from "./service.js";
 import { tools } from "./tools.js";
@@ -21,8 +22,8 @@ const TYPING_MS = 180;
 
 const start = fromAddress();
 let question = start.question;
-/** The block as /v1/block describes it; null where it is two numbers. @type {any} */
-let block = null;
+/** What predictions read of the block that is shown. @type {Record<string, number>} */
+let numbers = {};
 
 const form = /** @type {HTMLFormElement} */ (byId("form"));
 const fields = formFields(form, fieldsChanged);
@@ -41,19 +42,19 @@ const askSoon = afterPause(TYPING_MS, () => ask(question));
 function fieldsChanged(now, shapeWas, whole) {
   const kindWas = question.values.kind;
   question = now;
-  if (now.values.kind !== kindWas) {
-    // numbers are all that a free-standing block is given by, and no model answers for both
-    question = { shape: "numbers", values: { ...now.values, model: "" } };
-    fields.show(question);
-  } else if (now.shape !== shapeWas) {
-    if (now.shape === "numbers" && block?.kr > 0) {
-      // the same block, as the two numbers that the service gave for its shape
-      const numbers = { p2: forField(block.p2), kr: forField(block.kr) };
-      question = { ...now, values: { ...now.values, ...numbers } };
-    }
-    fields.show(question);
+  // no model answers for both
+  if (now.values.kind !== kindWas) question.values.model = "";
+  if (now.shape === "numbers" && shapeWas !== "numbers" && numbers.kr > 0) {
+    // the same block, as the two numbers that the service gave for its shape
+    const { p2, kr } = numbers;
+    question.values = { ...now.values, p2: forField(p2), kr: forField(kr) };
   }
+  if (["angles", "fractures"].includes(now.shape) && now.shape !== shapeWas) {
+    question.values.phi ||= USUAL_PHI;
+  }
+  if (now.values.kind !== kindWas || now.shape !== shapeWas) fields.show(question);
   sheets.stale();
+  sheets.letGo();
   drawing.upToDate(false);
   busy(true);
   if (whole) askSoon();
@@ -96,55 +97,40 @@ function busy(is) {
 
 /** @param {Question} asked */
 async function answerQuestion(asked) {
-  showAddress(addressOf(question, record.shown()));
-  offerModelsOf(asked.values.kind);
+  showAddress(addressOf(asked, record.shown()));
   try {
-    const [lines, found] = await Promise.all([
-      service.askDrawing(asked).catch(notRefused),
-      asked.shape === "numbers" ? null : service.askBlock(asked),
-    ]);
-    block = found;
-    if (lines) drawing.show(lines, block);
-    const noAnswer = block && whyNoAnswer(block);
-    const { p2, kr } = block ?? asked.values;
-    const two = { p2: String(p2), kr: String(kr) };
-    const answer = noAnswer ? null : await service.askProbability(two, asked);
+    const found = await service.askDrawing(asked);
+    numbers = found.numbers ?? {};
+    drawing.show(found, asked);
+    offerModelsOf(found.kind);
+    byId("sliding-part").hidden = found.kind !== "sliding";
+    const noAnswer = whyNoAnswer(found);
+    const answer = noAnswer ? null : await service.askProbability(asked, found.kind);
     reached();
     nothingWrong(form);
-    if (!answer) return nothingKnown(noAnswer);
+    if (!answer) {
+      sheets.hide();
+      return nothingKnown(noAnswer, found.block.warnings);
+    }
     showAnswer(answer);
-    const place = { p2: fromField(two.p2), kr: fromField(two.kr) };
-    await sheets.show(asked, answer, place, () => asked === question);
-    const size = lines?.rectangle_r3_m * place.p2;
+    sayOfBlock(asked, found);
+    await sheets.show(asked, answer, found, () => asked === question);
     // X(p) bounds what a block does that a slope backs
-    if (asked.values.kind) record.placeBlock(null);
-    else record.placeBlock({ p2: place.p2, y: answer.y_m_s }, size);
+    if (found.kind === "toppling") {
+      const { p2 } = found.numbers;
+      record.placeBlock({ p2, y: answer.y_m_s }, found.rectangle_r3_m * p2);
+    } else record.placeBlock(null);
     busy(asked !== question);
   } catch (error) {
     failed(error);
   }
 }
 
-/**
- * What a block lacks for a drawing, the other answers say in better words.
- * @param {unknown} error
- */
-function notRefused(error) {
-  if (error instanceof Refusal) return null;
-  throw error;
-}
-
-/** @param {any} found answer of /v1/block */
-function whyNoAnswer(found) {
-  if (found.mode === "topple" && found.state === "stable" && found.kr > 0) return "";
-  return `${blockInWords(found)} The probability here is that of toppling alone.`;
-}
-
-/** @param {string} why */
-function nothingKnown(why) {
+/** @type {(why: string, warnings?: string[]) => void} */
+function nothingKnown(why, warnings) {
   busy(false);
-  showNoAnswer(why);
-  sheets.showNoBlock();
+  showNoAnswer(why, warnings);
+  sheets.showNoAnswer();
   record.placeBlock(null);
 }
 
@@ -164,10 +150,7 @@ function failed(error) {
 }
 
 whenTokenGiven(() => ask(question));
-tools(
-  () => addressOf(question, record.shown()),
-  () => addressOf(question, null),
-);
+tools(() => addressOf(question, record.shown()));
 service.askVersion().then(
   (version) => (byId("service-version").textContent = `rbfrag ${version}`),
   () => {}, // the answers above say that the service cannot be reached

@@ -3,23 +3,20 @@
 import { byId } from "./page.js";
 import { askModels } from "./service.js";
 
-/** What a block does that nothing else is said of. */
-const BACKED = "toppling";
-
 /** A model of this term needs the record itself, which /v1/predict is not given here. */
 const NEEDS_RECORD = "xp";
 
 /** @type {any[]} */
 let models = [];
-let kind = BACKED;
+let kind = "";
 
 /**
  * Offer the models of another kind.
- * @param {string} asked its name; empty for blocks that a slope backs
+ * @param {string} asked its name
  */
 export function offerModelsOf(asked) {
   const before = kind;
-  kind = asked || BACKED;
+  kind = asked;
   if (kind !== before) offer();
 }
 

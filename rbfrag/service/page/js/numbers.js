@@ -40,12 +40,22 @@ export function forField(value) {
 }
 
 /**
+ * A text as the service reads it: a decimal comma is a point, a typographic minus a hyphen.
+ * @param {string} text
+ * @returns {string}
+ */
+export function plain(text) {
+  const number = text.trim().replace(/^\u2212/, "-");
+  return /^[+-]?(\d+,\d*|,\d+)(e[+-]?\d+)?$/i.test(number) ? number.replace(",", ".") : number;
+}
+
+/**
  * The number a field's text states, or NaN.
  * @param {string} text
  * @returns {number}
  */
 export function fromField(text) {
-  return text.trim() === "" ? NaN : Number(text);
+  return text.trim() === "" ? NaN : Number(plain(text));
 }
 
 /**

@@ -1,5 +1,7 @@
 /** Elements of the page by their id. */
 
+import { plain } from "./numbers.js";
+
 /**
  * @param {string} id
  * @returns {HTMLElement}
@@ -9,10 +11,10 @@ export function byId(id) {
 }
 
 /**
- * The text in a field, trimmed.
+ * The text in a field, as the service reads it.
  * @param {string} id
  * @returns {string}
  */
 export function textIn(id) {
-  return /** @type {HTMLInputElement} */ (byId(id)).value.trim();
+  return plain(/** @type {HTMLInputElement} */ (byId(id)).value);
 }

@@ -20,49 +20,80 @@ export function percent(p) {
   return `${Number((100 - missing).toFixed(decimals))}${GAP}%`;
 }
 
-/** What blocks do, by the failure that an answer is about. */
-const VERBS = { toppling: "topple", overturning: "overturn" };
+/** What blocks do, by the kind of an answer. */
+const VERBS = { toppling: "topple", rocking: "overturn", sliding: "slide too far", slumping: "slump" };
 
 /**
  * What a block does that fails as an answer says.
- * @param {{failure?: string}} answer
+ * @param {{kind: string}} answer
  */
-export function verbOf({ failure = "toppling" }) {
-  return VERBS[/** @type {keyof typeof VERBS} */ (failure)] ?? "fail";
+export function verbOf({ kind }) {
+  return VERBS[/** @type {keyof typeof VERBS} */ (kind)] ?? "fail";
 }
 
 /**
- * What a probability, its interval and the range of one earthquake mean, in counts of blocks.
- * @param {{probability: number, ci_low: number, ci_high: number, event_low: number | null,
- *   event_high: number | null, level: number, failure?: string}} answer
+ * @typedef {{kind: string, probability: number, ci_low: number, ci_high: number,
+ *   event_low: number | null, event_high: number | null, level: number}} Answer
+ */
+
+/**
+ * What a probability means, in counts of blocks.
+ * @param {Answer} answer
  * @returns {string}
  */
-export function inWords(answer) {
-  const { probability: p, ci_low: low, ci_high: high, event_low, event_high, level } = answer;
+export function inOneSentence(answer) {
+  const { probability: p, ci_high: high } = answer;
   if (p === 0 && high === 0) return "No earthquake motion with this shaking makes the block fail.";
-  const of = [100, 1000, 10000].find((n) => p * n >= 1 && (1 - p) * n >= 1) ?? 10000;
-  const among = of.toLocaleString("en").replace(",", "\u202f");
+  const of = among(p);
   return (
-    `Of ${among} such blocks ${count(p, of)} ${verbOf(answer)}, over all earthquakes and sites with this ` +
-    `shaking; as far as the data tell it, between ${count(low, of, true)} and ` +
-    `${count(high, of, true)}.` +
-    (event_low === null || event_high === null
-      ? ""
-      : ` In one single earthquake, between ${count(event_low, of, true)} and ` +
-        `${count(event_high, of, true)} ${verbOf(answer)}.`) +
-    ` (Both ranges ${percent(level)}.)`
+    `Of ${grouped(of)} such blocks ${about(p, of)} ${verbOf(answer)} in shaking like this, ` +
+    "over all earthquakes and sites."
   );
+}
+
+/**
+ * What its interval and the range of one earthquake mean.
+ * @param {Answer} answer
+ * @returns {string}
+ */
+export function ranges({ probability: p, ci_low: low, ci_high: high, event_low, event_high, level }) {
+  if (p === 0 && high === 0) return "";
+  const of = among(p);
+  const between = (/** @type {number} */ a, /** @type {number} */ b) =>
+    count(a, of) === count(b, of) ? count(a, of) : `between ${count(a, of)} and ${count(b, of)}`;
+  const event =
+    event_low === null || event_high === null
+      ? ""
+      : ` In one single earthquake it may be ${between(event_low, event_high)}.`;
+  return `As far as the data tell, it is ${between(low, high)}.${event} (Each ${percent(level)}.)`;
+}
+
+/**
+ * Of how many blocks a share is a count that tells something.
+ * @param {number} p
+ */
+function among(p) {
+  return [100, 1000, 10000].find((n) => p * n >= 1 && (1 - p) * n >= 1) ?? 10000;
+}
+
+/** @type {(p: number, of: number) => string} */
+function about(p, of) {
+  const text = count(p, of);
+  return /\d$/.test(text) && !text.startsWith("fewer") ? `about ${text}` : text;
 }
 
 /**
  * @param {number} p
  * @param {number} of
- * @param {boolean} [bare] without "about"
  */
-function count(p, of, bare = false) {
+function count(p, of) {
   const n = Math.round(p * of);
   if (n === 0 && p > 0) return "fewer than 1";
   if (n === of && p < 1) return "almost all";
-  const text = n.toLocaleString("en").replace(",", "\u202f");
-  return bare ? text : `about ${text}`;
+  return grouped(n);
+}
+
+/** @param {number} n */
+function grouped(n) {
+  return n.toLocaleString("en").replace(",", "\u202f");
 }

@@ -50,10 +50,10 @@ export function labelOf(across) {
  * Factors come from the answer itself: its toppling velocity over the k_r that was asked, its
  * intensity over the measure that was asked.
  * @param {any} answer of /v1/predict
- * @param {{p2: number, kr: number}} block
+ * @param {Record<string, number>} block what predictions read of it: p2 and kr of one that topples
  * @param {Record<string, string>} measures
  * @param {Record<string, [number, number]>} domain of the model, by variable
- * @param {Plane | null} before the plane shown until now: its ranges stay where they can
+ * @param {Plane | null} before the plane whose ranges stay, while the point is moved; else null
  * @returns {Plane}
  */
 export function planeOf(answer, block, measures, domain, before) {
@@ -130,8 +130,8 @@ function acrossOf(term) {
 }
 
 /**
- * The range shown: the one shown before, or the usual one, wider if the value lies outside it.
- * @param {number[]} before
+ * A range, wider if the value lies outside it.
+ * @param {number[]} range
  * @param {number} value
  * @returns {[number, number]}
  */

@@ -19,8 +19,9 @@ const ARROWS = {
  *   pixels of the sheet
  * @param {(byRatio: [number, number]) => void} onKeys called with the ratios by which a key
  *   changes x and y
+ * @param {(is: boolean) => void} dragged called when the point is taken and when it is let go
  */
-export function movable(point, area, toPlace, onKeys) {
+export function movable(point, area, toPlace, onKeys, dragged) {
   const placeOf = (/** @type {MouseEvent} */ event) => {
     const box = /** @type {SVGElement} */ (point.ownerSVGElement).getBoundingClientRect();
     return /** @type {[number, number]} */ ([event.clientX - box.left, event.clientY - box.top]);
@@ -28,9 +29,11 @@ export function movable(point, area, toPlace, onKeys) {
   point.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
     point.setPointerCapture(event.pointerId);
+    dragged(true);
     point.focus({ preventScroll: true });
     event.preventDefault();
   });
+  point.addEventListener("lostpointercapture", () => dragged(false));
   // a finger on the point moves it, not the page; CSS cannot say so for a part of a drawing
   point.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
   point.addEventListener("pointermove", (event) => {

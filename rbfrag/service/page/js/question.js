@@ -1,29 +1,40 @@
 /** What the reader asks: block, shaking and model, as texts named like the options. */
 
+import { plain } from "./numbers.js";
+
 /**
- * @typedef {"numbers" | "angles" | "fractures"} Shape how the block is given
- * @typedef {Record<string, string>} Values texts of the fields by name; no_back is "true" or "", kind
- *   is "" for a block that is backed by a slope, or the name of another
+ * @typedef {"rectangle" | "numbers" | "angles" | "fractures"} Shape how the block is given
+ * @typedef {Record<string, string>} Values texts of the fields by name; kind is "" for a block that is
+ *   backed by a slope, or the name of another
  * @typedef {{shape: Shape, values: Values}} Question
  */
 
 export const BLOCK_FIELDS = {
+  rectangle: ["height", "width", "dip", "phi"],
   numbers: ["p2", "kr"],
-  angles: ["alpha1", "alpha3", "r3", "beta", "phi", "no_back"],
-  fractures: ["s1", "s2", "gamma", "beta", "phi", "no_back"],
+  angles: ["alpha1", "alpha3", "r3", "beta", "phi"],
+  fractures: ["s1", "s2", "gamma", "beta", "phi"],
 };
 
-export const SPECTRAL = ["sa03_g", "sa10_g", "sa20_g", "sa30_g"];
+/** By which of its fields an address names a shape. */
+const OWN_FIELDS = /** @type {[Shape, string[]][]} */ ([
+  ["angles", ["alpha1", "alpha3", "r3"]],
+  ["fractures", ["s1", "s2", "gamma"]],
+  ["numbers", ["p2", "kr"]],
+]);
 
-export const MEASURES = ["pgv", "pga", "tm", "pgd", ...SPECTRAL];
+/** Of the shaking, what stands in the part of the form that is closed at first. */
+export const FURTHER = ["tm", "pgd", "sa03_g", "sa10_g", "sa20_g", "sa30_g"];
+
+export const MEASURES = ["pgv", "pga", ...FURTHER];
 
 export const MODEL_FIELDS = ["model", "level"];
 
-/** Names of what is said of a block that is not backed by a slope. */
-const FREE_FIELDS = ["kind", "restitution"];
-
-/** The same block of some 2.5 m in its three descriptions, and a strong shaking. */
+/** A block in each of its descriptions, and a strong shaking. */
 export const DEFAULTS = {
+  height: "2",
+  width: "0.5",
+  dip: "6",
   p2: "3",
   kr: "0.1",
   alpha1: "-15",
@@ -33,10 +44,10 @@ export const DEFAULTS = {
   s2: "1.6",
   gamma: "85",
   beta: "18",
-  phi: "38",
-  no_back: "",
+  phi: "",
   kind: "",
   restitution: "",
+  displacement: "0.1",
   pgv: "0.6",
   pga: "",
   tm: "",
@@ -48,6 +59,9 @@ export const DEFAULTS = {
   model: "",
   level: "0.95",
 };
+
+/** Friction of a block that is no rectangle, of which it must be known [deg]. */
+export const USUAL_PHI = "38";
 
 /**
  * Some of the values.
@@ -62,11 +76,13 @@ export function only(values, names) {
 }
 
 /**
- * Names of what says how the block stands; none where a slope backs it.
- * @param {Values} values
+ * What describes the block, as the operations on its shape are asked.
+ * @param {Question} question
+ * @returns {Values}
  */
-export function standing(values) {
-  return values.kind ? FREE_FIELDS : [];
+export function blockOf({ shape, values }) {
+  const block = only(values, BLOCK_FIELDS[shape]);
+  return values.kind ? { ...block, no_back: "true" } : block;
 }
 
 /**
@@ -75,28 +91,32 @@ export function standing(values) {
  * @returns {Values}
  */
 export function asked({ shape, values }) {
-  const names = [...BLOCK_FIELDS[shape], ...standing(values), ...MEASURES, ...MODEL_FIELDS];
-  return only(values, names);
+  const free = values.kind ? ["kind", "restitution"] : [];
+  const names = [...BLOCK_FIELDS[shape], ...free, "displacement", ...MEASURES, ...MODEL_FIELDS];
+  const given = only(values, names);
+  for (const name of /** @type {const} */ (["level", "displacement"])) {
+    if (given[name] === DEFAULTS[name]) delete given[name];
+  }
+  return given;
 }
 
 /**
  * The question an address holds, with defaults for what it leaves out.
  *
- * An address that names any measure leaves the other measures unknown.
+ * An address that names any measure leaves the other measures unknown, and so it is with what
+ * describes the block.
  * @param {URLSearchParams} query
  * @returns {Question}
  */
 export function fromQuery(query) {
   /** @type {Values} */
   const values = { ...DEFAULTS };
-  if (MEASURES.some((name) => query.has(name))) values.pgv = "";
-  for (const [name, text] of query) if (name in values) values[name] = text;
   const has = (/** @type {string[]} */ names) => names.some((name) => query.has(name));
   /** @type {Shape} */
-  let shape = "numbers";
-  if (values.kind) return { shape, values };
-  if (has(["alpha1", "alpha3", "r3"])) shape = "angles";
-  else if (has(["s1", "s2", "gamma"])) shape = "fractures";
+  const shape = OWN_FIELDS.find(([, names]) => has(names))?.[0] ?? "rectangle";
+  if (has(MEASURES)) values.pgv = "";
+  if (has(BLOCK_FIELDS[shape])) for (const name of BLOCK_FIELDS[shape]) values[name] = "";
+  for (const [name, text] of query) if (name in values) values[name] = plain(text);
   return { shape, values };
 }
 
@@ -106,7 +126,5 @@ export function fromQuery(query) {
  * @returns {string}
  */
 export function toQuery(question) {
-  const given = asked(question);
-  if (given.level === DEFAULTS.level) delete given.level;
-  return new URLSearchParams(given).toString();
+  return new URLSearchParams(asked(question)).toString();
 }

@@ -8,6 +8,17 @@ import { ratios } from "./numbers.js";
 
 const SIZES = ratios(0.1, 30, 41).map((p2) => Number(p2.toPrecision(4)));
 
+/** A record to try: one sine, no earthquake. */
+export function syntheticPulse() {
+  const [amplitude_g, duration_s, count] = [0.35, 0.8, 160];
+  const rows = Array.from({ length: count + 1 }, (_, i) => {
+    const a = amplitude_g * Math.sin((2 * Math.PI * i) / count);
+    return `${((duration_s * i) / count).toFixed(4)},${a.toFixed(6)}`;
+  });
+  const text = ["time_s,acceleration_g", ...rows, ""].join("\n");
+  return new File([text], "synthetic pulse, one sine of 0.35 g and 0.8 s");
+}
+
 /**
  * The frequency parameters at which a spectrum is asked: a fixed range that includes the block's.
  * @param {number} p2 of the reader's block, or NaN
@@ -21,14 +32,14 @@ export function sizesFor(p2) {
 /**
  * Both polarities of an answer of /v1/spectrum as one spectrum.
  * @param {any[]} answers
- * @param {string} name of the file, if the record names itself by nothing
+ * @param {string} name under which it is shown
  * @returns {Spectrum}
  */
 export function spectrumOf(answers, name) {
   const of = (/** @type {string} */ polarity) => answers.find((each) => each.polarity === polarity);
   const [forward, reverse] = [of("forward"), of("reverse")];
   return {
-    name: forward.name || name,
+    name,
     pgv_m_s: forward.pgv_m_s,
     p2: forward.p2,
     forward: forward.x_m_s,

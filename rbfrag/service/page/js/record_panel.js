@@ -6,7 +6,7 @@ import { nothingWrong, sayWrong } from "./fields.js";
 import { afterPause, latest } from "./latest.js";
 import { quantity } from "./numbers.js";
 import { byId, textIn } from "./page.js";
-import { recordsFrom, valueAt } from "./record.js";
+import { recordsFrom, syntheticPulse, valueAt } from "./record.js";
 import { askSpectrum } from "./service.js";
 import { spectrumPlot } from "./spectrum.js";
 import { reached, unreachable } from "./trouble.js";
@@ -39,8 +39,10 @@ export function recordPanel(tell) {
   const ask = latest(async (/** @type {File} */ asked) => {
     byId("record-said").textContent = `Waiting for the spectrum of ${asked.name} …`;
     const reading = Object.fromEntries(READING.map((id) => [id, textIn(id)]));
+    const trace = chosenTrace();
+    const name = trace ? `${asked.name}, trace ${trace}` : asked.name;
     try {
-      const found = await askSpectrum(asked, reading, block?.p2 ?? NaN);
+      const found = await askSpectrum(asked, reading, block?.p2 ?? NaN, name);
       reached();
       nothingWrong(panel);
       if (asked === file) show(found);
@@ -48,6 +50,10 @@ export function recordPanel(tell) {
       if (error instanceof Unreachable) return unreachable(error, () => ask(asked));
       if (!(error instanceof Refusal)) throw error;
       nothingWrong(panel);
+      if (error.traces && asked === file && !trace) {
+        offerTraces(error.traces);
+        return ask(asked);
+      }
       const words = error.message.replace(/^the file: /, "");
       sayWrong(`${asked.name}: ${words}`, byId("record-error"));
       show(null);
@@ -57,28 +63,55 @@ export function recordPanel(tell) {
   });
   const askSoon = afterPause(PAUSE_MS, ask);
 
+  /**
+   * Offer the traces of a file; none where it has one.
+   * @param {string[]} names
+   */
+  function offerTraces(names) {
+    const traces = /** @type {HTMLSelectElement} */ (byId("trace"));
+    const text = (/** @type {string} */ name, /** @type {number} */ i) =>
+      name ? `${i + 1}: ${name}` : String(i + 1);
+    traces.replaceChildren(...names.map((name, i) => new Option(text(name, i), String(i))));
+    byId("trace-part").hidden = names.length === 0;
+  }
+
+  /** The trace that is chosen, as it is listed; empty where the file has one. */
+  function chosenTrace() {
+    const traces = /** @type {HTMLSelectElement} */ (byId("trace"));
+    return traces.selectedOptions[0]?.text ?? "";
+  }
+
   /** @param {Spectrum | null} found */
   function show(found) {
     spectrum = found;
     byId("spectrum-part").hidden = !found;
+    byId("record-part").hidden = !found && byId("trace-part").hidden;
     plot.show(found);
-    byId("record-name").textContent = found
-      ? `${found.name}, PGV ${quantity(found.pgv_m_s, "m/s")}`
-      : "";
+    byId("record-name").textContent = found?.name ?? file?.name ?? "";
     showWarnings(byId("record-warnings"), found?.warnings ?? []);
-    byId("spectrum-words").textContent = spectrum && block ? comparison(spectrum, block) : "";
+    compare();
     tell.changed();
   }
 
-  recordsFrom(byId("drop"), /** @type {HTMLInputElement} */ (byId("record-file")), (taken) => {
+  function compare() {
+    byId("spectrum-words").textContent = spectrum ? inWords(spectrum, block) : "";
+  }
+
+  /** @param {File} taken */
+  function take(taken) {
     file = taken;
+    offerTraces([]);
     ask(taken);
     panel.scrollIntoView({ block: "nearest" });
-  });
+  }
+
+  recordsFrom(byId("drop"), /** @type {HTMLInputElement} */ (byId("record-file")), take);
+  byId("example-record").addEventListener("click", () => take(syntheticPulse()));
   for (const id of READING) byId(id).addEventListener("input", () => file && askSoon(file));
   byId("take-pgv").addEventListener("click", () => spectrum && tell.takePgv(spectrum.pgv_m_s));
   byId("drop-record").addEventListener("click", () => {
     file = null;
+    offerTraces([]);
     show(null);
     byId("record-file").focus();
   });
@@ -96,10 +129,20 @@ export function recordPanel(tell) {
       const other = place && place.p2 !== block?.p2;
       block = place;
       plot.showBlock(place, sizeTimesP2);
-      byId("spectrum-words").textContent = spectrum && block ? comparison(spectrum, block) : "";
+      compare();
       if (file && other) askSoon(file);
     },
   };
+}
+
+/**
+ * What a record is, and whether it can topple a block.
+ * @param {Spectrum} spectrum
+ * @param {Place | null} block
+ */
+function inWords(spectrum, block) {
+  const record = `Its PGV is ${quantity(spectrum.pgv_m_s, "m/s")}.`;
+  return block ? `${record} ${comparison(spectrum, block)}` : record;
 }
 
 /**

@@ -3,42 +3,40 @@
 import { get, post, upload } from "./ask.js";
 import { fromField } from "./numbers.js";
 import { columnsOf, rowsOf, stepsOf } from "./plane.js";
-import { BLOCK_FIELDS, MEASURES, only, standing } from "./question.js";
+import { blockOf, MEASURES, only } from "./question.js";
 import { sizesFor, spectrumOf } from "./record.js";
 
 /**
  * @typedef {import("./question.js").Question} Question
  * @typedef {import("./plane.js").Plane} Plane
- * @typedef {{p2: string, kr: string}} TwoNumbers as texts, so that the service reads what was typed
+ * @typedef {{kind: string, numbers: Record<string, number>}} Failing how a block fails, and what
+ *   predictions read of it, as /v1/drawing says
  */
 
 /** Digits of the values of a grid: what is drawn does not show more, edges stay apart. */
 const DIGITS = 9;
 
 /**
- * Mode, yield and size of a block.
+ * The lines of a drawing of a block, how it fails and what predictions read of it.
  * @param {Question} question
  */
-export function askBlock({ shape, values }) {
-  return get("v1/block", only(values, BLOCK_FIELDS[shape]));
+export function askDrawing(question) {
+  return get("v1/drawing", blockOf(question));
 }
 
 /**
- * The lines of a drawing of a block.
+ * The probability that a block fails.
  * @param {Question} question
+ * @param {string} kind how it fails
  */
-export function askDrawing({ shape, values }) {
-  return get("v1/drawing", only(values, BLOCK_FIELDS[shape]));
-}
-
-/**
- * The probability that a block topples.
- * @param {TwoNumbers} block
- * @param {Question} question
- */
-export function askProbability(block, { values }) {
-  const names = [...standing(values), ...MEASURES, "model", "level"];
-  return get("v1/predict", { ...block, ...only(values, names) });
+export function askProbability(question, kind) {
+  const { no_back, ...block } = blockOf(question);
+  const free = question.shape === "numbers" ? {} : { no_back };
+  const names = [...MEASURES, "model", "level"];
+  return get("v1/predict", {
+    ...{ ...block, ...free, kind },
+    ...only(question.values, [...optionsOf(kind), ...names]),
+  });
 }
 
 /** The version of the service. */
@@ -55,18 +53,16 @@ export function askModels() {
  * Probabilities over the plane of the chart.
  * @param {Plane} plane
  * @param {string} model
+ * @param {Failing} failing
  * @param {Question} question
  * @returns {Promise<import("./contours.js").Grid>}
  */
-export async function askGrid(plane, model, { values }) {
+export async function askGrid(plane, model, failing, question) {
   const [xs, ys] = [columnsOf(plane), rowsOf(plane)];
   const across = ys.flatMap(() => xs.map(rounded));
   const kr = ys.flatMap((y) => xs.map(() => rounded(y / plane.perKr)));
   const answer = await post("v1/predict", {
-    p2: plane.p2,
-    kr,
-    ...standingOf(values),
-    ...measuresOf(values),
+    ...{ ...fixed(failing, question), kr },
     [plane.across]: across,
     model,
   });
@@ -77,20 +73,17 @@ export async function askGrid(plane, model, { values }) {
  * Probabilities of one block over the measure that runs across.
  * @param {Plane} plane
  * @param {string} model
- * @param {number} kr
+ * @param {Failing} failing
  * @param {Question} question
  * @returns {Promise<import("./curve.js").Curve>}
  */
-export async function askCurve(plane, model, kr, { values }) {
+export async function askCurve(plane, model, failing, question) {
   const xs = stepsOf(plane);
   const answer = await post("v1/predict", {
-    p2: plane.p2,
-    kr,
-    ...standingOf(values),
-    ...measuresOf(values),
+    ...fixed(failing, question),
     [plane.across]: xs.map(rounded),
     model,
-    level: fromField(values.level),
+    level: fromField(question.values.level),
   });
   const { probability, ci_low, ci_high, event_low, event_high, in_domain } = answer;
   return { plane, xs, probability, ci_low, ci_high, event_low, event_high, in_domain };
@@ -101,23 +94,31 @@ export async function askCurve(plane, model, kr, { values }) {
  * @param {File} file
  * @param {Record<string, string>} reading unit, sampling interval and trace, where needed
  * @param {number} p2 of the reader's block, or NaN
+ * @param {string} name under which it is shown
  */
-export async function askSpectrum(file, reading, p2) {
+export async function askSpectrum(file, reading, p2, name) {
   const query = { ...reading, polarity: "both", p2: sizesFor(p2).join(",") };
-  return spectrumOf(await upload("v1/spectrum", query, file), file.name);
+  return spectrumOf(await upload("v1/spectrum", query, file), name);
 }
 
-/** @param {Record<string, string>} values */
-function standingOf(values) {
-  const { kind, restitution } = only(values, standing(values));
-  return restitution ? { kind, restitution: fromField(restitution) } : { kind };
+/**
+ * What else is said of a block that fails so.
+ * @param {string} kind
+ */
+function optionsOf(kind) {
+  return { rocking: ["restitution"], sliding: ["displacement"] }[kind] ?? [];
 }
 
-/** @param {Record<string, string>} values */
-function measuresOf(values) {
-  return Object.fromEntries(
-    Object.entries(only(values, MEASURES)).map(([name, text]) => [name, fromField(text)]),
-  );
+/**
+ * What is alike in all questions of a figure: block, kind and measures, as numbers.
+ * @param {Failing} failing
+ * @param {Question} question
+ */
+function fixed({ kind, numbers }, { values }) {
+  const { beta_deg: beta, ...block } = numbers;
+  const texts = Object.entries(only(values, [...optionsOf(kind), ...MEASURES]));
+  const known = Object.fromEntries(texts.map(([name, text]) => [name, fromField(text)]));
+  return { ...block, ...(beta === undefined ? {} : { beta }), ...known, kind };
 }
 
 /** @param {number} value */

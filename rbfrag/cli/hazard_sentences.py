@@ -1,0 +1,141 @@
+"""Answers about many blocks or many earthquakes in words, rounded as an engineer writes them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from rbfrag.cli.output import percent
+from rbfrag.cli.sentences import once_in, rounded
+
+if TYPE_CHECKING:
+    from rbfrag.hazards.losses import LossAnswer
+    from rbfrag.hazards.survival import SurvivalAnswer
+
+
+def several(number: int, what: str) -> str:
+    """Return a number of things, in the plural where it is not one."""
+    return f"{number:,} {what}{'' if number == 1 else 's'}"
+
+
+def with_error(mean: float, error: float) -> str:
+    """Return a mean with its standard error, the error with two digits, and the mean as fine."""
+    if not error > 0.0:
+        return rounded(mean)
+    power = int(f"{error:.1e}".partition("e")[2])
+    if power < -6:
+        return f"{mean:.1e} ± {error:.0e}"
+    digits = max(1 - power, 0)
+    return f"{mean:,.{digits}f} ± {error:,.{digits}f}"
+
+
+def rounded_values(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values with three digits where they are no counts, names or yes and no."""
+    return {
+        name: float(f"{value:.3g}") if isinstance(value, float) else value
+        for name, value in values.items()
+    }
+
+
+def map_in_words(document: Mapping[str, Any], *, own: bool) -> Iterator[str]:
+    """Yield where blocks topple most, and how many are expected to.
+
+    Args:
+        document: an answer of `rbfrag shakemap` under the keys of the JSON contract.
+        own: blocks at places of their own, and not one at every node.
+    """
+    place = f"{document['largest_at_lat']:.3f} N, {document['largest_at_lon']:.3f} E"
+    likely, places = document["places_above_1_percent"], document["places"]
+    yield (
+        f"{'A block' if own else 'Such a block'} topples with a probability of up to "
+        f"{percent(document['largest_probability'])}, at {place}; it is above 1 % at {likely:,} "
+        f"of {several(places, 'place')}."
+    )
+    if own:
+        some = document["probability_any"]
+        yield (
+            f"{rounded(document['expected_failures'])} of {several(places, 'block')} are expected "
+            "to topple"
+            + ("" if some is None else f", at least one with a probability of {percent(some)}")
+            + "."
+        )
+
+
+def survival_in_words(answer: SurvivalAnswer) -> Iterator[str]:
+    """Yield how likely the blocks stand, and what that says of the hazard."""
+    one = answer.blocks == 1
+    who = "the block stands" if one else f"all {answer.blocks} blocks stand"
+    sd = f" (standard deviation {answer.age_sd_years:,.6g})" if answer.age_sd_years else ""
+    rate = answer.annual_rate_any
+    often = "never fails" if rate == 0.0 else f"fails {once_in(rate)} on average"
+    yield (
+        f"{_condition(answer)}, {who} for {answer.age_years:,.6g} years{sd} with a probability of "
+        f"{percent(answer.probability_standing)} ({percent(answer.ci_low)} to "
+        f"{percent(answer.ci_high)}); {'it' if one else 'one of them'} {often}."
+    )
+    five = answer.factor_5_percent
+    if five is None:
+        yield "No factor on its rates makes that improbable: the blocks say nothing against it."
+    elif five < 1.0:
+        yield (
+            "That is less than 5 %: it would be 5 % if all rates of the hazard were multiplied by "
+            f"{five:.2g}."
+        )
+    else:
+        yield (
+            f"Standing does not contradict it: all rates of the hazard would have to be {five:.2g} "
+            "times as high to leave 5 %."
+        )
+
+
+def _condition(answer: SurvivalAnswer) -> str:
+    if len(answer.branches) == 1:
+        return "If the hazard is right"
+    weighted = answer.branches[0].name != answer.hazard
+    return f"Over {answer.hazard}" if weighted else f"If the hazard of {answer.hazard} is right"
+
+
+def losses_in_words(answer: LossAnswer) -> Iterator[str]:
+    """Yield how many blocks fail, how often one does, and what it costs."""
+    failures = with_error(answer.average_annual_failures, answer.error(answer.failures))
+    blocks, rate = several(answer.portfolio.size, "block"), answer.annual_rate_any
+    if answer.events.is_scenario:
+        yield f"{failures} of {blocks} are expected to fail."
+        if rate is not None:
+            yield f"At least one fails with a probability of {percent(rate)}."
+        return
+    yield (
+        f"{failures} failures a year are expected of {blocks}; the events cover "
+        f"{answer.events.effective_years:,.0f} years."
+    )
+    if rate is not None:
+        often = f"{once_in(rate)} on average" if rate > 0.0 else "never"
+        yield f"An earthquake fails at least one of them {often}."
+    if answer.average_annual_loss is not None:
+        loss = with_error(answer.average_annual_loss, answer.error(answer.loss))
+        yield f"The average annual loss is {loss}."
+
+
+def campaign_in_words(report: Mapping[str, Any]) -> str:
+    """Return what a campaign has stored.
+
+    Args:
+        report: an answer of `rbfrag simulate` under the keys of the JSON contract.
+    """
+    total, before = report["combinations"], report["resumed"]
+    parts = [
+        f"{report[key]:,} {text}"
+        for key, text in (
+            ("found", "with a critical value"),
+            ("below_limit", "of which nothing fails down to the search limit"),
+            ("no_motion", "that move nothing"),
+            ("outside_model", "outside the model"),
+            ("not_searched", "with outcomes of a grid alone"),
+        )
+        if report[key]
+    ]
+    stored = f", {before:,} of them before" if before else ""
+    return (
+        f"{several(total, 'combination')} of kind {report['kind']} "
+        f"{'is' if total == 1 else 'are'} stored{stored}: {', '.join(parts) or 'none'}."
+    )

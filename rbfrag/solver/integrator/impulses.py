@@ -1,0 +1,306 @@
+"""The impulses of corners on planes within one time step.
+
+Each corner that ends a step on its plane pushes, without rebound and with Coulomb friction
+(Moreau 1988; Stewart and Trinkle 1996). Gauss-Seidel sweeps from zero find which of them push,
+which stick and which slip, in a few sweeps; those known, the impulses are the solution of at most
+three linear equations, one for each degree of freedom. Sweeps go on where that solution breaks
+Coulomb's law, or where the equations do not decide.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from rbfrag.solver.integrator.compiled import inner_kernel
+from rbfrag.solver.results import FloatArray
+
+SWEEPS_MAX = 400
+"""Gauss-Seidel sweeps of one step. All are taken only where two corners stick while the planes push
+out what rounding put below them, which no velocity does exactly for both."""
+
+CONVERGED = 1e-10
+"""Change of velocity in a sweep, over that by gravity in a step, at which impulses are found."""
+
+SINGULAR = 1e-9
+"""Pivot at which the linear equations are taken not to decide."""
+
+OPEN, DOWN, UP, STUCK = range(4)
+"""What a corner does: it does not push; it pushes and slips up or down its plane, so that
+friction is down or up it; it pushes and sticks."""
+
+
+class Corners(NamedTuple):
+    """The pairs of corner and plane that may touch; all arrays have shape (m,).
+
+    Args:
+        arm_x: from the centroid to the corner, block not turned, along the base [m].
+        arm_y: the same normal to the base [m].
+        normal_x: unit normal of the plane, into the block.
+        normal_y: the other component.
+        off_m: distance of the plane from the origin along its normal [m].
+        friction: tangent of its friction angle.
+        bit: what it means where they touch, as `rbfrag.solver.integrator.free_body` names it.
+    """
+
+    arm_x: FloatArray
+    arm_y: FloatArray
+    normal_x: FloatArray
+    normal_y: FloatArray
+    off_m: FloatArray
+    friction: FloatArray
+    bit: FloatArray
+
+
+class Work(NamedTuple):
+    """Arrays that a step writes to.
+
+    Args:
+        across: impulse of each pair along the normal of its plane, per mass [m/s], shape (m,).
+        along: the same down the plane, along (n_y, -n_x), shape (m,).
+        pair: places of the pairs that may touch within the step, shape (m,).
+        moment_n: moment of a unit impulse along the normal about the centroid [m], of each of
+            them, shape (m,).
+        moment_t: the same of one down the plane, shape (m,).
+        per_n: impulse along the normal that gives its corner unit speed along it, per mass,
+            shape (m,).
+        per_t: the same along the plane, shape (m,).
+        least: speed from the plane that each must have at the end of the step [m/s], shape (m,).
+        approach: speed towards it before the step [m/s], shape (m,).
+        does: what each does: `OPEN`, `DOWN`, `UP` or `STUCK`, shape (m,).
+        equations: coefficients and right sides of the linear equations, shape (3, 4).
+        columns: velocity and spin that the unknown impulses of them give, shape (3, 3).
+    """
+
+    across: FloatArray
+    along: FloatArray
+    pair: FloatArray
+    moment_n: FloatArray
+    moment_t: FloatArray
+    per_n: FloatArray
+    per_t: FloatArray
+    least: FloatArray
+    approach: FloatArray
+    does: FloatArray
+    equations: FloatArray
+    columns: FloatArray
+
+
+def work_of(corners: Corners) -> Work:
+    """Return the work arrays of a run."""
+    m = corners.arm_x.size
+    shapes = [*10 * [(m,)], (3, 4), (3, 3)]
+    return Work(*[np.zeros(shape) for shape in shapes])
+
+
+class Velocity(NamedTuple):
+    """Velocity of the centroid [m/s] and spin [rad/s]."""
+
+    vx: float
+    vy: float
+    spin: float
+
+
+@inner_kernel
+def after_impulses(
+    corners: Corners, work: Work, active: int, per_inertia: float, free: Velocity, tolerance: float
+) -> Velocity:
+    """Return the velocity at the end of a step, and leave the impulses in the work arrays.
+
+    Args:
+        corners: pairs of corner and plane.
+        work: what is known of those that may touch; `across` and `along` are zero.
+        active: how many may touch.
+        per_inertia: mass over moment of inertia about the centroid [1/m²].
+        free: velocity without impulses.
+        tolerance: change of velocity in a sweep at which the impulses are found [m/s].
+    """
+    if active == 1:
+        decided, velocity = _of_one(corners, work, per_inertia, free)
+        if decided:
+            return velocity
+    vx, vy, spin = free
+    across, along = work.across, work.along
+    for k in range(active):
+        work.does[k] = -1.0
+        work.per_n[k] = 1.0 / (1.0 + work.moment_n[k] ** 2 * per_inertia)
+        work.per_t[k] = 1.0 / (1.0 + work.moment_t[k] ** 2 * per_inertia)
+    tried = False
+    for _ in range(SWEEPS_MAX):
+        change = 0.0
+        same = True
+        for k in range(active):
+            i = int(work.pair[k])
+            nx, ny = corners.normal_x[i], corners.normal_y[i]
+            mn, mt = work.moment_n[k], work.moment_t[k]
+            speed = vx * nx + vy * ny + spin * mn
+            push = max(across[i] - (speed - work.least[k]) * work.per_n[k], 0.0)
+            part = push - across[i]
+            across[i] = push
+            vx += part * nx
+            vy += part * ny
+            spin += part * mn * per_inertia
+            change = max(change, abs(part))
+            speed = vx * ny - vy * nx + spin * mt
+            limit = corners.friction[i] * push
+            grip = min(max(along[i] - speed * work.per_t[k], -limit), limit)
+            part = grip - along[i]
+            along[i] = grip
+            vx += part * ny
+            vy -= part * nx
+            spin += part * mt * per_inertia
+            change = max(change, abs(part))
+            does = float(OPEN)
+            if push > 0.0:
+                does = float(DOWN if grip >= limit else UP if grip <= -limit else STUCK)
+            same = same and does == work.does[k]
+            work.does[k] = does
+        if change <= tolerance:
+            break
+        tried = tried and same
+        if same and not tried:
+            tried = True
+            decided, velocity = _solved(corners, work, active, per_inertia, free)
+            if decided:
+                return velocity
+    return Velocity(vx, vy, spin)
+
+
+@inner_kernel
+def _of_one(
+    corners: Corners, work: Work, per_inertia: float, free: Velocity
+) -> tuple[bool, Velocity]:
+    """Solve for the impulse of the only corner that may touch.
+
+    Returns:
+        Whether there is one solution; and the velocity.
+    """
+    i = int(work.pair[0])
+    nx, ny, friction = corners.normal_x[i], corners.normal_y[i], corners.friction[i]
+    mn, mt = work.moment_n[0], work.moment_t[0]
+    nn, nt = 1.0 + mn * mn * per_inertia, mn * mt * per_inertia
+    tt = 1.0 + mt * mt * per_inertia
+    if nn - friction * abs(nt) <= SINGULAR:
+        return False, free
+    off = work.least[0] - (free.vx * nx + free.vy * ny + free.spin * mn)
+    if off <= 0.0:
+        return True, free
+    slips = free.vx * ny - free.vy * nx + free.spin * mt
+    push = (off * tt + slips * nt) / (nn * tt - nt * nt)
+    grip = -(slips + nt * push) / tt
+    if not abs(grip) <= friction * push:
+        push = off / (nn + friction * nt)
+        grip = friction * push
+        if slips + nt * push + tt * grip > 0.0:
+            push = off / (nn - friction * nt)
+            grip = -friction * push
+    work.across[i], work.along[i] = push, grip
+    return True, Velocity(
+        free.vx + push * nx + grip * ny,
+        free.vy + push * ny - grip * nx,
+        free.spin + (push * mn + grip * mt) * per_inertia,
+    )
+
+
+@inner_kernel
+def _solved(
+    corners: Corners, work: Work, active: int, per_inertia: float, free: Velocity
+) -> tuple[bool, Velocity]:
+    """Solve for the impulses of corners that do what the last two sweeps say.
+
+    Returns:
+        Whether there is one solution, which keeps to Coulomb's law; and the velocity.
+    """
+    equations, columns = work.equations, work.columns
+    n = 0
+    for k in range(active):
+        if work.does[k] == OPEN:
+            continue
+        i = int(work.pair[k])
+        nx, ny = corners.normal_x[i], corners.normal_y[i]
+        mn, mt = work.moment_n[k], work.moment_t[k]
+        stuck = work.does[k] == STUCK
+        if n + (2 if stuck else 1) > 3:
+            return False, free
+        # a slipping corner pushes along its normal and rubs along its plane in one proportion
+        rubs = 0.0
+        if not stuck:
+            rubs = corners.friction[i] if work.does[k] == DOWN else -corners.friction[i]
+        columns[n, 0] = nx + rubs * ny
+        columns[n, 1] = ny - rubs * nx
+        columns[n, 2] = (mn + rubs * mt) * per_inertia
+        n += 1
+        if stuck:
+            columns[n, 0], columns[n, 1], columns[n, 2] = ny, -nx, mt * per_inertia
+            n += 1
+    row = 0
+    for k in range(active):
+        if work.does[k] == OPEN:
+            continue
+        i = int(work.pair[k])
+        nx, ny, mn, mt = (
+            corners.normal_x[i], corners.normal_y[i], work.moment_n[k], work.moment_t[k],
+        )  # fmt: skip
+        for j in range(n):
+            equations[row, j] = columns[j, 0] * nx + columns[j, 1] * ny + columns[j, 2] * mn
+        equations[row, 3] = work.least[k] - (free.vx * nx + free.vy * ny + free.spin * mn)
+        row += 1
+        if work.does[k] == STUCK:
+            for j in range(n):
+                equations[row, j] = columns[j, 0] * ny - columns[j, 1] * nx + columns[j, 2] * mt
+            equations[row, 3] = -(free.vx * ny - free.vy * nx + free.spin * mt)
+            row += 1
+    for j in range(n):
+        if not equations[j, j] > SINGULAR:
+            return False, free
+        for row in range(j + 1, n):
+            factor = equations[row, j] / equations[j, j]
+            for c in range(j + 1, n):
+                equations[row, c] -= factor * equations[j, c]
+            equations[row, 3] -= factor * equations[j, 3]
+    vx, vy, spin = free
+    for j in range(n - 1, -1, -1):
+        impulse = equations[j, 3]
+        for c in range(j + 1, n):
+            impulse -= equations[j, c] * equations[c, 3]
+        impulse /= equations[j, j]
+        equations[j, 3] = impulse
+        vx += impulse * columns[j, 0]
+        vy += impulse * columns[j, 1]
+        spin += impulse * columns[j, 2]
+    row = 0
+    for k in range(active):
+        i = int(work.pair[k])
+        nx, ny = corners.normal_x[i], corners.normal_y[i]
+        does = work.does[k]
+        if does == OPEN:
+            if vx * nx + vy * ny + spin * work.moment_n[k] < work.least[k]:
+                return False, free
+            continue
+        push = equations[row, 3]
+        if push <= 0.0:
+            return False, free
+        if does == STUCK:
+            if abs(equations[row + 1, 3]) > corners.friction[i] * push:
+                return False, free
+        else:
+            slips = vx * ny - vy * nx + spin * work.moment_t[k]
+            if slips > 0.0 if does == DOWN else slips < 0.0:
+                return False, free
+        row += 2 if does == STUCK else 1
+    row = 0
+    for k in range(active):
+        i = int(work.pair[k])
+        does = work.does[k]
+        work.across[i] = work.along[i] = 0.0
+        if does == OPEN:
+            continue
+        push = work.across[i] = equations[row, 3]
+        if does == STUCK:
+            row += 1
+            work.along[i] = equations[row, 3]
+        else:
+            work.along[i] = corners.friction[i] * (push if does == DOWN else -push)
+        row += 1
+    return True, Velocity(vx, vy, spin)

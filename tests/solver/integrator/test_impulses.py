@@ -1,0 +1,64 @@
+"""Impulses of corners on planes: Coulomb's law and no interpenetration, whatever the state."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from rbfrag.solver.integrator.impulses import Corners, Velocity, after_impulses, work_of
+
+TOLERANCE = 1e-13
+
+
+@njit
+def compiled(corners, work, active, per_inertia, free, tolerance):
+    return after_impulses(corners, work, active, per_inertia, free, tolerance)
+
+
+def test_impulses_push_and_rub_as_coulomb_says() -> None:
+    random = np.random.default_rng(3)
+    doing = {"open": 0, "stuck": 0, "slips": 0}
+    for trial in range(600):
+        m = 1 + trial % 2
+        arms = random.uniform(-1.0, 1.0, (m, 2))
+        # planes like base and back, with the block on the side that their normals point to
+        turned = np.array([0.0, random.uniform(0.3, 1.2)])[:m]
+        normals = np.stack([np.sin(turned), np.cos(turned)], axis=1)
+        friction = random.uniform(0.0, 0.8, m)
+        corners = Corners(*arms.T.copy(), *normals.T.copy(), np.zeros(m), friction, np.ones(m))
+        inertia = random.uniform(0.2, 1.0)
+        free = Velocity(*random.normal(size=3) * 1e-3)
+        work = work_of(corners)
+        work.pair[:] = np.arange(m)
+        work.moment_n[:] = arms[:, 0] * normals[:, 1] - arms[:, 1] * normals[:, 0]
+        work.moment_t[:] = -arms[:, 0] * normals[:, 0] - arms[:, 1] * normals[:, 1]
+        work.least[:] = random.choice([0.0, -1e-4], m)
+        # a corner that its own friction can wedge has no unique impulse, by itself or at all
+        if (1.0 + work.moment_n**2 / inertia
+                <= friction * abs(work.moment_n * work.moment_t) / inertia).any():  # fmt: skip
+            continue
+        after = compiled(corners, work, m, 1.0 / inertia, free, TOLERANCE)
+        total = np.zeros(3)
+        for i in range(m):
+            (nx, ny), mn, mt = normals[i], work.moment_n[i], work.moment_t[i]
+            push, grip = work.across[i], work.along[i]
+            total += push * np.array([nx, ny, mn / inertia])
+            total += grip * np.array([ny, -nx, mt / inertia])
+            off = after.vx * nx + after.vy * ny + after.spin * mn - work.least[i]
+            slip = after.vx * ny - after.vy * nx + after.spin * mt
+            assert push >= 0.0
+            assert abs(grip) <= friction[i] * push * (1.0 + 1e-12)
+            assert off > -1e-10
+            if push == 0.0:
+                doing["open"] += 1
+                continue
+            assert abs(off) < 1e-10
+            if abs(slip) < 1e-10:
+                doing["stuck"] += 1
+            else:
+                doing["slips"] += 1
+                assert math.isclose(grip, -math.copysign(friction[i] * push, slip), rel_tol=1e-9)
+        assert np.allclose(np.array(free) + total, after, rtol=0.0, atol=1e-15)
+    assert min(doing.values()) > 50, doing
