@@ -3,7 +3,7 @@
 How many blocks overturn at each strength: rectangles on level ground that rock about both corners
 with Housner's restitution, and those that a slope backs, the mean of both polarities. The motions
 are those that a campaign over --records (a folder with MANIFEST.csv) has, uncorrected ones
-processed. --write renews the table and the figure of docs/theory/rocking.md.
+processed. --write renews the figure of docs/theory/rocking.md and keeps the table.
 """
 
 from __future__ import annotations

@@ -1,16 +1,19 @@
-"""Slumping and confined toppling beside a free block on springs:
+"""Yields, slumping and confined toppling beside a free block on springs:
 
-    python -m benchmarks.contact_simulation --records FOLDER [--write]
+    python -m benchmarks.contact_simulation --records FOLDER [--write] [--only yields|motions]
 
-The cases, and the simulation, are those of tests/physics/test_against_penalty.py; here all of
-them make tables and figures.
+The cases, and the simulation, are those of tests/physics/test_against_penalty.py and
+test_table_3_2.py; here all of them make tables and figures. The yields are also held against limit
+analysis.
 """
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +21,17 @@ from benchmarks.page import ROOT, parser, report
 from rbfrag.bench.cases import RECORDS_VARIABLE
 from rbfrag.bench.tables import markdown
 from rbfrag.motions.recognise import read_motions
-from rbfrag.plots.canvas import new_figure, save_figure
+from rbfrag.plots.canvas import (
+    MODE_COLOURS,
+    legend_below,
+    light_grid,
+    mode_title,
+    new_figure,
+    save_figure,
+)
 from rbfrag.solver.results import Outcome, Response
+from rbfrag.solver.stability.modes import MODES
+from rbfrag.solver.stability.single import Stability
 from tests.physics.penalty import Simulated
 from tests.physics.test_against_penalty import (
     CONFINED,
@@ -31,13 +43,22 @@ from tests.physics.test_against_penalty import (
     deviation,
     half_sines,
 )
+from tests.physics.test_table_3_2 import MOST_G, TABLE_3_2
 
 PAGES = {
     "slumping": ROOT / "docs" / "theory" / "slumping.md",
     "confined_toppling": ROOT / "docs" / "theory" / "confined-toppling.md",
 }
 
+VERIFICATION = ROOT / "docs" / "evidence" / "verification.md"
+
 FIGURES = ROOT / "docs" / "figures"
+
+AT_ONCE_G = 0.02
+"""Acceleration by which a block without strength has moved."""
+
+BEHIND_G = 0.05
+"""Distance from the end of a ramp within which a block that starts has not gone far enough."""
 
 REAL_CONFINED = {
     f"peer_at2_opensees/{name}": Case(-60, 20, 1, 15, 35, 35, (), until=38.0)
@@ -52,7 +73,13 @@ SHOWN = {
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    chosen = parser(__doc__).parse_args(arguments)
+    understood = parser(__doc__)
+    understood.add_argument("--only", choices=("yields", "motions"), help="one part of it")
+    chosen = understood.parse_args(arguments)
+    if chosen.only != "motions":
+        yields(write=chosen.write)
+    if chosen.only == "yields":
+        return
     root = Path(chosen.records or os.environ.get(RECORDS_VARIABLE, "."))
     for kind, page in PAGES.items():
         pulses, real = (SLUMPS, REAL_SLUMPS) if kind == "slumping" else (CONFINED, REAL_CONFINED)
@@ -77,6 +104,109 @@ def main(arguments: Sequence[str] | None = None) -> None:
         report(kind, markdown((headers, cells)), write=chosen.write, page=page)
         if chosen.write:
             draw([item for item in drawn if item[0] in SHOWN[kind]], kind)
+
+
+class Compared(NamedTuple):
+    """The yields of one model of Table 3.2 [g]: by the formulas and by the two checks.
+
+    Args:
+        found: mode, state and yield by the formulas.
+        decided: whether statics alone has one answer.
+        limit_g: the greatest k that contact forces can hold.
+        ramp_g: k on a slow ramp at which a block on springs starts to move; None up to `MOST_G`.
+    """
+
+    found: Stability
+    decided: bool
+    limit_g: float
+    ramp_g: float | None
+
+    @property
+    def finite(self) -> bool:
+        """Whether the formulas give a yield."""
+        return math.isfinite(self.found.yield_acceleration)
+
+
+def yields(*, write: bool) -> None:
+    """Compare the yields of the 1,632 models of Table 3.2, as Figs. 3.24 and 3.25 do."""
+    compared = [
+        Compared(model.found, model.decided, model.limit_g(), model.ramp_g()) for model in TABLE_3_2
+    ]
+    rows = []
+    for mode in MODES:
+        of_mode = [each for each in compared if each.found.mode == mode]
+        limit = np.abs([difference for _, difference in limit_differences(of_mode)])
+        ramp = np.abs([difference for _, difference in ramp_differences(of_mode)])
+        silent = [each for each in of_mode if each.ramp_g is None]
+        weak = [each for each in of_mode if each.found.yield_acceleration <= 0.0]
+        at_once = [each for each in weak if each.ramp_g is not None and each.ramp_g < AT_ONCE_G]
+        beyond = [each for each in silent if each.found.yield_acceleration > MOST_G - BEHIND_G]
+        rows.append(
+            [
+                mode.replace("_", " "),
+                str(len(of_mode)),
+                f"{limit.size}: {limit.max():.0e}" if limit.size else "none",
+                str(sum(each.finite and not each.decided for each in of_mode)),
+                f"{ramp.size}: {np.median(ramp):.4f}, {ramp.max():.4f}",
+                f"{len(beyond)} of {len(silent)}",
+                f"{len(at_once)} of {len(weak)}",
+            ]
+        )
+    headers = [
+        "mode", "models", "limit analysis, one answer: greatest difference [g]",
+        "planes may hold more", "springs: median, greatest difference [g]",
+        f"at rest up to {MOST_G} g, as they should", "no strength: move at once",
+    ]  # fmt: skip
+    report("yields", markdown((headers, rows)), write=write, page=VERIFICATION)
+    if write:
+        draw_yields(compared)
+
+
+def limit_differences(compared: Sequence[Compared]) -> list[tuple[float, float]]:
+    """Return yields and their differences from limit analysis where it has one answer [g]."""
+    return [
+        (each.found.yield_acceleration, each.found.yield_acceleration - each.limit_g)
+        for each in compared
+        if each.finite and each.decided
+    ]
+
+
+def ramp_differences(compared: Sequence[Compared]) -> list[tuple[float, float]]:
+    """Return yields of blocks that rest and their differences from the springs' [g]."""
+    return [
+        (each.found.yield_acceleration, each.found.yield_acceleration - each.ramp_g)
+        for each in compared
+        if each.finite and each.found.yield_acceleration > 0.0 and each.ramp_g is not None
+    ]
+
+
+def draw_yields(compared: Sequence[Compared]) -> None:
+    """Draw both differences against the yield."""
+    figure = new_figure(width_in=7.6, height_in=5.8)
+    above, below = figure.subplots(2, 1, sharex=True)
+    for mode in MODES:
+        of_mode = [each for each in compared if each.found.mode == mode]
+        for axes, pairs, scale in (
+            (above, limit_differences(of_mode), 1e15),
+            (below, ramp_differences(of_mode), 1.0),
+        ):
+            k, difference = np.array(pairs).reshape(-1, 2).T
+            axes.scatter(
+                k, scale * difference, s=13, alpha=0.55, linewidths=0.0, color=MODE_COLOURS[mode],
+                label=mode_title(mode) if axes is below else None,
+            )  # fmt: skip
+    below.axhspan(-0.02, 0.02, color="#ececec", zorder=0, label="0.02 g, the dissertation's")
+    for axes in (above, below):
+        axes.axhline(0.0, color="black", lw=0.6)
+        light_grid(axes)
+    above.set_ylabel("less limit analysis [$10^{-15}$ g]")
+    above.set_title("Yield acceleration by the formulas", fontsize=10)
+    below.set_ylabel("less that of a block\non springs, slow ramp [g]")
+    below.set_ylim(-0.025, 0.025)
+    below.set_xlabel("yield acceleration by the formulas [g]")
+    below.set_xlim(right=MOST_G)
+    legend_below(figure, 3)
+    save_figure(figure, FIGURES / "yield-differences.svg")
 
 
 def end_s(case: Case, answer: Response) -> float:

@@ -20,6 +20,7 @@ from rbfrag.db.schema import (
     outcome_interval,
     recording,
     response,
+    shock_pair,
     simulation,
     suite,
     suite_motion,
@@ -88,6 +89,7 @@ def _queries() -> dict[str, Select[Any]]:
         ).select_from(with_motions(table))
         for table in (combination, response)
     }
+    first = motion.alias("first")
     return {
         "earthquake": select(*_own(earthquake)),
         "recording": select(*event_key, *_own(recording, "earthquake_id")).select_from(
@@ -115,6 +117,16 @@ def _queries() -> dict[str, Select[Any]]:
             simulation.join(combination)
         ),
         "response": labelled[response],
+        "shock_pair": select(
+            shock_pair.c.natural_key,
+            first.c.samples_sha256,
+            *_motion_key,
+            *_own(shock_pair, "natural_key", "first_motion_id", "second_motion_id"),
+        ).select_from(
+            shock_pair.join(motion, motion.c.id == shock_pair.c.second_motion_id).join(
+                first, first.c.id == shock_pair.c.first_motion_id
+            )
+        ),
         "fragility_model": select(*_own(fragility_model)),
     }
 

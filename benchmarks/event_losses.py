@@ -2,7 +2,7 @@
 
 The event set is made up: as many events as give the rows, each shaking every site. A case is a
 process of its own, whose processor time, from reading the files to the answer, and peak memory are
-given. With --write the table of docs/evidence/performance.md is replaced.
+given. --write keeps the table in benchmarks/results.
 """
 
 from __future__ import annotations

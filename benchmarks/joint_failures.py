@@ -2,8 +2,8 @@
 
 Estimates the copula of failures from predictions of held-out earthquakes, and tests it on
 portfolios of blocks in earthquakes that neither the probabilities nor the copula were fitted to.
-The reference that is shipped has all that is read. Ten minutes of processor time. With --write
-the tables of docs/evidence/joint-failures.md are renewed. --quadrature only compares P(any) by
+The reference that is shipped has all that is read. Ten minutes of processor time. --write keeps
+the tables in benchmarks/results. --quadrature only compares P(any) by
 quadrature with so many samples, on portfolios at random.
 """
 

@@ -2,8 +2,8 @@
 
 Fits each to a database with outcomes of the whole grid and prints what it scores on earthquakes
 left out, beside what is asked of it: log loss, calibration slope, log loss of each block size, and
-the failures of strong blocks that stay the same under every motion, predicted over observed. With
---write the table goes into docs/theory/fragility.md. The exit status is 1 where anything is missed.
+the failures of strong blocks that stay the same under every motion, predicted over observed.
+--write keeps the table in benchmarks/results. The exit status is 1 where anything is missed.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Every method on every measure is judged by earthquakes that it was not fitted to, and beside the
 plain table of what share of the blocks fails at each strength and size. The reference that is
-shipped has all that is read. Two minutes of processor time; --aims prints the aims alone. With
---write the tables of docs/evidence/model-choice.md are replaced.
+shipped has all that is read. Two minutes of processor time; --aims prints the aims alone. --write
+keeps the tables, in docs/evidence/model-choice.md or benchmarks/results.
 """
 
 from __future__ import annotations
@@ -440,7 +440,7 @@ def study(source: FitSource, data: Outcomes, *, aims_alone: bool = False) -> dic
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print the tables, or write them into the page."""
+    """Print the tables, and keep them if asked to."""
     options = parser(__doc__)
     options.add_argument("--db", default=str(REFERENCE), help="database with outcomes of the grid")
     options.add_argument("--aims", action="store_true", help="only the table of aims")

@@ -3,9 +3,9 @@
     python -m benchmarks.other_kinds DATABASE [--write]
 
 reads the campaigns of a database (toppling, slumping by 2 degrees and past recovery, sliding), fits
-the models, compares them with published regressions, and writes the tables and the figure of
-docs/evidence/other-kinds.md. Toppling may be in another database, such as the shipped one. What the
-blocks of one earthquake share is that of the shipped models.
+the models, compares them with published regressions, and prints the tables; --write keeps them and
+draws the figure of docs/evidence/other-kinds.md. Toppling may be in another database, such as the
+shipped one. What the blocks of one earthquake share is that of the shipped models.
 """
 
 from __future__ import annotations
@@ -216,7 +216,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("database")
     options.add_argument("--toppling", help="database of the toppling campaign, if it is another")
-    options.add_argument("--write", action="store_true", help="write page and figure")
+    options.add_argument("--write", action="store_true", help="keep tables, draw the figure")
     chosen = options.parse_args()
     found, (sliding, slumping) = tables(chosen.database, chosen.toppling)
     kinds = ("sliding", "slumping")

@@ -4,8 +4,8 @@ Fits them to the rocking campaign of --db FILE, or to one that is made of --reco
 MANIFEST.csv), and prints what each scores on earthquakes that it has not seen, beside what is
 asked: log loss, Brier score, calibration slope over all and by block size. T0, T1 and T2 are the
 forms of two, three and five terms, without the factor of size, that the shipped ones are compared
-with; T1 is of blocks with Housner's restitution alone. With --write the tables go into
-docs/theory/rocking.md. The exit status is 1 where anything is missed.
+with; T1 is of blocks with Housner's restitution alone. --write keeps the tables in
+benchmarks/results. The exit status is 1 where anything is missed.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Free-standing blocks on a shake table:  python -m benchmarks.shake_table FOLDER --work WORK
 
 Predicts which tests overturn two granite blocks, in folds that never share a base record, by
-measures of the motion and by simulated blocks. FOLDER is described in docs/evidence/shake-table.md,
-whose table --write renews; --work keeps the simulated outcomes. The exit status is 1 where a target
-is missed.
+measures of the motion and by simulated blocks. FOLDER is described in docs/evidence/shake-table.md;
+--write keeps the tables in benchmarks/results, --work the simulated outcomes. The exit status is 1
+where a target is missed.
 """
 
 from __future__ import annotations
@@ -401,7 +401,7 @@ def main(arguments: list[str] | None = None) -> None:
     options.add_argument("folder", type=Path, help="folder of the tests")
     options.add_argument("--work", type=Path, help="folder that keeps the simulated outcomes")
     options.add_argument("--workers", type=int, default=2, help="processes (default 2)")
-    options.add_argument("--write", action="store_true", help="write the tables into the page")
+    options.add_argument("--write", action="store_true", help="keep tables in benchmarks/results")
     chosen = options.parse_args(arguments)
     trials = read(chosen.folder)
     text, reached = study(trials, outcomes(trials, work=chosen.work, workers=chosen.workers))

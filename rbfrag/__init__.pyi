@@ -27,6 +27,7 @@ from rbfrag.hazards.survival import survival as survival
 from rbfrag.motions.ground_motion import GroundMotion as GroundMotion
 from rbfrag.motions.recognise import read_motions as read_motions
 from rbfrag.motions.toppling_spectrum import toppling_spectrum as toppling_spectrum
+from rbfrag.plots.report.write import report as report
 from rbfrag.solver.block.arrays import BlockArray as BlockArray
 from rbfrag.solver.block.geometry import Block as Block
 from rbfrag.solver.block.mesh_block import MeshBlock as MeshBlock

@@ -38,7 +38,7 @@ EXCEPTIONS = {
     "connection_made": "asyncio calls a protocol's method by this name",
     "DatabaseNotFoundError": "a public error: scripts catch it by this name",
     "found": {
-        "campaign/simulate.py": "a key of the JSON answer of `simulate`",
+        "campaign/summary.py": "a key of the JSON answer of `simulate`",
         "db/queries.py": "the same of `db info --by suite`",
     },
     "FOUND_HAS_VALUE": "about the stored status `found`",

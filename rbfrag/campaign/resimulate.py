@@ -11,10 +11,18 @@ from typing import NamedTuple
 from sqlalchemy import Connection
 
 from rbfrag.campaign.machine import processor_and_compiler
+from rbfrag.campaign.sequences import PairWork, SequenceTask, run_pair
 from rbfrag.db.check.finding import COMPUTE_AGAIN, Finding
 from rbfrag.db.check.maps import BORDER_ERROR, contradictions
 from rbfrag.db.motions import load_motion
 from rbfrag.db.rows import Interval
+from rbfrag.db.shock_pairs import (
+    PARTS,
+    ShockEnd,
+    StoredShockPair,
+    pair_keys_with_samples,
+    stored_shock_pair,
+)
 from rbfrag.db.stored_combination import (
     StoredCombination,
     keys_with_samples,
@@ -72,7 +80,7 @@ class Resimulation:
     """What computing a sample again showed.
 
     Args:
-        sampled: combinations computed again.
+        sampled: combinations, and blocks under two motions, computed again.
         exact: of these, equal bit for bit.
         within_error: equal within the error of the solver, made on another machine.
         eligible: combinations of the present numerics whose samples are stored.
@@ -89,7 +97,7 @@ class Resimulation:
 
 
 def resimulate(connection: Connection, *, sample: int, seed: int = 0) -> Resimulation:
-    """Compute a random sample of the stored combinations again and compare.
+    """Compute a random sample of combinations and pairs of motions again and compare.
 
     What was made on this kind of processor with this version of numba must come out bit for
     bit, anything else within the error of the solver. The sample is drawn from the sorted
@@ -100,11 +108,25 @@ def resimulate(connection: Connection, *, sample: int, seed: int = 0) -> Resimul
         seed: of the random choice.
     """
     keys = keys_with_samples(connection, numerics_version=NUMERICS_VERSION)
+    pairs = pair_keys_with_samples(connection, numerics_version=NUMERICS_VERSION)
+    of_pairs = set(pairs)
+    keys = sorted([*keys, *pairs])
     chosen = random.Random(seed).sample(keys, min(sample, len(keys)))
     here = processor_and_compiler()
     exact = within_error = 0
     findings: list[Finding] = []
     for key in chosen:
+        if key in of_pairs:
+            pair = stored_shock_pair(connection, key)
+            off = _pair_differences(connection, pair, exactly=True)
+            exact += not off
+            if off and pair.processor != here:
+                off = _pair_differences(connection, pair, exactly=False)
+                within_error += not off
+            findings += (
+                Finding("shock_pair", str(pair.id), problem, COMPUTE_AGAIN) for problem in off
+            )
+            continue
         stored = stored_combination(connection, key)
         try:
             again = _compute(connection, stored)
@@ -127,6 +149,30 @@ def resimulate(connection: Connection, *, sample: int, seed: int = 0) -> Resimul
         seed=seed,
         findings=tuple(findings),
     )
+
+
+def _pair_differences(connection: Connection, pair: StoredShockPair, *, exactly: bool) -> list[str]:
+    """Return what computing a block under two motions again gives otherwise."""
+    then = pair.record
+    first, second = (
+        load_motion(connection, row) for row in (then.first_motion_id, then.second_motion_id)
+    )
+    task = SequenceTask(then.natural_key, then.polarity, then.block)
+    work = PairWork(
+        then.kind, then.first_motion_id, then.second_motion_id, then.pairing, first, second, (task,)
+    )
+    try:
+        (now,) = run_pair(work).records
+    except RbfragError as error:
+        return [f"cannot be computed again: {error}"]
+    return [
+        f"{part}_{name} is {old!r}, computed again {new!r}"
+        for part in PARTS
+        for name, old, new in zip(
+            ShockEnd._fields, getattr(then, part), getattr(now, part), strict=True
+        )
+        if old != new and (exactly or isinstance(old, str) or not _close(old, new))
+    ]
 
 
 def _finding(stored: StoredCombination, problem: str) -> Finding:

@@ -6,7 +6,6 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from sqlalchemy import Engine
@@ -24,6 +23,9 @@ from rbfrag.campaign.plan import (
     remaining_work,
     strengths_of,
 )
+from rbfrag.campaign.sequences import refuse_kind, simulate_sequences
+from rbfrag.campaign.summary import CampaignProgress as CampaignProgress
+from rbfrag.campaign.summary import CampaignSummary as CampaignSummary
 from rbfrag.campaign.worker import MotionResults, MotionWork, TaskResult, run_work
 from rbfrag.db.campaigns import (
     CombinationRecord,
@@ -41,7 +43,6 @@ from rbfrag.db.queries import Vertical
 from rbfrag.db.responses import insert_responses
 from rbfrag.db.spectra import store_spectrum
 from rbfrag.errors import InputError, StoppedError, WorkFailedError
-from rbfrag.frames import Tabular
 from rbfrag.solver.kind import Case
 from rbfrag.solver.kinds import models
 from rbfrag.solver.quantity import positive
@@ -63,72 +64,6 @@ OPTIONS = {
 """What may be asked of a kind, as the command line calls it."""
 
 
-@dataclass(frozen=True)
-class CampaignProgress:
-    """How far a campaign is, in combinations."""
-
-    done: int
-    total: int
-    resumed: int
-    seconds: float
-
-    @property
-    def rate_per_s(self) -> float:
-        """Combinations finished per second by this run."""
-        computed = self.done - self.resumed
-        return computed / self.seconds if self.seconds > 0.0 else 0.0
-
-    @property
-    def seconds_left(self) -> float | None:
-        """Estimated time left [s]; None before anything is finished."""
-        return (self.total - self.done) / self.rate_per_s if self.rate_per_s else None
-
-
-@dataclass(frozen=True, repr=False)
-class CampaignSummary(Tabular):
-    """What a finished campaign reports.
-
-    Args:
-        kind: what the blocks do.
-        combinations: those asked for (motions x vertical x polarity x cases of the kind).
-        found: of these, with a critical value above the limit.
-        below_limit: nothing fails down to the search limit, or to where the model ends (censored).
-        no_motion: no block down to the limit ever moves.
-        outside_model: the motion is outside the model.
-        not_searched: of a kind without a search; outcomes of its grid are all there is.
-        certified: with a proven answer.
-        reentrant: with a stronger failure below which a block is spared, as far as was looked at.
-        runs: simulations made by this run.
-        grid_runs: of these, runs of blocks asked for by `grid`.
-        responses: histories that this run stored.
-        without_vertical: horizontal motions that vertical shaking was asked for and have none.
-        seconds: wall time of this run.
-        resumed: combinations of which everything that is asked for was stored before.
-        warnings: what a reader of the results should know.
-    """
-
-    kind: str
-    combinations: int
-    found: int
-    below_limit: int
-    no_motion: int
-    outside_model: int
-    not_searched: int
-    certified: int
-    reentrant: int
-    runs: int
-    grid_runs: int
-    responses: int
-    without_vertical: int
-    seconds: float
-    resumed: int
-    warnings: tuple[str, ...] = field(default=())
-
-    def as_dict(self) -> dict[str, object]:
-        """Return the keys of the JSON contract."""
-        return {**asdict(self), "warnings": list(self.warnings)}
-
-
 def simulate(
     db: str | os.PathLike[str] | None = None,
     *,
@@ -144,6 +79,9 @@ def simulate(
     store_responses: Sequence[float | Literal["critical"]] | None = None,
     full_map: bool = False,
     map_depth: float = MAP_DEPTH,
+    sequence: bool = False,
+    seed: int = 1,
+    draws: int = 1,
     jobs: int | None = None,
     scheduler: str | None = None,
     on_progress: Callable[[CampaignProgress], None] | None = None,
@@ -178,6 +116,11 @@ def simulate(
         full_map: map the intervals of k_r/PGA that fail and that do not, down to the limit.
         map_depth: width of k_r/PGA that the maps may leave undecided at a border; a map that is
             stored stays as it is.
+        sequence: sliding and slumping: run blocks under two motions, one after the other, and
+            return the conditional fragility; two shocks of one station where metadata state them,
+            and each other motion after a drawn one of another earthquake.
+        seed: of the draws of a sequence.
+        draws: how many first motions are drawn for each second one.
         jobs: worker processes; None for one per processor, 1 for none (in this process).
         scheduler: address of a Dask scheduler whose workers take the place of local ones.
         on_progress: called after each motion.
@@ -193,10 +136,20 @@ def simulate(
     blocks = {"p2": p2, "rotations_deg": rotations_deg, "displacements_m": displacements_m,
               "family": family, "restitution_factors": restitution_factors}  # fmt: skip
     described = {name: value for name, value in blocks.items() if value is not None}
+    if sequence:
+        refuse_kind(kind)
     extras = {"grid": grid, "store_responses": store_responses, "full_map": full_map or None}
     cases = _cases(kind, described, [name for name, given in extras.items() if given is not None])
     wanted = _wanted(grid, store_responses, full_map)
     depth = positive(map_depth, "map_depth", "a width of k_r/PGA")
+    if sequence:
+        if vertical != "without" or full_map:
+            one = "--map" if full_map else "--vertical"
+            raise InputError(f"{one} does not go with --sequence: leave one of them out")
+        return simulate_sequences(
+            models()[kind], cases, db=db, suite=suite, seed=seed, draws=draws, jobs=jobs,
+            scheduler=scheduler, on_progress=on_progress, stopped=stopped,
+        )  # fmt: skip
     started = time.perf_counter()
     with opened_database(db) as engine:
         with engine.connect() as connection:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.cli.output import percent
-from rbfrag.cli.sentences import once_in, rounded
+from rbfrag.cli.sentences import rounded
+from rbfrag.fragility.words import percent
+from rbfrag.hazards.report import once_in
 
 if TYPE_CHECKING:
     from rbfrag.hazards.losses import LossAnswer

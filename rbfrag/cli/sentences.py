@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from rbfrag.cli.output import percent
+from rbfrag.fragility.words import percent
 
 STATUS = {
     "below_limit": "This motion topples no block of this size down to the search limit.",
@@ -33,29 +33,6 @@ def rounded(value: float) -> str:
         return f"{value:.2g}"
     text = f"{value:#.3g}"
     return f"{float(text):,.0f}" if abs(value) >= 100.0 else text.rstrip(".")
-
-
-def once_in(annual_rate: float) -> str:
-    """Return a rate as people say it: once in so many years."""
-    if not annual_rate > 1e-8:
-        return "less than once in a hundred million years"
-    years = float(f"{1.0 / annual_rate:.2g}")
-    return f"once in {years:,.0f} years" if years >= 10.0 else f"once in {years:g} years"
-
-
-def rate_in_words(document: Mapping[str, Any]) -> str:
-    """Return how often one block fails.
-
-    Args:
-        document: an answer of `rbfrag hazard` for one block under the keys of the JSON contract.
-    """
-    rate, ends = document["annual_rate"], (document["ci_high"], document["ci_low"])
-    most, least = (once_in(end).removeprefix("once in ").removesuffix(" years") for end in ends)
-    interval = f" ({most} to {least}, {100.0 * document['level']:g} %)"
-    return (
-        f"The block fails {once_in(rate)} on average{interval if min(ends) > 1e-8 else ''}, with a "
-        f"probability of {percent(document['probability'])} in {document['years']:g} years."
-    )
 
 
 def response_in_words(answer: Mapping[str, Any], advice: str) -> Iterator[str]:
@@ -147,7 +124,7 @@ def critical_in_words(answer: Mapping[str, Any]) -> str:
     half_width = 0.5 * (answer["upper"] - answer["lower"]) * answer["pga_g"]
     certified = "certified" if answer["certified"] else "not certified"
     return (
-        f"The strongest block of p² = {answer['p2']:g} 1/s² that this motion topples has "
+        f"The strongest block of p² = {answer['p2']:.3g} 1/s² that this motion topples has "
         f"k_r = {rounded(answer['kr'])} (± {half_width:.0e}, {certified}), "
         f"{rounded(answer['kr_over_pga'])} of the PGA of {rounded(answer['pga_g'])} g."
     )

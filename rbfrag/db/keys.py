@@ -54,6 +54,25 @@ def response_key(*, p2: float, kr: float, **inputs: Any) -> str:
     return _digest({**_inputs(**inputs), "p2": float(p2), "kr": float(kr)})
 
 
+def pair_key(
+    *, first_sha256: str, first_dt_s: float, block: Mapping[str, object], **inputs: Any
+) -> str:
+    """Return the key of one block under two motions.
+
+    Args:
+        first_sha256: hash of the samples of the first motion.
+        first_dt_s: their interval [s].
+        block: which block it is.
+        inputs: the second motion without a vertical one, polarity, kind and numerics, as for
+            :func:`combination_key`.
+
+    Returns:
+        SHA-256 as 64 hexadecimal digits.
+    """
+    first = {"first": first_sha256, "first_dt_s": float(first_dt_s)}
+    return _digest({**_inputs(vertical_sha256=None, **inputs), **first, "block": block})
+
+
 def key_of_row(
     row: Mapping[str, Any] | RowMapping,
     motion_sha256: str,

@@ -150,6 +150,13 @@ def motion_rows(connection: Connection, *, suite: str | None = None) -> list[Mot
     ]
 
 
+def times_of_earthquakes(connection: Connection) -> dict[str, str]:
+    """Return origin times or years, as metadata state them, by event id."""
+    column = schema.earthquake.c
+    query = select(column.event_id, column.time).where(~column.guessed, column.time.is_not(None))
+    return {row.event_id: row.time for row in connection.execute(query)}
+
+
 def motion_row(connection: Connection, motion_id: int) -> MotionRow:
     """Return one stored motion without its samples."""
     return _motion_row(_row_of(connection, _row_query(), motion_id))

@@ -436,6 +436,81 @@ response = _table(
     Index(None, "vertical_motion_id"),
 )
 
+
+def _end(of: str, meaning: str, *, may_be_missing: bool = False) -> tuple[Column[Any], ...]:
+    """Return the columns that say how one motion of two leaves a block."""
+    outcome = f"how the block ends {meaning}: as of simulation, and seated_with_gap"
+    return (
+        _column(f"{of}_outcome", Text, outcome, nullable=may_be_missing),
+        _optional(
+            f"{of}_displacement_m",
+            Double,
+            f"where it is left {meaning}: slip of its contact along the base since its first "
+            "place; missing where that is not known",
+            "m",
+        ),
+        _optional(
+            f"{of}_rotation_rad",
+            Double,
+            f"rotation that is left {meaning}; missing of slides, and where it is not known",
+            "rad",
+        ),
+        _optional(
+            f"{of}_peak_rad",
+            Double,
+            f"greatest rotation {meaning}; missing of slides, and where the block failed",
+            "rad",
+        ),
+    )
+
+
+shock_pair = _table(
+    "shock_pair",
+    "Blocks under two motions, one after the other, and under the second alone: what a block that "
+    "survives the first, in the state that it is left in, does in the second.",
+    _row_number(),
+    _column("natural_key", Text, _KEY),
+    _reference("campaign_id", "campaign.id", "RESTRICT", "the campaign that made it"),
+    _reference("first_motion_id", "motion.id", "RESTRICT", "the first horizontal motion"),
+    _reference("second_motion_id", "motion.id", "RESTRICT", "the second one"),
+    _column(
+        "pairing",
+        Text,
+        "station: two shocks of one station, in their order in time; drawn: motions of different "
+        "earthquakes, drawn by a seed",
+    ),
+    _column("polarity", Text, f"of both motions; {_POLARITY}"),
+    _column("kind", Text, _KIND),
+    _column("block", Text, "JSON object: the block and its planes"),
+    _column("yield_g", Double, "yield acceleration of the block in its first place", "g"),
+    _optional(
+        "critical_rad",
+        Double,
+        "rotation at which the block has no strength left; missing of slides",
+        "rad",
+    ),
+    _column("numerics_version", Text, _NUMERICS),
+    *_end("first", "after the first motion"),
+    *_end(
+        "second",
+        "after both, from its first place; missing where the first leaves it nowhere known",
+        may_be_missing=True,
+    ),
+    *_end("intact", "after the second motion alone"),
+    UniqueConstraint("natural_key"),
+    CheckConstraint("length(natural_key) = 64", name="natural_key"),
+    CheckConstraint("pairing IN ('station', 'drawn')", name="pairing"),
+    CheckConstraint(POLARITY, name="polarity"),
+    CheckConstraint(KIND, name="kind"),
+    CheckConstraint("yield_g > 0 AND critical_rad > 0", name="ranges"),
+    CheckConstraint(
+        "first_outcome <> '' AND second_outcome <> '' AND intact_outcome <> ''", name="outcome"
+    ),
+    Index(None, "campaign_id"),
+    Index(None, "first_motion_id"),
+    Index(None, "second_motion_id"),
+)
+
 fragility_model = _table(
     "fragility_model",
     "Fitted fragility models.",

@@ -21,8 +21,8 @@ from rbfrag.exchange.block_table import (
     rectangle_columns,
 )
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
-from rbfrag.exchange.table_files import table_parts, table_path, table_source, table_writer
-from rbfrag.exchange.table_parts import Part
+from rbfrag.exchange.tables.files import table_parts, table_path, table_source, table_writer
+from rbfrag.exchange.tables.parts import Part
 from rbfrag.files import reading, written_whole
 from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.measures import STATED

@@ -18,8 +18,8 @@ from rbfrag.errors import InputError, checked_name
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts
 from rbfrag.exchange.points import SUFFIXES as GEOJSON
 from rbfrag.exchange.points import read_points
-from rbfrag.exchange.table_files import table_parts, table_path, table_source, table_writer
-from rbfrag.exchange.table_parts import Part, cells_of
+from rbfrag.exchange.tables.files import table_parts, table_path, table_source, table_writer
+from rbfrag.exchange.tables.parts import Part, cells_of
 from rbfrag.files import is_number, reading, written_whole
 from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.described import rectangle_numbers

@@ -24,7 +24,7 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.frames import TABLES, chosen_columns, frames
 from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.exchange.excel_text import as_text, changed_texts, formula_warnings
-from rbfrag.exchange.table_parts import pyarrow
+from rbfrag.exchange.tables.parts import pyarrow
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -226,7 +226,7 @@ def read_table(
     Args:
         table: ``earthquake``, ``recording``, ``motion``, ``suite``, ``suite_motion``,
             ``toppling_spectrum``, ``campaign``, ``combination``, ``outcome_interval``,
-            ``simulation``, ``response`` or ``fragility_model``.
+            ``simulation``, ``response``, ``shock_pair`` or ``fragility_model``.
         db: the database (path, URL, or None for the default).
         columns: only these columns.
         arrays: include samples [g] and histories, as one float64 array a row.

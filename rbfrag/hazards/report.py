@@ -1,10 +1,11 @@
-"""Annual rates as scripts read them: a dictionary of plain values."""
+"""Annual rates as scripts read them, a dictionary of plain values, and in a sentence."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rbfrag.fragility.words import percent
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
 
@@ -107,3 +108,26 @@ def _of_site(curve: HazardCurve, answer: HazardAnswer) -> dict[str, Any]:
     if answer.branches:
         common["branches"] = [one.as_dict() for one in answer.branches]
     return common
+
+
+def once_in(annual_rate: float) -> str:
+    """Return a rate as people say it: once in so many years."""
+    if not annual_rate > 1e-8:
+        return "less than once in a hundred million years"
+    years = float(f"{1.0 / annual_rate:.2g}")
+    return f"once in {years:,.0f} years" if years >= 10.0 else f"once in {years:g} years"
+
+
+def rate_in_words(document: Mapping[str, Any]) -> str:
+    """Return how often one block fails.
+
+    Args:
+        document: an answer of `rbfrag hazard` for one block under the keys of the JSON contract.
+    """
+    rate, ends = document["annual_rate"], (document["ci_high"], document["ci_low"])
+    most, least = (once_in(end).removeprefix("once in ").removesuffix(" years") for end in ends)
+    interval = f" ({most} to {least}, {100.0 * document['level']:g} %)"
+    return (
+        f"The block fails {once_in(rate)} on average{interval if min(ends) > 1e-8 else ''}, with a "
+        f"probability of {percent(document['probability'])} in {document['years']:g} years."
+    )

@@ -125,6 +125,14 @@ def plot_block(
     plot_path(path)
     figure = new_figure(7.4, 4.8)
     axes, panel = figure.subplots(1, 2, width_ratios=[2.6, 1.0])
+    draw_block(axes, block, stability)
+    _write_panel(panel, block, stability)
+    figure.suptitle(title or _title(stability), fontsize=11)
+    return save_figure(figure, path)
+
+
+def draw_block(axes: Axes, block: Block, stability: Stability) -> None:
+    """Draw the block of :func:`plot_block` into axes."""
     lines = block_lines(block, stability)
     axes.fill(*zip(*lines.rock, strict=True), facecolor="#e9e5de", edgecolor=ROCK, hatch="////",
               lw=0.0)  # fmt: skip
@@ -149,9 +157,6 @@ def plot_block(
     axes.set_xlabel("horizontal distance from the centroid, out of the slope [m]")
     axes.set_ylabel("height above the centroid [m]")
     light_grid(axes)
-    _write_panel(panel, block, stability)
-    figure.suptitle(title or _title(stability), fontsize=11)
-    return save_figure(figure, path)
 
 
 def _title(stability: Stability) -> str:

@@ -62,6 +62,33 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
     return target
 
 
+_LAYOUT_DIGITS = 6
+"""Of places on the sheet, of its width and height."""
+
+
+def freeze_layout(figure: Figure) -> None:
+    """Arrange the parts of a figure once and for all, the same each time.
+
+    What arranges them solves equations in an order that changes from run to run, and differs in
+    the last digits.
+    """
+
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
+    parts = list(figure.subfigs)
+    for part in parts:
+        parts += part.subfigs
+        box = part.bbox_relative
+        box.p0, box.p1 = (np.round(place, _LAYOUT_DIGITS) + 0.0 for place in (box.p0, box.p1))
+    for each in (figure, *parts):
+        if each.get_suptitle():
+            for text in each.texts:
+                x, y = (round(float(place), _LAYOUT_DIGITS) for place in text.get_position())
+                text.set_position((x, y))
+    for axes in figure.axes:
+        axes.set_position(np.round(axes.get_position().bounds, _LAYOUT_DIGITS).tolist())
+
+
 def written_numbers(axis: Axis, *digits: float) -> None:
     """Write numbers of these leading digits, without powers of ten, beside a logarithmic axis."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,11 +38,11 @@ CONTOURS = (0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
 
 _BOLD = (0.05, 0.5, 0.95)
 
-_LABEL_AT = 1.035
-"""Abscissa of the labels, of the width of the sheet."""
+_LABEL_OFF_PT = 14.0
+"""From the sheet to the labels [points]."""
 
-_LABEL_APART = 0.026
-"""Least distance of labels, of the height of the sheet."""
+_LABEL_APART_PT = 9.5
+"""Least distance of labels [points]."""
 
 _POINTS = 300
 _NODES = 241
@@ -50,8 +51,8 @@ _NODES = 241
 _SPAN = 1.25
 """Factor by which the sheet goes beyond the fitted range."""
 
-_KR_AXIS_AT = 1.125
-"""Abscissa of the axis of k_r, beyond the labels, of the width of the sheet."""
+_KR_AXIS_OFF_PT = 52.0
+"""From the sheet to the axis of k_r, beyond the labels [points]."""
 
 _DEFAULT_RANGE = (0.01, 2.0)
 
@@ -99,10 +100,12 @@ def draw_chart(
     ends = [*across, *([] if point is None else [point[0]])]
     x = np.geomspace(min(ends) / _SPAN, _SPAN * max(ends), _POINTS)
     lines = {p: failure_line(model, x, p, held) for p in CONTOURS}
-    logarithmic(axes, (1.0, 2.0, 5.0), (1.0, 2.0, 5.0))
     bottom, top = _vertical_range(lines, up)
     if point is not None:
         bottom, top = min(bottom, point[1] / _SPAN), max(top, _SPAN * point[1])
+    width_pt, height_pt = _size_pt(axes)
+    digits = _digits(x[-1] / x[0], width_pt, 30.0), _digits(top / bottom, height_pt, 14.0)
+    logarithmic(axes, *digits)
     axes.set(xlim=(x[0], x[-1]), ylim=(bottom, top))
     for probability, y in lines.items():
         axes.plot(x, y, color=BLUE, lw=1.9 if probability in _BOLD else 0.9)
@@ -117,7 +120,7 @@ def draw_chart(
     axes.grid(visible=True, which="minor", lw=0.3, color="#c8c8c8")
     axes.set_axisbelow(True)
     if held.size_is_given:
-        _draw_kr_axis(axes, held.p2)
+        _draw_kr_axis(axes, held.p2, digits[1])
     if point is not None:
         axes.plot(*point, "o", ms=8, color=RED, mec="white", mew=1.2, zorder=9, label="_point")
         for xs, ys in (([point[0]] * 2, [bottom, point[1]]), ([x[0], point[0]], [point[1]] * 2)):
@@ -157,18 +160,24 @@ def _vertical_range(
     return max(bottom, known[0] / _SPAN), min(top, max(_SPAN * known[1], 2.0 * bottom))
 
 
-def _draw_kr_axis(axes: Axes, p2: float) -> None:
+def _digits(ratio: float, size_pt: float, apart_pt: float) -> tuple[float, ...]:
+    """Return the leading digits of the numbers that an axis has space for."""
+    usual = (1.0, 2.0, 5.0)
+    return usual if size_pt > len(usual) * apart_pt * math.log10(ratio) else usual[:1]
+
+
+def _draw_kr_axis(axes: Axes, p2: float, digits: Sequence[float]) -> None:
     """Add the axis of k_r for blocks of one size, right of the probabilities."""
     from matplotlib.ticker import NullLocator
 
     per_kr = STANDARD_GRAVITY_M_S2 / math.sqrt(p2)
     beside = axes.secondary_yaxis(
-        _KR_AXIS_AT,
+        1.0 + _KR_AXIS_OFF_PT / _size_pt(axes)[0],
         functions=(lambda y: np.asarray(y) / per_kr, lambda kr: np.asarray(kr) * per_kr),
     )
-    written_numbers(beside.yaxis, 1.0, 2.0, 5.0)
+    written_numbers(beside.yaxis, *digits)
     beside.yaxis.set_minor_locator(NullLocator())
-    beside.set_ylabel(f"rocking coefficient $k_r$ at $p^2$ = {p2:.3g} s$^{{-2}}$")
+    beside.set_ylabel(f"$k_r$ at $p^2$ = {p2:.3g} s$^{{-2}}$")
 
 
 def _write_beside(axes: Axes, x: np.ndarray, lines: dict[float, np.ndarray]) -> None:
@@ -183,17 +192,25 @@ def _write_beside(axes: Axes, x: np.ndarray, lines: dict[float, np.ndarray]) -> 
             across = float((np.log(x[at]) - left) / (right - left))
             ends.append((float((np.log(y[at]) - bottom) / (top - bottom)), across, probability))
     ends.sort()
-    places = spread_out([up for up, *_ in ends], _LABEL_APART, 0.01, 0.99)
+    width_pt, height_pt = _size_pt(axes)
+    beside = 1.0 + _LABEL_OFF_PT / width_pt
+    places = spread_out([up for up, *_ in ends], _LABEL_APART_PT / height_pt, 0.01, 0.99)
     for place, (up, across, probability) in zip(places, ends, strict=True):
         text = f"{100.0 * probability:g} %"
         axes.plot(
-            [across, _LABEL_AT - 0.005], [up, place], color=BLUE, lw=0.5,
+            [across, beside - 0.005], [up, place], color=BLUE, lw=0.5,
             transform=axes.transAxes, clip_on=False, label=f"_{text}",
         )  # fmt: skip
         axes.text(
-            _LABEL_AT, place, text, fontsize=8, va="center", color=BLUE, transform=axes.transAxes,
+            beside, place, text, fontsize=8, va="center", color=BLUE, transform=axes.transAxes,
             fontweight="bold" if probability in _BOLD else "normal",
         )  # fmt: skip
+
+
+def _size_pt(axes: Axes) -> tuple[float, float]:
+    """Return width and height of axes before the figure is laid out [points]."""
+    box = axes.get_window_extent()
+    return 72.0 * box.width / axes.figure.dpi, 72.0 * box.height / axes.figure.dpi
 
 
 def _shade_outside(axes: Axes, across: tuple[float, float], up: tuple[float, float] | None) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import (
     BLUE,
@@ -23,6 +26,9 @@ from rbfrag.plots.canvas import (
     save_figure,
 )
 from rbfrag.plots.model_lines import model_answers
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FloatArray = NDArray[np.float64]
 
@@ -100,14 +106,55 @@ def plot_curve(
             f"{' and '.join(missing)} for the curve"
         )
     held = {name: float((fixed or {})[name]) for name in others}
-    y = kr * STANDARD_GRAVITY_M_S2 / np.sqrt(p2)
-    end = _right_end(model, p2, kr, varied, held, float(y))
-    x = np.linspace(0.0, end, _POINTS)
-    x[0] = _START * end
-    answer = model_answers(model, p2, kr, {varied: x, **held}, level=level)
-    known = answer.in_domain
     figure = new_figure(7.0, 4.6)
     axes = figure.add_subplot()
+    draw_curve(axes, model, {"p2": p2, "kr": kr}, varied, held, level=level, beside=beside)
+    y = kr * STANDARD_GRAVITY_M_S2 / np.sqrt(p2)
+    conditions = ", ".join(FIXED.get(name, name + " = {:g}").format(held[name]) for name in others)
+    about = model.row.diagnostics
+    counts = (
+        f", fitted on {about['n']} critical blocks of {about['events']} earthquakes"
+        if about.get("n") and about.get("events")
+        else ""
+    )
+    axes.set_title(
+        f"block $p^2$ = {p2:g} s$^{{-2}}$, $k_r$ = {kr:g}, $y$ = {y:.3g} m/s"
+        + (f"; {conditions}" if conditions else "")
+        + f"\nmodel {model.name}{counts}",
+        fontsize=10,
+    )
+    legend_below(figure, 2)
+    return save_figure(figure, path)
+
+
+def draw_curve(
+    axes: Axes,
+    model: FragilityModel,
+    block: Mapping[str, float],
+    varied: str,
+    held: Mapping[str, float],
+    *,
+    level: float = 0.95,
+    beside: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
+    at: float = 0.0,
+) -> None:
+    """Draw the curve of :func:`plot_curve` into axes.
+
+    Args:
+        axes: empty axes.
+        model: the model.
+        block: numbers of the block by name, ``p2`` [1/s²] and ``kr`` among them.
+        varied: the measure along the abscissa, by name.
+        held: the other measures that the model reads.
+        level: level of both bands.
+        beside: other fragilities, as for :func:`plot_curve`.
+        at: a value of the measure to point out; 0 for none.
+    """
+    end = max(_right_end(model, block, varied, held), 1.15 * at)
+    x = np.linspace(0.0, end, _POINTS)
+    x[0] = _START * end
+    answer = _answers(model, block, {varied: x, **held}, level)
+    known = answer.in_domain
     percent = f"{100.0 * level:g} %"
     if not np.isnan(answer.event_low).all():
         axes.fill_between(
@@ -130,35 +177,31 @@ def plot_curve(
     axes.set(xlim=(0.0, end), ylim=(0.0, 1.0))
     axes.set(xlabel=AXIS[varied], ylabel="probability that the block topples")
     light_grid(axes)
-    conditions = ", ".join(FIXED.get(name, name + " = {:g}").format(held[name]) for name in others)
-    about = model.row.diagnostics
-    counts = (
-        f", fitted on {about['n']} critical blocks of {about['events']} earthquakes"
-        if about.get("n") and about.get("events")
-        else ""
-    )
-    axes.set_title(
-        f"block $p^2$ = {p2:g} s$^{{-2}}$, $k_r$ = {kr:g}, $y$ = {y:.3g} m/s"
-        + (f"; {conditions}" if conditions else "")
-        + f"\nmodel {model.name}{counts}",
-        fontsize=10,
-    )
-    legend_below(figure, 2)
-    return save_figure(figure, path)
+    if at > 0.0:
+        p = float(_answers(model, block, {varied: np.array([at]), **held}, level).probability[0])
+        axes.plot([at, at, 0.0], [0.0, p, p], color=RED, lw=0.9, ls="--")
+        axes.plot(at, p, "o", ms=8, color=RED, mec="white", mew=1.2, zorder=9)
+
+
+def _answers(
+    model: FragilityModel,
+    block: Mapping[str, float],
+    measures: Mapping[str, FloatArray | float],
+    level: float = 0.95,
+) -> PredictionArray:
+    others = {name: value for name, value in block.items() if name not in ("p2", "kr")}
+    return model_answers(model, block["p2"], block["kr"], {**measures, **others}, level=level)
 
 
 def _right_end(
-    model: FragilityModel,
-    p2: float,
-    kr: float,
-    varied: str,
-    held: Mapping[str, float],
-    y_m_s: float,
+    model: FragilityModel, block: Mapping[str, float], varied: str, held: Mapping[str, float]
 ) -> float:
     """Where the curve has nearly reached its top, found by doubling."""
+    kr = block["kr"]
+    y_m_s = kr * STANDARD_GRAVITY_M_S2 / math.sqrt(block["p2"])
     unit = y_m_s if varied in ("pgv_m_s", "xp_m_s") else 0.1 * y_m_s if varied == "pgd_m" else kr
     x = unit * 2.0 ** np.arange(0.0, 12.0, 0.5)
-    answer = model_answers(model, p2, kr, {varied: x, **held})
+    answer = _answers(model, block, {varied: x, **held})
     high = np.flatnonzero(answer.probability > 0.97)
     if high.size:
         return float(x[high[0]])

@@ -6,6 +6,8 @@ import math
 import os
 import shutil
 import subprocess
+from bisect import bisect_right
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +32,7 @@ BITRATE_KBIT_S = 1500
 FRAMES_PER_S = 20
 
 FRAMES_MAX = 100
-"""Frames of a film; a longer motion is shown faster."""
+"""Frames of a film for each motion; a longer one is shown faster."""
 
 MARGIN_S = 0.5
 """Rest shown before the first motion and after the last [s]."""
@@ -80,6 +82,9 @@ def film(
     (edge,) = scene.plot(*_closed(shown[0]).T, color=BLOCK, lw=1.6, zorder=4)
     clock = scene.set_title("", fontsize=9)
     cursor = _draw_trace(trace, history, time_s)
+    begins_s = [part.begins_s for part in response.parts]
+    for begin_s in begins_s[1:]:
+        trace.axvline(begin_s, color=ROCK, lw=1.0, ls=":")
     scale = "true scale" if exaggerate == 1.0 else f"displacements times {exaggerate:g}"
     pace = "" if speed == 1.0 else f", {speed:.2g} times as fast as it was"
     figure.suptitle(f"{title}\n{mode_title(response.kind)}, {scale}{pace}", fontsize=10)
@@ -87,7 +92,7 @@ def film(
     def show(frame: int) -> tuple[Any, ...]:
         patch.set_xy(_closed(shown[frame]))
         edge.set_data(*_closed(shown[frame]).T)
-        clock.set_text(f"{time_s[frame]:.2f} s")
+        clock.set_text(f"{time_s[frame]:.2f} s{_which(begins_s, time_s[frame])}")
         cursor.set_xdata([time_s[frame], time_s[frame]])
         return patch, edge, clock, cursor
 
@@ -140,9 +145,17 @@ def _frame_times(response: Response, history: ResponseHistory) -> tuple[FloatArr
         end = float(history.time_s[moving[-1] + 1]) if moving.size else response.started_s
         first = max(first, response.started_s - MARGIN_S)
         last = min(last, end + MARGIN_S)
-    n = max(2, min(FRAMES_MAX, math.ceil((last - first) * FRAMES_PER_S)))
+    most = FRAMES_MAX * max(1, len(response.parts))
+    n = max(2, min(most, math.ceil((last - first) * FRAMES_PER_S)))
     speed = max(1.0, (last - first) * FRAMES_PER_S / n)
     return np.linspace(first, last, n), 1.0 if speed < 1.02 else speed
+
+
+def _which(begins_s: Sequence[float], time_s: float) -> str:
+    """Return which motion of several it is."""
+    if len(begins_s) < 2:
+        return ""
+    return f", motion {bisect_right(begins_s[1:], time_s) + 1} of {len(begins_s)}"
 
 
 def _outlines(

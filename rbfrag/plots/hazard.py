@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.plots.canvas import new_figure, plot_path, save_figure, written_numbers
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _SHOWN = 1e-4
 _NAMES = {
@@ -34,9 +38,8 @@ def plot_contribution(curve: HazardCurve, answer: HazardAnswer, path: str | Path
     plot_path(path)
     figure = new_figure(6.4, 6.4)
     top, bottom = figure.subplots(2, 1, sharex=True)
-    top.loglog(curve.levels, curve.annual_rate, "o-", color="black", ms=3.5, lw=1.4)
-    top.set_ylabel("exceedances a year, λ [1/a]")
-    rate = max(float(answer.annual_rate[0]), np.finfo(float).tiny)
+    draw_contribution(top, bottom, curve, answer)
+    rate = float(answer.annual_rate[0])
     place = f" at {curve.place}" if curve.place else ""
     top.set_title(
         f"hazard of {curve.imt}{place}: the block topples {rate:.3g} times a year\n"
@@ -44,6 +47,14 @@ def plot_contribution(curve: HazardCurve, answer: HazardAnswer, path: str | Path
         f"model {answer.model}; {100 * answer.probability[0]:.3g} % in {answer.years:g} years)",
         fontsize=10,
     )
+    return save_figure(figure, path)
+
+
+def draw_contribution(top: Axes, bottom: Axes, curve: HazardCurve, answer: HazardAnswer) -> None:
+    """Draw both parts of :func:`plot_contribution` into axes that share their abscissa."""
+    top.loglog(curve.levels, curve.annual_rate, "o-", color="black", ms=3.5, lw=1.4)
+    top.set_ylabel("exceedances a year, λ [1/a]")
+    rate = max(float(answer.annual_rate[0]), np.finfo(float).tiny)
     width = np.diff(np.log10(answer.edges))
     percent = 100.0 * answer.contribution[0] / rate
     bottom.bar(
@@ -68,4 +79,3 @@ def plot_contribution(curve: HazardCurve, answer: HazardAnswer, path: str | Path
     for axes in (top, bottom):
         axes.grid(True, which="major", color="#dddddd", lw=0.6)
         axes.set_axisbelow(True)
-    return save_figure(figure, path)

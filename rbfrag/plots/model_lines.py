@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,7 @@ class HeldMeasures:
         pga_g: PGA [g], or None for one in proportion to PGV.
         pgv_over_pga_s: PGV/(PGA g) [s] where PGA is in proportion.
         tm_s: mean period [s].
+        others: what else is known of the block, such as its restitution.
         words: what is held, for the caption; empty where nothing matters.
         size_is_given: whether the figure is of blocks of this size, and not of any.
     """
@@ -76,6 +77,7 @@ class HeldMeasures:
     tm_s: float = _ANY_TM_S
     words: str = ""
     size_is_given: bool = False
+    others: Mapping[str, float] = field(default_factory=dict)
 
     def measures(self, model: FragilityModel, x_m_s: FloatArray) -> dict[str, FloatArray]:
         """Return the measures of motions of some intensities x [m/s], shape (n,)."""
@@ -93,7 +95,7 @@ class HeldMeasures:
             )
         if "tm_s" in others:
             measures["tm_s"] = np.full(x_m_s.shape, self.tm_s)
-        return measures
+        return measures | {name: np.full(x_m_s.shape, value) for name, value in self.others.items()}
 
 
 def held_measures(

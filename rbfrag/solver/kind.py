@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -181,6 +181,8 @@ class Kind:
         campaign: whether campaigns store it.
         campaign_options: what :meth:`cases` may be asked.
         polarities: those that campaigns run; one alone where the other is its mirror image.
+        sequence_measure: what counts as failure in campaigns of sequences: where the block is left
+            [m], or its greatest rotation [rad]; empty of kinds that have none.
     """
 
     kind: str
@@ -196,6 +198,7 @@ class Kind:
     campaign: bool = False
     campaign_options: tuple[str, ...] = ()
     polarities: tuple[Polarity, ...] = POLARITIES
+    sequence_measure: Literal["", "displacement_m", "peak_rad"] = ""
 
     def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
         """Return what the block does."""
@@ -291,6 +294,26 @@ class Kind:
     ) -> Response:
         """Return the motion in time of one block: the campaign option `store_responses`."""
         raise InputError(f"campaigns of {self.kind} keep no histories")
+
+    def sequence_blocks(self, cases: Sequence[Case]) -> tuple[Mapping[str, object], ...]:
+        """Return the blocks that campaigns of sequences shake, as they are stored.
+
+        Args:
+            cases: what the campaign is asked for.
+        """
+        raise InputError(f"campaigns of sequences are not known of {self.kind}")
+
+    def sequence_limits(self, cases: Sequence[Case]) -> tuple[float | None, ...]:
+        """Return what counts as failure, in the unit of the measure; None for past recovery.
+
+        Args:
+            cases: what the campaign is asked for.
+        """
+        raise InputError(f"campaigns of sequences are not known of {self.kind}")
+
+    def sequence_site(self, block: Mapping[str, Any]) -> BlockOnPlanes:
+        """Return a block of :meth:`sequence_blocks` on its planes."""
+        raise InputError(f"campaigns of sequences are not known of {self.kind}")
 
     def refuse_foreign(self, given: Iterable[str], own: Sequence[str]) -> None:
         """Refuse an option that is not among the kind's own."""

@@ -402,6 +402,7 @@ class ShakenMechanism:
         leaves_g: k_h at which a contact opens as the motion starts [g]; infinite where none does.
         most_rad: rotation at which the model ends whatever the motion [rad].
         remarks: what is known about the block that an answer should say.
+        site: the block on its planes.
     """
 
     kind: str
@@ -412,6 +413,7 @@ class ShakenMechanism:
     leaves_g: float
     most_rad: float
     remarks: tuple[str, ...]
+    site: BlockOnPlanes
 
 
 def shaken_mechanism(
@@ -469,6 +471,7 @@ def shaken_mechanism(
         leaves_g=_leaves_g(mechanism),
         most_rad=mechanism.first.highest if model.one_phase else math.inf,
         remarks=judged.warnings,
+        site=site,
     )
 
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import rbfrag
-from rbfrag.cli.sentences import once_in
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.exchange.block_table import read_columns
 from rbfrag.hazards import report
+from rbfrag.hazards.report import once_in
 from tests.cli.conftest import Refuses, Shell
 from tests.fragility.conftest import model_row
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from rbfrag.cli.output import block_in_words, percent, prediction_in_words
+from rbfrag.fragility.words import block_in_words, percent, prediction_in_words
 
 
 def words(

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from rbfrag.cli.hazard_sentences import campaign_in_words, with_error
-from rbfrag.cli.sentences import once_in, rate_in_words, rounded, table_in_words
+from rbfrag.cli.sentences import rounded, table_in_words
+from rbfrag.hazards.report import once_in, rate_in_words
 
 
 @pytest.mark.parametrize(

@@ -21,13 +21,15 @@ from rbfrag.db.check.database import (
 from rbfrag.db.check.finding import Finding
 from rbfrag.db.engine import opened_database
 from rbfrag.db.insert import insert_row, insert_rows
-from rbfrag.db.keys import response_key
+from rbfrag.db.keys import pair_key, response_key
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import save_model
+from rbfrag.db.shock_pairs import PARTS, ShockEnd
 from rbfrag.db.spectra import store_spectrum
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES
 from rbfrag.motions.toppling_spectrum import toppling_spectrum as spectrum_of
+from rbfrag.solver.results import NUMERICS_VERSION
 
 # The map of the first found combination of `filled`, whose critical kr/PGA is 0.1.
 MAP = (
@@ -148,6 +150,35 @@ def _store_response(connection: Any) -> None:
     insert_row(connection, schema.response, {**values, **block, **series})
 
 
+def _store_pair(connection: Any) -> None:
+    first, second = connection.execute(
+        select(schema.motion).order_by(schema.motion.c.id).limit(2)
+    ).all()
+    block = {"polarity": "forward", "kind": "slumping", "numerics_version": NUMERICS_VERSION}
+    key = pair_key(
+        first_sha256=first.samples_sha256,
+        first_dt_s=first.dt_s,
+        motion_sha256=second.samples_sha256,
+        dt_s=second.dt_s,
+        block={"gamma_deg": 20.0},
+        **block,
+    )
+    ends = {f"{part}_{name}": 0.1 for part in PARTS for name in ShockEnd._fields}
+    values = {
+        "natural_key": key,
+        "campaign_id": connection.scalar(select(func.min(schema.campaign.c.id))),
+        "first_motion_id": first.id,
+        "second_motion_id": second.id,
+        "pairing": "drawn",
+        "block": '{"gamma_deg":20.0}',
+        "yield_g": 0.1,
+        "critical_rad": 0.3,
+        **ends,
+        **{f"{part}_outcome": "stable" for part in PARTS},
+    }
+    insert_row(connection, schema.shock_pair, {**values, **block})
+
+
 def _store_spectrum(connection: Any, motion: GroundMotion) -> None:
     motion_id = connection.scalar(select(func.min(schema.motion.c.id)))
     for polarity in POLARITIES:
@@ -165,6 +196,7 @@ def test_an_altered_value_is_found(
     with filled.begin() as connection:
         _store_map(connection, MAP)
         _store_response(connection)
+        _store_pair(connection)
         _store_spectrum(connection, make_motion(1))
         save_model(connection, model)
         assert check_database(connection) == []

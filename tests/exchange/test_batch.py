@@ -13,9 +13,9 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError, MissingExtraError
-from rbfrag.exchange import csv_table, table_parts
 from rbfrag.exchange.batch import ANSWERS, predict_table
 from rbfrag.exchange.block_table import read_columns, write_block_table
+from rbfrag.exchange.tables import csv_file, parts
 from rbfrag.fragility.predict import predict
 from tests.fragility.conftest import model_row
 
@@ -35,7 +35,7 @@ def answer(
         def missing() -> None:
             raise MissingExtraError("Parquet files need pyarrow", "parquet")
 
-        monkeypatch.setattr(csv_table, "pyarrow", missing)
+        monkeypatch.setattr(csv_file, "pyarrow", missing)
     database = tmp_path / "model.db"
     with opened_database(str(database), create=True) as engine, engine.begin() as connection:
         save_model(connection, model_row())
@@ -88,7 +88,7 @@ def test_a_range_of_one_earthquake_that_is_not_known_is_an_empty_cell(tmp_path: 
 def test_parts_join_without_a_seam(
     answer: Answer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(table_parts, "ROWS", 7)
+    monkeypatch.setattr(parts, "ROWS", 7)
     random = np.random.default_rng(3)
     kr = random.uniform(0.02, 0.3, 40)
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"

@@ -14,9 +14,9 @@ import openpyxl
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.exchange import workbook
 from rbfrag.exchange.batch import predict_table
 from rbfrag.exchange.block_table import read_columns, waiting_blocks, write_block_table
+from rbfrag.exchange.tables import workbook
 
 HEAD = ("block_id", "p2_1_s2", "kr", "pgv_m_s", "remark")
 
@@ -175,7 +175,7 @@ import sys
 sys.modules["openpyxl"] = None
 from rbfrag.errors import MissingExtraError
 from rbfrag.exchange.block_table import waiting_blocks
-from rbfrag.exchange.table_files import table_path
+from rbfrag.exchange.tables.files import table_path
 for act in (lambda: table_path("a.xlsx"), lambda: waiting_blocks("a.xlsx")):
     try:
         act()

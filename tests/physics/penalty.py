@@ -201,3 +201,52 @@ def _shake(
             kept[2, m] = heel - heel0
             kept[3, m] = toe - toe0
     return kept
+
+
+RAMP_G_PER_S = 0.5
+"""Rate of the ramp; a block with any yield is then some hundredths of a second behind it."""
+
+NARROW = 0.4
+"""Base over r3 below which springs are as stiff as elsewhere."""
+
+
+def yield_on_ramp(
+    block: Block, *, beta_deg: float, phi_deg: float, most_g: float = 2.5
+) -> float | None:
+    """Return the k_h at which a block that has settled starts to move on a slow ramp [g].
+
+    A block that starts to move at t0 has gone as (t - t0)³ soon after, because the acceleration in
+    excess of its yield grows with time: from the times t1, at a ten-thousandth of r3, and t2, at
+    eight times that, t0 is 2 t1 - t2. A tenth of the usual stiffness suffices but for bases so
+    narrow that the give of their springs turns the block by as much.
+
+    Args:
+        block: the block.
+        beta_deg: dip of the base [deg].
+        phi_deg: friction angle of both planes [deg].
+        most_g: end of the ramp [g].
+
+    Returns:
+        k_h; below zero for a block that has not come to rest; None where it has not moved at the
+        end of the ramp.
+    """
+    until_s = most_g / RAMP_G_PER_S
+    soft = 1.0 if block.base_m < NARROW * block.r3_m else 0.1
+    moved = simulate(
+        block, beta_deg=beta_deg, phi_deg=phi_deg, phi_back_deg=phi_deg, time_s=[0.0, until_s],
+        k_h=[0.0, most_g], until_s=until_s, keep=50, stiffness=soft * STIFFNESS,
+        step_s=STEP_S / math.sqrt(soft),
+    )  # fmt: skip
+    gone = np.maximum(abs(moved.turned_rad), np.maximum(abs(moved.heel_m), abs(moved.toe_m))
+                      / block.r3_m)  # fmt: skip
+    times = []
+    for least in (1e-4, 8e-4):
+        beyond = np.flatnonzero(gone > least)
+        if not beyond.size:
+            return None
+        i = beyond[0]
+        if i == 0:
+            return -np.inf
+        part = (least - gone[i - 1]) / (gone[i] - gone[i - 1])
+        times.append(moved.time_s[i - 1] + part * (moved.time_s[i] - moved.time_s[i - 1]))
+    return float(RAMP_G_PER_S * (2.0 * times[0] - times[1]))

@@ -41,6 +41,23 @@ def test_the_block_moves_in_the_film(slump: Response, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_film_of_two_motions_shows_both(tmp_path: Path) -> None:
+    motion = GroundMotion.from_nodes([0.0, 0.0, 0.2, 0.2, 4.0], [0.0, 0.9, 0.9, 0.0, 0.0])
+    planes = {"block": BLOCK, "beta_deg": 0.0, "phi_deg": 35.0}
+    both = respond([motion, motion], history=True, **planes)  # type: ignore[arg-type]
+    path = film(both, BLOCK, tmp_path / "both.gif", beta_deg=0.0, exaggerate=3.0)
+    with Image.open(path) as moving:
+        # the rest between them, 4 s, is shown as long as it was
+        last = moving.n_frames - 1
+        assert last >= 4 * FRAMES_PER_S
+        frames = []
+        for n in (last // 2, last):
+            moving.seek(n)
+            frames.append(np.asarray(moving.convert("L"), dtype=float))
+    scene = slice(frames[0].shape[0] // 6, frames[0].shape[0] // 2)
+    assert (np.abs(frames[0][scene] - frames[1][scene]) > 20.0).mean() > 0.005
+
+
 @pytest.mark.skipif(
     shutil.which("ffmpeg") is None or shutil.which("ffprobe") is None,
     reason="ffmpeg and ffprobe, which make and read an .mp4, are not installed",

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.output import (
     check_files,
-    percent,
     print_json,
     print_pairs,
     print_table,
@@ -16,9 +15,11 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
+from rbfrag.cli.parameters.curve import CurveOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
-from rbfrag.cli.sentences import once_in, rate_in_words
 from rbfrag.errors import InputError
+from rbfrag.fragility.words import percent
+from rbfrag.hazards.report import once_in, rate_in_words
 
 if TYPE_CHECKING:
     from rbfrag.hazards.answer import HazardAnswer
@@ -33,25 +34,6 @@ SHORT = (
 EXAMPLE = (
     "Example:  rbfrag hazard pgv-curve.csv --height 2.4 --width 0.5 --dip 3 --component rotd50"
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class CurveOptions:
-    """What a hazard curve means."""
-
-    imt: str | None = option("Intensity measure of the curve: PGV, PGA, 'SA(1.0)'.")
-    site: str | None = option("Site of the file: its number from 1 on, or its name.")
-    convert: str | None = option(
-        "Published conversion of a spectral acceleration to PGV: newmark_hall_1982 "
-        "(SA(1)) or bommer_alarcon_2006 (SA(0.5)); its scatter is integrated."
-    )
-    convert_sigma: float | None = option(
-        "Standard deviation of ln PGV about the conversion. Default: that of the reference's "
-        "motions."
-    )
-    component: str | None = option(
-        "What the curve's horizontal component means: single, geometric_mean, rotd50 or larger."
-    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,18 +8,22 @@ from typing import TYPE_CHECKING, Literal, cast
 from rbfrag.cli.hazard_sentences import campaign_in_words
 from rbfrag.cli.output import (
     ProgressBar,
+    check_files,
     print_json,
     print_pairs,
+    print_table,
     print_warnings,
     say_when_compiling,
+    write_table,
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.cli.parameters.values import number_list
 
 if TYPE_CHECKING:
-    from rbfrag.campaign.simulate import CampaignProgress
+    from rbfrag.campaign.summary import CampaignProgress
     from rbfrag.db.queries import Vertical
+    from rbfrag.fragility.conditional import ConditionalShare
 
 EXAMPLE = "Example:  rbfrag simulate --p2 30,10,3,1,0.3,0.1 --vertical both --grid 23"
 
@@ -64,6 +68,26 @@ class Blocks:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Sequence:
+    """Two motions, one after the other."""
+
+    sequence: bool = option(
+        "Sliding and slumping: run blocks under two motions, one after the other, and print the "
+        "conditional fragility.",
+        False,
+    )
+    seed: int = option("With --sequence: seed of the pairs that are drawn.", 1)
+    draws: int = option(
+        "With --sequence: how many first motions are drawn for each that is no later shock of a "
+        "station.",
+        1,
+    )
+    out: str | None = option(
+        "With --sequence: write the conditional fragility (.csv, .parquet).", metavar="FILE"
+    )
+
+
 @stacked
 def simulate(
     *,
@@ -91,6 +115,7 @@ def simulate(
         "values, or the word critical for the critical block of each combination.",
         metavar="LIST",
     ),
+    sequence: Sequence,
     db: options.Db = None,
     printing: options.Printing,
 ) -> None:
@@ -102,12 +127,20 @@ def simulate(
     --kind sliding, the strengths that slide stated displacements; with --kind rocking, the outcomes
     of a grid of free-standing blocks, which have no critical one, in one polarity.
 
+    With --sequence, sliding and slumping blocks under two motions, the second of which finds them
+    where the first has left them: two shocks of one station where the metadata state them, and each
+    other motion after one of another earthquake that a seed draws. Printed is the share that fails
+    in the second of those that survived the first, by the state it left and by the PGA of the
+    second over the block's yield acceleration, beside the share of the same blocks in their first
+    place.
+
     After Ctrl-C, a crash or a kill, the same command goes on where it stopped; what is stored is
     not computed again, and what a stored combination lacks is added.
     """
     from rbfrag.campaign.interrupt import stopped_by_interrupts
     from rbfrag.campaign.simulate import simulate as run
 
+    check_files(table=sequence.out)
     say_when_compiling()
     with stopped_by_interrupts() as stopped, ProgressBar("simulate", "combinations") as bar:
 
@@ -127,21 +160,69 @@ def simulate(
             grid=None if grid is None else _grid(grid),
             store_responses=None if store_responses is None else _blocks(store_responses),
             full_map=full_map,
+            sequence=sequence.sequence,
+            seed=sequence.seed,
+            draws=sequence.draws,
             jobs=workers.jobs,
             scheduler=workers.scheduler,
             on_progress=show,
             stopped=stopped,
         )
     report = summary.as_dict()
+    pairs = summary.sequence
+    if pairs is not None and sequence.out is not None:
+        write_table(pairs.table_columns(), sequence.out, excel_text=False)
     if printing.json:
         print_json(report)
         return
     print_warnings(summary.warnings)
+    if pairs is not None:
+        print(
+            f"{summary.combinations} sequences of {summary.kind} blocks are stored, "
+            f"{summary.resumed} of them from before: {pairs.station_pairs} pairs of shocks of one "
+            f"station and {pairs.drawn_pairs} drawn pairs."
+        )
+        print()
+        print_table(_CONDITIONAL, map(_conditional_cells, pairs.conditional))
+        return
     del report["warnings"]
     print(campaign_in_words(report))
     print()
     shown = report if printing.verbose else {name: report[name] for name in SHORT if report[name]}
     print_pairs(shown)
+
+
+_CONDITIONAL = (
+    "limit", "state left", "PGA/yield", "blocks", "earthquakes", "of station", "P", "95 %",
+    "P intact", "95 %", "ratio",
+)  # fmt: skip
+"""Headers of the conditional fragility; all of it with --json or --out."""
+
+
+def _conditional_cells(row: ConditionalShare) -> tuple[object, ...]:
+    limit = "recovery"
+    if row.displacement_m is not None:
+        limit = f"{row.displacement_m:g} m"
+    elif row.rotation_deg is not None:
+        limit = f"{row.rotation_deg:g} deg"
+    state, most = "none", row.pga_over_yield_to
+    if row.state_to > 0.0:
+        state = f"{100.0 * row.state_from:g} to {100.0 * row.state_to:g} %"
+    return (
+        limit,
+        state,
+        f"over {row.pga_over_yield_from:g}"
+        if most is None
+        else f"{row.pga_over_yield_from:g} to {most:g}",
+        row.blocks,
+        row.earthquakes,
+        row.of_station,
+        f"{row.probability:.3f}",
+        f"{row.ci_low:.3f} to {row.ci_high:.3f}",
+        f"{row.intact_probability:.3f}",
+        f"{row.intact_ci_low:.3f} to {row.intact_ci_high:.3f}",
+        None if row.ratio is None else f"{row.ratio:.2f}",
+    )
 
 
 def _numbers(text: str | None, option: str) -> list[float] | None:

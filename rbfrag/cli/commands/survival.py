@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.cli.commands.hazard import CurveOptions
 from rbfrag.cli.hazard_sentences import survival_in_words
 from rbfrag.cli.output import (
     cell,
@@ -18,6 +17,7 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import StandingOptions, TableOptions
+from rbfrag.cli.parameters.curve import CurveOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.cli.sentences import rounded
 

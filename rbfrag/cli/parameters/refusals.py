@@ -68,6 +68,12 @@ CONFLICTS = (
     Conflict(("--block-draws",), ("--batch",), "one question is about one block"),
     Conflict(("--block-draws",), ("--ky", "--restitution"), "the table has the block"),
     Conflict(("--draws",), ("--csv", "--plot", "--film"), "they show one run", ("respond",)),
+    Conflict(
+        ("--vertical", "--map"),
+        ("--sequence",),
+        "two motions are two horizontal ones, and no map is made of them",
+        ("simulate",),
+    ),
     Conflict(("--polarity",), ("--reverse",), "one of them is enough"),
     Conflict(
         (*PLANES, "--cohesion", "--kv"),
@@ -119,6 +125,13 @@ NEEDS = (
         _NAME_IT,
         ("rockmass",),
     ),
+    Need(
+        ("--imt", "--site", "--component", "--convert", "--convert-sigma", "--years"),
+        ("--hazard",),
+        "--hazard",
+        "name the hazard curve, too",
+        ("report",),
+    ),
     Need(("--model",), MEASURES, "a measure of the motion", _MEASURE, ("rockmass",)),
     Need(
         ("--db",),
@@ -133,6 +146,13 @@ NEEDS = (
         "--draws",
         "it is about what the block may be, of which so many are run",
         ("respond",),
+    ),
+    Need(
+        ("--seed", "--draws", "--out"),
+        ("--sequence",),
+        "--sequence",
+        "it is about pairs of motions",
+        ("simulate",),
     ),
     Need(("--exaggerate",), ("--film",), "--film", "it is a factor on what the film shows"),
     Need(("--up", "--contact-mm"), ("--mesh",), "--mesh", "it is about the pose of a mesh"),

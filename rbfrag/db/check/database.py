@@ -23,6 +23,7 @@ from sqlalchemy.sql.elements import ColumnElement
 from rbfrag.db.check.combinations import check_combinations, check_responses
 from rbfrag.db.check.finding import FIT_AGAIN, RESTORE, Finding
 from rbfrag.db.check.motions import check_motions, check_spectra
+from rbfrag.db.check.shock_pairs import check_shock_pairs
 from rbfrag.db.insert import table_digests
 from rbfrag.db.model_file import STORED, decode_model
 from rbfrag.db.schema import earthquake, fragility_model, metadata, motion, recording
@@ -189,5 +190,6 @@ _LOOKS = (
     _check_unused,
     check_combinations,
     check_responses,
+    check_shock_pairs,
     _check_models,
 )

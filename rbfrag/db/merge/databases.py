@@ -19,6 +19,7 @@ from rbfrag.db.merge.results import (
     merge_combinations,
     merge_models,
     merge_responses,
+    merge_shock_pairs,
     merge_spectra,
 )
 from rbfrag.db.schema import metadata
@@ -89,6 +90,7 @@ def merge_databases(
             merge_spectra(merge)
             merge_combinations(merge)
             merge_responses(merge)
+            merge_shock_pairs(merge)
             merge_models(merge)
             if ledger.conflicts:
                 raise _refusal(ledger, database_label(ours.url), label)

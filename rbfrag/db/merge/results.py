@@ -30,9 +30,11 @@ from rbfrag.db.schema import (
     motion,
     outcome_interval,
     response,
+    shock_pair,
     simulation,
     toppling_spectrum,
 )
+from rbfrag.db.shock_pairs import PARTS, ShockEnd
 from rbfrag.db.stored_combination import intervals_of, points_of
 
 _AT_ONCE = 500
@@ -304,6 +306,45 @@ def merge_responses(merge: Merge) -> None:
             ledger.conflict("response", name, "peak_theta_n", here, there)
         elif any(ours[c] != theirs[c] for c in ("time_s", "theta_rad", "theta_dot_rad_s")):
             ledger.within_error += 1
+
+
+def merge_shock_pairs(merge: Merge) -> None:
+    """Bring in what two motions do to blocks."""
+    source, target, ledger = merge.source, merge.target, merge.ledger
+    for theirs in source.execute(select(shock_pair).order_by(shock_pair.c.id)).mappings():
+        both = {theirs["first_motion_id"], theirs["second_motion_id"]}
+        if merge.other_bits.keys() & both:
+            ledger.notes.append(
+                f"left out: pair of motions {theirs['natural_key'][:12]}… of samples whose last "
+                "bits are other here: rbfrag simulate --sequence  makes it again"
+            )
+            continue
+        values = {name: value for name, value in theirs.items() if name not in NOT_DIGESTED}
+        values["campaign_id"] = merge.campaigns[theirs["campaign_id"]]
+        for name in ("first_motion_id", "second_motion_id"):
+            values[name] = merge.motions[theirs[name]]
+        if insert_if_new(target, shock_pair, values):
+            ledger.added["shock_pair"] += 1
+            continue
+        ledger.same["shock_pair"] += 1
+        same_key = shock_pair.c.natural_key == theirs["natural_key"]
+        ours = target.execute(select(shock_pair).where(same_key)).mappings().one()
+        _compare_ends(f"{theirs['natural_key'][:12]}…", ours, theirs, ledger)
+
+
+def _compare_ends(name: str, ours: AnyRow, theirs: AnyRow, ledger: Ledger) -> None:
+    if ours["pairing"] != theirs["pairing"]:
+        ledger.keep("shock_pair", name, "pairing", ours["pairing"], theirs["pairing"])
+    columns = [f"{part}_{end}" for part in PARTS for end in ShockEnd._fields]
+    for column in columns:
+        here, there = ours[column], theirs[column]
+        differs = here != there
+        if isinstance(here, float) and isinstance(there, float):
+            differs = _differ(here, there)
+        if differs:
+            ledger.conflict("shock_pair", name, column, here, there)
+            return
+    ledger.within_error += any(ours[column] != theirs[column] for column in columns)
 
 
 def merge_models(merge: Merge) -> None:

@@ -20,7 +20,7 @@ it tips back; from there it is followed step by step (docs/theory/slide-to-slump
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -69,6 +69,9 @@ KY_OVER_PGA = (
     0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95,
 )  # fmt: skip
 """Strengths of the outcome grid, whose displacements are stored."""
+
+SEQUENCE_KY_G = (0.02, 0.05, 0.1, 0.2)
+"""Yield accelerations of the blocks of sequences, whose motions are as recorded [g]."""
 
 LEVEL_PLANE = {"plane": "level"}
 """The block of a campaign: on a base that dips, a displacement is a factor times its."""
@@ -205,8 +208,14 @@ def sliding_displacements(
 
 def slide_m(excited: Excitation, ky: float) -> float:
     """Return the permanent displacement down a level plane [m]; NaN where it is thrown."""
+    run = follow(mechanism(level_plane(ky)), excited)
+    return run.x if run.outcome is Outcome.STABLE else math.nan
+
+
+def level_plane(ky: float) -> BlockOnPlanes:
+    """Return a block that slides on a level plane, of yield acceleration `ky` [g]."""
     friction_rad = math.atan(ky)
-    level = BlockOnPlanes(
+    return BlockOnPlanes(
         block=None,
         beta_rad=0.0,
         phi_rad=friction_rad,
@@ -216,8 +225,6 @@ def slide_m(excited: Excitation, ky: float) -> float:
         yield_g=ky,
         settings={},
     )
-    run = follow(mechanism(level), excited)
-    return run.x if run.outcome is Outcome.STABLE else math.nan
 
 
 class Sliding(MechanismKind):
@@ -233,6 +240,7 @@ class Sliding(MechanismKind):
     search_options = ("displacement_m", "tolerance", "block", *PLANES)
     campaign = True
     campaign_options = ("displacements_m",)
+    sequence_measure = "displacement_m"
 
     def mechanism(self, site: BlockOnPlanes) -> Mechanism:
         """Return the sliding block."""
@@ -316,6 +324,19 @@ class Sliding(MechanismKind):
             )
             results.append(CaseResult(searched, blocks))
         return results
+
+    def sequence_blocks(self, cases: Sequence[Case]) -> tuple[Mapping[str, object], ...]:
+        """Return blocks of stated yield accelerations on a level plane."""
+        return tuple({**LEVEL_PLANE, "ky": ky} for ky in SEQUENCE_KY_G)
+
+    def sequence_limits(self, cases: Sequence[Case]) -> tuple[float | None, ...]:
+        """Return the stated displacements [m]."""
+        limits: list[Any] = [case.settings["displacement_m"] for case in cases]
+        return tuple(limit for limit in limits if limit > 0.0)
+
+    def sequence_site(self, block: Mapping[str, Any]) -> BlockOnPlanes:
+        """Return the block on its level plane."""
+        return level_plane(block["ky"])
 
 
 MODEL = Sliding()

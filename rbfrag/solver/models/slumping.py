@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import product
 from typing import Any
@@ -232,6 +232,7 @@ class Slumping(ScaledKind):
     parameters = ("ks", "ps2")
     campaign = True
     campaign_options = ("rotations_deg", "family", "full_map")
+    sequence_measure = "peak_rad"
     one_phase = True
 
     def mechanism(self, site: BlockOnPlanes) -> Mechanism:
@@ -317,6 +318,22 @@ class Slumping(ScaledKind):
                 blocks = grid_points(ratios, runs, critical_rad(shaken)) if grid else None
                 results[i] = CaseResult(result, blocks)
         return [results[i] for i in range(len(cases))]
+
+    def sequence_blocks(self, cases: Sequence[Case]) -> tuple[Mapping[str, object], ...]:
+        """Return the blocks of the family."""
+        return tuple(block.as_dict() for block in dict.fromkeys(map(_class_of, cases)))
+
+    def sequence_limits(self, cases: Sequence[Case]) -> tuple[float | None, ...]:
+        """Return the stated rotations [rad]."""
+        stated: list[Any] = [case.settings["rotation_deg"] for case in cases]
+        return tuple(
+            None if rotation is None else math.radians(rotation)
+            for rotation in dict.fromkeys(stated)
+        )
+
+    def sequence_site(self, block: Mapping[str, Any]) -> BlockOnPlanes:
+        """Return the block on its planes."""
+        return self._shaken(BlockClass(**block)).site
 
     def _shaken(self, each: BlockClass) -> ShakenMechanism:
         return shaken_mechanism(

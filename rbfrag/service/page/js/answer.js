@@ -26,11 +26,8 @@ const KNOWS = {
   pga_sa03_sa10_sa30: "PGA, SA(0.3, 1, 3 s)",
 };
 
-/** How the sentence begins that says where the models come from. */
-const OF_THE_REFERENCE = "answered by the reference model";
-
-/** Sentences of the service that the page says in its own place. */
-const SAID = new RegExp(`^(${OF_THE_REFERENCE}|no friction angle is given)`);
+/** How sentences of the service begin that the page says in its own place. */
+const SAID = /^(answered by the reference|no friction angle is given)/;
 
 /** An equals sign that does not part from what stands beside it. */
 const IS = "\u00a0=\u00a0";
@@ -48,9 +45,6 @@ export function showAnswer(answer) {
   const range = answer.in_domain
     ? "within the fitted range"
     : "outside the fitted range: an extrapolation";
-  const reference = answer.warnings.some((/** @type {string} */ each) =>
-    each.startsWith(OF_THE_REFERENCE),
-  );
   byId("probability").textContent = percent(answer.probability);
   byId("sentence").textContent = inOneSentence(answer);
   byId("in-words").textContent = ranges(answer);
@@ -59,11 +53,12 @@ export function showAnswer(answer) {
   domain.dataset.inside = String(answer.in_domain);
   writeText(
     byId("about"),
-    `Model ${answer.model}. Intensity ${quantity(answer.intensity_m_s, "m/s")}` +
+    `Model ${answer.model}${answer.data ? ` of ${answer.data}` : ""}. ` +
+      `Intensity ${quantity(answer.intensity_m_s, "m/s")}` +
       (answer.y_m_s === null
         ? ""
-        : `, velocity of the block y = k g/p = ${quantity(answer.y_m_s, "m/s")}`) +
-      `. ${reference ? "It is shipped with rbfrag." : "It comes from the database of this service."}`,
+        : `, velocity of the block y${IS}k\u00a0g/p${IS}${quantity(answer.y_m_s, "m/s")}`) +
+      ".",
   );
   drawMeter(answer);
   showWarnings(
@@ -192,7 +187,7 @@ function drawMeter(answer) {
 /** @param {any[]} answers */
 function showOthers(answers) {
   const list = answers ?? [];
-  byId("others").hidden = false;
+  byId("others").hidden = list.length < 2;
   d3.select("#other-answers")
     .selectAll("tr")
     .data(list)

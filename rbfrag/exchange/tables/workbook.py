@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, MissingExtraError
-from rbfrag.exchange import table_parts
-from rbfrag.exchange.table_parts import Part, Parts, Write, cells_of, columns_to_write
+from rbfrag.exchange.tables import parts
+from rbfrag.exchange.tables.parts import Part, Parts, Write, cells_of, columns_to_write
 
 MOST_ROWS = 1 << 20
 """Rows of a sheet, its first with the names."""
@@ -130,7 +130,7 @@ def _parts(origin: Path, header: list[str], rows: Any, numeric: Sequence[str]) -
                     cells[i] = _text(cells[i])
                 kept.append(cells)
                 lines.append(number)
-                if len(kept) == table_parts.ROWS:
+                if len(kept) == parts.ROWS:
                     ended = False
                     break
             if kept:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange import table_parts
-from rbfrag.exchange.table_parts import Part, Parts, Write, pyarrow
+from rbfrag.exchange.tables import parts
+from rbfrag.exchange.tables.parts import Part, Parts, Write, pyarrow
 
 
 def parquet_parts(
@@ -28,13 +28,13 @@ def parquet_parts(
 
     def batches() -> Iterator[Any]:
         try:
-            yield from file.iter_batches(batch_size=table_parts.ROWS)
+            yield from file.iter_batches(batch_size=parts.ROWS)
         except (arrow.ArrowException, OSError, UnicodeError) as error:
             raise InputError(
                 f"{origin}: the Parquet file is damaged: {error}; write it again"
             ) from None
 
-    def parts() -> Parts:
+    def read() -> Parts:
         first = 1
         for group in batches():
             cells: dict[str, Any] = {}
@@ -50,7 +50,7 @@ def parquet_parts(
             yield Part(range(first, first + group.num_rows), cells)
             first += group.num_rows
 
-    return header, parts()
+    return header, read()
 
 
 def parquet_writer(

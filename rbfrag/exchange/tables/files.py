@@ -8,10 +8,10 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.csv_table import Dialect, csv_parts, csv_writer
-from rbfrag.exchange.parquet_table import parquet_parts, parquet_writer
-from rbfrag.exchange.table_parts import Parts, Write, pyarrow
-from rbfrag.exchange.workbook import openpyxl, workbook_parts, workbook_writer
+from rbfrag.exchange.tables.csv_file import Dialect, csv_parts, csv_writer
+from rbfrag.exchange.tables.parquet import parquet_parts, parquet_writer
+from rbfrag.exchange.tables.parts import Parts, Write, pyarrow
+from rbfrag.exchange.tables.workbook import openpyxl, workbook_parts, workbook_writer
 from rbfrag.files import output_path
 
 SUFFIXES = (".csv", ".xlsx", ".parquet")

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import MissingExtraError
-from rbfrag.exchange import table_parts
-from rbfrag.exchange.parquet_table import arrow_array, arrow_columns
-from rbfrag.exchange.table_parts import Part, Parts, Write, cells_of, columns_to_write, pyarrow
+from rbfrag.exchange.tables import parts
+from rbfrag.exchange.tables.parquet import arrow_array, arrow_columns
+from rbfrag.exchange.tables.parts import Part, Parts, Write, cells_of, columns_to_write, pyarrow
 
 _PEEK = 1 << 16
 _BOM = b"\xef\xbb\xbf"
@@ -129,7 +129,7 @@ def _cell_by_cell(header: list[str], reader: Any, dialect: Dialect, done: int = 
             row = [*row[:width], *[""] * (width - len(row))]
         rows.append(row)
         lines.append(reader.line_num)
-        if len(rows) == table_parts.ROWS:
+        if len(rows) == parts.ROWS:
             yield part()
             rows, lines, faults = [], [], {}
     if rows:

@@ -1,0 +1,305 @@
+"""Campaigns of sequences: blocks under two motions, one after the other, and under the second."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from sqlalchemy import Engine
+
+from rbfrag.campaign.executors.local import CLUSTER, executor
+from rbfrag.campaign.interrupt import Stopped
+from rbfrag.campaign.machine import processor_and_compiler
+from rbfrag.campaign.motion_pairs import MotionPair, motion_pairs
+from rbfrag.campaign.summary import CampaignProgress, CampaignSummary, SequenceReport
+from rbfrag.db.campaigns import finish_campaign, start_campaign
+from rbfrag.db.engine import opened_database
+from rbfrag.db.keys import pair_key
+from rbfrag.db.motions import load_motion
+from rbfrag.db.shock_pairs import (
+    NOT_RUN,
+    Pairing,
+    ShockEnd,
+    ShockPairRecord,
+    insert_shock_pairs,
+    known_shock_pairs,
+    shock_pair_rows,
+)
+from rbfrag.errors import InputError, StoppedError, WorkFailedError
+from rbfrag.fragility.conditional import conditional_shares
+from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.solver.kind import BlockOnPlanes, Case, Kind, Shaking
+from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.results import NUMERICS_VERSION, BlockState, Polarity, Response
+from rbfrag.solver.sequence import STARTS_ANEW
+
+
+@dataclass(frozen=True)
+class SequenceTask:
+    """One block under one pair of motions in one polarity."""
+
+    natural_key: str
+    polarity: Polarity
+    block: Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class PairTasks:
+    """What is to do on one pair of motions."""
+
+    pair: MotionPair
+    tasks: tuple[SequenceTask, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class PairWork:
+    """Two motions with all that is to do on them: they travel once.
+
+    Args:
+        kind: what the blocks do.
+        first_id: row id of the first motion.
+        second_id: row id of the second one.
+        pairing: how they were paired.
+        first: the first motion.
+        second: the second one.
+        tasks: what to do.
+    """
+
+    kind: str
+    first_id: int
+    second_id: int
+    pairing: Pairing
+    first: GroundMotion
+    second: GroundMotion
+    tasks: tuple[SequenceTask, ...]
+
+
+@dataclass(frozen=True)
+class PairResults:
+    """The answers, the number of runs they took, and the numerics of whoever gave them."""
+
+    records: tuple[ShockPairRecord, ...]
+    runs: int
+    numerics_version: str
+
+
+def refuse_kind(name: str) -> None:
+    """Refuse a kind that carries no state from one motion to the next.
+
+    Raises:
+        InputError: there is no such kind, or a motion leaves its blocks where they were.
+    """
+    if not model_of_kind(name).carries_state:
+        raise InputError(f"--sequence does not go with --kind {name}: {STARTS_ANEW}")
+
+
+def simulate_sequences(
+    kind: Kind,
+    cases: Sequence[Case],
+    *,
+    db: str | os.PathLike[str] | None,
+    suite: str | None,
+    seed: int,
+    draws: int,
+    jobs: int | None,
+    scheduler: str | None,
+    on_progress: Callable[[CampaignProgress], None] | None,
+    stopped: Stopped,
+) -> CampaignSummary:
+    """Store what pairs of motions do to the blocks of a kind, and tabulate it.
+
+    Args:
+        kind: what the blocks do.
+        cases: what the campaign is asked for: the blocks of slumps, and what counts as failure.
+        db: the database.
+        suite: only the motions of this suite.
+        seed: of the pairs that are drawn.
+        draws: first motions that are drawn for each second one.
+        jobs: worker processes.
+        scheduler: address of a Dask scheduler.
+        on_progress: called after each pair of motions.
+        stopped: asked now and then whether to end.
+    """
+    if draws < 1:
+        raise InputError(f"--draws must be at least 1, not {draws}")
+    blocks, limits = kind.sequence_blocks(cases), kind.sequence_limits(cases)
+    started = time.perf_counter()
+    with opened_database(db) as engine:
+        with engine.connect() as connection:
+            pairs = motion_pairs(connection, suite=suite, seed=seed, draws=draws)
+            plan = [PairTasks(pair, _tasks(pair, kind, blocks)) for pair in pairs]
+            keys = [task.natural_key for each in plan for task in each.tasks]
+            known = known_shock_pairs(connection, keys)
+        todo = _remaining(plan, known)
+        total, done, runs = len(keys), len(known), 0
+
+        def tell() -> None:
+            if on_progress is not None:
+                seconds = time.perf_counter() - started
+                on_progress(CampaignProgress(done, total, len(known), seconds))
+
+        with executor(run_pair, jobs, scheduler if todo else None, stopped) as execute:
+            settings = {
+                "kind": kind.kind,
+                "suite": suite,
+                "sequence": True,
+                "seed": seed,
+                "draws": draws,
+                "made_on": processor_and_compiler() if scheduler is None else CLUSTER,
+            }
+            with engine.begin() as connection:
+                campaign_id = start_campaign(connection, settings)
+            tell()
+            for results in execute(_work(engine, kind, todo), len(todo)):
+                if results.numerics_version != NUMERICS_VERSION:
+                    raise WorkFailedError(
+                        f"a worker computes with numerics version {results.numerics_version}, "
+                        f"this rbfrag with {NUMERICS_VERSION}: install the same version on all "
+                        "machines"
+                    )
+                with engine.begin() as connection:
+                    insert_shock_pairs(connection, campaign_id, results.records)
+                done += len(results.records)
+                runs += results.runs
+                tell()
+            if done < total:
+                raise StoppedError(f"stopped: {done} of {total} stored; the same command goes on")
+            with engine.begin() as connection:
+                finish_campaign(connection, campaign_id)
+        with engine.connect() as connection:
+            rows = shock_pair_rows(connection, keys)
+    of_station = sum(pair.pairing == "station" for pair in pairs)
+    return CampaignSummary(
+        kind=kind.kind,
+        combinations=total,
+        found=0,
+        below_limit=0,
+        no_motion=0,
+        outside_model=0,
+        not_searched=total,
+        certified=0,
+        reentrant=0,
+        runs=runs,
+        grid_runs=0,
+        responses=0,
+        without_vertical=0,
+        seconds=time.perf_counter() - started,
+        resumed=len(known),
+        warnings=_warnings(len(pairs), of_station, seed),
+        sequence=SequenceReport(
+            seed=seed,
+            station_pairs=of_station,
+            drawn_pairs=len(pairs) - of_station,
+            conditional=conditional_shares(rows, kind.sequence_measure, limits),
+        ),
+    )
+
+
+def _warnings(pairs: int, of_station: int, seed: int) -> tuple[str, ...]:
+    drawn = pairs - of_station
+    if not drawn:
+        return ()
+    return (
+        f"{of_station} of {pairs} pairs of motions are shocks of one station; the other {drawn} "
+        f"are motions of different earthquakes, drawn with seed {seed}",
+    )
+
+
+def _tasks(
+    pair: MotionPair, kind: Kind, blocks: Sequence[Mapping[str, object]]
+) -> tuple[SequenceTask, ...]:
+    return tuple(
+        SequenceTask(
+            pair_key(
+                first_sha256=pair.first.sha256,
+                first_dt_s=pair.first.dt_s,
+                motion_sha256=pair.second.sha256,
+                dt_s=pair.second.dt_s,
+                polarity=polarity,
+                kind=kind.kind,
+                block=block,
+                numerics_version=NUMERICS_VERSION,
+            ),
+            polarity,
+            block,
+        )
+        for polarity in kind.polarities
+        for block in blocks
+    )
+
+
+def _remaining(plan: Sequence[PairTasks], known: set[str]) -> list[PairTasks]:
+    left = [
+        PairTasks(each.pair, tuple(t for t in each.tasks if t.natural_key not in known))
+        for each in plan
+    ]
+    return [each for each in left if each.tasks]
+
+
+def _work(engine: Engine, kind: Kind, todo: Sequence[PairTasks]) -> Iterator[PairWork]:
+    for each in todo:
+        pair = each.pair
+        with engine.connect() as connection:
+            first, second = (load_motion(connection, row.id) for row in (pair.first, pair.second))
+        yield PairWork(
+            kind.kind, pair.first.id, pair.second.id, pair.pairing, first, second, each.tasks
+        )
+
+
+def run_pair(work: PairWork) -> PairResults:
+    """Run every block under both motions, and under the second alone."""
+    kind = model_of_kind(work.kind)
+    records, runs = [], 0
+    for task in work.tasks:
+        site = kind.sequence_site(task.block)
+        run = _Block(kind, site, task.polarity)
+        first, intact = run.under(work.first, None), run.under(work.second, None)
+        second, runs = None, runs + 2
+        if first.state is not None:
+            second, runs = run.under(work.second, first.state), runs + 1
+        critical = first.critical_angle_deg
+        assert site.yield_g is not None
+        records.append(
+            ShockPairRecord(
+                natural_key=task.natural_key,
+                first_motion_id=work.first_id,
+                second_motion_id=work.second_id,
+                pairing=work.pairing,
+                polarity=task.polarity,
+                kind=work.kind,
+                block=task.block,
+                yield_g=site.yield_g,
+                critical_rad=None if critical is None else math.radians(critical),
+                numerics_version=NUMERICS_VERSION,
+                first=_end(first, None),
+                second=NOT_RUN if second is None else _end(second, first.state),
+                intact=_end(intact, None),
+            )
+        )
+    return PairResults(tuple(records), runs, NUMERICS_VERSION)
+
+
+@dataclass(frozen=True)
+class _Block:
+    kind: Kind
+    site: BlockOnPlanes
+    polarity: Polarity
+
+    def under(self, motion: GroundMotion, start: BlockState | None) -> Response:
+        """Return what the block does under a motion that finds it in a state."""
+        shaking = Shaking(motion, None, self.polarity, history=False, start=start)
+        return self.kind.respond(self.site, shaking)
+
+
+def _end(response: Response, start: BlockState | None) -> ShockEnd:
+    slip = response.displacement_m
+    before = 0.0 if start is None else start.displacement_m
+    return ShockEnd(
+        outcome=response.outcome.value,
+        displacement_m=None if slip is None else before + slip,
+        rotation_rad=response.final_theta_rad,
+        peak_rad=response.peak_theta_rad,
+    )

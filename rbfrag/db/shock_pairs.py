@@ -1,0 +1,213 @@
+"""Writing and reading what two motions, one after the other, do to a block."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Literal, NamedTuple
+
+from sqlalchemy import Connection, select
+
+from rbfrag.db.digest import NOT_DIGESTED
+from rbfrag.db.insert import insert_rows, rows_of_keys
+from rbfrag.db.keys import canonical_json
+from rbfrag.db.schema import campaign, earthquake, motion, recording, shock_pair
+from rbfrag.db.stored_json import stored_json
+from rbfrag.motions.polarity import Polarity
+
+Pairing = Literal["station", "drawn"]
+
+PARTS = ("first", "second", "intact")
+"""The runs of a pair: the first motion, the second after it, the second alone."""
+
+COLUMNS = tuple(column.name for column in shock_pair.c if column.name not in NOT_DIGESTED)
+
+
+class ShockEnd(NamedTuple):
+    """How one motion of two leaves a block.
+
+    Args:
+        outcome: how the run ended.
+        displacement_m: slip along the base since the block's first place [m]; None if not known.
+        rotation_rad: rotation that is left [rad]; None of slides, and if not known.
+        peak_rad: greatest rotation [rad]; None of slides, and where the block failed.
+    """
+
+    outcome: str | None
+    displacement_m: float | None
+    rotation_rad: float | None
+    peak_rad: float | None
+
+
+NOT_RUN = ShockEnd(None, None, None, None)
+"""The second motion, where the first leaves the block nowhere known."""
+
+
+@dataclass(frozen=True)
+class ShockPairRecord:
+    """One block under two motions as it is stored.
+
+    Args:
+        natural_key: from :func:`rbfrag.db.keys.pair_key`.
+        first_motion_id: the first motion.
+        second_motion_id: the second one.
+        pairing: ``station`` for two shocks of one station, ``drawn`` for others.
+        polarity: of both.
+        kind: response kind.
+        block: the same that went into the key.
+        yield_g: yield acceleration in its first place [g].
+        critical_rad: rotation without strength [rad]; None of slides.
+        numerics_version: the same that went into the key.
+        first: after the first motion.
+        second: after both.
+        intact: after the second alone.
+    """
+
+    natural_key: str
+    first_motion_id: int
+    second_motion_id: int
+    pairing: Pairing
+    polarity: Polarity
+    kind: str
+    block: Mapping[str, object]
+    yield_g: float
+    critical_rad: float | None
+    numerics_version: str
+    first: ShockEnd
+    second: ShockEnd
+    intact: ShockEnd
+
+
+class ShockPairRow(NamedTuple):
+    """One block under two motions as tables of conditional fragility read it.
+
+    Args:
+        event_id: earthquake of the second motion.
+        pga_g: its PGA [g].
+        pairing: ``station`` or ``drawn``.
+        yield_g: yield acceleration of the block [g].
+        critical_rad: rotation without strength [rad]; None of slides.
+        first: after the first motion.
+        second: after both.
+        intact: after the second alone.
+    """
+
+    event_id: str
+    pga_g: float
+    pairing: Pairing
+    yield_g: float
+    critical_rad: float | None
+    first: ShockEnd
+    second: ShockEnd
+    intact: ShockEnd
+
+
+@dataclass(frozen=True)
+class StoredShockPair:
+    """One stored block under two motions.
+
+    Args:
+        id: its row.
+        processor: the processor and numba of its campaign.
+        record: what is stored.
+    """
+
+    id: int
+    processor: object
+    record: ShockPairRecord
+
+
+def insert_shock_pairs(
+    connection: Connection, campaign_id: int, records: Sequence[ShockPairRecord]
+) -> None:
+    """Store blocks under two motions; those whose key is there are left alone."""
+    # in one order: two campaigns on one server then wait for each other, never both at once
+    ordered = sorted(records, key=lambda each: each.natural_key)
+    insert_rows(connection, shock_pair, COLUMNS, [_row(campaign_id, each) for each in ordered])
+
+
+def known_shock_pairs(connection: Connection, keys: Iterable[str]) -> set[str]:
+    """Return those natural keys that are stored."""
+    column = shock_pair.c.natural_key
+    return {key for (key,) in rows_of_keys(connection, select(column), column, keys)}
+
+
+def pair_keys_with_samples(connection: Connection, *, numerics_version: str) -> list[str]:
+    """Return, sorted, the natural keys of pairs of motions that can be computed again."""
+    first = motion.alias("first")
+    query = (
+        select(shock_pair.c.natural_key)
+        .select_from(
+            shock_pair.join(motion, motion.c.id == shock_pair.c.second_motion_id).join(
+                first, first.c.id == shock_pair.c.first_motion_id
+            )
+        )
+        .where(
+            shock_pair.c.numerics_version == numerics_version,
+            motion.c.samples.is_not(None),
+            first.c.samples.is_not(None),
+        )
+    )
+    return sorted(connection.scalars(query))
+
+
+def stored_shock_pair(connection: Connection, natural_key: str) -> StoredShockPair:
+    """Return one block under two motions by its natural key."""
+    query = select(shock_pair, campaign.c.settings).join(campaign)
+    row = connection.execute(query.where(shock_pair.c.natural_key == natural_key)).mappings().one()
+    what = f"of pair of motions {row['id']}"
+    ends: dict[str, Any] = {
+        part: ShockEnd(*(row[f"{part}_{name}"] for name in ShockEnd._fields)) for part in PARTS
+    }
+    names = [each.name for each in fields(ShockPairRecord) if each.name not in (*PARTS, "block")]
+    return StoredShockPair(
+        id=row["id"],
+        processor=stored_json(row["settings"], dict, f"settings of the campaign {what}").get(
+            "made_on"
+        ),
+        record=ShockPairRecord(
+            **{name: row[name] for name in names},
+            block=stored_json(row["block"], dict, f"block {what}"),
+            **ends,
+        ),
+    )
+
+
+def shock_pair_rows(connection: Connection, keys: Iterable[str]) -> list[ShockPairRow]:
+    """Return what is stored under some natural keys, in the order of the keys' text."""
+    ends = [shock_pair.c[f"{part}_{name}"] for part in PARTS for name in ShockEnd._fields]
+    query = select(
+        shock_pair.c.natural_key,
+        earthquake.c.event_id,
+        motion.c.pga_g,
+        shock_pair.c.pairing,
+        shock_pair.c.yield_g,
+        shock_pair.c.critical_rad,
+        *ends,
+    ).select_from(
+        shock_pair.join(motion, motion.c.id == shock_pair.c.second_motion_id)
+        .join(recording)
+        .join(earthquake)
+    )
+    size, rows = len(ShockEnd._fields), []
+    stored = map(tuple, rows_of_keys(connection, query, shock_pair.c.natural_key, keys))
+    for _, *values in sorted(stored, key=lambda row: row[0]):
+        known, runs = values[:5], values[5:]
+        each = (ShockEnd(*runs[start : start + size]) for start in range(0, len(runs), size))
+        rows.append(ShockPairRow(*known, *each))
+    return rows
+
+
+def _row(campaign_id: int, record: ShockPairRecord) -> tuple[object, ...]:
+    ends = {
+        f"{part}_{name}": value
+        for part in PARTS
+        for name, value in getattr(record, part)._asdict().items()
+    }
+    values = {
+        **{name: value for name, value in vars(record).items() if name not in PARTS},
+        **ends,
+        "campaign_id": campaign_id,
+        "block": canonical_json(record.block),
+    }
+    return tuple(values[name] for name in COLUMNS)

@@ -1,0 +1,1 @@
+"""Tables of blocks as files: CSV, Excel workbooks, Parquet; one reader and one writer."""

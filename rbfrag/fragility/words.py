@@ -1,0 +1,82 @@
+"""What a probability means, in sentences and rounded as people say it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+
+def percent(share: float) -> str:
+    """Return a share in percent with two digits."""
+    if 0.0 < share < 5e-5:
+        return "below 0.01 %"
+    if 0.9995 <= share < 1.0:
+        return "above 99.9 %"
+    digits = 0 if share in (0.0, 1.0) or 0.0995 <= share <= 0.995 else 1 if share >= 0.001 else 2
+    return f"{100.0 * share:.{digits}f} %"
+
+
+def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return what P, its interval and the range of one earthquake mean, in counts of blocks.
+
+    Args:
+        document: an answer under the keys of the JSON contract.
+    """
+    p, level = document["probability"], f"{100.0 * document['level']:g} %"
+    low, high = document["ci_low"], document["ci_high"]
+    event_low, event_high = document["event_low"], document["event_high"]
+    of = next((n for n in (100, 1000) if p * n >= 1.0 and (1.0 - p) * n >= 1.0), 10_000)
+    if high == 0.0:
+        return ("No such block fails.",)
+    of_block = document.get("block_sd")
+    sentences = [
+        f"Of {of} such blocks {_count(p, of)} fail{'s' * (_count(p, of) == '1')} "
+        f"({_range(low, high, of)} as far as the data tell it, {level}).",
+        "How many in one single earthquake is not known."
+        if event_low is None
+        else f"In one single earthquake it is {_range(event_low, event_high, of)} of {of} "
+        f"({level}).",
+    ]
+    if of_block is not None:
+        sentences.append(
+            "The block is uncertain: among what it may be, P differs with a standard deviation of "
+            f"{of_block:.2g}."
+        )
+    return tuple(sentences)
+
+
+def _count(share: float, of: int) -> str:
+    count = round(share * of)
+    if count in (0, of) and 0.0 < share < 1.0:
+        return "fewer than 1" if count == 0 else "nearly all"
+    return str(count)
+
+
+def _range(low: float, high: float, of: int) -> str:
+    ends = _count(low, of), _count(high, of)
+    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
+
+
+def block_in_words(method: str, given: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return what is asked about: the numbers of a block, and how it is taken to stand.
+
+    Args:
+        method: the one that the model which answers is fitted by.
+        given: what the question gives, by the names of :func:`rbfrag.predict`.
+    """
+    from rbfrag.fragility.methods import method_named
+
+    block = method_named(method).block
+    values = {name: given.get(name) for name in (block.size, block.strength) if name is not None}
+    if not all(isinstance(value, (int, float)) for value in values.values()):
+        return ()
+    units = {block.size: " 1/s²"}
+    numbers = " and ".join(
+        f"{_SYMBOLS.get(name, name)} = {value:.3g}{units.get(name, '')}"
+        for name, value in values.items()
+    )
+    stands = (f"{block.presumes[:1].upper()}{block.presumes[1:]}.",) if block.presumes else ()
+    return (f"The block has {numbers}.", *stands)
+
+
+_SYMBOLS = {"p2": "p²", "ps2": "p_s²", "kr": "k_r", "ky": "k_y", "ks": "k_s"}

@@ -1,0 +1,1 @@
+"""One block, one question: what was asked and answered, on one page."""

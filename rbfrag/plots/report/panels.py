@@ -1,0 +1,84 @@
+"""The pictures of a report, each drawn into a figure or a part of one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+from rbfrag.plots.block import draw_block
+from rbfrag.plots.chart import draw_chart
+from rbfrag.plots.curve import AXIS, draw_curve
+from rbfrag.plots.hazard import draw_contribution
+from rbfrag.plots.model_lines import MORE_TERMS
+from rbfrag.plots.report.contents import Contents
+
+if TYPE_CHECKING:
+    from matplotlib.figure import FigureBase
+
+
+class Panel(NamedTuple):
+    """One picture.
+
+    Args:
+        name: identifier, in a page that has several.
+        title: what it shows.
+        draw: draws it into an empty figure.
+    """
+
+    name: str
+    title: str
+    draw: Callable[[FigureBase], None]
+
+
+def panels_of(contents: Contents) -> list[Panel]:
+    """Return the pictures of a report, in their order."""
+    panels = [Panel("block", f"Block: {contents.drawn}", lambda part: _block(part, contents))]
+    if contents.model.term.inputs[0] in AXIS:
+        title = "Probability of failure of this block"
+        panels.append(Panel("curve", title, lambda part: _curve(part, contents)))
+    if contents.held is not None:
+        title = f"Design chart, model {contents.model.name}"
+        panels.append(Panel("chart", title, lambda part: _chart(part, contents)))
+    if contents.rate is not None:
+        title = "Hazard, and the shaking that the rate comes from"
+        panels.append(Panel("rate", title, lambda part: _rate(part, contents)))
+    return panels
+
+
+def _block(part: FigureBase, contents: Contents) -> None:
+    axes = part.subplots()
+    draw_block(axes, contents.block, contents.stability)
+    axes.set_xlabel("out of the slope, from the centroid [m]")
+    axes.set_ylabel("above the centroid [m]")
+
+
+def _chart(part: FigureBase, contents: Contents) -> None:
+    assert contents.held is not None
+    by_pgv = contents.model.term.name in MORE_TERMS
+    x = contents.measures["pgv_m_s"] if by_pgv else contents.document["intensity_m_s"]
+    axes = part.subplots()
+    draw_chart(axes, contents.model, contents.held, point=(x, contents.document["y_m_s"]))
+    axes.set_ylabel("toppling velocity, $y = k_r\\,g/p$ [m/s]")
+    if contents.model.term.inputs == ("pgv_m_s",):
+        axes.set_xlabel(AXIS["pgv_m_s"])
+    if contents.held.words:
+        axes.set_title(contents.held.words, fontsize=8)
+
+
+def _curve(part: FigureBase, contents: Contents) -> None:
+    first, *others = contents.model.term.inputs
+    axes = part.subplots()
+    draw_curve(
+        axes, contents.model, contents.numbers, first,
+        {name: contents.measures[name] for name in others}, level=contents.document["level"],
+        at=contents.measures[first],
+    )  # fmt: skip
+    part.legend(loc="outside lower center", fontsize=7, frameon=False)
+
+
+def _rate(part: FigureBase, contents: Contents) -> None:
+    assert contents.rate is not None
+    top, bottom = part.subplots(2, 1, sharex=True)
+    draw_contribution(top, bottom, contents.rate.curve, contents.rate.answer)
+    top.set_ylabel("exceedances [1/a]")
+    bottom.set_ylabel("share of the rate\n[% per decade]")

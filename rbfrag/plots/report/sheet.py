@@ -1,0 +1,138 @@
+"""A report as one page of A4."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
+
+from rbfrag.files import written_whole
+from rbfrag.plots.canvas import BLUE, freeze_layout, new_figure
+from rbfrag.plots.labels import settle_labels
+from rbfrag.plots.report.contents import Contents, Table
+from rbfrag.plots.report.panels import panels_of
+from rbfrag.version import __version__
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure, SubFigure
+
+_WIDTH_IN, _HEIGHT_IN = 8.27, 11.69
+_LEFT, _RIGHT = 0.085, 0.915
+"""Edges of what is written, of the width of the sheet."""
+
+_MARGIN = 0.11
+"""At the sides of the pictures, of the width of one."""
+
+_STEP_IN = 0.158
+"""From one row of a table to the next."""
+
+_TALLEST_ROW_IN = 3.7
+"""Of pictures: two rows of them are spread over the page, one is not."""
+
+_WIDE, _NARROW, _FINE = 104, 80, 136
+"""Letters that a line holds of small text, of the first sentence and of the notes."""
+
+_RC: Any = {"pdf.fonttype": 42, "font.size": 8.5, "axes.titlesize": 9}
+"""Letters stay letters, so that the page can be searched and copied from."""
+
+
+def write_sheet(contents: Contents, title: str, date: str, target: Path) -> None:
+    """Write a report as a page of A4, PDF or PNG by the suffix of the file.
+
+    Args:
+        contents: what it says.
+        title: its title.
+        date: its date; empty for none.
+        target: file to write.
+    """
+    from matplotlib import rc_context
+
+    with rc_context(_RC):
+        figure = new_figure(_WIDTH_IN, _HEIGHT_IN)
+        _draw(figure, contents, title, date)
+        freeze_layout(figure)
+        settle_labels(figure)
+        kind = target.suffix.lower()[1:]
+        about: dict[str, str | None] = {"Title": title, "Creator": f"rbfrag {__version__}"}
+        if kind == "pdf":
+            about["CreationDate"] = None
+        with written_whole(target, "report") as partial, partial.open("wb") as stream:
+            figure.savefig(stream, format=kind, metadata=about, dpi=130)
+
+
+def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
+    head_in = 0.85 + 0.17 * len(_head_lines(contents))
+    tables_in = 0.1 + _STEP_IN * max(map(_lines_of, contents.columns()))
+    foot_in = 0.35 + 0.13 * len(_foot_lines(contents))
+    panels = panels_of(contents)
+    rows = [panels[i : i + 2] for i in range(0, len(panels), 2)]
+    row_in = min((_HEIGHT_IN - head_in - tables_in - foot_in) / len(rows), _TALLEST_ROW_IN)
+    heights = [head_in, tables_in, *[row_in] * len(rows)]
+    heights.append(_HEIGHT_IN - sum(heights))
+    parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
+    _write_head(parts[0], contents, title, date, head_in)
+    _write_tables(parts[1], contents, tables_in)
+    for part, row in zip(parts[2:-1], rows, strict=True):
+        # one picture alone is as wide as two
+        widths = [2.0 / len(row)] * len(row)
+        ratios = [_MARGIN, *widths, _MARGIN]
+        _, *cells, _ = part.subfigures(1, len(ratios), width_ratios=ratios, squeeze=False)[0]
+        for cell, panel in zip(cells, row, strict=True):
+            panel.draw(cell)
+            cell.suptitle(panel.title, fontsize=9)
+    _write_foot(parts[-1], contents, heights[-1])
+
+
+def _head_lines(contents: Contents) -> list[tuple[str, bool]]:
+    first, *others = contents.sentences
+    return [
+        *((line, True) for line in _wrapped(first, _NARROW)),
+        *((line, False) for line in _wrapped(" ".join(others), _WIDE)),
+    ]
+
+
+def _wrapped(text: str, letters: int) -> list[str]:
+    """Return the lines of a text, of which none begins with a percent sign."""
+    return wrap(text.replace(" %", "\u00a0%"), letters, break_on_hyphens=False)
+
+
+def _foot_lines(contents: Contents) -> list[str]:
+    notes = [f"Note: {remark[:1].upper()}{remark[1:]}." for remark in contents.remarks]
+    return [line for text in (*notes, *contents.versions) for line in _wrapped(text, _FINE)]
+
+
+def _lines_of(tables: Sequence[Table]) -> float:
+    return sum(1.5 + len(rows) for _, rows in tables)
+
+
+def _write_head(part: SubFigure, contents: Contents, title: str, date: str, tall_in: float) -> None:
+    y = 1.0 - 0.42 / tall_in
+    part.text(_LEFT, y, title, fontsize=15, fontweight="bold", color=BLUE, va="center")
+    part.text(_RIGHT, y, date, fontsize=9, ha="right", va="center")
+    y -= 0.33 / tall_in
+    for line, is_first in _head_lines(contents):
+        size, weight = (11, "bold") if is_first else (9, "normal")
+        part.text(_LEFT, y, line, fontsize=size, fontweight=weight, va="center")
+        y -= (0.2 if is_first else 0.165) / tall_in
+
+
+def _write_tables(part: SubFigure, contents: Contents, tall_in: float) -> None:
+    step = _STEP_IN / tall_in
+    for x, wide, tables in zip((_LEFT, 0.56), (0.235, 0.19), contents.columns(), strict=True):
+        y = 1.0 - 0.5 * step
+        for heading, rows in tables:
+            part.text(x, y, heading, fontsize=9, fontweight="bold", color=BLUE, va="center")
+            for name, value in rows:
+                y -= step
+                part.text(x, y, name, fontsize=8.2, va="center")
+                part.text(x + wide, y, value, fontsize=8.2, va="center")
+            y -= 1.5 * step
+
+
+def _write_foot(part: SubFigure, contents: Contents, tall_in: float) -> None:
+    lines = _foot_lines(contents)
+    y = 0.25 / tall_in + 0.13 * (len(lines) - 1) / tall_in
+    for line in lines:
+        part.text(_LEFT, y, line, fontsize=6.8, color="#333333", va="center")
+        y -= 0.13 / tall_in

@@ -1,0 +1,105 @@
+"""A report as one file of HTML with its pictures in it."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+from rbfrag.files import write_text
+from rbfrag.plots.canvas import freeze_layout, new_figure
+from rbfrag.plots.labels import settle_labels
+from rbfrag.plots.report.contents import Contents, Table
+from rbfrag.plots.report.panels import Panel, panels_of
+
+_SIZE_IN = (5.4, 4.6)
+
+_STYLE = """
+body { font: 15px/1.45 system-ui, sans-serif; color: #222; max-width: 60rem; margin: 2rem auto;
+  padding: 0 1rem; }
+h1 { color: #1f4e79; font-size: 1.6rem; margin: 0; }
+h2 { color: #1f4e79; font-size: 1rem; margin: 1rem 0 .2rem; }
+.first { font-size: 1.15rem; font-weight: 600; }
+.parts { display: grid; grid-template-columns: repeat(auto-fit, minmax(22rem, 1fr)); gap: 1rem; }
+table { border-collapse: collapse; width: 100%; }
+th { width: 50%; }
+th, td { text-align: left; font-weight: normal; padding: .1rem .6rem .1rem 0;
+  border-bottom: 1px solid #ddd; }
+figure { margin: 0; break-inside: avoid; }
+figcaption { font-size: .9rem; }
+svg { width: 100%; height: auto; }
+footer { font-size: .85rem; color: #333; margin-top: 1rem; }
+footer p { margin: .2rem 0; }
+sub { font-size: 75%; line-height: 0; }
+@page { size: A4; margin: 12mm; }
+@media print { body { font-size: 10px; margin: 0; max-width: none; }
+  .parts { grid-template-columns: 1fr 1fr; } }
+"""
+
+
+def write_html(contents: Contents, title: str, date: str, target: Path) -> None:
+    """Write a report as a page that needs nothing but itself.
+
+    Args:
+        contents: what it says.
+        title: its title.
+        date: its date; empty for none.
+        target: file to write.
+    """
+    first, *others = contents.sentences
+    parts = [
+        "<!DOCTYPE html>", '<html lang="en">', '<head><meta charset="utf-8">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f"<title>{escape(title)}</title>", f"<style>{_STYLE}</style></head>", "<body>",
+        f"<h1>{escape(title)}</h1>", f"<p>{escape(date)}</p>" if date else "",
+        f'<p class="first">{_written(first)}</p>', f"<p>{_written(' '.join(others))}</p>",
+        '<div class="parts">', *map(_column, contents.columns()), "</div>",
+        '<div class="parts">', *map(_figure, panels_of(contents)), "</div>",
+        "<footer>", *(f"<p>Note: {_written(text)}.</p>" for text in contents.remarks),
+        *(f"<p>{escape(text)}</p>" for text in contents.versions), "</footer>",
+        "</body></html>",
+    ]  # fmt: skip
+    write_text("\n".join(part for part in parts if part) + "\n", target)
+
+
+def _written(text: str) -> str:
+    """Return a text for the page, with the index of k_r where it belongs."""
+    return escape(text).replace("k_r", "k<sub>r</sub>")
+
+
+def _column(tables: Sequence[Table]) -> str:
+    return f"<div>{''.join(map(_table, tables))}</div>"
+
+
+def _table(table: Table) -> str:
+    heading, rows = table
+    cells = "".join(
+        f'<tr><th scope="row">{_written(name)}</th><td>{escape(value)}</td></tr>'
+        for name, value in rows
+    )
+    return f"<h2>{escape(heading)}</h2><table>{cells}</table>"
+
+
+def _figure(panel: Panel) -> str:
+    return f"<figure><figcaption>{escape(panel.title)}</figcaption>\n{_svg(panel)}\n</figure>"
+
+
+def _svg(panel: Panel) -> str:
+    """Return a picture as an element of the page; names inside it are its own."""
+    from matplotlib import rc_context
+
+    with rc_context({"svg.hashsalt": panel.name, "font.size": 9}):
+        figure = new_figure(*_SIZE_IN)
+        panel.draw(figure)
+        freeze_layout(figure)
+        settle_labels(figure)
+        text = io.StringIO()
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    svg = text.getvalue()
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, flags=re.DOTALL)
+    svg = re.sub(r' xmlns(:\w+)?="[^"]*"', "", svg)  # the page says what they are
+    svg = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{panel.name}-", svg)
+    return svg.replace("<svg", f'<svg role="img" aria-label="{escape(panel.title)}"', 1).strip()

@@ -1,0 +1,157 @@
+"""One page about one block: it says what was asked and answered, and is the same each time."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+import rbfrag
+from rbfrag.fragility.lookup import FROM_REFERENCE
+from rbfrag.hazards.curve import HazardCurve
+from rbfrag.plots.report import sheet
+from rbfrag.plots.report.contents import RateQuestion, contents_of, data_name
+from rbfrag.solver.described import DescribedBlock
+from tests.cli.conftest import Refuses, Shell, refuses, shell
+
+__all__ = ["refuses", "shell"]
+
+ROCK = rbfrag.Block.rectangle(2.4, 0.5)
+SHAPE = ("--height", "2.4", "--width", "0.5", "--dip", "3", "--phi", "35", "--pgv", "0.6")
+CURVE = "pgv_m_s,annual_rate\n0.05,0.08\n0.1,0.03\n0.2,0.009\n0.4,0.0022\n0.8,0.0004\n1.6,5e-5\n"
+
+
+def words_of(path: Path) -> str:
+    """Return the text of a report, its lines joined."""
+    if path.suffix == ".pdf":
+        pypdf = pytest.importorskip("pypdf")
+        pages = pypdf.PdfReader(path).pages
+        assert len(pages) == 1
+        assert [round(float(edge)) for edge in pages[0].mediabox[2:]] == [595, 842]
+        text = pages[0].extract_text()
+    else:
+        text = re.sub(r"<(style|svg).*?</\1>", " ", path.read_text("utf-8"), flags=re.DOTALL)
+        text = re.sub(r"</?sub>", "_", text).replace("k_r_", "k_r")
+        text = re.sub(r"<[^>]*>", " ", text)
+    return " ".join(text.split())
+
+
+@pytest.mark.parametrize("suffix", ["pdf", "html"])
+def test_a_report_says_what_was_asked_and_answered(shell: Shell, suffix: str) -> None:
+    Path("curve.csv").write_text(CURVE)
+    out = f"rock.{suffix}"
+    told = shell.json(
+        "report", *SHAPE, "--hazard", "curve.csv", "--component", "rotd50", "--years", "100",
+        "--title", "Rock above the mill", "--date", "1 May 2026", "--out", out,
+    )  # fmt: skip
+    predicted = shell.json("predict", *SHAPE)
+    rate = shell.json("hazard", "curve.csv", *SHAPE[:-2], "--component", "rotd50", "--years", "100")
+    assert told["probability"] == predicted["probability"]
+    assert told["hazard"]["annual_rate"] == rate["annual_rate"]
+    printed = shell("predict", *SHAPE).stdout.splitlines()
+    words = words_of(Path(out))
+    annual = shell("hazard", "curve.csv", *SHAPE[:-2], "--component", "rotd50", "--years", "100")
+    for sentence in (*printed[:2], annual.stdout.splitlines()[0]):
+        assert sentence in words
+    for text in (
+        "Rock above the mill", "1 May 2026", "2.4 m", "0.5 m", "3°", "35°", "0.6 m/s",
+        "probability in 100 years", f"rbfrag {rbfrag.__version__}", told["model"], "curve.csv",
+        "48 earthquakes", "the reference that is shipped",
+    ):  # fmt: skip
+        assert text in words, text
+    for warning in told["warnings"][:-1]:
+        assert warning[1:].split(":")[0] in words
+
+
+def test_the_same_question_gives_the_same_file(tmp_path: Path) -> None:
+    for suffix in ("pdf", "png", "html"):
+        first, second = (
+            rbfrag.report(tmp_path / f"{name}.{suffix}", block=ROCK, beta_deg=3.0, pgv_m_s=0.6)
+            for name in ("first", "second")
+        )
+        assert first.read_bytes() == second.read_bytes()
+
+
+def test_a_page_needs_nothing_but_itself(tmp_path: Path) -> None:
+    curve = HazardCurve("pgv_m_s", np.array([0.1, 1.0]), np.array([0.02, 1e-4]))
+    path = rbfrag.report(
+        tmp_path / "a.html", p2=3.0, kr=0.1, pgv_m_s=0.6, curve=curve, component="single"
+    )
+    text = path.read_text("utf-8")
+    assert text.count("<svg") == text.count("</svg>") == 4
+    for outside in ("http", "src=", "@import", "<link", "<script"):
+        assert outside not in text, outside
+    names = re.findall(r'\bid="([^"]*)"', text)
+    assert len(names) == len(set(names))
+    used = set(re.findall(r'(?:url\(#|href="#)([^")]*)', text))
+    assert used <= set(names)
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (("--p2", "3", "--pgv", "0.6"), "kr is missing"),
+        (("--p2", "3", "--kr", "0.1"), "nothing about the motion is given"),
+        (("--p2", "-3", "--kr", "0.1", "--pgv", "0.6"), "p2 = -3"),
+        (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--kind", "sliding"), "kind sliding"),
+        (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--hazard", "no.csv"), "no.csv: no such"),
+        (("--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--years", "10"), "--years goes with"),
+        (("--height", "1", "--width", "2", "--phi", "30", "--pgv", "0.6"), "its mode is slide"),
+    ],
+)
+def test_bad_questions_leave_no_file(refuses: Refuses, asked: tuple[str, ...], words: str) -> None:
+    assert words in refuses("report", *asked, "--out", "a.pdf")
+    assert not list(Path().iterdir())
+
+
+def test_a_path_of_another_kind_is_refused(refuses: Refuses) -> None:
+    assert ".docx" in refuses("report", *SHAPE, "--out", "a.docx")
+
+
+@pytest.mark.parametrize(
+    ("given", "kind", "with_rate"),
+    [
+        ({"pgv_m_s": 0.6, "pga_g": 0.5}, None, True),
+        ({"pgv_m_s": 0.6}, "rocking", False),
+        ({"sa10_g": 0.5, "pga_g": 0.6}, "rocking", False),
+        ({"pgv_m_s": 0.6, "pga_g": 0.5, "tm_s": 0.6}, None, False),
+    ],
+)
+def test_nothing_on_the_sheet_covers_anything(
+    given: dict[str, float], kind: str | None, with_rate: bool, tmp_path: Path
+) -> None:
+    (tmp_path / "curve.csv").write_text(CURVE)
+    curve = tmp_path / "curve.csv" if with_rate else None
+    contents = contents_of(
+        DescribedBlock(ROCK, {"beta_deg": 0.0}), given, kind=kind, model=None, level=0.95, db=None,
+        rate=RateQuestion(curve, component="single"),
+    )  # fmt: skip
+    with rc_context(sheet._RC):
+        figure = sheet.new_figure(8.27, 11.69)
+        sheet._draw(figure, contents, "A title", "today")
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        renderer = canvas.get_renderer()
+        texts = [text for text in texts_of(figure) if text.get_text()]
+        for axes in figure.axes:
+            texts += [one for one in (axes.xaxis.label, axes.yaxis.label) if one.get_text()]
+        boxes = [each.get_window_extent(renderer) for each in (*figure.axes, *texts)]
+    for i, box in enumerate(boxes):
+        assert figure.bbox.contains(*box.min)
+        assert figure.bbox.contains(*box.max)
+        for other in boxes[i + 1 :]:
+            assert not box.padded(-1.0).overlaps(other.padded(-1.0))
+
+
+def texts_of(part):
+    return [*part.texts, *(text for each in part.subfigs for text in texts_of(each))]
+
+
+def test_the_password_of_a_database_is_not_printed() -> None:
+    assert data_name("postgresql://me:secret@host/rocks", []) == "rocks"
+    assert data_name("/home/me/rocks.db", []) == "rocks.db"
+    assert data_name(None, [FROM_REFERENCE]) == "the reference that is shipped"
