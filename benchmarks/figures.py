@@ -17,7 +17,7 @@ from pathlib import Path
 
 from benchmarks.page import ROOT
 
-CAPTION = re.compile(r"Drawn by\*\s+`rbfrag\s+((?:plot|block|rockmass)\s[^`]+)`")
+CAPTION = re.compile(r"Drawn by\*\s+`rbfrag\s+((?:plot|block|rockmass|report)\s[^`]+)`")
 
 
 def commands(docs: Path = ROOT / "docs") -> list[tuple[Path, list[str]]]:
@@ -31,7 +31,7 @@ def commands(docs: Path = ROOT / "docs") -> list[tuple[Path, list[str]]]:
 
 def figure_of(arguments: Sequence[str]) -> str:
     """Return the file that a command draws."""
-    option = "--out" if arguments[0] == "plot" else "--plot"
+    option = "--out" if arguments[0] in ("plot", "report") else "--plot"
     return arguments[arguments.index(option) + 1]
 
 

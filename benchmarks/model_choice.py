@@ -146,7 +146,6 @@ class Score:
         slope: of calibration, with its standard error.
         middle: log loss at the strengths of the undecided middle.
         skill_log: 1 less log loss over that of the table of shares, of the same blocks.
-        skill_brier: the same of the Brier score.
         skill_middle: the same of the log loss in the middle.
     """
 
@@ -155,7 +154,6 @@ class Score:
     slope: tuple[float, float]
     middle: float
     skill_log: float
-    skill_brier: float
     skill_middle: float
 
 
@@ -163,32 +161,31 @@ def score(rows: Rows, p: FloatArray, shares: FloatArray) -> Score:
     """Return the scores of a model, of the blocks that it predicts."""
     known, failed = np.isfinite(p), rows.failed
     loss, plain = log_losses(p, failed), log_losses(shares, failed)
-    squared, plain_squared = (p - failed) ** 2, (shares - failed) ** 2
     middle = known & rows.middle
     return Score(
         log_loss=clustered_mean(loss, rows.event),
-        brier=float(squared[known].mean()),
+        brier=float(((p - failed) ** 2)[known].mean()),
         slope=calibration_slope(p[known], failed[known], rows.event[known]),
         middle=float(loss[middle].mean()),
         skill_log=float(1.0 - loss[known].mean() / plain[known].mean()),
-        skill_brier=float(1.0 - squared[known].mean() / plain_squared[known].mean()),
         skill_middle=float(1.0 - loss[middle].mean() / plain[middle].mean()),
     )
 
 
 def score_table(scores: Mapping[str, Score]) -> str:
     """Return the scores of models, best first."""
-    head = ["model", "log loss", "Brier", "calibration slope", "undecided middle", "skill",
-            "skill by Brier", "skill in the middle"]  # fmt: skip
+    head = ["model", "log loss", "calibration slope", "undecided middle", "skill"]
     order = sorted(scores, key=lambda name: scores[name].log_loss[0])
     cells = [
         [
-            name, f"{one.log_loss[0]:.4f} ± {one.log_loss[1]:.4f}", f"{one.brier:.4f}",
-            f"{one.slope[0]:.2f} ± {one.slope[1]:.2f}", f"{one.middle:.3f}",
-            f"{one.skill_log:+.3f}", f"{one.skill_brier:+.3f}", f"{one.skill_middle:+.3f}",
+            name,
+            f"{one.log_loss[0]:.4f} ± {one.log_loss[1]:.4f}",
+            f"{one.slope[0]:.2f} ± {one.slope[1]:.2f}",
+            f"{one.middle:.3f}",
+            f"{one.skill_log:+.3f}",
         ]
         for name, one in ((name, scores[name]) for name in order)
-    ]  # fmt: skip
+    ]
     return markdown((head, cells))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import re
 from pathlib import Path
 
@@ -36,7 +37,7 @@ def words_of(path: Path) -> str:
     else:
         text = re.sub(r"<(style|svg).*?</\1>", " ", path.read_text("utf-8"), flags=re.DOTALL)
         text = re.sub(r"</?sub>", "_", text).replace("k_r_", "k_r")
-        text = re.sub(r"<[^>]*>", " ", text)
+        text = html.unescape(re.sub(r"<[^>]*>", " ", text))
     return " ".join(text.split())
 
 

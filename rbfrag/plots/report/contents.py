@@ -296,7 +296,8 @@ def _tables(
 
 
 def _interval(low: float, high: float) -> str:
-    return f"{percent(low)} to {percent(high)}"
+    ends = percent(low), percent(high)
+    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 
 def _hazard_rows(rate: Rate, level: str) -> Rows:

@@ -65,8 +65,8 @@ def write_html(contents: Contents, title: str, date: str, target: Path) -> None:
 
 
 def _written(text: str) -> str:
-    """Return a text for the page, with the index of k_r where it belongs."""
-    return escape(text).replace("k_r", "k<sub>r</sub>")
+    """Return a text for the page: the index of k_r where it belongs, no percent sign alone."""
+    return escape(text).replace("k_r", "k<sub>r</sub>").replace(" %", "&nbsp;%")
 
 
 def _column(tables: Sequence[Table]) -> str:
@@ -76,7 +76,7 @@ def _column(tables: Sequence[Table]) -> str:
 def _table(table: Table) -> str:
     heading, rows = table
     cells = "".join(
-        f'<tr><th scope="row">{_written(name)}</th><td>{escape(value)}</td></tr>'
+        f'<tr><th scope="row">{_written(name)}</th><td>{_written(value)}</td></tr>'
         for name, value in rows
     )
     return f"<h2>{escape(heading)}</h2><table>{cells}</table>"

@@ -1,0 +1,112 @@
+"""What a first shock leaves for the second: the tables of docs/howto/sequences.md.
+
+    rbfrag motions add FOLDER --metadata FOLDER/MANIFEST.csv --db sequences.db
+    python -m benchmarks.sequences --db sequences.db --write
+
+The campaigns are run, or resumed, in the database: sliding with four drawn first motions for each
+second one, slumping with two.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from benchmarks.page import ROOT, parser, write_table
+from rbfrag.campaign.simulate import simulate
+from rbfrag.exchange.database_tables import read_table
+from rbfrag.fragility.conditional import ConditionalShare
+
+HOWTO = ROOT / "docs" / "howto" / "sequences.md"
+DRAWS = {"sliding": 4, "slumping": 2}
+SHOWN = {"sliding": 0.15, "slumping": None}
+"""The limit of each kind that the page shows; the others are kept among the results."""
+
+LEAST_RAD = np.radians(0.05)
+SHARES = (0.0, 0.01, 0.1, 0.25, 0.5, 1.0)
+
+
+def main() -> None:
+    """Run the campaigns and print, or write, their tables."""
+    made = parser(__doc__)
+    made.add_argument("--db", type=Path, required=True, help="database with the motions")
+    given = made.parse_args()
+    tables = {}
+    for kind, draws in DRAWS.items():
+        summary = simulate(given.db, kind=kind, sequence=True, draws=draws, jobs=1)
+        assert summary.sequence is not None
+        rows = summary.sequence.conditional
+        tables[f"{kind}-all"] = conditional_table(rows)
+        tables[kind] = conditional_table([row for row in rows if _limit(row) == SHOWN[kind]])
+    tables["geometry"] = geometry_table(read_table("shock_pair", db=given.db))
+    for name, text in tables.items():
+        print(f"\n{name}\n\n{text}")
+        if given.write:
+            write_table(HOWTO, name, text)
+
+
+def _limit(row: ConditionalShare) -> float | None:
+    return row.rotation_deg if row.displacement_m is None else row.displacement_m
+
+
+def conditional_table(rows: list[ConditionalShare] | tuple[ConditionalShare, ...]) -> str:
+    """Return the conditional fragility in Markdown."""
+    lines = [
+        "| limit | state left by the first | PGA/yield of the second | blocks | earthquakes | of "
+        "one station | P | P of the intact block | ratio |",
+        "| --- " * 9 + "|",
+    ]
+    for row in rows:
+        limit = "past recovery" if _limit(row) is None else f"{_limit(row):g}"
+        limit += "" if row.displacement_m is None else " m"
+        limit += "" if row.rotation_deg is None else "°"
+        state = f"{row.state_from:.0%} to {row.state_to:.0%}" if row.state_to else "none"
+        most = row.pga_over_yield_to
+        shaking = f"{row.pga_over_yield_from:g} to {most:g}" if most else "over 4"
+        ratio = "-" if row.ratio is None else f"{row.ratio:.2f}"
+        after = f"{row.probability:.3f} ({row.ci_low:.3f} to {row.ci_high:.3f})"
+        intact = (
+            f"{row.intact_probability:.3f} ({row.intact_ci_low:.3f} to {row.intact_ci_high:.3f})"
+        )
+        lines.append(
+            f"| {limit} | {state} | {shaking} | {row.blocks} | {row.earthquakes} | "
+            f"{row.of_station} | {after} | {intact} | {ratio} |"
+        )
+    return "\n".join(lines)
+
+
+def geometry_table(pairs: pd.DataFrame) -> str:
+    """Return what the second shock adds to a block that moved, over what it does to an intact one.
+
+    Of blocks that come to rest in both, and that it moves by 0.05° at least, or slides.
+    """
+    slides = pairs[(pairs.kind == "sliding") & (pairs.second_outcome == "stable")]
+    sums = slides.first_displacement_m + slides.intact_displacement_m
+    off = float((slides.second_displacement_m - sums).abs().max())
+    slumps = pairs[
+        (pairs.kind == "slumping")
+        & (pairs.second_outcome == "stable")
+        & (pairs.intact_outcome == "stable")
+        & (pairs.intact_rotation_rad > LEAST_RAD)
+    ]
+    left = slumps.first_rotation_rad / slumps.critical_rad
+    ratio = (slumps.second_rotation_rad - slumps.first_rotation_rad) / slumps.intact_rotation_rad
+    lines = [
+        "| rotation that the first leaves, of the one without strength | slumps | ratio, 10 % | "
+        "median | 90 % |",
+        "| --- " * 5 + "|",
+    ]
+    for low, high in pairwise(SHARES):
+        some = ratio[(left > low) & (left <= high)]
+        ends = " | ".join(f"{value:.2f}" for value in np.percentile(some, [10, 50, 90]))
+        lines.append(f"| {low:.0%} to {high:.0%} | {len(some)} | {ends} |")
+    return "\n".join(
+        [*lines, "", f"Of {len(slides)} slides the sum differs by {off:.1g} m at most."]
+    )
+
+
+if __name__ == "__main__":
+    main()
