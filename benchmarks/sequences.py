@@ -9,6 +9,7 @@ second one, slumping with two.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
 
@@ -40,7 +41,9 @@ def main() -> None:
         assert summary.sequence is not None
         rows = summary.sequence.conditional
         tables[f"{kind}-all"] = conditional_table(rows)
-        tables[kind] = conditional_table([row for row in rows if _limit(row) == SHOWN[kind]])
+        tables[kind] = conditional_table(
+            (row for row in rows if _limit(row) == SHOWN[kind]), short=True
+        )
     tables["geometry"] = geometry_table(read_table("shock_pair", db=given.db))
     for name, text in tables.items():
         print(f"\n{name}\n\n{text}")
@@ -52,30 +55,35 @@ def _limit(row: ConditionalShare) -> float | None:
     return row.rotation_deg if row.displacement_m is None else row.displacement_m
 
 
-def conditional_table(rows: list[ConditionalShare] | tuple[ConditionalShare, ...]) -> str:
-    """Return the conditional fragility in Markdown."""
-    lines = [
-        "| limit | state left by the first | PGA/yield of the second | blocks | earthquakes | of "
-        "one station | P | P of the intact block | ratio |",
-        "| --- " * 9 + "|",
-    ]
+def conditional_table(rows: Iterable[ConditionalShare], *, short: bool = False) -> str:
+    """Return the conditional fragility in Markdown.
+
+    Args:
+        rows: the classes.
+        short: without the limit, and without second shocks whose PGA is below the yield, in which
+            no block moves but for one that its rotation has made weaker.
+    """
+    names = ["state left by the first", "PGA/yield of the second", "blocks", "earthquakes",
+             "of one station", "P", "P of the intact block", "ratio"]  # fmt: skip
+    table = [names if short else ["limit", *names]]
     for row in rows:
+        if short and row.pga_over_yield_to == 1.0:
+            continue
         limit = "past recovery" if _limit(row) is None else f"{_limit(row):g}"
         limit += "" if row.displacement_m is None else " m"
         limit += "" if row.rotation_deg is None else "°"
-        state = f"{row.state_from:.0%} to {row.state_to:.0%}" if row.state_to else "none"
         most = row.pga_over_yield_to
-        shaking = f"{row.pga_over_yield_from:g} to {most:g}" if most else "over 4"
-        ratio = "-" if row.ratio is None else f"{row.ratio:.2f}"
-        after = f"{row.probability:.3f} ({row.ci_low:.3f} to {row.ci_high:.3f})"
-        intact = (
-            f"{row.intact_probability:.3f} ({row.intact_ci_low:.3f} to {row.intact_ci_high:.3f})"
-        )
-        lines.append(
-            f"| {limit} | {state} | {shaking} | {row.blocks} | {row.earthquakes} | "
-            f"{row.of_station} | {after} | {intact} | {ratio} |"
-        )
-    return "\n".join(lines)
+        cells = [
+            f"{row.state_from:.0%} to {row.state_to:.0%}" if row.state_to else "none",
+            f"{row.pga_over_yield_from:g} to {most:g}" if most else "over 4",
+            *map(str, (row.blocks, row.earthquakes, row.of_station)),
+            f"{row.probability:.3f} ({row.ci_low:.2f}-{row.ci_high:.2f})",
+            f"{row.intact_probability:.3f} ({row.intact_ci_low:.2f}-{row.intact_ci_high:.2f})",
+            "-" if row.ratio is None else f"{row.ratio:.2f}",
+        ]
+        table.append(cells if short else [limit, *cells])
+    lines = [f"| {' | '.join(cells)} |" for cells in table]
+    return "\n".join([lines[0], "| --- " * len(table[0]) + "|", *lines[1:]])
 
 
 def geometry_table(pairs: pd.DataFrame) -> str:

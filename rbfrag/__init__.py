@@ -31,7 +31,9 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module 'rbfrag' has no attribute {name!r}")
     from importlib import import_module
 
-    value = getattr(import_module(homes[name]), name)
+    value = getattr(import_module(homes[name]), name, None)
+    if value is None:  # a module, which is imported when it is asked for
+        value = import_module(f"{homes[name]}.{name}")
     globals()[name] = value
     return value
 

@@ -1,5 +1,7 @@
 # The one list of public names: rbfrag/__init__.py reads it when a name is first used.
 from rbfrag.campaign.add_motions import add_motions as add_motions
+from rbfrag.campaign.rock_mass_answer import RockMassAnswer as RockMassAnswer
+from rbfrag.campaign.rock_mass_answer import rockmass as rockmass
 from rbfrag.campaign.simulate import simulate as simulate
 from rbfrag.errors import DatabaseError as DatabaseError
 from rbfrag.errors import FitError as FitError
@@ -8,8 +10,11 @@ from rbfrag.errors import MotionFileError as MotionFileError
 from rbfrag.errors import RbfragError as RbfragError
 from rbfrag.errors import UnknownModelError as UnknownModelError
 from rbfrag.errors import WorkFailedError as WorkFailedError
+from rbfrag.exchange import export as export
 from rbfrag.exchange.database_tables import read_table as read_table
 from rbfrag.exchange.event_losses import losses as losses
+from rbfrag.exchange.map_answer import ShakeMapAnswer as ShakeMapAnswer
+from rbfrag.exchange.map_answer import shakemap as shakemap
 from rbfrag.exchange.mesh_file import block_from_mesh as block_from_mesh
 from rbfrag.fragility.fit.stored import fit as fit
 from rbfrag.fragility.predict import predict as predict
@@ -27,6 +32,7 @@ from rbfrag.hazards.survival import survival as survival
 from rbfrag.motions.ground_motion import GroundMotion as GroundMotion
 from rbfrag.motions.recognise import read_motions as read_motions
 from rbfrag.motions.toppling_spectrum import toppling_spectrum as toppling_spectrum
+from rbfrag.plots import plot as plot
 from rbfrag.plots.report.write import report as report
 from rbfrag.solver.block.arrays import BlockArray as BlockArray
 from rbfrag.solver.block.geometry import Block as Block

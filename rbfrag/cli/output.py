@@ -224,8 +224,6 @@ def show_prediction(
     if json:
         print_json(document)
         return
-    from rbfrag.fragility.lookup import FROM_REFERENCE
-
     answers = document.pop("answers")
     polarities = document.pop("polarities", None)
     warnings = document.pop("warnings")
@@ -236,9 +234,6 @@ def show_prediction(
         shown = {key: value for key, value in document.items() if key not in _LEFT_OUT or value}
     else:
         shown = _short(document)
-        if FROM_REFERENCE in warnings:
-            warnings.remove(FROM_REFERENCE)
-            shown["data"] = "the reference that is shipped with rbfrag"
     print_pairs(shown)
     if polarities:
         print()
@@ -267,6 +262,7 @@ def _short(document: Mapping[str, Any]) -> dict[str, object]:
         **{name: document[name] for name in _IF_KNOWN if document.get(name)},
         "in domain": document["in_domain"],
         "model": document["model"],
+        "data": document["data"],
     }
 
 

@@ -97,9 +97,11 @@ def rock_mass_in_words(document: Mapping[str, Any]) -> Iterator[str]:
         )
     for scale in () if shaking is None else shaking["scales"]:
         of_all = scale["all"]["fails_of_all"]
+        unknown = scale["all"]["open_of_all"]
         yield (
             f"{shaking['motion']} times {scale['scale']:g}: {percent(of_all['share'])} of the "
-            f"blocks fail ({percent(of_all['ci_low'])} to {percent(of_all['ci_high'])})."
+            f"blocks fail ({percent(of_all['ci_low'])} to {percent(of_all['ci_high'])})"
+            + (f"; of another {percent(unknown)} it is open whether they do." if unknown else ".")
         )
 
 

@@ -12,7 +12,7 @@ import math
 import sqlite3
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -38,7 +38,8 @@ class ModelRow:
         domain: fitted range (low, high) of each variable by name.
         data_fingerprint: hash of the data that were fitted.
         diagnostics: everything else a report prints (counts, scores, warnings), JSON-able.
-        is_default: True for the model of its kind that answers when none is named.
+        is_default: True for the model of its kind that answers when none is named: the chosen one,
+            else the one of the best score (:func:`with_defaults`).
         created: UTC time of the fit, ISO 8601.
         kind: response kind of the blocks that it answers for.
         form: which form of its predictor was fitted; only :data:`MODEL_FORM` answers.
@@ -218,6 +219,38 @@ def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
     return f"there is no model {name!r} in {where}; it holds: {', '.join(known)}"
 
 
+def held_out_loss(row: ModelRow) -> float:
+    """Return the log loss of a model on earthquakes left out; infinite where it has none."""
+    scores = row.diagnostics.get("scores")
+    value = scores.get("log_loss_held_out") if isinstance(scores, Mapping) else None
+    return float(value) if isinstance(value, int | float) else math.inf
+
+
+def _last_of_all(row: ModelRow) -> bool:
+    """Return whether a model answers special questions only: of a record, or of one rotation."""
+    return row.term == "xp" or row.diagnostics.get("rotation_deg") is not None
+
+
+def with_defaults(rows: Sequence[ModelRow]) -> list[ModelRow]:
+    """Return all models of a database, sorted by name, with the default of each kind.
+
+    That is the one that was chosen, else the one of the least log loss on earthquakes left out.
+
+    Args:
+        rows: the models, of which the chosen ones say so.
+    """
+    best: dict[str, ModelRow] = {}
+    ordered = sorted(rows, key=lambda row: row.name)
+    for row in sorted(
+        ordered, key=lambda r: (not r.is_default, _last_of_all(r), held_out_loss(r), r.created)
+    ):
+        best.setdefault(row.kind, row)
+    return [
+        row if row.is_default is (best[row.kind] is row) else replace(row, is_default=True)
+        for row in ordered
+    ]
+
+
 def read_models(path: str | PathLike[str]) -> list[ModelRow]:
     """Return all models of an SQLite database, sorted by name.
 
@@ -238,4 +271,4 @@ def read_models(path: str | PathLike[str]) -> list[ModelRow]:
             raise explained_sqlite_error(error, file) from error
         except DatabaseError as error:
             raise DatabaseError(f"{file}: {error}") from error
-    return sorted(rows, key=lambda model: model.name)
+    return with_defaults(rows)

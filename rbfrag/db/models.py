@@ -8,16 +8,22 @@ from sqlalchemy import Connection, Select, and_, delete, select
 
 from rbfrag.db.connect import database_label
 from rbfrag.db.insert import insert_row, update_rows, utc_now
-from rbfrag.db.model_file import STORED, ModelRow, decode_model, encode_model, unknown_model
+from rbfrag.db.model_file import (
+    STORED,
+    ModelRow,
+    decode_model,
+    encode_model,
+    unknown_model,
+    with_defaults,
+)
 from rbfrag.db.schema import fragility_model
-from rbfrag.errors import InputError, UnknownModelError
+from rbfrag.errors import DatabaseError, InputError, UnknownModelError
 
 
 def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) -> ModelRow:
     """Store a fitted model.
 
-    The first model of a kind becomes its default; a later one only when it asks to be.
-    A model that is replaced passes its being the default on.
+    It becomes the default of its kind when it says so; a model that is replaced passes that on.
 
     Args:
         row: the model; without a time of creation it is now.
@@ -31,15 +37,14 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
     """
     values = encode_model(row)
     values["created"] = row.created or utc_now()
-    query = select(fragility_model.c.name, fragility_model.c.is_default, fragility_model.c.kind)
-    stored = connection.execute(query).all()
-    if any(other.name == row.name for other in stored) and not replace:
+    query = select(fragility_model.c.name, fragility_model.c.is_default)
+    chosen = {other.name: bool(other.is_default) for other in connection.execute(query)}
+    if row.name in chosen and not replace:
         raise InputError(
             f"there is a model {row.name!r} already: give another --name, or replace it with "
             "--replace"
         )
-    defaults = {other.name: other.is_default for other in stored if other.kind == row.kind}
-    values["is_default"] = row.is_default or defaults.get(row.name, False) or not defaults
+    values["is_default"] = row.is_default or chosen.get(row.name, False)
     if values["is_default"]:
         _clear_default(connection, row.kind)
     connection.execute(delete(fragility_model).where(fragility_model.c.name == row.name))
@@ -48,9 +53,8 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
 
 
 def model_rows(connection: Connection) -> list[ModelRow]:
-    """Return all models, sorted by name."""
-    rows = [decode_model(row) for row in connection.execute(_model_query())]
-    return sorted(rows, key=lambda model: model.name)
+    """Return all models, sorted by name, with the default of each kind."""
+    return with_defaults([decode_model(row) for row in connection.execute(_model_query())])
 
 
 def load_model(
@@ -59,21 +63,31 @@ def load_model(
     """Return one model.
 
     Args:
-        name: its name; None for the default of a kind.
+        name: its name; None for the default of a kind
+            (:func:`rbfrag.db.model_file.with_defaults`).
         kind: the kind whose default is meant.
 
     Raises:
         UnknownModelError: there is none; the message lists the names there are.
     """
-    query = _model_query()
     if name is None:
-        query = query.where(fragility_model.c.is_default, fragility_model.c.kind == kind)
+        rows = (row for row in model_rows(connection) if row.kind == kind)
+        default = next((row for row in rows if row.is_default), None)
     else:
-        query = query.where(fragility_model.c.name == name)
-    row = connection.execute(query).one_or_none()
-    if row is None:
+        query = _model_query().where(fragility_model.c.name == name)
+        stored = connection.execute(query).one_or_none()
+        default = None if stored is None else _with_default(connection, decode_model(stored))
+    if default is None:
         raise _unknown(connection, name)
-    return decode_model(row)
+    return default
+
+
+def _with_default(connection: Connection, row: ModelRow) -> ModelRow:
+    """Return a model that says whether it is the default; as stored where another is damaged."""
+    try:
+        return next(each for each in model_rows(connection) if each.name == row.name)
+    except DatabaseError:
+        return row
 
 
 def set_default(connection: Connection, name: str) -> None:

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from sqlalchemy import ColumnElement, Connection, RowMapping, Select, and_, case, func, select
 
 from rbfrag.db.location import SCHEMA_REVISION
+from rbfrag.db.models import load_model
 from rbfrag.db.motions import require_suite
 from rbfrag.db.rows import SPECTRAL_COLUMNS, CombinationTable
 from rbfrag.db.schema import (
     combination,
     earthquake,
-    fragility_model,
     metadata,
     motion,
     recording,
@@ -25,7 +25,7 @@ from rbfrag.db.schema import (
 )
 from rbfrag.db.schema import suite as suite_table
 from rbfrag.db.stored_json import stored_json, stored_number
-from rbfrag.errors import InputError
+from rbfrag.errors import DatabaseError, InputError, UnknownModelError
 from rbfrag.motions.quality import PGD_IN_DOUBT
 from rbfrag.solver.results import NUMERICS_VERSION
 
@@ -249,12 +249,16 @@ def database_info(connection: Connection, *, kind: str = "toppling") -> Database
             row.status: row.number for row in connection.execute(by_status.order_by("status"))
         },
         numerics_versions=tuple(sorted(connection.scalars(versions))),
-        default_model=connection.scalar(
-            select(fragility_model.c.name).where(
-                fragility_model.c.is_default, fragility_model.c.kind == kind
-            )
-        ),
+        default_model=_default_name(connection, kind),
     )
+
+
+def _default_name(connection: Connection, kind: str) -> str | None:
+    """Return the name of the default of a kind; None without one, or where a model is damaged."""
+    try:
+        return load_model(connection, kind=kind).name
+    except (DatabaseError, UnknownModelError):
+        return None
 
 
 def suite_counts(connection: Connection) -> tuple[SuiteCount, ...]:

@@ -100,20 +100,21 @@ class Contradiction(Finding):
     Args:
         ratio: what is out of its range.
         values: the values by name.
-        fitted: least and greatest ratio of the fitted motions.
+        fitted: least and greatest ratio of the fitted motions; None where the model says nothing
+            of it.
     """
 
     ratio: Ratio
     values: Mapping[str, Any]
-    fitted: tuple[float, float]
+    fitted: tuple[float, float] | None
 
     def about(self, value: float) -> str:
         """Return the sentence for one value."""
-        return self.ratio.contradiction(self.values, value, *self.fitted)
+        return self.ratio.contradiction(self.values, value, self.fitted)
 
     def in_general(self) -> str:
         """Return the sentence for many values."""
-        return self.ratio.in_general(*self.fitted)
+        return self.ratio.in_general(self.fitted)
 
 
 _RATIO_NAMES = frozenset(ratio.name for ratio in RATIOS)
@@ -256,10 +257,11 @@ def _not(condition: Any) -> Any:
 def outside_domain(model: FragilityModel, values: Mapping[str, Any]) -> Iterator[Finding]:
     """Yield the variables that lie outside their fitted range, and measures that contradict."""
     for ratio in model.ratios_of(values):
-        low, high = model.row.domain.get(ratio.name, (0.0, math.inf))
+        low, high = ratio.limits(model.row.domain)
         value = values[ratio.name]
         outside = (value < low * (1.0 - 1e-9)) | (value > high * (1.0 + 1e-9))
-        yield Contradiction(outside, "", value, "", ratio, values, (low, high))
+        fitted = model.row.domain.get(ratio.name)
+        yield Contradiction(outside, "", value, "", ratio, values, fitted)
     for name, (low, high) in model.row.domain.items():
         if name not in values or name in _RATIO_NAMES:
             continue

@@ -21,6 +21,9 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 INSIDE = 0.995
 """Share of the fitted points that lie within the fitted distance."""
 
+MARGIN = 2.0
+"""Factor by which a ratio may lie beyond those of the shipped motions before it is doubted."""
+
 MEASURE_WORDS: Mapping[str, tuple[str, str]] = {
     "pgv_m_s": ("a PGV", " m/s"),
     "pga_g": ("a PGA", " g"),
@@ -42,6 +45,8 @@ class Ratio:
         unit: its unit, empty for none.
         of: the values that it is made of; the first is the one that does not go with the others.
         formula: the ratio from the values by name.
+        shipped: its range over the motions of the shipped reference, which judges where a model
+            says nothing of it; None where models say it all.
     """
 
     name: str
@@ -49,28 +54,57 @@ class Ratio:
     unit: str
     of: tuple[str, ...]
     formula: Callable[[Mapping[str, Any]], Any]
+    shipped: tuple[float, float] | None = None
+
+    def limits(self, domain: Mapping[str, tuple[float, float]]) -> tuple[float, float]:
+        """Return the range within which nothing is to be said.
+
+        Args:
+            domain: fitted ranges of a model by name.
+        """
+        if self.name in domain or self.shipped is None:
+            return domain.get(self.name, (0.0, math.inf))
+        return self.shipped[0] / MARGIN, self.shipped[1] * MARGIN
+
+    def _ranges(self, fitted: tuple[float, float] | None) -> tuple[str, str]:
+        """Return whose range it is, in numbers, and what lying outside means."""
+        if fitted is None and self.shipped is not None:
+            return (
+                f"more than a factor of {MARGIN:g} outside the {self.shipped[0]:.3g} to "
+                f"{self.shipped[1]:.3g}{self.unit} of the motions of the shipped reference",
+                "check the values",
+            )
+        low, high = fitted or (0.0, math.inf)
+        return (
+            f"outside the fitted {low:.2g} to {high:.2g}{self.unit}",
+            "the answer is an extrapolation",
+        )
 
     def contradiction(
-        self, values: Mapping[str, float], ratio: float, low: float, high: float
+        self, values: Mapping[str, float], ratio: float, fitted: tuple[float, float] | None
     ) -> str:
-        """Return the sentence for values whose ratio is not between `low` and `high`."""
+        """Return the sentence for values whose ratio is outside its range.
+
+        Args:
+            values: the values by name.
+            ratio: theirs.
+            fitted: range of the fitted motions; None where the shipped ones judge.
+        """
         first, *others = (
             f"{MEASURE_WORDS[name][0]} of {values[name]:.3g}{MEASURE_WORDS[name][1]}"
             for name in self.of
         )
+        where, what = self._ranges(fitted)
         return (
             f"{first} does not go with {' and '.join(others)}: {self.symbol} is "
-            f"{ratio:.2g}{self.unit}, the fitted motions hold {low:.2g} to "
-            f"{high:.2g}{self.unit}: the answer is an extrapolation"
+            f"{ratio:.2g}{self.unit}, {where}: {what}"
         )
 
-    def in_general(self, low: float, high: float) -> str:
-        """Return the sentence for many values."""
+    def in_general(self, fitted: tuple[float, float] | None) -> str:
+        """Return the sentence for many values; `fitted` as for :meth:`contradiction`."""
         first, *others = (MEASURE_WORDS[name][0].partition(" ")[2] for name in self.of)
-        return (
-            f"{first} does not go with {' and '.join(others)}: {self.symbol} is outside the fitted "
-            f"{low:.2g} to {high:.2g}{self.unit}: the answer is an extrapolation"
-        )
+        where, what = self._ranges(fitted)
+        return f"{first} does not go with {' and '.join(others)}: {self.symbol} is {where}: {what}"
 
 
 def _over(name: str, factor: float, other: str, values: Mapping[str, Any]) -> Any:
@@ -130,9 +164,21 @@ RATIOS: tuple[Ratio, ...] = (
         ("pgd_m", "pgv_m_s", "pga_g"),
         lambda v: v["pgd_m"] / v["pgv_m_s"] * (v["pga_g"] * STANDARD_GRAVITY_M_S2 / v["pgv_m_s"]),
     ),
+    Ratio(
+        "pgd_over_pgv_tm",
+        "2π·PGD/(PGV·Tm)",
+        "",
+        ("pgd_m", "pgv_m_s", "tm_s"),
+        lambda v: v["pgd_m"] * 2.0 * math.pi / (v["pgv_m_s"] * v["tm_s"]),
+        (1.22, 110.0),
+    ),
     *_sa_ratios(),
 )
-"""The ratios that are fitted and judged; PGD·PGA/PGV² after Newmark and Rosenblueth (1971)."""
+"""The ratios that are fitted and judged; PGD·PGA/PGV² after Newmark and Rosenblueth (1971).
+
+Of a harmonic motion 2π·PGD/(PGV·Tm) is 1, and of any other more, because displacements have longer
+periods than accelerations, which Tm is the mean of.
+"""
 
 
 def ratios_of(known: Collection[str]) -> tuple[Ratio, ...]:

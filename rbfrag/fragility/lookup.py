@@ -9,18 +9,21 @@ from os import PathLike
 from pathlib import Path
 
 from rbfrag.db.location import DEFAULT_NAME, REFERENCE, locate, reference_file
-from rbfrag.db.model_file import ModelRow, unknown_model
+from rbfrag.db.model_file import ModelRow, held_out_loss, unknown_model
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.fragility.measures import MEASURES, least_inputs, terms_from
 from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, methods
 from rbfrag.fragility.model import FragilityModel
 
-FROM_REFERENCE = (
-    "answered by the reference model that is shipped with rbfrag: there is no rbfrag.db with a "
-    "model here, and no --db or RBFRAG_DB names another"
-)
+SHIPPED = "the reference that is shipped with rbfrag"
+"""What answers are said to come from where no other database is named, or is there."""
 
 _Stamp = tuple[int, ...]
+
+
+def data_name(place: str) -> str:
+    """Return what answers call a database: its name, without folder, server or password."""
+    return place if place == SHIPPED else place.partition("?")[0].rpartition("/")[2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +34,6 @@ class _Store:
         place: its name in messages.
         stamp: what tells whether the file has changed since; () where nothing can.
         rows: the models of all kinds.
-        notes: what each of them says of where it comes from.
         models: those that have answered, by name.
         suited: those that have been found to suit a question, the recommended first.
     """
@@ -39,7 +41,6 @@ class _Store:
     place: str
     stamp: _Stamp
     rows: list[ModelRow]
-    notes: tuple[str, ...] = ()
     models: dict[str, FragilityModel] = field(default_factory=dict)
     suited: dict[tuple[object, ...], list[FragilityModel]] = field(default_factory=dict)
 
@@ -55,7 +56,7 @@ class _Store:
         """Return one of its models, ready to answer."""
         model = self.models.get(row.name)
         if model is None:
-            model = self.models[row.name] = FragilityModel.from_row(row, self.notes)
+            model = self.models[row.name] = FragilityModel.from_row(row, data_name(self.place))
         return model
 
 
@@ -97,8 +98,9 @@ def find_model(
 
     The more is known of the motion, the better the model: one on X(p), then PGV with PGA and Tm,
     then PGV with PGA, then PGV, then PGA with spectral accelerations and the single measures, in
-    the order of their skill. Among the stored models of the best term that the
-    measures suffice for, the database's default answers, else the best method.
+    the order of their skill. Of the stored models that the measures suffice for, the database's
+    default answers if no other reads more of the motion, else the one of the least log loss on
+    earthquakes left out.
 
     Args:
         model: a model, the name of a stored one, or None.
@@ -206,9 +208,15 @@ def _suited_in(
             "the measures that one of them needs, or fit another with  rbfrag fit --kind "
             f"{kind} --term {' or '.join(possible)}"
         )
+    most = max(model.term.level for model in best.values())
     return sorted(
         best.values(),
-        key=lambda m: (-m.term.level, not m.row.is_default, possible.index(m.term.name)),
+        key=lambda m: (
+            not (m.row.is_default and m.term.level == most),
+            held_out_loss(m.row),
+            -m.term.level,
+            possible.index(m.term.name),
+        ),
     )
 
 
@@ -221,8 +229,8 @@ def _how_to_make(kind: str) -> str:
     return f"there are models of {', '.join(stored)}"
 
 
-def _merit(model: FragilityModel) -> tuple[bool, int]:
-    return model.row.is_default, -model.form.rank
+def _merit(model: FragilityModel) -> tuple[bool, float, int]:
+    return model.row.is_default, -held_out_loss(model.row), -model.form.rank
 
 
 def _check_block(
@@ -382,7 +390,7 @@ def _read_again(path: Path, shipped: bool) -> _Store:
 
     key = str(path)
     stamp = _stamp(key, shipped)
-    store = _Store(key, stamp, read_models(path), (FROM_REFERENCE,) if shipped else ())
+    store = _Store(SHIPPED if shipped else key, stamp, read_models(path))
     if stamp:
         _stores_before[key, shipped] = store
     return store

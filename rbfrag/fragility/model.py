@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, cast
 from rbfrag.db.model_file import MODEL_FORM, ModelRow
 from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility.dependence import Dependence, EventSpread
-from rbfrag.fragility.domain import Ratio, Spread, ratios_of, stored_spread
+from rbfrag.fragility.domain import RATIOS, Ratio, Spread, ratios_of, stored_spread
 from rbfrag.fragility.intervals import ParameterErrors, Quantiles, packed
 from rbfrag.fragility.measures import CREDIBLE, HIGHEST, LOWEST, TERMS, Term
 from rbfrag.fragility.methods import (
@@ -28,6 +28,8 @@ from rbfrag.fragility.unknown_outcomes import UnknownOutcomes
 LEAST = 1e-290
 """Velocities, accelerations and strengths are taken for at least this, for logarithms."""
 
+
+_SHIPPED = {ratio.name: ratio for ratio in RATIOS if ratio.shipped is not None}
 
 NO_EVENT_RANGE = (
     "no estimate of what the blocks of one earthquake share is stored with this model (too few "
@@ -85,9 +87,10 @@ class FragilityModel:
         errors: how well they are known.
         event_spread: what one earthquake may do; None where it is not known.
         vertical: whether it was fitted with vertical motion.
-        notes: what every answer says of the model, such as where it comes from.
+        notes: what every answer says of the model.
         spread: how the fitted points scatter; None where the row does not say it.
         unknown: how many outcomes that it was fitted to are not known; None where all are.
+        data: the database that it is stored in, as people call it; None of a row by itself.
     """
 
     row: ModelRow
@@ -101,6 +104,7 @@ class FragilityModel:
     notes: tuple[str, ...] = ()
     spread: Spread | None = None
     unknown: UnknownOutcomes | None = None
+    data: str | None = None
     ranges: dict[tuple[str, ...], tuple[Range, ...]] = field(
         default_factory=dict, compare=False, repr=False
     )
@@ -111,8 +115,12 @@ class FragilityModel:
     """What :meth:`ratios_of` has found for some names."""
 
     @classmethod
-    def from_row(cls, row: ModelRow, notes: tuple[str, ...] = ()) -> FragilityModel:
+    def from_row(cls, row: ModelRow, data: str | None = None) -> FragilityModel:
         """Return the model of a stored row.
+
+        Args:
+            row: the row.
+            data: the database that it is stored in, as people call it.
 
         Raises:
             ModelError: the model is of an older form, this rbfrag does not know its term or
@@ -156,8 +164,7 @@ class FragilityModel:
             )
         rho_e = None if row.dependence is None else row.dependence.get("rho_e")
         term = TERMS[row.term]
-        if term.advice:
-            notes = (*notes, term.advice)
+        notes = (term.advice,) if term.advice else ()
         event_spread = EventSpread.of(rho_e) if isinstance(rho_e, int | float) else None
         return cls(
             row=row,
@@ -171,6 +178,7 @@ class FragilityModel:
             notes=notes if event_spread is not None else (*notes, NO_EVENT_RANGE),
             spread=stored_spread(row.name, row.diagnostics),
             unknown=UnknownOutcomes.stored(row.diagnostics, method.block.strength, row.name),
+            data=data,
         )
 
     @property
@@ -241,7 +249,7 @@ class FragilityModel:
             ratios = tuple(
                 ratio
                 for ratio in ratios_of(key)
-                if ratio.name in judged and not self._implied(ratio)
+                if (ratio.name in judged or ratio.shipped) and not self._implied(ratio)
             )
             self.ratios[key] = ratios
         return ratios
@@ -274,7 +282,9 @@ class FragilityModel:
             return Range(name, 0.0, HIGHEST)
         low, high = LOWEST, HIGHEST
         for least, most, *_ in (
-            self.row.domain.get(name, (low, high)),
+            _SHIPPED[name].limits(self.row.domain)
+            if name in _SHIPPED
+            else self.row.domain.get(name, (low, high)),
             CREDIBLE.get(name, (low, high)),
         ):
             low, high = max(low, least), min(high, most)

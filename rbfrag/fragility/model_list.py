@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rbfrag.db.model_file import ModelRow
+from rbfrag.db.model_file import ModelRow, held_out_loss
 
 
 def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
@@ -17,8 +18,8 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
             "term": row.term,
             "method": row.method,
             "is_default": row.is_default,
-            "n": row.diagnostics.get("n"),
-            "log_loss": _scores(row).get("log_loss_held_out"),
+            "n": fitted_number(row.diagnostics),
+            "log_loss": loss if (loss := held_out_loss(row)) < math.inf else None,
             "events": row.diagnostics.get("events"),
             "sensitive_share": row.diagnostics.get("sensitive_share"),
             "domain": dict(row.domain),
@@ -28,6 +29,8 @@ def model_list(rows: Iterable[ModelRow]) -> list[dict[str, Any]]:
     ]
 
 
-def _scores(row: ModelRow) -> Mapping[str, Any]:
-    scores = row.diagnostics.get("scores")
-    return scores if isinstance(scores, Mapping) else {}
+def fitted_number(diagnostics: Mapping[str, Any]) -> int | None:
+    """Return how many critical values a model was fitted to; of one that reads none, outcomes."""
+    critical, outcomes = (diagnostics.get(name) for name in ("n", "n_outcomes"))
+    number = critical or outcomes or critical
+    return None if number is None else int(number)

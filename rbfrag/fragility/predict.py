@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -35,6 +35,9 @@ SIMULATED = (
     "what a known motion does to an uncertain block is simulated, by  rbfrag respond MOTION --draws"
     "  or rbfrag.respond_draws"
 )
+
+LEAST_APART = 1e-3
+"""Intervals that do not overlap are told of where the higher of them begins above this P."""
 
 _SINGLE_TYPES = (float, int, str, bytes)
 
@@ -70,6 +73,7 @@ class Prediction:
             where all are known.
         block_sd: standard deviation of P over what an uncertain block may be; None where it is
             certain.
+        data: the database that the model is of; None of a model that was given itself.
     """
 
     kind: str
@@ -91,6 +95,7 @@ class Prediction:
     median_displacement_m: float | None = None
     unknown_share: float | None = None
     block_sd: float | None = None
+    data: str | None = field(default=None, compare=False)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
@@ -289,8 +294,10 @@ def predict(
         motion: the accelerogram itself or its file, instead of its measures.
         polarity: ``forward`` or ``reverse`` where it is known how the motion points at the slope;
             ``both`` gives the mean of the two, which stand beside it (motion only).
-        model: a model, the name of a stored one, or None for the best one that what is given
-            suffices for: the database's default where it suffices for no less than any other.
+        model: a model, the name of a stored one, or None for the one of the best score that what
+            is given suffices for, or the database's default where no other reads more of the
+            motion. Of single numbers the others answer, too, and a warning tells where their
+            interval does not overlap.
         level: confidence level of the interval and of the range of one earthquake, between 0
             and 1.
         db: database of the model: a path or SQLAlchemy URL; None for ``RBFRAG_DB``, or else
@@ -364,8 +371,57 @@ def predict(
             given, motion, kind=kind, rotation_deg=rotation_deg, polarity=polarity, model=model,
             level=level, db=db,
         )  # fmt: skip
-    chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
-    return answer_given(chosen, given, level, nan=nan, interval=interval, weights=weights)
+    first, *others = _candidates(given, model, db, kind=kind, rotation_deg=rotation_deg)
+    answer = answer_given(first, given, level, nan=nan, interval=interval, weights=weights)
+    if type(answer) is not Prediction:
+        return answer
+    return _with_disagreement(answer, [_one_of(each, given, level, weights) for each in others])
+
+
+def _candidates(
+    given: Mapping[str, ArrayLike],
+    model: Model | None,
+    db: str | PathLike[str] | None,
+    *,
+    kind: str | None,
+    rotation_deg: float | None,
+) -> list[FragilityModel]:
+    """Return the models that may answer, the one that does first."""
+    if model is None:
+        return suited_models(given, db, kind=kind, rotation_deg=rotation_deg)
+    return [find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)]
+
+
+def _one_of(
+    model: FragilityModel, given: Mapping[str, ArrayLike], level: float, weights: ArrayLike | None
+) -> Prediction:
+    answer = answer_given(model, given, level, weights=weights)
+    assert isinstance(answer, Prediction)
+    return answer
+
+
+def _with_disagreement(first: Prediction, others: Sequence[Prediction]) -> Prediction:
+    """Return an answer that says which of the other models answer otherwise."""
+    apart = [
+        other
+        for other in others
+        if (least := max(first.ci_low, other.ci_low)) > min(first.ci_high, other.ci_high)
+        and least >= LEAST_APART
+    ]
+    if not apart:
+        return first
+    listed = ", ".join(f"{_percent(other)} by {other.model}" for other in apart)
+    text = (
+        f"the answers do not agree: {_percent(first)} by {first.model}, but {listed}, whose "
+        "intervals do not overlap with its own: this shaking is not what is usual for the "
+        "measures that those read, or a measure is wrong"
+    )
+    return replace(first, warnings=(*first.warnings, text))
+
+
+def _percent(answer: Prediction) -> str:
+    p, low, high = (100.0 * x for x in (answer.probability, answer.ci_low, answer.ci_high))
+    return f"{p:.2g} % ({low:.2g} to {high:.2g} %)"
 
 
 def spectral(sa_g: Mapping[float, ArrayLike]) -> dict[str, ArrayLike]:
@@ -495,6 +551,7 @@ def _predict_one(
         median,
         share,
         block_sd,
+        model.data,
     )
 
 
@@ -658,16 +715,11 @@ def prediction_document(
             )
         ]  # fmt: skip
     else:
-        criterion: Any = {"kind": kind, "rotation_deg": rotation_deg}
-        suited = (
-            suited_models(given, db, **criterion)
-            if model is None
-            else [find_model(model, given, db, **criterion)]
+        first, *rest = (
+            _one_of(each, given, level, weights)
+            for each in _candidates(given, model, db, kind=kind, rotation_deg=rotation_deg)
         )
-        others = [
-            answer_given(each, given, level, weights=weights)  # type: ignore[misc]
-            for each in suited
-        ]
+        others = [_with_disagreement(first, rest), *rest]
     recommended = others[0]
     document = recommended.as_dict()
     document["warnings"] = [*remarks, *recommended.warnings]

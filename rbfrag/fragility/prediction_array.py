@@ -72,6 +72,7 @@ class PredictionArray(Tabular):
             the share that is not known; None where all are known.
         block_sd: standard deviation of P over what each uncertain block may be; None where all are
             certain.
+        data: the database that the model is of; None of a model that was given itself.
         index: labels of the rows, of the pandas Series that were given; None without one.
     """
 
@@ -92,6 +93,7 @@ class PredictionArray(Tabular):
     notes: tuple[str, ...] = ()
     unknown_share: FloatArray | None = None
     block_sd: FloatArray | None = None
+    data: str | None = None
     index: pd.Index | None = None
 
     @cached_property
@@ -198,6 +200,7 @@ def predict_many(
         notes=model.notes,
         unknown_share=None if unknown is None else unknown.reshape(shape),
         block_sd=None if out.block_sd is None else out.block_sd.reshape(shape),
+        data=model.data,
         index=index if shape == (0 if index is None else len(index),) else None,
     )
 

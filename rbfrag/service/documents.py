@@ -72,6 +72,7 @@ class PredictAnswer(_Document):
     median_displacement_m: float | None
     unknown_share: float | None
     block_sd: float | None
+    data: str | None
     answers: list[ModelAnswer]
 
 
@@ -88,6 +89,7 @@ class PredictArrays(_Fitted):
     reason: list[str]
     kind: str
     level: float
+    data: str | None
     warnings: list[str]
 
 

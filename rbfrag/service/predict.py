@@ -105,6 +105,7 @@ def answer_many(given: dict[str, Any], chosen: dict[str, Any], db: str | None) -
             "model": answers.model,
             "term": answers.term,
             "method": answers.method,
+            "data": answers.data,
             "warnings": list(answers.notes),
         }
     )

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
 
 from rbfrag.fragility.words import block_in_words, percent, prediction_in_words
+from tests.cli.conftest import Shell
 
 
 def words(
@@ -79,3 +81,20 @@ def test_the_block_is_named_with_how_it_is_taken_to_stand() -> None:
 )  # fmt: skip
 def test_percent_has_the_digits_of_an_engineer(share: float, said: str) -> None:
     assert percent(share) == said
+
+
+def test_answers_whose_intervals_do_not_overlap_are_told_of(shell: Shell) -> None:
+    asked = ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--pga", "0.5"]
+    document = shell.json("predict", *asked, "--tm", "0.5")
+    first, *others = document["answers"]
+    apart = {
+        each["model"]
+        for each in others
+        if each["ci_low"] > first["ci_high"] or each["ci_high"] < first["ci_low"]
+    }
+    (told,) = [text for text in document["warnings"] if text.startswith("the answers do not agree")]
+    assert re.findall(r" by ([\w-]+),", told) == [first["model"], *apart]
+    assert apart == {"bounded-pgv"}
+    assert document["data"] == "the reference that is shipped with rbfrag"
+    agreed = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
+    assert not any("do not agree" in text for text in agreed["warnings"])

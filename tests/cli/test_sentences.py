@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rbfrag.cli.hazard_sentences import campaign_in_words, with_error
-from rbfrag.cli.sentences import rounded, table_in_words
+from rbfrag.cli.sentences import rock_mass_in_words, rounded, table_in_words
 from rbfrag.hazards.report import once_in, rate_in_words
 
 
@@ -84,3 +84,18 @@ def test_how_many_rows_are_answered() -> None:
     assert table_in_words({"rows": 3, "answered": 3, "without_answer": 0}) == (
         "All 3 blocks are answered."
     )
+
+
+def test_blocks_of_which_it_is_open_whether_they_fail_are_told() -> None:
+    fails = {"share": 0.2, "ci_low": 0.15, "ci_high": 0.26}
+    for unknown, end in ((0.0, "26 %)."), (0.3, "; of another 30 % it is open whether they do.")):
+        document = {
+            "modes": {"slide": {"share": 1.0}}, "blocks": 200, "scenario": None,
+            "shaking": {
+                "motion": "Rinaldi",
+                "scales": [
+                    {"scale": 1.0, "all": {"fails_of_all": fails, "open_of_all": unknown}}
+                ],
+            },
+        }  # fmt: skip
+        assert list(rock_mass_in_words(document))[1].endswith(end)

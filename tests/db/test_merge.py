@@ -483,7 +483,7 @@ class TestModels:
         self, engine: Engine, theirs: Engine, model: ModelRow, tmp_path: Path
     ) -> None:
         with engine.begin() as connection:
-            save_model(connection, model)
+            save_model(connection, replace(model, is_default=True))
         other = replace(model, data_fingerprint="0" * 64, created="2025-01-01T00:00:00+00:00")
         with theirs.begin() as connection:
             save_model(connection, other)

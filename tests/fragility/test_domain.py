@@ -10,8 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import ModelError
+from rbfrag.exchange.database_tables import read_table
 from rbfrag.fragility.domain import RATIOS, ratios_of
 from rbfrag.fragility.fit.data import FitData, fit_data
 from rbfrag.fragility.fit.domain import joint_scatter
@@ -103,7 +105,7 @@ def test_contradictory_measures_are_named() -> None:
     assert not answer.in_domain
     assert domain_sentences(answer) == [
         "a PGV of 0.169 m/s does not go with a PGA of 0.906 g and a Tm of 1.6 s: "
-        "PGV/(PGA·g·Tm/2π) is 0.074, the fitted motions hold 0.5 to 2.8: the answer is an "
+        "PGV/(PGA·g·Tm/2π) is 0.074, outside the fitted 0.5 to 2.8: the answer is an "
         "extrapolation",
     ]
     as_array = predict(**{name: [v] for name, v in given_by_issue().items()}, model=row)
@@ -236,3 +238,24 @@ def test_a_scatter_that_is_not_whole_is_refused(model: FragilityModel, broken: A
     stored = {**whole, **broken} if broken else {}
     with pytest.raises(ModelError, match="fit it again"):
         FragilityModel.from_row(replace(model.row, diagnostics={"mahalanobis": stored}))
+
+
+def test_a_displacement_that_velocity_and_period_cannot_go_with_is_told_of() -> None:
+    shaking = {"pgv_m_s": 0.6, "tm_s": 0.5}
+    # a harmonic motion has PGD = PGV Tm / 2π, any other more
+    for pgd_m, told in ((0.02, True), (0.06, False), (1.0, False), (12.0, True)):
+        answer = predict(3.0, 0.1, pgd_m=pgd_m, **shaking)
+        text = f"a PGD of {pgd_m:.3g} m does not go with a PGV of 0.6 m/s and a Tm of 0.5 s"
+        assert any(text in warning for warning in answer.warnings) is told
+        assert answer.in_domain is not told
+        many = predict(3.0, [0.1, 0.2], pgd_m=pgd_m, **shaking)
+        assert all(("PGD does not go with PGV and Tm" in each) is told for each in many.reason)
+        assert many.in_domain.tolist() == [not told] * 2
+
+
+def test_the_range_of_a_ratio_that_the_shipped_motions_judge_is_theirs() -> None:
+    motions = read_table("motion", db=REFERENCE)
+    motions = motions[~motions.is_vertical]
+    for ratio in (each for each in RATIOS if each.shipped is not None):
+        values = ratio.formula(motions)
+        assert ratio.shipped == pytest.approx((values.min(), values.max()), rel=5e-3)

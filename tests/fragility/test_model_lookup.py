@@ -1,6 +1,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -8,7 +9,8 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import load_model, save_model, set_default
 from rbfrag.errors import DatabaseNotFoundError, InputError, UnknownModelError
-from rbfrag.fragility.lookup import FROM_REFERENCE, find_model
+from rbfrag.fragility.lookup import SHIPPED, find_model, stored_rows
+from rbfrag.fragility.model_list import model_list
 from rbfrag.fragility.predict import predict
 
 
@@ -88,6 +90,7 @@ def test_the_database_of_the_environment_and_folder_without_heavy_libraries(data
     path = database("pgv")
     program = """
 import sys
+from dataclasses import replace
 from rbfrag.fragility.predict import predict
 print(predict(3.0, 0.1, pgv_m_s=0.6).model)
 heavy = {"numpy", "scipy", "pandas", "statsmodels", "numba", "matplotlib", "sqlalchemy"}
@@ -112,7 +115,7 @@ def test_the_reference_named_as_a_database_is_no_stopgap(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("RBFRAG_DB", raising=False)
     for _ in range(2):
-        assert FROM_REFERENCE in predict(3.0, 0.1, pgv_m_s=0.6).warnings
+        assert predict(3.0, 0.1, pgv_m_s=0.6).data == SHIPPED
         assert predict(3.0, 0.1, pgv_m_s=0.6, db=REFERENCE).warnings == ()
 
 
@@ -122,6 +125,57 @@ def test_a_database_without_a_model_does_not_take_the_place_of_the_reference(tmp
     with opened_database("rbfrag.db", create=True):
         pass
     for _ in range(2):
-        assert FROM_REFERENCE in predict(3.0, 0.1, pgv_m_s=0.6).warnings
+        assert predict(3.0, 0.1, pgv_m_s=0.6).data == SHIPPED
     with pytest.raises(UnknownModelError, match="holds no model yet"):
         predict(3.0, 0.1, pgv_m_s=0.6, db="rbfrag.db")
+
+
+@pytest.fixture
+def scored(tmp_path, row):
+    """A database of models with log losses, and its path."""
+
+    def make(losses, default=None):
+        path = tmp_path / "scored.db"
+        with opened_database(path, create=True) as engine, engine.begin() as connection:
+            for term, loss in losses.items():
+                one = row(term)
+                scores = {"scores": {"log_loss_held_out": loss}}
+                save_model(
+                    connection,
+                    replace(one, diagnostics={**one.diagnostics, **scores}),
+                    replace=True,
+                )
+            if default is not None:
+                set_default(connection, f"wls-{default}")
+        return path
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("default", "measures", "name"),
+    [
+        (None, ["pgv_m_s", "pga_g", "tm_s"], "wls-pga_tm"),
+        (None, ["pgv_m_s"], "wls-pgv"),
+        (None, ["pga_g", "tm_s"], "wls-pga_tm"),
+        ("pgv", ["pgv_m_s", "pga_g", "tm_s"], "wls-pgv"),
+        ("pgv", ["pga_g", "tm_s"], "wls-pga_tm"),
+    ],
+)
+def test_the_best_score_answers_unless_another_was_chosen(scored, default, measures, name):
+    path = scored({"pgv": 0.20, "pga_tm": 0.15, "pgd_tm": 0.4}, default)
+    for _ in range(2):
+        assert find_model(None, measures, path).name == name
+
+
+def test_the_first_fitted_is_no_default_by_being_first(scored):
+    path = scored({"pgv": 0.20, "pga_tm": 0.15})
+    assert [row.name for row in stored_rows(path) if row.is_default] == ["wls-pga_tm"]
+    with opened_database(path, read_only=True) as engine, engine.connect() as connection:
+        assert load_model(connection).name == "wls-pga_tm"
+
+
+def test_the_number_of_a_model_without_critical_values_is_that_of_its_outcomes():
+    listed = {each["name"]: each for each in model_list(stored_rows(REFERENCE))}
+    assert listed["rocking-pgv_pga"]["n"] == 140_989
+    assert listed["bounded-pgv"]["n"] == 3095

@@ -12,10 +12,10 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import rbfrag
-from rbfrag.fragility.lookup import FROM_REFERENCE
+from rbfrag.fragility.lookup import SHIPPED, data_name
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.plots.report import sheet
-from rbfrag.plots.report.contents import RateQuestion, contents_of, data_name
+from rbfrag.plots.report.contents import RateQuestion, contents_of
 from rbfrag.solver.described import DescribedBlock
 from tests.cli.conftest import Refuses, Shell, refuses, shell
 
@@ -153,6 +153,6 @@ def texts_of(part):
 
 
 def test_the_password_of_a_database_is_not_printed() -> None:
-    assert data_name("postgresql://me:secret@host/rocks", []) == "rocks"
-    assert data_name("/home/me/rocks.db", []) == "rocks.db"
-    assert data_name(None, [FROM_REFERENCE]) == "the reference that is shipped"
+    assert data_name("postgresql://me:secret@host/rocks?options=-c") == "rocks"
+    assert data_name("/home/me/rocks.db") == "rocks.db"
+    assert data_name(SHIPPED) == SHIPPED

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,7 +12,9 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import command_group, option, stacked
 from rbfrag.cli.parameters.values import number_list
-from rbfrag.errors import InputError
+
+if TYPE_CHECKING:
+    from rbfrag.exchange.export import ExportAnswer
 
 app = command_group(
     "Write fragility functions for other tools.",
@@ -20,22 +22,6 @@ app = command_group(
 )
 
 Out = Annotated[str, typer.Option("--out", help="File to write.")]
-
-
-class Exported(NamedTuple):
-    """Fragility functions to be written.
-
-    Args:
-        functions: the functions.
-        about: name, term and method of the model that answered.
-        warnings: what is to be said of them.
-        descriptions: a sentence on the block of each.
-    """
-
-    functions: list[Any]
-    about: tuple[str, ...]
-    warnings: list[str]
-    descriptions: list[str]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,51 +34,14 @@ class FunctionOptions(BlocksOptions):
     model: options.Model = None
     db: options.Db = None
 
-    def functions(self) -> Exported:
-        """Return the functions of the blocks."""
-        measure = self.measure()
-        from rbfrag.exchange.block_fragility import block_functions
-
+    def keywords(self) -> tuple[dict[str, Any], tuple[str, ...]]:
+        """Return the keywords of `rbfrag.export`, and what is to be said of the blocks."""
         table, is_class, remarks = self.toppling_blocks(name=self.name)
-        p2, kr = table["p2_1_s2"], table["kr"]
-        functions, about = block_functions(
-            [self.name] if is_class else list(table["block_id"]), p2, kr,
-            measure, one_class=is_class, levels=self.levels,
-            model=self.model, db=self.db,
-        )  # fmt: skip
-        descriptions = (
-            [f"Mean over {kr.size} stable toppling blocks of a rock mass, backed by a slope."]
-            if is_class
-            else [
-                f"Rock block backed by a slope, p² = {a:.6g} 1/s², k_r = {b:.6g}."
-                for a, b in zip(p2.tolist(), kr.tolist(), strict=True)
-            ]
-        )
-        return Exported(functions, about, list(remarks), descriptions)
-
-    def limit_states(self, shares: list[float]) -> Exported:
-        """Return functions of a rock mass, one a share of its blocks [%]."""
-        from rbfrag.exchange.share_fragility import share_functions
-
-        measure = self.measure()
-        table, _, remarks = self.toppling_blocks(name=self.name)
-        functions, about, warnings = share_functions(
-            self.name, table["p2_1_s2"], table["kr"], measure, shares, levels=self.levels,
-            model=self.model, db=self.db,
-        )  # fmt: skip
-        return Exported(functions, about, [*remarks, *warnings], [])
-
-    def measure(self) -> str:
-        """Return the measure that the functions are of, as `predict` calls it."""
-        from rbfrag.fragility.measures import SPECTRAL
-        from rbfrag.hazards.curve import ANSWERED
-        from rbfrag.hazards.measure_type import openquake_type
-
-        kind = openquake_type(self.imt, "--imt")
-        measure = kind.measure if kind.period_s is None else SPECTRAL.get(kind.period_s)
-        if measure is None:
-            raise InputError(f"--imt {self.imt}: use one of {ANSWERED}")
-        return measure
+        keywords = {
+            "blocks": table, "one_class": is_class, "imt": self.imt, "name": self.name,
+            "levels": self.levels, "model": self.model, "db": self.db,
+        }  # fmt: skip
+        return keywords, remarks
 
 
 @app.command("nrml", epilog="Example:  rbfrag export nrml --height 2.4 --width 0.5 --out block.xml")
@@ -108,17 +57,11 @@ def nrml(
     json: options.Json = False,
 ) -> None:
     """Write an OpenQuake fragility model, NRML 0.5 (.xml); PGV is in cm/s there."""
-    from rbfrag.exchange.nrml import nrml_text
-    from rbfrag.files import output_path, write_text
+    from rbfrag.exchange.export import nrml as written
 
-    target = output_path(out, (".xml",), "NRML file")
-    functions, about, warnings, _ = (
-        blocks.functions()
-        if shares is None
-        else blocks.limit_states(number_list(shares, "--shares"))
-    )
-    write_text(nrml_text(functions, description=_sentence(about)), target)
-    _print_answer(str(target), functions, about, warnings, json)
+    keywords, remarks = blocks.keywords()
+    wanted = None if shares is None else number_list(shares, "--shares")
+    _print(written(out, **keywords, shares=wanted), remarks, json=json)
 
 
 @app.command(
@@ -131,43 +74,15 @@ def pelicun(out: Out, blocks: FunctionOptions, json: options.Json = False) -> No
     PGV is in m/s (mps) there. The description has the table's name: fragility.json stands beside
     fragility.csv, as SimCenter's library has them.
     """
-    from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text, without_dashes
-    from rbfrag.files import output_path, write_text
+    from rbfrag.exchange.export import pelicun as written
 
-    target = output_path(out, (".csv",), "fragility table")
-    beside = output_path(str(target.with_suffix(".json")), (".json",), "description")
-    functions, about, warnings, descriptions = blocks.functions()
-    functions, renamed = without_dashes(functions)
-    table = pelicun_text(functions)
-    write_text(metadata_text(functions, descriptions, about), beside)
-    write_text(table, target)
-    more = {"description": str(beside)}
-    _print_answer(str(target), functions, about, [*warnings, *renamed], json, more)
+    keywords, remarks = blocks.keywords()
+    _print(written(out, **keywords), remarks, json=json)
 
 
-def _sentence(about: tuple[str, ...]) -> str:
-    return f"Toppling of rock blocks, model {about[0]} ({about[2]} on {about[1]})"
-
-
-def _print_answer(
-    path: str,
-    functions: list[Any],
-    about: tuple[str, ...],
-    warnings: list[str],
-    json: bool,
-    more: dict[str, Any] | None = None,
-) -> None:
-    errors = [function.grid_error for function in functions if function.grid_error is not None]
-    document = {
-        "file": path,
-        **(more or {}),
-        "functions": len(functions),
-        "lognormal": sum(function.is_lognormal for function in functions),
-        "largest_grid_error": max(errors, default=0.0),
-        "model": about[0],
-        "term": about[1],
-        "method": about[2],
-    }
+def _print(answer: ExportAnswer, remarks: tuple[str, ...], *, json: bool) -> None:
+    document = answer.as_dict()
+    warnings = [*remarks, *document.pop("warnings")]
     if json:
         print_json({**document, "warnings": warnings})
         return

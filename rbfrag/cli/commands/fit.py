@@ -69,8 +69,8 @@ def fit(
 ) -> None:
     """Fit a fragility model to stored critical values or outcomes.
 
-    The model is stored; the first of a kind becomes its default (rbfrag models default NAME
-    changes it).
+    The model is stored. The one of the best score on earthquakes left out is the default of its
+    kind, unless  rbfrag models default NAME  has chosen another.
     """
     from rbfrag.fragility.fit.stored import fit as run
 

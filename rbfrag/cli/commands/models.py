@@ -24,10 +24,12 @@ Name = Annotated[
 
 @app.command("list", epilog="Example:  rbfrag models list --json")
 def list_models(db: options.Db = None, json: options.Json = False) -> None:
-    """List the fitted models; the default answers when none is named.
+    """List the fitted models with their scores.
 
-    The log loss is that of earthquakes left out, the smaller the better among the models of a kind;
-    without a database the models that are shipped are listed.
+    The log loss is that of earthquakes left out, the smaller the better among the models of a kind:
+    of those that what is given suffices for, the best answers, or the default, the one that was
+    chosen or else the best of all, if no other reads more of the motion. Without a database the
+    models that are shipped are listed.
     """
     from rbfrag.fragility.lookup import stored_rows
     from rbfrag.fragility.model_list import model_list
@@ -64,7 +66,7 @@ def show_model(name: Name, printing: options.Printing, db: options.Db = None) ->
 
 @app.command("default", epilog="Example:  rbfrag models default wls-pgv")
 def set_default_model(name: Name, db: options.Db = None) -> None:
-    """Make a model the one of its kind that answers when none is named."""
+    """Choose the default of a kind, instead of the model of the best score."""
     from rbfrag.db.engine import opened_database
     from rbfrag.db.models import set_default
 

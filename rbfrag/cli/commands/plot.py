@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -39,13 +39,6 @@ class Held:
     )
 
 
-VARIED = {
-    "pgv": "pgv_m_s", "pga": "pga_g", "pgd": "pgd_m", "sa03": "sa03_g", "sa10": "sa10_g",
-    "sa20": "sa20_g", "sa30": "sa30_g",
-}  # fmt: skip
-"""What a curve may run over."""
-
-
 @app.command("fit", epilog="Example:  rbfrag plot fit --model wls-pgv --out fit.png")
 @stacked
 def plot_fit(
@@ -56,27 +49,11 @@ def plot_fit(
     db: options.Db = None,
 ) -> None:
     """Draw the data of a fit with its 2.5 %, 50 % and 97.5 % failure lines and histograms."""
-    from rbfrag.db.engine import opened_database
-    from rbfrag.db.models import load_model
-    from rbfrag.fragility.fit.check import source_of
-    from rbfrag.fragility.fit.data import fit_data
-    from rbfrag.fragility.methods import method_named
-    from rbfrag.fragility.model import FragilityModel
-    from rbfrag.plots.fit import plot_fit as draw
+    from rbfrag.plots import plot
 
-    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        row = load_model(connection, model)
-        fitted, source = FragilityModel.from_row(row), source_of(connection, row)
-    draw(source.table, fitted, out, log=log, xp_m_s=source.xp_m_s)
+    picture = plot.fit(out, model=model, log=log, db=db)
     print(out)
-    today = fit_data(source, method_named(row.method), fitted.term, kind=row.kind)
-    if today.fingerprint != row.data_fingerprint:
-        print_warnings(
-            [
-                f"the data have changed since {fitted.name} was fitted: the points are those of "
-                "today; rbfrag fit --replace  fits them anew"
-            ]
-        )
+    print_warnings(picture.warnings)
 
 
 @app.command(
@@ -98,13 +75,9 @@ def plot_chart(
 
     What the model reads beside them is held: --p2, and of a model of PGV with PGA --pga and --tm.
     """
-    from rbfrag.fragility.lookup import find_model
-    from rbfrag.fragility.measures import MEASURES
-    from rbfrag.plots.chart import plot_chart as draw
-    from rbfrag.plots.model_lines import held_measures
+    from rbfrag.plots import plot
 
-    chosen = find_model(model, ["pgv_m_s"] if model is None else MEASURES, db)
-    draw(chosen, out, held_measures(chosen, p2=held.p2, pga_g=held.pga, tm_s=held.tm))
+    plot.chart(out, model=model, p2=held.p2, pga_g=held.pga, tm_s=held.tm, db=db)
     print(out)
 
 
@@ -135,32 +108,23 @@ def plot_curve(
     One band is the interval of P as far as the data tell it, the other the share of such blocks
     that may fail in one single earthquake. The other measures are held at the values given.
     """
-    from rbfrag.fragility.lookup import find_model
-    from rbfrag.fragility.measures import MEASURES
-    from rbfrag.plots.curve import plot_curve as draw
+    from rbfrag.fragility.measures import SPECTRAL
+    from rbfrag.plots import plot
 
-    numbers, remarks = block.toppling()
-    p2, kr = numbers["p2"], numbers["kr"]
-    fixed = held.given()
-    varied = None if over is None else VARIED.get(over)
-    if over is not None and varied is None:
-        raise InputError(f"--over {over}: a curve runs over {', '.join(VARIED)}")
-    if model is None:
-        varied = varied or "pgv_m_s"
-        chosen = find_model(None, [varied, *fixed], db)
-    else:
-        chosen = find_model(model, MEASURES, db)
-        varied = varied or chosen.term.inputs[0]
-    if varied in fixed:
-        raise InputError(
-            f"{varied} is what the curve runs over: leave its value out, or add --over"
-        )
-    others = {}
-    if beside is not None:
+    def others(measure: str) -> Any:
+        if beside is None:
+            return {}
         from rbfrag.exchange.other_fragilities import of_measure
 
-        others = of_measure(beside, varied)
-    draw(chosen, p2, kr, out, over=varied, fixed=fixed, level=level, beside=others)
+        return of_measure(beside, measure)
+
+    numbers, remarks = block.toppling()
+    fixed: dict[str, Any] = held.given()
+    spectrum = {period: fixed.pop(name) for period, name in SPECTRAL.items() if name in fixed}
+    plot.curve(
+        numbers["p2"], numbers["kr"], out, over=over, **fixed, sa_g=spectrum or None, model=model,
+        level=level, beside=others, db=db,
+    )  # fmt: skip
     print_warnings(remarks)
     print(out)
 
@@ -193,21 +157,9 @@ def plot_calibration(
 
     Each model is fitted again, once without each earthquake.
     """
-    from rbfrag.db.engine import opened_database
-    from rbfrag.fragility.fit.check import held_out_of
-    from rbfrag.plots.calibration import plot_calibration as draw
-    from rbfrag.plots.canvas import plot_path
+    from rbfrag.plots import plot
 
-    plot_path(out)
-    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        names: list[str | None] = [*model] if model else [None]
-        answers = [held_out_of(connection, name, seed=seed) for name in names]
-    draw(
-        {each.name: each.bins for each in answers},
-        out,
-        scores={each.name: each.scores for each in answers},
-        data=answers[0].outcomes,
-    )
+    plot.calibration(out, models=model or (), seed=seed, db=db)
     print(out)
 
 
@@ -239,13 +191,13 @@ def plot_spectrum(
 ) -> None:
     """Draw the toppling spectra of motions over the size of the block, with PGV beside them."""
     from rbfrag.cli.parameters.values import number_list, polarities
+    from rbfrag.plots import plot
     from rbfrag.plots.canvas import plot_path
-    from rbfrag.plots.spectrum import plot_spectrum as draw
 
     sizes, wanted = number_list(p2, "--p2"), polarities(polarity)
     plot_path(out)
     records = [find_motion(text, db=db, reading=reading) for text in motions]
-    draw(records, out, polarities=wanted, p2=sizes)
+    plot.spectrum(records, out, polarities=wanted, p2=sizes)
     print(out)
 
 
@@ -262,17 +214,15 @@ def plot_response(
     db: options.Db = None,
 ) -> None:
     """Draw acceleration against k_r(theta), and theta over the critical angle, in time."""
-    from rbfrag.plots.response import plot_response as draw
-    from rbfrag.solver.toppling_run import respond
+    from rbfrag.plots import plot
 
     numbers, about = block.toppling()
-    p2, kr = numbers["p2"], numbers["kr"]
     ground, upward, remarks = find_shaking(motion, direction, db=db, reading=reading)
     say_when_compiling()
-    response = respond(
-        ground, p2=p2, kr=kr, vertical=upward, polarity=direction.polarity, history=True
-    )
-    draw(response, out, p2=p2, kr=kr, reverse=direction.reverse, title=ground.label)
+    plot.response(
+        ground, out, p2=numbers["p2"], kr=numbers["kr"], vertical=upward,
+        polarity=direction.polarity,
+    )  # fmt: skip
     print_warnings([*about, *remarks])
     print(out)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rbfrag.cli.output import (
     ProgressBar,
@@ -21,10 +21,6 @@ from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.cli.parameters.values import number_list
 from rbfrag.cli.sentences import rock_mass_in_words
-
-if TYPE_CHECKING:
-    from rbfrag.rockmasses.joint_sets import Realisations
-    from rbfrag.rockmasses.shaking import ShakenMass
 
 ALWAYS = ("at_rest", "stays", "unstable")
 """Outcomes that have a column of their own even if there are none."""
@@ -141,44 +137,39 @@ def rockmass(
     mode. With a measure of the motion (--pgv ...), the probability of failure is averaged over
     the blocks of each mode for which there is a fragility model.
     """
-    from rbfrag.fragility.intervals import checked_level
-    from rbfrag.rockmasses.counts import crossings, mode_counts
-    from rbfrag.rockmasses.failures import (
-        failures,
-        failures_as_dict,
-        outcome_columns,
-    )
-    from rbfrag.rockmasses.file import read_rock_mass
-    from rbfrag.rockmasses.report import as_dict, block_columns
-    from rbfrag.rockmasses.scenario import scenario
+    from rbfrag.campaign.rock_mass_answer import rockmass as answered
+    from rbfrag.fragility.measures import SPECTRAL
 
     check_files(table=out, plot=plot, excel_text=excel_text)
-    blocks = read_rock_mass(file).realise(drawn.n, drawn.seed)
-    answer = outcomes = failed = None
+    ground = upward = None
     about: list[str] = []
-    if measures.given():
-        answer = scenario(
-            blocks, measures.given(), model=answering.model, level=answering.level,
-            db=answering.db, displacement_m=limits.displacement, rotation_deg=limits.rotation,
-        )  # fmt: skip
     if shaken.motion is not None:
-        checked_level(answering.level)
-        outcomes, about = _run(blocks, shaken.motion, shaken, limits, reading, answering.db)
-        failed = failures_as_dict(outcomes, failures(outcomes, answering.level), answering.level)
-    document = as_dict(blocks, mode_counts(blocks), crossings(blocks), answer, failed)
+        ground, upward, about = find_shaking(
+            shaken.motion, shaken, db=answering.db, reading=reading
+        )
+        say_when_compiling()
+    stated: dict[str, Any] = measures.given()
+    spectrum = {period: stated.pop(name) for period, name in SPECTRAL.items() if name in stated}
+    with ProgressBar("rockmass", "blocks") as bar:
+        answer = answered(
+            file, n=drawn.n, seed=drawn.seed, **stated, sa_g=spectrum or None, motion=ground,
+            vertical=upward, polarity=shaken.polarity,
+            scales=[1.0] if shaken.scales is None else number_list(shaken.scales, "--scales"),
+            displacement_m=limits.displacement, rotation_deg=limits.rotation,
+            model=answering.model, level=answering.level, db=answering.db, jobs=shaken.jobs,
+            on_progress=lambda progress: bar.show(progress.done, progress.total),
+        )  # fmt: skip
+    document = answer.as_dict()
     document["warnings"] += about
     if out is not None:
-        columns = block_columns(blocks, answer) if outcomes is None else outcome_columns(outcomes)
-        write_table(columns, out, excel_text=excel_text)
+        write_table(answer.table_columns(), out, excel_text=excel_text)
     if plot is not None:
-        if outcomes is None:
-            from rbfrag.plots.rockmass import plot_rockmass
+        from rbfrag.plots.rockmass import plot_failures, plot_rockmass
 
-            plot_rockmass(blocks, plot)
+        if answer.outcomes is None:
+            plot_rockmass(answer.blocks, plot)
         else:
-            from rbfrag.plots.rockmass import plot_failures
-
-            plot_failures(outcomes, plot, level=answering.level)
+            plot_failures(answer.outcomes, plot, level=answering.level)
     if printing.json:
         print_json(document)
         return
@@ -187,38 +178,6 @@ def rockmass(
     print()
     _print(document, verbose=printing.verbose)
     print_warnings(document["warnings"])
-
-
-def _run(
-    blocks: Realisations,
-    motion: str,
-    shaken: ShakenBy,
-    limits: Limits,
-    reading: options.Reading,
-    db: str | None,
-) -> tuple[ShakenMass, list[str]]:
-    """Return the outcomes of the blocks, and sentences about the motion and about blocks."""
-    from rbfrag.campaign.shake_rockmass import shake
-    from rbfrag.rockmasses.failures import failure_warnings
-    from rbfrag.rockmasses.shaking import DISPLACEMENT_M, FailureLimits
-
-    distance = DISPLACEMENT_M if limits.displacement is None else limits.displacement
-    bounds = FailureLimits(distance, limits.rotation)
-    factors = [1.0] if shaken.scales is None else number_list(shaken.scales, "--scales")
-    ground, upward, remarks = find_shaking(motion, shaken, db=db, reading=reading)
-    say_when_compiling()
-    with ProgressBar("rockmass", "blocks") as bar:
-        outcomes = shake(
-            blocks,
-            ground,
-            scales=factors,
-            vertical=upward,
-            polarity=shaken.polarity,
-            limits=bounds,
-            jobs=shaken.jobs,
-            on_progress=lambda progress: bar.show(progress.done, progress.total),
-        )
-    return outcomes, [*remarks, *failure_warnings(outcomes)]
 
 
 def _print(document: dict[str, Any], *, verbose: bool) -> None:

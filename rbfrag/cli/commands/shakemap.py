@@ -75,158 +75,44 @@ def shakemap(
     slope; free-standing ones fail at weaker shaking: --kind rocking. How many of all fail together
     is drawn.
     """
-    import numpy as np
-
-    from rbfrag.exchange.shakemap import at_places, read_shakemap
+    from rbfrag.exchange.map_answer import shakemap as answered
     from rbfrag.files import output_path
-    from rbfrag.hazards.conversions import component as component_named
-    from rbfrag.hazards.map_failures import Places, map_failures
-    from rbfrag.hazards.site_probability import site_probability
 
     target = output_path(out, SUFFIXES, "map")
     check_files(table=out if excel_text else None, plot=plot, excel_text=excel_text)
-    component = component_named(meaning.component)
     (class_blocks, _, remarks), refused = (
         (blocks.toppling_blocks(standing, n=n), {})
         if blocks.blocks is None
         else blocks.blocks_and_refused(standing)
     )
-    shaken = read_shakemap(
-        grid, uncertainty=meaning.uncertainty, allow_partial=meaning.allow_partial
-    )
-    warnings = [*remarks, *taken_as_medians(class_blocks), *shaken.warnings]
-    own = "lon" in class_blocks
-    if refused and not own:
+    if refused and "lon" not in class_blocks:
         raise InputError(f"{blocks.blocks}: {remarks[0]}: the mean needs all of them")
-    if own:
-        lon, lat = class_blocks["lon"], class_blocks["lat"]
-        measures, std_ln, on_map = at_places(shaken, lon, lat)
-        if not on_map.all():
-            warnings.append(
-                f"{int((~on_map).sum())} of {on_map.size} blocks lie off the map and have no answer"
-            )
-    else:
-        lon, lat = shaken.lon, shaken.lat
-        measures, std_ln = shaken.measures, shaken.std_ln
-        on_map = np.ones(lon.size, dtype=bool)
-    if not on_map.any():
-        raise InputError(f"{grid}: none of the blocks lies on the map")
-    warnings.append(
-        f"the map's measures are taken as {component.title}; Beyer and Bommer (2006) relate them "
-        "to one component"
-        if component.name != "single"
-        else "the map is taken to be of one component"
-    )
-    here = on_map if own else slice(None)
-    p2, kr = class_blocks["p2_1_s2"][here], class_blocks["kr"][here]
-    options_of = {
-        name: class_blocks[name][here] for name in ("restitution",) if name in class_blocks
-    }
-    weight = class_blocks.get("weight")
-    answer = site_probability(
-        {name: values[on_map] for name, values in measures.items()}, p2, kr,
-        component=component, weight=None if own else weight, own_block=own,
-        std_ln={name: values[on_map] for name, values in std_ln.items()}, kind=standing.kind,
-        model=answering.model, level=answering.level, db=answering.db, **options_of,
+    answer = answered(
+        grid, blocks=class_blocks, kind=standing.kind, uncertainty=meaning.uncertainty,
+        component=meaning.component, allow_partial=meaning.allow_partial, draws=drawing.draws,
+        seed=drawing.seed, model=answering.model, level=answering.level, db=answering.db,
     )  # fmt: skip
-    shaking, chosen = answer.shaking, answer.shaking.model
-    if chosen.term.advice:
-        warnings.append(chosen.term.advice)
-    if "pgv_m_s" not in measures:
-        read = " and ".join(name.partition("_")[0].upper() for name in shaking.names)
-        warnings.append(f"the map has no PGV, which tells most: a model of {read} answers")
-    if not shaking.integrated:
-        warnings.append(
-            f"the map's uncertainty of {' and '.join(shaking.names)} is not given: its values "
-            "are taken as certain; name uncertainty.xml with --uncertainty"
-        )
-
-    names = class_blocks.get("site_id") if own else None
-    failures = map_failures(
-        answer, p2, kr,
-        Places.of(lon[on_map], lat[on_map], None if names is None else names[on_map]),
-        weight=None if weight is None else weight[here],
-        draws=drawing.draws, seed=drawing.seed, **options_of,
-    )  # fmt: skip
-    warnings += failures.warnings
-
-    def placed(values: Any, empty: Any = np.nan) -> Any:
-        whole = np.full(on_map.size, empty)
-        whole[on_map] = values
-        return whole
-
-    columns: dict[str, Any] = {}
-    if own:
-        columns["block_id"] = class_blocks["block_id"]
-        reasons = np.where(on_map, "", "the block lies off the map").astype(object)
-    columns |= {
-        "lon": lon,
-        "lat": lat,
-        **{
-            name: values
-            for name, values in measures.items()
-            if name in ("pgv_m_s", "pga_g", *shaking.names)
-        },
-        "probability": placed(answer.probability),
-        "ci_low": placed(answer.ci_low),
-        "ci_high": placed(answer.ci_high),
-        "event_low": placed(answer.event_low),
-        "event_high": placed(answer.event_high),
-        "in_domain": placed(answer.in_domain, False),
-    }
-    if own:
-        columns["reason"] = reasons
-    outside = int((~answer.in_domain & (answer.probability > 1e-4)).sum())
-    if outside:
-        warnings.append(
-            f"at {outside} places with P > 0.0001 shaking or block lie outside the ranges that the "
-            "model was fitted on (in_domain)"
-        )
-    event = shaken.event
-    document: dict[str, Any] = {
-        "event_id": event.event_id,
-        "event": event.description,
-        "magnitude": event.magnitude,
-        "time": event.time,
-        "model": chosen.name,
-        "term": chosen.term.name,
-        "method": chosen.row.method,
-        "level": answering.level,
-        "measures": " ".join(shaking.names),
-        "uncertainty_integrated": bool(shaking.integrated),
-    }
-    document |= {**failures.as_dict(), "seed": drawing.seed}
-    written = columns
+    warnings = [*remarks, *taken_as_medians(class_blocks), *answer.warnings]
+    written = dict(answer.columns)
     if refused and target.suffix.lower() in TABLES:
-        written = _with_refused(columns, class_blocks["row"], refused)
-    _write(written, {**document, "warnings": warnings}, target, excel_text=excel_text)
+        written = _with_refused(written, class_blocks["row"], refused)
+    about = {**answer.about, "warnings": warnings}
+    _write(written, about, target, excel_text=excel_text)
     if plot is not None:
         from rbfrag.plots.shakemap import plot_shakemap
 
-        name = " ".join(part for part in (event.description, event.time[:10]) if part)
-        size = "" if event.magnitude is None else f", M {event.magnitude:g}"
         plot_shakemap(
-            lon, lat, columns["probability"], plot,
-            title=f"{name}{size}\n{_what(class_blocks, own)}; model {chosen.name}"
-            + ("" if shaking.integrated else "\nthe uncertainty of the map's values is left out"),
-            epicentre=None if event.lon is None or event.lat is None else (event.lon, event.lat),
-            shape=(shaken.rows, shaken.columns) if shaken.is_whole and not own else None,
+            answer.columns["lon"], answer.columns["lat"], answer.columns["probability"], plot,
+            title=answer.title, epicentre=answer.epicentre, shape=answer.shape,
         )  # fmt: skip
-    best = int(np.nanargmax(columns["probability"]))
-    document |= {
-        "file": str(target),
-        "places": int(lon.size),
-        "places_above_1_percent": int((answer.probability > 0.01).sum()),
-        "largest_probability": float(columns["probability"][best]),
-        "largest_at_lon": float(lon[best]),
-        "largest_at_lat": float(lat[best]),
-    }
+    document = {**answer.as_dict(), "file": str(target), "warnings": warnings}
     if printing.json:
-        print_json({**document, "warnings": warnings})
+        print_json(document)
         return
-    for sentence in map_in_words(document, own=own):
+    for sentence in map_in_words(document, own="lon" in class_blocks):
         print(sentence)
     print()
+    del document["warnings"]
     short = rounded_values({name: document[name] for name in SHORT})
     print_pairs(document if printing.verbose else short)
     print_warnings(warnings)
@@ -261,12 +147,3 @@ def _write(
         from rbfrag.exchange.points import write_points
 
         write_points(columns, about, target)
-
-
-def _what(blocks: dict[str, Any], own: bool) -> str:
-    size = blocks["kr"].size
-    if own:
-        return f"{size} blocks at their places"
-    if size == 1:
-        return f"block with p² = {blocks['p2_1_s2'][0]:g} 1/s², $k_r$ = {blocks['kr'][0]:g}"
-    return f"mean of {size} blocks"

@@ -351,11 +351,12 @@ def merge_models(merge: Merge) -> None:
     """Bring models in; of two that differ under one name, the other's gets a number.
 
     A model "m" that differs from the "m" here is stored as "m-2", or the first number that is
-    free. The defaults stay; a database without models of a kind takes the other's.
+    free. Chosen defaults stay; a database without models of a kind takes the other's choice.
     """
     source, target, ledger = merge.source, merge.target, merge.ledger
     ours = {row.name: row for row in model_rows(target)}
     had = {row.kind for row in ours.values()}
+    chosen = set(source.scalars(select(fragility_model.c.name).where(fragility_model.c.is_default)))
     for theirs in model_rows(source):
         name, number = theirs.name, 1
         while name in ours and not _same(ours[name], theirs):
@@ -364,7 +365,8 @@ def merge_models(merge: Merge) -> None:
         if name in ours:
             ledger.same["fragility_model"] += 1
             continue
-        row = replace(theirs, name=name, is_default=theirs.is_default and theirs.kind not in had)
+        is_default = theirs.name in chosen and theirs.kind not in had
+        row = replace(theirs, name=name, is_default=is_default)
         insert_row(target, fragility_model, encode_model(row))
         ours[name] = row
         ledger.added["fragility_model"] += 1

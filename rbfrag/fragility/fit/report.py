@@ -13,6 +13,7 @@ from rbfrag.db.rows import CombinationTable
 from rbfrag.fragility.fit.line import clustered_line
 from rbfrag.fragility.measures import SINGLE_TERMS, TERMS
 from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model_list import fitted_number
 from rbfrag.frames import Tabular
 
 _FIELDS = ("standard_errors", "n", "n_censored", "events", "scores", "warnings")
@@ -29,7 +30,7 @@ class FitReport(Tabular):
         method: how it was fitted.
         coefficients: value of each parameter by name.
         standard_errors: standard error of each parameter by name.
-        n: number of critical values that were fitted.
+        n: number of critical values that were fitted; of a kind without them, of outcomes.
         n_censored: number of combinations whose critical value lies below the search limit.
         events: number of earthquakes.
         scores: how well the model predicts; ``held_out`` leaves whole earthquakes out.
@@ -64,7 +65,7 @@ class FitReport(Tabular):
             method=row.method,
             coefficients=dict(row.coefficients),
             standard_errors=dict(diagnostics.get("standard_errors", {})),
-            n=int(diagnostics.get("n", 0)),
+            n=fitted_number(diagnostics) or 0,
             n_censored=int(diagnostics.get("n_censored", 0)),
             events=int(diagnostics.get("events", 0)),
             scores=dict(diagnostics.get("scores", {})),

@@ -34,8 +34,8 @@ def fit(
 ) -> FitReport:
     """Fit a fragility model to the stored critical values or outcomes and store it.
 
-    The first model of a kind becomes its default. :func:`rbfrag.fragility.fit.fitting.fit` fits
-    likewise and stores nothing.
+    The model of the best score is the default of its kind, unless one was chosen.
+    :func:`rbfrag.fragility.fit.fitting.fit` fits likewise and stores nothing.
 
     Args:
         db: the database: a path or URL; None for ``RBFRAG_DB`` or ``rbfrag.db`` in the current

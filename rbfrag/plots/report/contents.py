@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.lookup import FROM_REFERENCE, block_of, find_model
+from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.measures import SPECTRAL, STATED
 from rbfrag.fragility.methods import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
@@ -180,8 +180,8 @@ def contents_of(
             *block_in_words(document["method"], given),
         ),
         tables=tuple(_tables(described, kind, numbers, measures, document, answered)),
-        remarks=tuple(dict.fromkeys(text for text in warnings if text != FROM_REFERENCE)),
-        versions=tuple(_versions(chosen, answered, data_name(db, warnings))),
+        remarks=tuple(dict.fromkeys(warnings)),
+        versions=tuple(_versions(chosen, answered, document["data"])),
         block=block,
         stability=stands,
         drawn=drawn,
@@ -310,18 +310,6 @@ def _hazard_rows(rate: Rate, level: str) -> Rows:
         ("on average", once_in(document["annual_rate"])),
         (f"probability in {document['years']:g} years", percent(document["probability"])),
     )
-
-
-def data_name(db: str | PathLike[str] | None, warnings: Sequence[str]) -> str:
-    """Return what a page calls the database of the models: of a URL its last part alone.
-
-    Args:
-        db: the database that was named; None for the one at hand.
-        warnings: those of the answer, which say whether the reference gave it.
-    """
-    if FROM_REFERENCE in warnings:
-        return "the reference that is shipped"
-    return "the one at hand" if db is None else Path(str(db)).name
 
 
 def _versions(model: FragilityModel, rate: Rate | None, data: str) -> Sequence[str]:

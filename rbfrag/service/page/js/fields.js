@@ -81,7 +81,7 @@ export function formFields(form, changed) {
     if (half) changed(read(), shape, true);
     half = false;
   });
-  return { read, show };
+  return { show };
 }
 
 /**
