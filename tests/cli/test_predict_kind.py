@@ -101,7 +101,7 @@ def test_a_campaign_is_run_fitted_and_asked(shell: Shell, tmp_path: Path) -> Non
     report = shell.json("fit", "--kind", "sliding", "--term", "pgv_pga")
     assert report["is_default"]
     assert report["events"] == 3
-    assert "calibration_slope" in shell("models", "show", "sliding-pgv_pga").stdout
+    assert "calibration_slope" in shell("models", "show", "sliding-pgv_pga", "--verbose").stdout
     (listed,) = shell.json("models", "list")
     assert (listed["name"], listed["kind"]) == ("sliding-pgv_pga", "sliding")
     assert "unchanged" in shell("models", "check").stdout

@@ -25,7 +25,7 @@ from rbfrag.errors import DatabaseError, RbfragError
 def test_what_is_not_covered_is_said(filled: Engine) -> None:
     with filled.connect() as connection:
         text = coverage(connection)
-    assert "of 12 tables, each column but id by the digest of its row" in text
+    assert "of 13 tables, each column but id by the digest of its row" in text
     assert "measures of 3 motions" in text
     assert "not covered: whole rows that were deleted" in text
 
