@@ -3,8 +3,9 @@
 Every number is a ball (python-flint's `arb`): a midpoint and a radius that holds all rounding.
 Samples, intervals, p² and k_r are taken as the exact rationals that the doubles are. On each
 interval the excitation is a straight line, and the solution is expanded in a Taylor series whose
-remainder is the next coefficient over a box that holds the whole step (Lagrange; R. E. Moore,
-Interval Analysis, 1966). Nothing is shared with rbfrag.solver but the arrays of the excitation.
+remainder is the next coefficient, bounded over the whole step (Lagrange; R. E. Moore, Interval
+Analysis, 1966) by the recurrence of the coefficients with all terms positive. Nothing is shared
+with rbfrag.solver but the arrays of the excitation.
 
 Events. *Start*: k_h = w k_r is linear in time, its root a rational number. *Impact*: the rotation
 is positive on all of a step, or falls through zero inside a ball of time; the run goes on from
@@ -34,6 +35,8 @@ BITS = (192, 384, 768)
 
 PH_MAX = 0.25
 """Greatest p·h of one step."""
+
+MOST_DEGREE = 120
 
 HALVINGS = 400
 """Times a part of a step is halved in search of an impact, before it is said to be a touch."""
@@ -244,7 +247,6 @@ class Block:
         *,
         lifted: bool,
         stop: Place | None = None,
-        look: bool = True,
     ) -> Flight:
         """Carry one excursion to its impact, its loss, the end of the record, or a place.
 
@@ -254,7 +256,6 @@ class Block:
             rate: its rate.
             lifted: theta >= 0, theta' >= 0 and q >= k_r there: no impact while q >= k_r (lift).
             stop: where to stop.
-            look: look for impacts and for the loss; without, theta may be below zero.
         """
         drive = self.drive
         self.theta, self.rate = theta, rate
@@ -273,7 +274,7 @@ class Block:
             g0, g1 = self.sign(i), self.sign(i + 1)
             if at.is_zero() and (g0 < 0 or (g0 == 0 and g1 < 0)):
                 lifted = False
-            if lifted and look:
+            if lifted:
                 # k_h >= w k_r as far as the downward crossing, or to the end: no impact until then
                 target = limit
                 if g0 > 0 and g1 < 0:
@@ -285,13 +286,13 @@ class Block:
                         raise NotEnclosedError("whether a block is lifted at an impact of another")
                 self._integrate(line, at, target)
                 at = target
-            if not (lifted and look):
-                landing = self._integrate(line, at, limit, look=look)
+            if not lifted:
+                landing = self._integrate(line, at, limit, look=True)
                 if landing is not None:
                     return Flight(IMPACT, Place(i, landing), self.theta, self.rate)
             if stops and stop is not None:
                 return Flight(STOPPED, stop, self.theta, self.rate)
-            if look and self._past_recovery(self.least[i + 1]):
+            if self._past_recovery(self.least[i + 1]):
                 return Flight(LOST, Place(i + 1, arb(0)), self.theta, self.rate)
         end = Place(last, arb(0))
         if stop is not None and stop.interval >= last:
@@ -325,42 +326,38 @@ class Block:
 
     def _series(self, line: _Line, at: arb, h: arb) -> tuple[arb_poly, arb_poly]:
         """Polynomials in time of theta' and theta that hold the solution on all of [0, h]."""
-        a, w = line.a + line.da * at, line.w + line.dw * at
         reach = arb(0).union(h)
-        a_box, w_box = a + line.da * reach, w + line.dw * reach
-        # |theta''| <= p² (|k_h| + |w|): boxes that hold theta' and theta over the step
-        bound = self.p2 * (abs(a_box) + abs(w_box))
-        h_most = h.upper()
-        slack = (bound * h_most).upper()
-        rate_box = self.rate + arb(0, slack)
-        theta_box = self.theta + self.rate * reach + arb(0, (slack * h_most / 2).upper())
-        size = float(h_most) * (math.sqrt(float(bound.upper())) + float(abs(self.rate).upper()))
-        degree = _degree(size, ctx.prec)
-        rates = self._coefficients(self.theta, self.rate, a, w, line, degree)
-        # only the last coefficient over the box is used, as the remainder
-        boxed = self._coefficients(theta_box, rate_box, a_box, w_box, line, degree)
-        rates[degree] = boxed[degree]
+        a, w = line.a + line.da * at, line.w + line.dw * at
+        # |theta''| <= p² (|k_h| + |w|): a bound of theta' over the step, and of what follows
+        drive = _most(self.p2 * (abs(a + line.da * reach) + abs(w + line.dw * reach)))
+        slope = _most(self.p2 * (abs(line.da) + abs(line.dw)))
+        h_most = _most(h)
+        degree, remainder = _remainder(
+            _most(abs(self.rate)) + drive * h_most, drive, slope, h_most, 2.0 ** (-0.9 * ctx.prec)
+        )
+        rates = self._coefficients(a, w, line, degree)
+        rates[degree] = arb(0, remainder)
         path = [self.theta] + [rates[k] / (k + 1) for k in range(degree + 1)]
         return arb_poly(rates), arb_poly(path)
 
-    def _coefficients(
-        self, theta: arb, rate: arb, a: arb, w: arb, line: _Line, degree: int
-    ) -> list[arb]:
-        """Taylor coefficients of theta' from a state and an excitation."""
-        sine, cosine = (self.theta_c - theta).sin_cos()
-        u, s, c = [rate], [sine], [cosine]
-        for k in range(degree):
+    def _coefficients(self, a: arb, w: arb, line: _Line, degree: int) -> list[arb]:
+        """Taylor coefficients of theta' from the present state; the last one is zero."""
+        sine, cosine = (self.theta_c - self.theta).sin_cos()
+        u, s, c = [self.rate], [sine], [cosine]
+        for k in range(degree - 1):
             drive = a * c[k] - w * s[k]
             if k:
                 drive += line.da * c[k - 1] - line.dw * s[k - 1]
+            u.append(self.p2 * drive / (k + 1))
+            if k == degree - 2:
+                break
             sum_s = sum_c = arb(0)
             for j in range(k + 1):
                 sum_s += u[j] * c[k - j]
                 sum_c += u[j] * s[k - j]
-            u.append(self.p2 * drive / (k + 1))
             s.append(-sum_s / (k + 1))
             c.append(sum_c / (k + 1))
-        return u
+        return [*u, arb(0)]
 
     def _landing(self, rates: arb_poly, path: arb_poly, h: arb) -> arb | None:
         """The first time in the step at which theta falls through zero; None if it stays above."""
@@ -435,14 +432,35 @@ def _root(rates: arb_poly, path: arb_poly, low: arb, high: arb) -> arb:
     return ball
 
 
-def _degree(size: float, bits: int) -> int:
-    """Degree at which size^n/n! is below what the precision can hold."""
-    wanted = -0.9 * bits * math.log(2.0)
-    log_size = math.log(max(size, 1e-300))
-    degree = 4
-    while degree < 120 and degree * log_size - math.lgamma(degree + 1.0) > wanted:
-        degree += 1
-    return degree
+def _remainder(
+    rate: float, drive: float, slope: float, h: float, enough: float
+) -> tuple[int, float]:
+    """Degree of a step, and a bound of that coefficient of theta' anywhere in the step.
+
+    The recurrence of the coefficients with every term positive, and sine and cosine at 1.
+
+    Args:
+        rate: bound of |theta'| over the step.
+        drive: bound of p² (|k_h| + |w|).
+        slope: bound of p² (|k_h'| + |w'|).
+        h: length of the step.
+        enough: the degree is reached where the term of theta is below this.
+    """
+    u, s = [rate], [1.0]
+    power = h
+    for k in range(MOST_DEGREE):
+        u.append((drive * s[k] + (slope * s[k - 1] if k else 0.0)) / (k + 1))
+        s.append(sum(u[j] * s[k - j] for j in range(k + 1)) / (k + 1))
+        power *= h
+        if k > 3 and u[-1] * power < enough:
+            break
+    # sums of positive terms in doubles: what they round off is far below this
+    return len(u) - 1, u[-1] * (1.0 + 1e-9)
+
+
+def _most(ball: arb) -> float:
+    """A double that no number of the ball exceeds."""
+    return math.nextafter(float(ball.upper()), math.inf)
 
 
 def width(ball: arb) -> float:

@@ -13,7 +13,7 @@ def by_size(rows: Sequence[Row]) -> str:
     """One line for each p²."""
     head = [
         "p² [1/s²]", "combinations, with vertical", "lower end topples, upper stays",
-        "at 1e-6 from them", "nothing above topples", "of these below K_up",
+        "at 1e-6 from them", "nothing above topples", "of these, bracket below K_up",
         "widest enclosure [rad, s]", "seconds: ends, above",
     ]  # fmt: skip
     sizes = sorted({row.p2 for row in rows}, reverse=True)

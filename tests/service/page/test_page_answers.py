@@ -7,8 +7,8 @@ from playwright.sync_api import expect
 
 from tests.service.page.reading import FIRST_ANSWER, agrees, points_of, probability_shown
 
-SAID_ELSEWHERE = ("answered by the reference", "no friction angle is given")
-"""Sentences of the service that the page says in a short line of its own."""
+SAID_ELSEWHERE = "no friction angle is given"
+"""How the sentence of the service begins that the page says in its own words."""
 
 REFUSED = "Failed to load resource: the server responded with a status of 422"
 
@@ -340,7 +340,7 @@ def test_a_model_can_be_chosen(open_page, ask):
     page = opened.page
     page.locator("#model-part summary").click()
     page.select_option("#model", "lognormal-pgv")
-    expect(page.locator("#about")).to_contain_text("Model lognormal-pgv.")
+    expect(page.locator("#about")).to_contain_text("Model lognormal-pgv of models.db.")
     opened.settled()
     answer = ask("v1/predict", p2=3, kr=0.1, pgv=0.6, model="lognormal-pgv")
     assert agrees(probability_shown(page), answer["probability"])

@@ -26,8 +26,8 @@ const KNOWS = {
   pga_sa03_sa10_sa30: "PGA, SA(0.3, 1, 3 s)",
 };
 
-/** How sentences of the service begin that the page says in its own place. */
-const SAID = /^(answered by the reference|no friction angle is given)/;
+/** How the sentence of the service begins that the page says in its own place. */
+const SAID = /^no friction angle is given/;
 
 /** An equals sign that does not part from what stands beside it. */
 const IS = "\u00a0=\u00a0";
@@ -53,7 +53,7 @@ export function showAnswer(answer) {
   domain.dataset.inside = String(answer.in_domain);
   writeText(
     byId("about"),
-    `Model ${answer.model}${answer.data ? ` of ${answer.data}` : ""}. ` +
+    `Model ${answer.model} of ${answer.data}. ` +
       `Intensity ${quantity(answer.intensity_m_s, "m/s")}` +
       (answer.y_m_s === null
         ? ""
