@@ -29,7 +29,8 @@ def floors(project: Path = ROOT / "pyproject.toml") -> dict[str, str]:
     wanted = list(about["dependencies"])
     for extra, names in about["optional-dependencies"].items():
         if extra not in TOOLS:
-            wanted += names
+            # an extra that names others of this package: theirs are here already
+            wanted += [name for name in names if not name.startswith("rbfrag[")]
     lowest = {}
     for dependency in wanted:
         match = _BOUND.match(dependency)

@@ -30,11 +30,11 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
         return ("No such block fails.",)
     of_block = document.get("block_sd")
     sentences = [
-        f"Of {of} such blocks {_count(p, of)} fail{'s' * (_count(p, of) == '1')} "
+        f"Of {of:,} such blocks {_count(p, of)} fail{'s' * (_count(p, of) == '1')} "
         f"({_range(low, high, of)} as far as the data tell it, {level}).",
         "How many in one single earthquake is not known."
         if event_low is None
-        else f"In one single earthquake it is {_range(event_low, event_high, of)} of {of} "
+        else f"In one single earthquake it is {_range(event_low, event_high, of)} of {of:,} "
         f"({level}).",
     ]
     if of_block is not None:
@@ -49,7 +49,7 @@ def _count(share: float, of: int) -> str:
     count = round(share * of)
     if count in (0, of) and 0.0 < share < 1.0:
         return "fewer than 1" if count == 0 else "nearly all"
-    return str(count)
+    return f"{count:,}"
 
 
 def _range(low: float, high: float, of: int) -> str:

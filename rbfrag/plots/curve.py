@@ -118,7 +118,7 @@ def plot_curve(
         else ""
     )
     axes.set_title(
-        f"block $p^2$ = {p2:g} s$^{{-2}}$, $k_r$ = {kr:g}, $y$ = {y:.3g} m/s"
+        f"block $p^2$ = {p2:.3g} s$^{{-2}}$, $k_r$ = {kr:.3g}, $y$ = {y:.3g} m/s"
         + (f"; {conditions}" if conditions else "")
         + f"\nmodel {model.name}{counts}",
         fontsize=10,

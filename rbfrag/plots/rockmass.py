@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,6 +40,9 @@ if TYPE_CHECKING:
 _POINTS = 600
 _SHOWN = 0.997
 _HIGHEST_PGA_G = 2.0
+
+TITLE_WIDTH = 90
+"""Letters of a line of the title, so that the label of a record is not cut at the edges."""
 
 
 def plot_rockmass(
@@ -229,8 +233,9 @@ def _part(each: ModeFailures, part: str) -> int:
 def _shaken_title(shaken: ShakenMass) -> str:
     limits = shaken.limits
     turned = "" if limits.rotation_deg is None else f"by more than {limits.rotation_deg:g}° or "
+    about = f"{shaken.shaking.motion.label}: {shaken.realisations.n_blocks:,} blocks of a rock mass"
     return (
-        f"{shaken.shaking.motion.label}: {shaken.realisations.n_blocks} blocks of a rock mass\n"
+        f"{fill(about, TITLE_WIDTH)}\n"
         f"a slide fails beyond {limits.displacement_m:g} m, "
         f"a block that turns {turned}past recovery"
     )

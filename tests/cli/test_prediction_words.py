@@ -33,13 +33,13 @@ def test_three_statements_in_counts_of_blocks() -> None:
             0.004,
             (0.001, 0.008),
             (0.0001, 0.02),
-            ("Of 1000 such blocks 4 fail (1 to 8 ", "fewer than 1 to 20"),
+            ("Of 1,000 such blocks 4 fail (1 to 8 ", "fewer than 1 to 20"),
         ),
         (
             0.9996,
             (0.99, 1.0),
             (0.9, 1.0),
-            ("Of 10000 such blocks 9996 fail (9900 to 10000 ", "9000 to 10000"),
+            ("Of 10,000 such blocks 9,996 fail (9,900 to 10,000 ", "9,000 to 10,000"),
         ),
         (
             1e-7,

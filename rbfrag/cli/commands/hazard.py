@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rbfrag.cli.hazard_sentences import rounded_values
 from rbfrag.cli.output import (
     check_files,
     print_json,
@@ -183,7 +184,8 @@ def _print(
 
 def _short(document: dict[str, Any]) -> dict[str, Any]:
     """Return what is shown without --verbose."""
-    return {name: document[name] for name in SHORT if document.get(name) is not None}
+    known = {name: document[name] for name in SHORT if document.get(name) is not None}
+    return rounded_values(known)
 
 
 def _in_common(answer: HazardAnswer, curve: HazardCurve) -> str:
