@@ -117,6 +117,8 @@ export function fromQuery(query) {
   if (has(MEASURES)) values.pgv = "";
   if (has(BLOCK_FIELDS[shape])) for (const name of BLOCK_FIELDS[shape]) values[name] = "";
   for (const [name, text] of query) if (name in values) values[name] = plain(text);
+  // the option of the API and the command line for a block that stands free
+  if (query.get("no_back") === "true") values.kind = "rocking";
   return { shape, values };
 }
 
