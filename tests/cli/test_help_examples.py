@@ -98,7 +98,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-@pytest.mark.parametrize("name", EXAMPLES.keys() - ELSEWHERE - {*FIRST})
+@pytest.mark.parametrize("name", sorted(EXAMPLES.keys() - ELSEWHERE - {*FIRST}))
 def test_the_example_runs(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     monkeypatch.delenv("RBFRAG_DB", raising=False)
