@@ -31,6 +31,7 @@ PAGES = sorted(
 
 _TREE = "openquake_classical_logic_tree/three_realizations"
 FROM_OUTSIDE = {
+    "grid.xml": "shakemap_v4_grid_cropped.xml",
     "los-angeles.json": "usgs_nshm_hazard_curves_los_angeles_2018.json",
     **{
         f"hazard_curve-{part}-PGV_7.csv": f"{_TREE}/hazard_curve-{part}-PGV_7.csv"

@@ -231,23 +231,41 @@ def _last_of_all(row: ModelRow) -> bool:
     return row.term == "xp" or row.diagnostics.get("rotation_deg") is not None
 
 
+def recommended(rows: Sequence[ModelRow], kind: str) -> ModelRow | None:
+    """Return the model of a kind that answers when none is named, None where there is none.
+
+    That is the one that was chosen, else the one of the least log loss on earthquakes left out,
+    else the one that was fitted first.
+    """
+    of_kind = [row for row in rows if row.kind == kind]
+    return min(
+        of_kind,
+        key=lambda row: (
+            not row.is_default,
+            _last_of_all(row),
+            held_out_loss(row),
+            row.created,
+            row.name,
+        ),
+        default=None,
+    )
+
+
 def with_defaults(rows: Sequence[ModelRow]) -> list[ModelRow]:
     """Return all models of a database, sorted by name, with the default of each kind.
 
-    That is the one that was chosen, else the one of the least log loss on earthquakes left out.
+    That is the recommended one; where no model was chosen and none has a score, there is no
+    default, so that what is asked decides.
 
     Args:
         rows: the models, of which the chosen ones say so.
     """
-    best: dict[str, ModelRow] = {}
-    ordered = sorted(rows, key=lambda row: row.name)
-    for row in sorted(
-        ordered, key=lambda r: (not r.is_default, _last_of_all(r), held_out_loss(r), r.created)
-    ):
-        best.setdefault(row.kind, row)
+    best = {kind: recommended(rows, kind) for kind in {row.kind for row in rows}}
     return [
-        row if row.is_default is (best[row.kind] is row) else replace(row, is_default=True)
-        for row in ordered
+        replace(row, is_default=True)
+        if row is best[row.kind] and math.isfinite(held_out_loss(row))
+        else row
+        for row in sorted(rows, key=lambda row: row.name)
     ]
 
 

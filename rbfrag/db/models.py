@@ -13,6 +13,7 @@ from rbfrag.db.model_file import (
     ModelRow,
     decode_model,
     encode_model,
+    recommended,
     unknown_model,
     with_defaults,
 )
@@ -64,15 +65,14 @@ def load_model(
 
     Args:
         name: its name; None for the default of a kind
-            (:func:`rbfrag.db.model_file.with_defaults`).
+            (:func:`rbfrag.db.model_file.recommended`).
         kind: the kind whose default is meant.
 
     Raises:
         UnknownModelError: there is none; the message lists the names there are.
     """
     if name is None:
-        rows = (row for row in model_rows(connection) if row.kind == kind)
-        default = next((row for row in rows if row.is_default), None)
+        default = recommended(model_rows(connection), kind)
     else:
         query = _model_query().where(fragility_model.c.name == name)
         stored = connection.execute(query).one_or_none()

@@ -29,7 +29,7 @@ from rbfrag.campaign.simulate import simulate
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="finds the workers under /proc")
 
-MOTIONS = 200  # so many that a fast machine is still at it when the signal comes
+MOTIONS, SAMPLES = 250, 2400  # so much that a busy test still finds the campaign at work
 SIZES = (10.0, 1.0)
 WHOLE = MOTIONS * 2 * len(SIZES)
 
@@ -37,7 +37,7 @@ WHOLE = MOTIONS * 2 * len(SIZES)
 @pytest.fixture(scope="module")
 def several(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("several") / "a.db"
-    make_database(str(place), MOTIONS)
+    make_database(str(place), MOTIONS, SAMPLES)
     return place
 
 
