@@ -31,7 +31,7 @@ PAGES = sorted(
 
 _TREE = "openquake_classical_logic_tree/three_realizations"
 FROM_OUTSIDE = {
-    "grid.xml": "shakemap_v4_grid_cropped.xml",
+    "grid.xml": "shakemap_v3_loma_prieta_grid.xml",
     "los-angeles.json": "usgs_nshm_hazard_curves_los_angeles_2018.json",
     **{
         f"hazard_curve-{part}-PGV_7.csv": f"{_TREE}/hazard_curve-{part}-PGV_7.csv"
