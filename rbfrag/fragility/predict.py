@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
@@ -375,7 +375,8 @@ def predict(
     answer = answer_given(first, given, level, nan=nan, interval=interval, weights=weights)
     if type(answer) is not Prediction:
         return answer
-    return _with_disagreement(answer, [_one_of(each, given, level, weights) for each in others])
+    apart = [each for each in others if not _surely_agrees(each, given, answer)]
+    return _with_disagreement(answer, [_one_of(each, given, level, weights) for each in apart])
 
 
 def _candidates(
@@ -390,6 +391,23 @@ def _candidates(
     if model is None:
         return suited_models(given, db, kind=kind, rotation_deg=rotation_deg)
     return [find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)]
+
+
+def _surely_agrees(
+    model: FragilityModel, given: Mapping[str, ArrayLike], first: Prediction
+) -> bool:
+    """Return whether a model's P is within the first one's interval: faster than its answer."""
+    if model.uncertain or any(type(value) is not float for value in given.values()):
+        return False
+    singles = cast("dict[str, float]", given)
+    try:
+        values = model.with_ratios(model.method.block.completed(singles, model.term, SINGLE))
+        if not _is_clear(model, values):
+            return False
+        probability = model.answer(values, None, SINGLE, singles).probability
+    except (ArithmeticError, ValueError):
+        return False
+    return bool(first.ci_low <= probability <= first.ci_high)
 
 
 def _one_of(
