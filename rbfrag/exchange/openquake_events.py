@@ -69,7 +69,8 @@ def _next(parts: Any, too_many_cells: type[Warning]) -> Any:
 
     pandas cuts such a line with a warning where it is the first of a part.
     """
-    with warnings.catch_warnings():
+    # numpy warns of a number beyond all integers, which pandas then refuses
+    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         warnings.simplefilter("error", too_many_cells)
         return next(parts, None)
 
@@ -420,6 +421,8 @@ def _duration(
             value = float(text)
         except ValueError:
             raise InputError(f"{ruptures.path}, line 1: {name} = {text!r} is no number") from None
+        if not 0.0 < value < math.inf:
+            raise InputError(f"{ruptures.path}, line 1: {name} = {text!r} is not above zero")
         if known.setdefault(name, value) != value:
             raise InputError(
                 f"{ruptures.path}, line 1: {name} is {value:g}, given is {known[name]:g}: leave it "
