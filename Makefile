@@ -52,7 +52,7 @@ floors:  ## the core of the tests with the lowest versions that are allowed
 	$(PYTHON) benchmarks/floors.py > $(FLOORS)/floors.txt
 	$(FLOORS)/bin/python -m pip install --quiet --disable-pip-version-check \
 	  --constraint $(FLOORS)/floors.txt \
-	  '.[plot,postgres,parquet,gis,dask,mesh,service]' pytest pytest-xdist hypothesis httpx2
+	  '.[plot,postgres,parquet,gis,excel,dask,mesh,service]' pytest pytest-xdist hypothesis httpx2
 	MPLCONFIGDIR="$$(cd $(FLOORS) && pwd)/matplotlib" $(FLOORS)/bin/python -m pytest \
 	  -o filterwarnings=default --disable-warnings -n auto $(CORE)
 
