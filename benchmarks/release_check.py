@@ -49,23 +49,27 @@ DATA_ONLY = ("pyslammer",)
 _HEADING = re.compile(r"^## \[(?P<version>[^\]]+)\](?: - (?P<day>\d{4}-\d\d-\d\d))?$", re.M)
 
 
-def run(command: Sequence[str | Path], **options: object) -> str:
+def run(
+    command: Sequence[str | Path], *, cwd: Path | None = None, env: dict[str, str] | None = None
+) -> str:
     """Return what a command prints.
 
     Raises:
         RuntimeError: it failed; with its last lines.
     """
-    done = subprocess.run(  # type: ignore[call-overload]
+    done = subprocess.run(
         [str(part) for part in command],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        **options,
+        cwd=cwd,
+        env=env,
+        check=False,
     )
     if done.returncode:
         last = "\n".join(done.stdout.splitlines()[-15:])
         raise RuntimeError(f"{' '.join(map(str, command))}: status {done.returncode}\n{last}")
-    return str(done.stdout)
+    return done.stdout
 
 
 def versions_agree(root: Path = ROOT) -> str:
