@@ -107,6 +107,8 @@ def losses(
         replace(events, warnings=texts), portfolio, samples=0 if expected else samples, seed=seed,
         level=level, run=run, on_progress=on_progress,
     )  # fmt: skip
+    if "loss" in rows.blocks:
+        answer.block_rates[2, np.isnan(rows.blocks["loss"])] = np.nan
     return replace(answer, refused=rows.refused_by_row())
 
 

@@ -111,8 +111,8 @@ class LossAnswer(Tabular):
         loss_variance: its variance, shape (laws, n); NaN where it was not computed.
         any_fails: probability of any failure, shape (laws, n); NaN likewise.
         bounds: the same under full dependence and independence, shape (2, n).
-        block_rates: rate of each row of the table, its standard error, and its loss, shape
-            (3, rows).
+        block_rates: rate of each row of the table that can be used, its standard error, and its
+            loss, NaN where it states none, shape (3, rows).
         exceedance: how often numbers of failures are reached, by law.
         loss_exceedance: how often losses are.
         quantiles: of failures and of the loss of a scenario at 5, 50 and 95 %, by law, shape
@@ -273,15 +273,17 @@ class LossAnswer(Tabular):
             self.portfolio.block_ids, self.portfolio.site_ids, *self.block_rates.tolist(),
             strict=True,
         )  # fmt: skip
-        rows = [
+        rows: list[dict[str, Any]] = [
             {**dict.fromkeys(names), **self.refused[i]}
             if i in self.refused
             else dict(zip(names, (*next(answered), ""), strict=True))
             for i in range(len(self.portfolio.block_ids) + len(self.refused))
         ]
-        if not self.has_losses:
-            for row in rows:
+        for row in rows:
+            if not self.has_losses:
                 del row[loss]
+            elif row[loss] != row[loss]:  # none is stated
+                row[loss] = None
         return rows
 
     def table_columns(self) -> dict[str, NDArray[Any]]:

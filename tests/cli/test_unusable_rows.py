@@ -117,6 +117,7 @@ def test_losses_leave_a_bad_row_out(shell: Shell, kind: str) -> None:
     assert said[0].startswith(f"{SAID} and are left out of all sums, which are lower bounds")
     assert bad["reason"] in said[0]
     assert any("1 of 2 blocks state no loss" in text for text in found["warnings"])
+    assert (first["average_annual_loss"] > 0.0, last["average_annual_loss"]) == (True, None)
     assert rbfrag.losses("job", "b.csv", component="single", samples=20).as_dict() == found
     printed = shell(*asked, "b.csv")
     assert "reason" in printed.stdout
