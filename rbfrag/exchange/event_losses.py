@@ -14,7 +14,7 @@ from rbfrag.exchange.block_rows import PORTFOLIO, BlockRows, read_blocks
 from rbfrag.exchange.openquake_events import JobFiles, read_events
 from rbfrag.files import as_path
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.predict import Model
+from rbfrag.fragility.model import Model
 from rbfrag.fragility.unusable import FROM_SUMS
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.losses import LossAnswer, Run, event_losses

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import PLACE, BlockRows, Blocks, read_blocks
 from rbfrag.exchange.shakemap import ShakeMapEvent, at_places, read_shakemap
-from rbfrag.fragility.predict import Model
+from rbfrag.fragility.model import Model
 from rbfrag.fragility.unusable import FROM_MEAN, FROM_SUMS
 from rbfrag.frames import Tabular
 from rbfrag.hazards.conversions import component as component_named

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import Model
+from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.fragility.unusable import (
     FROM_MEAN,
     FROM_SUMS,
