@@ -121,7 +121,7 @@ def wedges(cot: N, mu1: N, mu2: N) -> Any:
     return (cot - mu2) * mu1 + cot * mu2 + 1.0 < 0.0
 
 
-def rough_behind(cot: N, mu1: N, mu2: N) -> Any:
+def back_is_rougher(cot: N, mu1: N, mu2: N) -> Any:
     """Return whether the back plane of a slump holds better than its base: φ2 > φ1 + γ."""
     # sin(γ + φ1 - φ2) over the same
     return (cot + mu2) * mu1 - cot * mu2 + 1.0 < 0.0
@@ -319,7 +319,7 @@ class Planes(Generic[N]):
         sine, cosine, r_base, _ = slump(*contacts, self.mu1, self.mu2)
         share = 0.0 if self.bond is None else slump_bond(*contacts, self.mu2)
         k = self.coefficient(sine, cosine, share)
-        k = on_its_branch(k, self.ky, rough_behind(cot, self.mu1, self.mu2), self.functions)
+        k = on_its_branch(k, self.ky, back_is_rougher(cot, self.mu1, self.mu2), self.functions)
         # moments balance only if the base pulls: nothing holds the block
         untenable = r_base <= 0.0
         return where(untenable, -math.inf, k), untenable
