@@ -185,7 +185,7 @@ def _draw_regions(chart: _Chart) -> None:
 
 def _draw_yields(chart: _Chart) -> list[tuple[ContourSet, NDArray[np.bool_]]]:
     """Draw the contours; return those of each mode and where it has them."""
-    drawn = []
+    drawn: list[tuple[ContourSet, NDArray[np.bool_]]] = []
     values = chart.stability.yield_acceleration
     # Mode by mode: between topple and confined topple the yield jumps.
     for code, mode in enumerate(MODES):
@@ -243,7 +243,7 @@ def _write_values(
         places = places[:: max(1, len(places) // _PLACES)]
         column, row = np.clip(((places + 90.0) / _STEP_DEG).astype(int), 0, len(here) - 1).T
         value = axes.text(
-            *places[0], f"{level:g}", ha="center", va="center", fontsize=7.5,
+            0.0, 0.0, f"{level:g}", ha="center", va="center", fontsize=7.5,
             color=lines.get_edgecolor()[0], zorder=4, **halo(2.0),
         )  # fmt: skip
         value.set_in_layout(False)
