@@ -219,11 +219,6 @@ class FragilityModel:
         value = self.row.diagnostics.get(name) if name is not None else None
         return float(value) if isinstance(value, int | float) else None
 
-    @property
-    def has_exponent(self) -> bool:
-        """Whether the exponent M was estimated: P then depends on p beside y."""
-        return self.method.exponent in self.row.coefficients
-
     def with_ratios(
         self, values: dict[str, Any], of: Mapping[str, Any] | None = None
     ) -> dict[str, Any]:

@@ -132,13 +132,9 @@ def plot_curve(
 @app.command("sensitivity", epilog="Example:  rbfrag plot sensitivity --out sensitivity.png")
 def plot_sensitivity(out: Out, suite: options.Suite = None, db: options.Db = None) -> None:
     """Draw critical k_r/PGA over the frequency ratio omega_m/p, with the lines of single lobes."""
-    from rbfrag.db.engine import opened_database
-    from rbfrag.db.queries import combination_table
-    from rbfrag.plots.critical_strength import plot_sensitivity as draw
+    from rbfrag.plots import plot
 
-    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        table = combination_table(connection, suite=suite)
-    draw(table, out, data="without vertical motion" + (f", suite {suite}" if suite else ""))
+    plot.sensitivity(out, suite=suite, db=db)
     print(out)
 
 
@@ -166,15 +162,9 @@ def plot_calibration(
 @app.command("vertical", epilog="Example:  rbfrag plot vertical --out vertical.png")
 def plot_vertical(out: Out, suite: options.Suite = None, db: options.Db = None) -> None:
     """Draw critical strengths with vertical motion beside those without it."""
-    from rbfrag.db.engine import opened_database
-    from rbfrag.db.queries import combination_table
-    from rbfrag.plots.critical_strength import plot_vertical as draw
-    from rbfrag.plots.critical_strength import vertical_pairs
+    from rbfrag.plots import plot
 
-    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        without = combination_table(connection, suite=suite)
-        with_it = combination_table(connection, suite=suite, vertical="with")
-    draw(vertical_pairs(without, with_it), out)
+    plot.vertical(out, suite=suite, db=db)
     print(out)
 
 
@@ -252,20 +242,15 @@ def plot_modes(
 ) -> None:
     """Draw failure modes and yield accelerations over the block angles alpha1 and alpha3."""
     from rbfrag.cli.parameters.block import charted_blocks
+    from rbfrag.plots import plot
     from rbfrag.plots.canvas import plot_path
-    from rbfrag.plots.modes import plot_modes as draw
 
     plot_path(out)
     shown = charted_blocks(blocks, rockmass, phi=phi, phi_back=phi_back, no_back=no_back)
-    draw(
-        out,
-        phi_deg=phi,
-        beta_deg=beta,
-        phi_back_deg=phi_back,
-        back_fracture=not no_back,
-        alpha1_deg=shown.alpha1_deg,
-        alpha3_deg=shown.alpha3_deg,
-    )
+    plot.modes(
+        out, phi_deg=phi, beta_deg=beta, phi_back_deg=phi_back, back_fracture=not no_back,
+        alpha1_deg=shown.alpha1_deg, alpha3_deg=shown.alpha3_deg,
+    )  # fmt: skip
     print(out)
     print_warnings(shown.warnings)
 

@@ -164,12 +164,9 @@ def rockmass(
     if out is not None:
         write_table(answer.table_columns(), out, excel_text=excel_text)
     if plot is not None:
-        from rbfrag.plots.rockmass import plot_failures, plot_rockmass
+        from rbfrag.plots.plot import rockmass as drawn
 
-        if answer.outcomes is None:
-            plot_rockmass(answer.blocks, plot)
-        else:
-            plot_failures(answer.outcomes, plot, level=answering.level)
+        drawn(answer, plot)
     if printing.json:
         print_json(document)
         return
