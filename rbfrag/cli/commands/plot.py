@@ -180,11 +180,10 @@ def plot_spectrum(
     db: options.Db = None,
 ) -> None:
     """Draw the toppling spectra of motions over the size of the block, with PGV beside them."""
-    from rbfrag.cli.parameters.values import number_list, polarities
     from rbfrag.plots import plot
     from rbfrag.plots.canvas import plot_path
 
-    sizes, wanted = number_list(p2, "--p2"), polarities(polarity)
+    sizes, wanted = options.number_list(p2, "--p2"), options.polarities(polarity)
     plot_path(out)
     records = [find_motion(text, db=db, reading=reading) for text in motions]
     plot.spectrum(records, out, polarities=wanted, p2=sizes)
@@ -276,7 +275,6 @@ def plot_rotation(
     The rock behind a block may give way with it: its back plane then turns by a share of the
     block's rotation.
     """
-    from rbfrag.cli.parameters.values import number_list
     from rbfrag.plots.rotation import plot_rotation as draw
 
     described = shape.described()
@@ -285,7 +283,9 @@ def plot_rotation(
     block, conditions = described.without_kv().on_planes()
     if not conditions.pop("back_fracture", True):
         raise InputError("--no-back: without a plane behind it no block turns against it")
-    lines = draw(block, out, shares=number_list(back_follows, "--back-follows"), **conditions)
+    lines = draw(
+        block, out, shares=options.number_list(back_follows, "--back-follows"), **conditions
+    )
     if json:
         print_json({"plot": out, "lines": [line._asdict() for line in lines]})
         return

@@ -99,9 +99,9 @@ def shakemap(
     about = {**answer.about, "warnings": warnings}
     _write(written, about, target, excel_text=excel_text)
     if plot is not None:
-        from rbfrag.plots.plot import shakemap as drawn
+        from rbfrag.plots.plot import shakemap as draw
 
-        drawn(answer, plot)
+        draw(answer, plot)
     document = {**answer.as_dict(), "file": str(target), "warnings": warnings}
     if printing.json:
         print_json(document)
