@@ -116,18 +116,6 @@ class Placement:
         return dependence.correlation(*vars(self).values())
 
 
-def bivariate_normal(a: ArrayLike, b: ArrayLike, r: ArrayLike) -> FloatArray:
-    """Return Φ₂(a, b; R), the probability that two standard normals are below a and b.
-
-    Args:
-        a: first bound, any shape.
-        b: second bound.
-        r: correlation, -1 to 1.
-    """
-    first, second = (np.asarray(bound, dtype=np.float64) for bound in (a, b))
-    return np.asarray(joint_excess(first, second, r) + ndtr(first) * ndtr(second))
-
-
 def joint_excess(a: ArrayLike, b: ArrayLike, r: ArrayLike) -> FloatArray:
     """Return Φ₂(a, b; R) - Φ(a) Φ(b), the covariance of two failures.
 
