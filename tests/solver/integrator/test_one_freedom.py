@@ -45,7 +45,7 @@ def record(seed: int, amplitude_g: float) -> GroundMotion:
     return GroundMotion(amplitude_g * a / np.abs(a).max(), DT_S)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
 def test_harmonics_are_the_functions_that_they_stand_for(
     x: float, one: float, two: float, three: float

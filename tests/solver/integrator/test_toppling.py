@@ -213,7 +213,7 @@ def test_bad_numbers_are_named(name: str, value: float) -> None:
 values_g = st.sampled_from([-1.0, -0.4, -0.2, 0.0, 0.1, 0.2, 0.25, 0.5, 1.0])
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(
     st.lists(st.tuples(values_g, st.sampled_from([0.0, 0.003, 0.02, 0.2, 0.9])), max_size=12),
     st.sampled_from([0.05, 0.2, 0.4]),
