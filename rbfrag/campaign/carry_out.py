@@ -72,12 +72,11 @@ class Workforce:
                 seconds = time.perf_counter() - started
                 self.on_progress(CampaignProgress(done, total, resumed, seconds))
 
-        alone = self.scheduler is None
-        made_on = processor_and_compiler() if alone else CLUSTER
+        where = processor_and_compiler() if self.scheduler is None else CLUSTER
         scheduler = self.scheduler if chunks else None
         with executor(do, self.jobs, scheduler, self.stopped) as execute:
             with engine.begin() as connection:
-                campaign_id = start_campaign(connection, {**settings, "made_on": made_on})
+                campaign_id = start_campaign(connection, {**settings, "made_on": where})
             tell()
             for answers in execute(work, chunks):
                 if answers.numerics_version != NUMERICS_VERSION:
