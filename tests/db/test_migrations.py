@@ -53,6 +53,11 @@ def _texts(options: Any) -> dict[str, str]:
 
 def _described(engine: Engine) -> dict[str, Any]:
     inspector = inspect(engine)
+    without_rowid: set[str] = set()
+    if engine.dialect.name == "sqlite":
+        query = text("SELECT name FROM sqlite_master WHERE sql LIKE '%WITHOUT ROWID%'")
+        with engine.connect() as connection:
+            without_rowid = set(connection.scalars(query))
     return {
         table: {
             "columns": [
@@ -70,7 +75,7 @@ def _described(engine: Engine) -> dict[str, Any]:
                 (str(i["name"]), i["column_names"], i["unique"], _texts(i.get("dialect_options")))
                 for i in inspector.get_indexes(table)
             ),
-            "options": inspector.get_table_options(table),
+            "rowid": table not in without_rowid,
         }
         for table in inspector.get_table_names()
         if table != VERSION_TABLE
