@@ -107,6 +107,7 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     printed = shell("hazard", curve, "--blocks", "blocks.csv", "--years", "100").stdout
     assert f"{once_in(found['annual_rate_any'])} on average" in printed
     assert f"{found['expected_failures_per_year']:.2g} failures a year are expected" in printed
+    assert f"Most often fail A7 ({once_in(each[0])}) and B2 ({once_in(each[1])})." in printed
 
 
 def test_numbers_of_failures_that_are_asked_for(shell: Shell, curve: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.cli.hazard_sentences import rounded_values
+from rbfrag.cli.hazard_sentences import most_often, rounded_values
 from rbfrag.cli.output import (
     check_files,
     print_json,
@@ -23,6 +23,7 @@ from rbfrag.fragility.words import percent
 from rbfrag.hazards.report import once_in, rate_in_words
 
 if TYPE_CHECKING:
+    from rbfrag.exchange.site_rates import SiteBlocks
     from rbfrag.hazards.answer import HazardAnswer
     from rbfrag.hazards.curve import HazardCurve
 
@@ -142,11 +143,12 @@ def hazard(
     if printing.json:
         print_json(document)
         return
-    _print(document, answers, first, verbose=printing.verbose)
+    _print(document, sites, answers, first, verbose=printing.verbose)
 
 
 def _print(
     document: dict[str, Any],
+    sites: list[SiteBlocks],
     answers: list[HazardAnswer],
     curves: list[HazardCurve],
     *,
@@ -156,9 +158,10 @@ def _print(
     branches = document.pop("branches", None)
     rows = document.pop("blocks", None) or document.pop("answers", None)
     if rows is not None:
-        for one, curve_of in zip(answers, curves, strict=True):
+        for own, one, curve_of in zip(sites, answers, curves, strict=True):
             if one.joint is not None:
                 print(_in_common(one, curve_of))
+                print(most_often(own.names, one.annual_rate.tolist()))
         document.pop("sites", None)
         for law, bound in document.pop("bounds", {}).items():
             document |= {f"{name}_{law}": value for name, value in bound.items()}
