@@ -20,7 +20,7 @@ from rbfrag.cli.parameters.curve import CurveOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.fragility.words import percent
-from rbfrag.hazards.report import once_in, rate_in_words
+from rbfrag.hazards.report import beyond_in_words, once_in, rate_in_words
 
 if TYPE_CHECKING:
     from rbfrag.exchange.site_rates import SiteBlocks
@@ -170,10 +170,13 @@ def _print(
         for some in (counts, branches, rows):
             if some:
                 print()
-                print_table(list(some[0]), [list(row.values()) for row in some])
+                shown = some if verbose else [_short_row(row) for row in some]
+                print_table(list(shown[0]), [list(row.values()) for row in shown])
     else:
         del document["contributions"]
         print(rate_in_words(document))
+        for sentence in beyond_in_words(answers[0]):
+            print(sentence)
         print()
         print_pairs(document if verbose else _short(document))
         if document["annual_rate"] > 0.0:
@@ -191,10 +194,15 @@ def _short(document: dict[str, Any]) -> dict[str, Any]:
     return rounded_values(known)
 
 
+def _short_row(row: dict[str, Any]) -> dict[str, Any]:
+    """Return a row of a table without what is shown with --verbose alone."""
+    return rounded_values({name: value for name, value in row.items() if name != "numerical_error"})
+
+
 def _in_common(answer: HazardAnswer, curve: HazardCurve) -> str:
     """Return what several blocks of one site do, in two sentences."""
     assert answer.joint is not None
-    where = f"{curve.place}: " if curve.place else ""
+    where = f"{curve.place}: at" if curve.place else "At"
     expected = (
         f"{answer.expected_failures_per_year:.2g} failures a year are expected of all "
         f"{answer.annual_rate.size} blocks, several of them in one earthquake."
@@ -202,7 +210,7 @@ def _in_common(answer: HazardAnswer, curve: HazardCurve) -> str:
     rate, chance = answer.joint.annual_rate_any, answer.joint.probability_any
     if rate is not None and chance is not None:
         return (
-            f"{where}at least one of the blocks fails in an earthquake {once_in(rate)} on average, "
+            f"{where} least one of the blocks fails in an earthquake {once_in(rate)} on average, "
             f"with a probability of {percent(chance)} in {answer.years:g} years. {expected}"
         )
     least, most = (
@@ -210,7 +218,7 @@ def _in_common(answer: HazardAnswer, curve: HazardCurve) -> str:
         for name in ("fully_dependent", "independent")
     )
     return (
-        f"{where}at least one of the blocks fails in {answer.years:g} years with a probability of "
+        f"{where} least one of the blocks fails in {answer.years:g} years with a probability of "
         f"{least} under full dependence and {most} if independent. {expected}"
     )
 

@@ -38,7 +38,9 @@ class ShapeOptions:
     )
     width: _Number = option("Width of a rectangular block along its base [m].")
     dip: _Number = option("Dip of the base of a rectangular block [deg], its --beta. Default: 0.")
-    alpha1: _Number = option("Angle from the normal of the base to the line centroid-heel [deg], with --alpha3 and --r3.")
+    alpha1: _Number = option(
+        "Angle from the normal of the base to the line centroid-heel [deg], with --alpha3 and --r3."
+    )
     alpha3: _Number = option("The same of the toe [deg].")
     r3: _Number = option("Distance from centroid to toe [m].")
     s1: _Number = option("Spacing of the base fractures [m], with --s2 and --gamma.")
