@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.comparison import prediction_document
 from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.measures import SPECTRAL, STATED
 from rbfrag.fragility.methods import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import prediction_document
 from rbfrag.fragility.words import block_in_words, percent, prediction_in_words
 from rbfrag.hazards.answer import HazardAnswer, hazard
 from rbfrag.hazards.curve import HazardCurve
