@@ -105,3 +105,17 @@ def test_answers_whose_intervals_do_not_overlap_are_told_of(shell: Shell) -> Non
     assert document["data"] == "the reference that is shipped with rbfrag"
     agreed = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
     assert not any("do not agree" in text for text in agreed["warnings"])
+
+
+def test_of_many_answers_that_do_not_agree_two_are_told_of(shell: Shell) -> None:
+    motion = "--pgv 0.1 --pga 0.9 --tm 0.9 --pgd 1 --sa03 2 --sa10 2 --sa20 2 --sa30 2"
+    document = shell.json("predict", "--p2", "3", "--kr", "0.1", *motion.split())
+    first, *others = sorted(document["answers"], key=lambda each: each["probability"])
+    apart = [each for each in others if each["ci_low"] > first["ci_high"]]
+    assert len(apart) > 3
+    (told,) = [text for text in document["warnings"] if text.startswith("the answers do not agree")]
+    least, most = (f"{percent(each['probability'])} (" for each in (apart[0], apart[-1]))
+    assert f"but {len(apart)} others from {least}" in told
+    assert f" by {apart[0]['model']} to {most}" in told
+    assert len(told) < 400
+    assert "e+" not in told

@@ -10,6 +10,7 @@ from rbfrag.cli.output import (
     check_files,
     print_json,
     print_pairs,
+    print_rows,
     print_table,
     print_warnings,
     write_table,
@@ -102,18 +103,25 @@ def hazard(
     are branches of a logic tree: the mean of the rates, and how they are distributed. The block is
     backed by a slope; a free-standing one fails at weaker shaking: --kind rocking.
     """
+    import numpy as np
+
     from rbfrag.exchange.site_rates import blocks_at_sites, rate_columns
+    from rbfrag.fragility.unusable import FROM_SUMS
     from rbfrag.hazards.answer import hazard as answer
     from rbfrag.hazards.curve_file import suited_in
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot, excel_text=excel_text)
-    (table, is_class, remarks), refused = blocks.blocks_and_refused(standing)
+    table, is_class, remarks, rows = blocks.toppling_blocks(standing)
     files = [
         suited_in(path, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
         for path in curve
     ]
-    sites, joined = blocks_at_sites(files, table, site_chosen=meaning.site is not None)
+    sites, joined, missing = blocks_at_sites(files, table, site_chosen=meaning.site is not None)
+    if rows is not None:
+        of_none = np.isin(np.arange(rows.blocks["row"].size), [*missing])
+        rows = rows.without(of_none, missing.__getitem__)
+        remarks += rows.unusable_in_words(FROM_SUMS)
     if plot is not None and (len(sites) > 1 or len(sites[0].names) > 1):
         raise InputError(
             "--plot draws one block at one site: choose them with --site, --p2 and --kr"
@@ -131,15 +139,17 @@ def hazard(
         for one in sites
     ]  # fmt: skip
     if out is not None:
-        write_table(rate_columns(sites, answers, refused), out, excel_text=excel_text)
+        write_table(rate_columns(sites, answers, rows), out, excel_text=excel_text)
     first = [one.curves[0] for one in sites]
     if plot is not None:
         from rbfrag.plots.hazard import plot_contribution
 
         plot_contribution(first[0], answers[0], plot)
     document = as_dict(
-        first, [one.names for one in sites], answers, (*remarks, *taken_as_medians(table), *joined)
-    )
+        first, [one.names for one in sites], answers,
+        (*remarks, *taken_as_medians(table), *joined),
+        None if rows is None else rows.refused_by_row(),
+    )  # fmt: skip
     if printing.json:
         print_json(document)
         return
@@ -170,8 +180,7 @@ def _print(
         for some in (counts, branches, rows):
             if some:
                 print()
-                shown = some if verbose else [_short_row(row) for row in some]
-                print_table(list(shown[0]), [list(row.values()) for row in shown])
+                print_rows(some if verbose else [_short_row(row) for row in some])
     else:
         del document["contributions"]
         print(rate_in_words(document))
