@@ -98,8 +98,8 @@ def _with_disagreement(first: Prediction, others: Sequence[Prediction]) -> Predi
         listed = ", ".join(map(_in_words, apart))
     else:
         by_probability = sorted(apart, key=lambda other: other.probability)
-        least, most = _in_words(by_probability[0]), _in_words(by_probability[-1])
-        listed = f"{len(apart)} others from {least} to {most}"
+        low, high = _in_words(by_probability[0]), _in_words(by_probability[-1])
+        listed = f"{len(apart)} others from {low} to {high}"
     text = (
         f"the answers do not agree: {_in_words(first)}, but {listed}, whose "
         "intervals do not overlap with its own: this shaking is not what is usual for the "
