@@ -182,7 +182,8 @@ class Curve:
         "motions."
     )
     component: str | None = option(
-        "What the curve's horizontal component means: single, geometric_mean, rotd50 or larger."
+        "What the curve's horizontal component means: single, geometric_mean, rotd50 or larger. "
+        "Left out: single, with a warning."
     )
 
 
