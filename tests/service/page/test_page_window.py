@@ -142,7 +142,8 @@ def test_nothing_is_asked_of_another_host(open_page, service):
     page.fill("#pgv", "1.1")
     opened.settled()
     page.click("#example-record")
-    expect(page.locator("#spectrum-part")).to_be_visible()
+    # the first spectrum of a service waits for its kernels to be compiled
+    expect(page.locator("#spectrum-part")).to_be_visible(timeout=300_000)
     page.get_by_label("angles", exact=True).check()
     opened.settled()
     assert len(opened.requests) > 20
