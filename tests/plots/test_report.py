@@ -109,6 +109,16 @@ def test_bad_questions_leave_no_file(refuses: Refuses, asked: tuple[str, ...], w
     assert not list(Path().iterdir())
 
 
+def test_notes_are_sentences_and_symbols_have_their_index(tmp_path: Path) -> None:
+    for suffix in ("pdf", "html"):
+        path = rbfrag.report(tmp_path / f"a.{suffix}", p2=3.0, kr=0.1, pgv_m_s=30.0)
+        words = words_of(path)
+        assert "did you mean cm/s?" in words
+        assert "cm/s?." not in words
+    page = (tmp_path / "a.html").read_text("utf-8")
+    assert "rectangle of this p² and k<sub>r</sub>" in page
+
+
 def test_a_path_of_another_kind_is_refused(refuses: Refuses) -> None:
     assert ".docx" in refuses("report", *SHAPE, "--out", "a.docx")
 
