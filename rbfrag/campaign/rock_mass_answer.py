@@ -13,7 +13,8 @@ from rbfrag.campaign.shake_rockmass import ShakingProgress, shake
 from rbfrag.errors import InputError
 from rbfrag.files import as_path
 from rbfrag.fragility.intervals import checked_level
-from rbfrag.fragility.predict import Model, spectral
+from rbfrag.fragility.measures import spectral
+from rbfrag.fragility.model import Model
 from rbfrag.frames import Tabular
 from rbfrag.motions.polarity import Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion
@@ -135,7 +136,7 @@ def rockmass(
     blocks = _rock_mass(mass).realise(n, seed)
     stated = {"pgv_m_s": pgv_m_s, "pga_g": pga_g, "tm_s": tm_s, "pgd_m": pgd_m}
     if sa_g is not None:
-        stated |= spectral(sa_g)  # type: ignore[arg-type]
+        stated |= spectral(sa_g)
     measures = {name: value for name, value in stated.items() if value is not None}
     checked_level(level)
     if motion is not None and measures:

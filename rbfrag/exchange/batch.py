@@ -28,7 +28,7 @@ from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.measures import STATED
 from rbfrag.fragility.methods import TOPPLING_BLOCK, methods
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import answer_given
+from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.solver.kinds import model_of_kind
 

@@ -13,7 +13,8 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import FragilityFunction
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import SPECTRAL
-from rbfrag.fragility.predict import Model, answer_given
+from rbfrag.fragility.model import Model
+from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.measure_type import IntensityType
 

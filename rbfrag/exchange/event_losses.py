@@ -12,7 +12,7 @@ import numpy as np
 from rbfrag.exchange.block_table import waiting_blocks
 from rbfrag.exchange.openquake_events import JobFiles, read_events
 from rbfrag.files import as_path
-from rbfrag.fragility.predict import Model
+from rbfrag.fragility.model import Model
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.losses import LossAnswer, Run, event_losses
 from rbfrag.hazards.portfolio import Portfolio

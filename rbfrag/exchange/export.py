@@ -18,7 +18,7 @@ from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text, without_d
 from rbfrag.exchange.share_fragility import share_functions
 from rbfrag.files import output_path, write_text
 from rbfrag.fragility.measures import SPECTRAL
-from rbfrag.fragility.predict import Model
+from rbfrag.fragility.model import Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.curve import ANSWERED
 from rbfrag.hazards.measure_type import openquake_type

@@ -14,7 +14,7 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.block_table import waiting_blocks
 from rbfrag.exchange.shakemap import ShakeMapEvent, at_places, read_shakemap
 from rbfrag.files import as_path
-from rbfrag.fragility.predict import Model
+from rbfrag.fragility.model import Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.map_failures import MapFailures, Places, map_failures

@@ -17,7 +17,7 @@ from rbfrag.exchange.fragility_function import FragilityFunction, discrete_funct
 from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.predict import Model
+from rbfrag.fragility.model import Model
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
 FloatArray = NDArray[np.float64]

@@ -13,7 +13,7 @@ from rbfrag.db.model_file import ModelRow, held_out_loss, unknown_model
 from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.fragility.measures import MEASURES, least_inputs, terms_from
 from rbfrag.fragility.methods import TOPPLING_BLOCK, BlockParameters, methods
-from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.model import FragilityModel, Model
 
 SHIPPED = "the reference that is shipped with rbfrag"
 """What answers are said to come from where no other database is named, or is there."""
@@ -87,7 +87,7 @@ def block_of(given: Collection[str], kind: str | None = None) -> BlockParameters
 
 
 def find_model(
-    model: ModelRow | FragilityModel | str | None,
+    model: Model | None,
     given: Collection[str],
     db: str | PathLike[str] | None = None,
     *,
@@ -190,16 +190,19 @@ def _suited_in(
     of_kind = [row for row in store.rows if row.kind == kind]
     if not of_kind:
         raise UnknownModelError(f"{store.place} holds no {kind} model: {_how_to_make(kind)}")
-    suited = [store.model(row) for row in of_kind if row.term in possible]
-    block = suited[0].method.block if suited else block_of_question
+    suited = sorted((row for row in of_kind if row.term in possible), key=_merit)
+    block = store.model(suited[0]).method.block if suited else block_of_question
     _check_block(kind, block, given, None)
     _check_criterion(kind, block, rotation_deg)
     best: dict[str, FragilityModel] = {}
-    for model in suited:
-        name = model.term.name
-        suits = model.criterion == rotation_deg
-        if suits and (name not in best or _merit(model) > _merit(best[name])):
-            best[name] = model
+    for row in suited:
+        if block.criterion_of(row.diagnostics) != rotation_deg:
+            continue
+        before = best.get(row.term)
+        if before is None:
+            best[row.term] = store.model(row)
+        elif _merit(before.row) == _merit(row):  # else it is no better, and its method not loaded
+            best[row.term] = min(before, store.model(row), key=lambda model: model.form.rank)
     if not best:
         have = ", ".join(f"{row.name} ({row.term}{_of_criterion(row, block)})" for row in of_kind)
         of = "" if block.criterion is None else f" of {_failure(rotation_deg)}"
@@ -229,8 +232,9 @@ def _how_to_make(kind: str) -> str:
     return f"there are models of {', '.join(stored)}"
 
 
-def _merit(model: FragilityModel) -> tuple[bool, float, int]:
-    return model.row.is_default, -held_out_loss(model.row), -model.form.rank
+def _merit(row: ModelRow) -> tuple[bool, float]:
+    """Return what sorts models of one term, the best first, as far as their rows tell."""
+    return not row.is_default, held_out_loss(row)
 
 
 def _check_block(
@@ -274,10 +278,7 @@ def _failure(rotation_deg: float | None) -> str:
 
 
 def _of_criterion(row: ModelRow, block: BlockParameters) -> str:
-    if block.criterion is None:
-        return ""
-    value = row.diagnostics.get(block.criterion)
-    return f", {_failure(value if isinstance(value, int | float) else None)}"
+    return "" if block.criterion is None else f", {_failure(block.criterion_of(row.diagnostics))}"
 
 
 def _measures(given: Collection[str]) -> str:

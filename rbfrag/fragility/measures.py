@@ -9,10 +9,12 @@ import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from rbfrag.errors import InputError
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -217,6 +219,25 @@ SINGLE_TERMS = ("pgv", "pga_tm", "pgd_tm")
 
 BEST_FIRST = tuple(sorted(TERMS, key=lambda name: -TERMS[name].level))
 """The terms by falling skill on held-out earthquakes (docs/evidence/model-choice.md)."""
+
+
+def spectral(sa_g: Mapping[float, T]) -> dict[str, T]:
+    """Return spectral accelerations [g] by name instead of by period [s].
+
+    Raises:
+        InputError: no mapping, or a period of which there is no model.
+    """
+    if not isinstance(sa_g, Mapping):
+        raise InputError(
+            f"sa_g = {sa_g!r}: give accelerations [g] by period [s], such as {{1: 0.4}}"
+        )
+    for period in sa_g:
+        if period not in SPECTRAL:
+            raise InputError(
+                f"sa_g has the period {period!r} s: there are models of SA at "
+                f"{', '.join(f'{each:g}' for each in SPECTRAL)} s"
+            )
+    return {SPECTRAL[period]: value for period, value in sa_g.items()}
 
 
 def intensity_term(name: str) -> Term:

@@ -215,9 +215,7 @@ class FragilityModel:
     @property
     def criterion(self) -> float | None:
         """What counts as failure where there are several criteria; None for the usual one."""
-        name = self.method.block.criterion
-        value = self.row.diagnostics.get(name) if name is not None else None
-        return float(value) if isinstance(value, int | float) else None
+        return self.method.block.criterion_of(self.row.diagnostics)
 
     @property
     def has_exponent(self) -> bool:
@@ -328,6 +326,10 @@ class FragilityModel:
             return Answer(middle, low, high, None, None, eta, log_sigma)
         event_low, event_high = spread.ends(ns.ndtri(middle), quantiles.normal, ns.ndtr)
         return Answer(middle, low, high, event_low, event_high, eta, log_sigma)
+
+
+Model = ModelRow | FragilityModel | str
+"""A model as callers give it: itself, as it is stored, or by the name of a stored one."""
 
 
 def _fit_line(row: ModelRow) -> str:

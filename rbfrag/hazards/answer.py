@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import Model
+from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import checked_years, failure_rate, probability_in
 from rbfrag.hazards.branch_weights import Weights, stated_weights

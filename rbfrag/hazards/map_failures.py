@@ -25,7 +25,7 @@ from scipy.special import ndtr
 from rbfrag.errors import InputError
 from rbfrag.fragility.joint import UNKNOWN, Placement
 from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.fragility.predict import answer_given
+from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.correlations import correlations
 from rbfrag.hazards.site_probability import SiteProbability, described

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.joint import UNKNOWN, Placement
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import Model, answer_given
+from rbfrag.fragility.model import FragilityModel, Model
+from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.annual_rate import Fragility

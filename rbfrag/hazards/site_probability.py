@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from rbfrag.fragility.joint import event_ranges
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import Model, answer_given
+from rbfrag.fragility.model import FragilityModel, Model
+from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import Component

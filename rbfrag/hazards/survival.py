@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.predict import Model
+from rbfrag.fragility.model import Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import Fragility
 from rbfrag.hazards.branch_weights import Weights, stated_weights

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from rbfrag.plots.canvas import (
     MODE_COLOURS,
     ROCK,
+    in_own_style,
     light_grid,
     mode_title,
     new_figure,
@@ -107,6 +108,7 @@ def _resultant(stability: Stability, length: float) -> Point:
 _INK, _RESULTANT = "#222222", "#b2182b"
 
 
+@in_own_style
 def plot_block(
     block: Block, stability: Stability, path: str | PathLike[str], *, title: str = ""
 ) -> Path:

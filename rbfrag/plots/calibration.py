@@ -10,7 +10,14 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.fit.scores import CalibrationBins
-from rbfrag.plots.canvas import light_grid, new_figure, plot_path, save_figure
+from rbfrag.plots.canvas import (
+    in_own_style,
+    light_grid,
+    new_figure,
+    plot_path,
+    save_figure,
+)
+from rbfrag.plots.labels import as_written
 
 COLOURS = ("#1f4e79", "#d98c1f", "#4c9a6a", "#8c2d4f")
 MARKERS = ("o", "s", "^", "D")
@@ -18,6 +25,7 @@ MARKERS = ("o", "s", "^", "D")
 MOST_MODELS = len(COLOURS)
 
 
+@in_own_style
 def plot_calibration(
     models: Mapping[str, CalibrationBins],
     path: str | PathLike[str],
@@ -49,7 +57,7 @@ def plot_calibration(
             x, bins.observed,
             yerr=np.clip([bins.observed - bins.low, bins.high - bins.observed], 0.0, None),
             fmt=MARKERS[number] + "-", ms=4.5, lw=1.0, elinewidth=0.9, capsize=2.0, color=colour,
-            label=name + _scores((scores or {}).get(name, {})),
+            label=as_written(name, 50) + _scores((scores or {}).get(name, {})),
         )  # fmt: skip
         below.plot(bins.predicted, bins.blocks, MARKERS[number] + "-", ms=3.5, lw=0.9, color=colour)
     axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))

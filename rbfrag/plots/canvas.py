@@ -7,10 +7,11 @@ extra brings matplotlib where it is missing (MissingExtraError).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,29 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".png", ".pdf", ".svg")
 """File types that a figure can be saved as."""
+
+
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
+
+
+def in_own_style(draw: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
+    """Let a function draw by matplotlib's defaults, not by the settings of whoever runs it.
+
+    Places and sizes of labels belong to these defaults; TeX, or a dark sheet under halos of
+    white, would spoil them.
+    """
+
+    @wraps(draw)
+    def drawn(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
+        try:
+            from matplotlib import style
+        except ImportError:
+            return draw(*args, **kwargs)  # and let it say what is missing
+        with style.context("default"):
+            return draw(*args, **kwargs)
+
+    return drawn
 
 
 def new_figure(width_in: float = 7.0, height_in: float = 5.0) -> Figure:
@@ -90,12 +114,20 @@ def freeze_layout(figure: Figure) -> None:
 
 
 def written_numbers(axis: Axis, *digits: float) -> None:
-    """Write numbers of these leading digits, without powers of ten, beside a logarithmic axis."""
+    """Write numbers of these leading digits beside a logarithmic axis, powers of ten if need be."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axis.set_major_locator(LogLocator(subs=digits))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value)))
     axis.set_minor_formatter(NullFormatter())
+
+
+def _number(value: float) -> str:
+    digits, power, exponent = f"{value:g}".partition("e")
+    if not power:
+        return digits
+    factor = "" if digits == "1" else rf"{digits}\times"
+    return f"${factor}10^{{{int(exponent)}}}$"
 
 
 def spread_out(

@@ -16,6 +16,7 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import (
     BLUE,
     RED,
+    in_own_style,
     logarithmic,
     new_figure,
     plot_path,
@@ -23,6 +24,7 @@ from rbfrag.plots.canvas import (
     spread_out,
     written_numbers,
 )
+from rbfrag.plots.labels import as_written
 from rbfrag.plots.model_lines import (
     MORE_TERMS,
     HeldMeasures,
@@ -54,9 +56,13 @@ _SPAN = 1.25
 _KR_AXIS_OFF_PT = 52.0
 """From the sheet to the axis of k_r, beyond the labels [points]."""
 
+_USUAL_WIDTH_PT = 350.0
+"""Of axes whose lines are as thick as usual; on narrower ones they would run together [points]."""
+
 _DEFAULT_RANGE = (0.01, 2.0)
 
 
+@in_own_style
 def plot_chart(
     model: FragilityModel, path: str | PathLike[str], held: HeldMeasures | None = None
 ) -> Path:
@@ -107,8 +113,9 @@ def draw_chart(
     digits = _digits(x[-1] / x[0], width_pt, 30.0), _digits(top / bottom, height_pt, 14.0)
     logarithmic(axes, *digits)
     axes.set(xlim=(x[0], x[-1]), ylim=(bottom, top))
+    thin = min(max(width_pt / _USUAL_WIDTH_PT, 0.5), 1.0)
     for probability, y in lines.items():
-        axes.plot(x, y, color=BLUE, lw=1.9 if probability in _BOLD else 0.9)
+        axes.plot(x, y, color=BLUE, lw=thin * (1.9 if probability in _BOLD else 0.9))
     _write_beside(axes, x, lines)
     if held.words:
         _shade_where_not_fitted(axes, model, held)
@@ -246,7 +253,7 @@ def _caption(model: FragilityModel, held: HeldMeasures) -> str:
     n, events = about.get("n"), about.get("events")
     counts = f"fitted on {n} critical blocks of {events} earthquakes; " if n and events else ""
     return (
-        f"Probability that the block topples: model {model.name}\n"
+        f"{as_written(f'Probability that the block topples: model {model.name}', 85)}\n"
         f"{held.words + chr(10) if held.words else ''}"
         f"{counts}shaded: outside the fitted range"
     )

@@ -25,6 +25,7 @@ from rbfrag.plots.canvas import (
     RED,
     density,
     grey_bars,
+    in_own_style,
     legend_below,
     light_grid,
     logarithmic,
@@ -32,6 +33,7 @@ from rbfrag.plots.canvas import (
     plot_path,
     save_figure,
 )
+from rbfrag.plots.labels import as_written
 
 FloatArray = NDArray[np.float64]
 
@@ -88,6 +90,7 @@ def lobe_line(name: str, frequency_ratio: ArrayLike) -> FloatArray:
 STYLES = {"rectangular": ("-", RED), "half-sine": ("--", BLUE), "triangular": ("-.", "#2e7d32")}
 
 
+@in_own_style
 def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data: str = "") -> Path:
     """Draw critical k_r/PGA against ω_m/p with the lines of lobes half a mean period long.
 
@@ -134,7 +137,7 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
     motions = len(set(table.motion_id[shown].tolist()))
     axes.set_title(
         f"{x.size} critical blocks, {motions} motions of {events} earthquakes"
-        + (f"\n{data}" if data else ""),
+        + (f"\n{as_written(data, 85)}" if data else ""),
         fontsize=10,
     )
     light_grid(axes)
@@ -193,6 +196,7 @@ def vertical_pairs(without: CombinationTable, with_vertical: CombinationTable) -
     )
 
 
+@in_own_style
 def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
     """Draw the critical k_r/PGA with vertical motion against that without, and their ratio.
 

@@ -19,12 +19,14 @@ from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import (
     BLUE,
     RED,
+    in_own_style,
     legend_below,
     light_grid,
     new_figure,
     plot_path,
     save_figure,
 )
+from rbfrag.plots.labels import as_written
 from rbfrag.plots.model_lines import model_answers
 
 if TYPE_CHECKING:
@@ -53,10 +55,15 @@ FIXED = {
 
 EVENT = "#b8b8b8"
 _COLOURS = (RED, "#4d9221", "#e08214", "#762a83", "#636363")
+_STYLES = ("-", "--", "-.", ":")
+MOST_BESIDE = len(_COLOURS) * len(_STYLES)
+_ROW_IN = 0.18
+"""Height of a row of the legend [inch]."""
 _POINTS = 241
 _START = 1e-6
 
 
+@in_own_style
 def plot_curve(
     model: FragilityModel,
     p2: float,
@@ -88,8 +95,8 @@ def plot_curve(
             probabilities at levels of it.
 
     Raises:
-        InputError: a value that cannot be used, a measure that is missing, or a path that
-            cannot be written.
+        InputError: a value that cannot be used, a measure that is missing, too many to compare
+            with, or a path that cannot be written.
     """
     plot_path(path)
     varied = model.term.inputs[0] if over is None else over
@@ -106,7 +113,11 @@ def plot_curve(
             f"{' and '.join(missing)} for the curve"
         )
     held = {name: float((fixed or {})[name]) for name in others}
-    figure = new_figure(7.0, 4.6)
+    if len(beside or {}) > MOST_BESIDE:
+        raise InputError(
+            f"{len(beside or {})} fragilities to compare with: a figure shows at most {MOST_BESIDE}"
+        )
+    figure = new_figure(7.0, 4.6 + _ROW_IN * math.ceil(len(beside or {}) / 2))
     axes = figure.add_subplot()
     draw_curve(axes, model, {"p2": p2, "kr": kr}, varied, held, level=level, beside=beside)
     y = kr * STANDARD_GRAVITY_M_S2 / np.sqrt(p2)
@@ -120,7 +131,8 @@ def plot_curve(
     axes.set_title(
         f"block $p^2$ = {p2:.3g} s$^{{-2}}$, $k_r$ = {kr:.3g}, $y$ = {y:.3g} m/s"
         + (f"; {conditions}" if conditions else "")
-        + f"\nmodel {model.name}{counts}",
+        + "\n"
+        + as_written(f"model {model.name}{counts}", 85),
         fontsize=10,
     )
     legend_below(figure, 2)
@@ -171,9 +183,8 @@ def draw_curve(
     fitted = np.where(known, answer.probability, np.nan)
     axes.plot(x, fitted, color=BLUE, lw=2.0, label="P: share over all earthquakes and sites")
     for i, (name, other) in enumerate((beside or {}).items()):
-        style = ("-", "--", "-.", ":")[i // len(_COLOURS) % 4]
-        colour = _COLOURS[i % len(_COLOURS)]
-        axes.plot(x, other(x), style, color=colour, lw=1.4, label=name)
+        colour, style = _COLOURS[i % len(_COLOURS)], _STYLES[i // len(_COLOURS)]
+        axes.plot(x, other(x), style, color=colour, lw=1.4, label=as_written(name, 45))
     axes.set(xlim=(0.0, end), ylim=(0.0, 1.0))
     axes.set(xlabel=AXIS[varied], ylabel="probability that the block topples")
     light_grid(axes)

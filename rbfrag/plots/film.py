@@ -15,7 +15,14 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.files import output_path, written_whole
-from rbfrag.plots.canvas import ROCK, light_grid, mode_title, new_figure
+from rbfrag.plots.canvas import (
+    ROCK,
+    in_own_style,
+    light_grid,
+    mode_title,
+    new_figure,
+)
+from rbfrag.plots.labels import as_written
 from rbfrag.plots.response import BLOCK, MOTION, STRENGTH
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.results import FloatArray, Response, ResponseHistory
@@ -38,6 +45,7 @@ MARGIN_S = 0.5
 """Rest shown before the first motion and after the last [s]."""
 
 
+@in_own_style
 def film(
     response: Response,
     block: Block,
@@ -87,7 +95,8 @@ def film(
         trace.axvline(begin_s, color=ROCK, lw=1.0, ls=":")
     scale = "true scale" if exaggerate == 1.0 else f"displacements times {exaggerate:g}"
     pace = "" if speed == 1.0 else f", {speed:.2g} times as fast as it was"
-    figure.suptitle(f"{title}\n{mode_title(response.kind)}, {scale}{pace}", fontsize=10)
+    verdict = f"{mode_title(response.kind)}, {scale}{pace}"
+    figure.suptitle(f"{as_written(title, 75)}\n{verdict}", fontsize=10)
 
     def show(frame: int) -> tuple[Any, ...]:
         patch.set_xy(_closed(shown[frame]))

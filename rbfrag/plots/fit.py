@@ -18,6 +18,7 @@ from rbfrag.plots.canvas import (
     RED,
     density,
     grey_bars,
+    in_own_style,
     legend_below,
     logarithmic,
     new_figure,
@@ -26,6 +27,7 @@ from rbfrag.plots.canvas import (
     save_figure,
 )
 from rbfrag.plots.equation import equation_lines
+from rbfrag.plots.labels import as_written
 from rbfrag.plots.model_lines import (
     depends_on_size,
     failure_line,
@@ -45,6 +47,7 @@ _LINES = (
 _BARS = 40
 
 
+@in_own_style
 def plot_fit(
     table: CombinationTable,
     model: FragilityModel,
@@ -164,8 +167,8 @@ def plot_fit(
     n_events = len(set(table.event_id[shown].tolist()))
     n_censored = int(np.isin(table.status.astype(str), ("below_limit", "no_motion")).sum())
     figure.suptitle(
-        f"{model.name}: {x.size} critical blocks of {n_events} earthquakes\n"
-        f"not shown: {n_censored} whose critical block lies below the search limit\n"
+        f"{as_written(model.name, 60)}: {x.size} critical blocks of {n_events} earthquakes\n"
+        f"not shown: {n_censored} critical blocks below the search limit\n"
         + "\n".join(equation_lines(model)),
         fontsize=10,
     )

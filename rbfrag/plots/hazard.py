@@ -10,7 +10,14 @@ import numpy as np
 
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure, written_numbers
+from rbfrag.plots.canvas import (
+    in_own_style,
+    new_figure,
+    plot_path,
+    save_figure,
+    written_numbers,
+)
+from rbfrag.plots.labels import as_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +34,7 @@ def measure_title(curve: HazardCurve) -> str:
     return _NAMES.get(curve.measure, f"spectral acceleration, {curve.imt} [g]")
 
 
+@in_own_style
 def plot_contribution(curve: HazardCurve, answer: HazardAnswer, path: str | PathLike[str]) -> Path:
     """Draw a hazard curve and, below it, where the failures of the first block come from.
 
@@ -41,10 +49,11 @@ def plot_contribution(curve: HazardCurve, answer: HazardAnswer, path: str | Path
     draw_contribution(top, bottom, curve, answer)
     rate = float(answer.annual_rate[0])
     place = f" at {curve.place}" if curve.place else ""
-    top.set_title(
-        f"hazard of {curve.imt}{place}: the block topples {rate:.3g} times a year\n"
-        f"({100 * answer.level:g} % interval {answer.ci_low[0]:.3g} to {answer.ci_high[0]:.3g}, "
-        f"model {answer.model}; {100 * answer.probability[0]:.3g} % in {answer.years:g} years)",
+    figure.suptitle(
+        as_written(f"hazard of {curve.imt}{place}, model {answer.model}", 75)
+        + f"\nthe block fails {rate:.3g} times a year ({100 * answer.level:g} % interval "
+        f"{answer.ci_low[0]:.3g} to {answer.ci_high[0]:.3g}),\n"
+        f"{100 * answer.probability[0]:.3g} % in {answer.years:g} years",
         fontsize=10,
     )
     return save_figure(figure, path)

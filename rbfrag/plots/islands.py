@@ -9,8 +9,14 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.plots.canvas import BLUE, new_figure, save_figure, written_numbers
-from rbfrag.plots.labels import write_near
+from rbfrag.plots.canvas import (
+    BLUE,
+    in_own_style,
+    new_figure,
+    save_figure,
+    written_numbers,
+)
+from rbfrag.plots.labels import as_written, write_near
 from rbfrag.solver.excitation import Excitation, excitation
 from rbfrag.solver.results import CriticalResult
 from rbfrag.solver.toppling_run import runner
@@ -38,6 +44,7 @@ NEAR_CRITICAL = 0.03
 """Relative distance shown on both sides of the critical value where there is no island."""
 
 
+@in_own_style
 def plot_islands(
     motion: GroundMotion,
     result: CriticalResult,
@@ -81,7 +88,7 @@ def plot_islands(
     _legend(whole, result)
     name = f"{title}{', reversed' if result.polarity == 'reverse' else ''}"
     name += ", with vertical motion" if vertical is not None else ""
-    figure.suptitle(f"{name}\n{_verdict(result)}", fontsize=10)
+    figure.suptitle(f"{as_written(name, 85)}\n{_verdict(result)}", fontsize=10)
     save_figure(figure, path)
 
 

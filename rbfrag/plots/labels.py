@@ -1,4 +1,4 @@
-"""Labels that can be read wherever they stand: a white halo, and a place off the lines.
+"""Labels that can be read wherever they stand: a white halo, and a place off the lines; names.
 
 A label is written beside its place of the data. When the figure is saved, where all is laid out,
 each label takes the first of the places around its point where it covers no line, no point and no
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +26,21 @@ _MOVABLE = "_movable label"
 
 _OFF_THE_AXES, _ON_TEXT, _ON_LINE = 100.0, 20.0, 4.0
 """What it costs a place to leave the axes, and to cover a text or a line."""
+
+
+def as_written(name: str, letters: int, lines: int = 3) -> str:
+    """Return a name out of a file for a figure: its letters alone, in a few lines.
+
+    A dollar sign begins no formula, and a legend leaves out no name for its first underscore.
+
+    Args:
+        name: what a file or the user calls something.
+        letters: the most letters of a line.
+        lines: the most lines.
+    """
+    shown = "".join(letter if letter.isprintable() else " " for letter in name)
+    text = "\n".join(wrap(shown, letters, max_lines=lines, placeholder=" …")).replace("$", r"\$")
+    return f" {text}" if text.startswith("_") else text
 
 
 def halo(width: float = 2.5) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from rbfrag.hazards.losses import Exceedance, LossAnswer
 from rbfrag.plots.canvas import (
     BLUE,
     RED,
+    in_own_style,
     legend_below,
     light_grid,
     new_figure,
@@ -28,6 +29,7 @@ _COLOURS = (BLUE, RED)
 _LOWEST = 0.05  # of one event in the effective time
 
 
+@in_own_style
 def plot_losses(answer: LossAnswer, path: str | PathLike[str]) -> Path:
     """Draw the curves of exceedance of failures and, where there is one, of the loss.
 
@@ -49,13 +51,13 @@ def plot_losses(answer: LossAnswer, path: str | PathLike[str]) -> Path:
         raise InputError("there is no curve to draw: no block fails in a sample, or none was drawn")
     figure = new_figure(5.2 * len(panels), 4.4)
     all_axes = figure.subplots(1, len(panels), squeeze=False)[0]
+    scenario = answer.events.is_scenario
     for axes, (title, curves) in zip(all_axes, panels, strict=True):
         _draw(axes, answer, curves)
         axes.set_xlabel(f"{title}, at least")
+        axes.set_ylabel("probability given the event" if scenario else "times a year [1/a]")
         open_corner(axes)
     light_grid(*all_axes)
-    scenario = answer.events.is_scenario
-    all_axes[0].set_ylabel("probability given the event" if scenario else "times a year [1/a]")
     legend_below(figure, 4)
     return save_figure(figure, path)
 
@@ -63,9 +65,11 @@ def plot_losses(answer: LossAnswer, path: str | PathLike[str]) -> Path:
 def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedance]]) -> None:
     axes.set_yscale("log")
     drawn = [curve for curve in curves.values() if curve]
-    if drawn and max(one.value for curve in drawn for one in curve) > 30.0:
+    values = [one.value for curve in drawn for one in curve]
+    if drawn and max(values) > 30.0:
         axes.set_xscale("log")
-        written_numbers(axes.xaxis, 1.0)
+        digits = (1.0,) if max(values) > 30.0 * min(values) else (1.0, 2.0, 5.0)
+        written_numbers(axes.xaxis, *digits)
     place = axes.get_subplotspec()
     assert place is not None  # it was made as one of a row
     first = not place.colspan.start
@@ -94,5 +98,9 @@ def _draw(axes: Axes, answer: LossAnswer, curves: Mapping[str, Sequence[Exceedan
         axes.set_ylim(min(max(lowest, _LOWEST / effective), 0.5 / effective), highest)
         axes.axhspan(
             axes.get_ylim()[0], 1.0 / effective, color="#dddddd", alpha=0.6, lw=0.0,
-            label=f"less than once in {effective:.6g} years" if first else None,
+            label=f"less than once in {_years(effective)} years" if first else None,
         )  # fmt: skip
+
+
+def _years(value: float) -> str:
+    return f"{value:,.0f}" if value >= 100.0 else f"{value:.3g}"

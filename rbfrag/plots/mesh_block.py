@@ -14,13 +14,14 @@ from rbfrag.plots.canvas import (
     BLUE,
     RED,
     ROCK,
+    in_own_style,
     legend_below,
     light_grid,
     new_figure,
     plot_path,
     save_figure,
 )
-from rbfrag.plots.labels import write_near
+from rbfrag.plots.labels import as_written, write_near
 from rbfrag.solver.block.mesh_block import ContactHull, MeshBlock, Weakest
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ _LINES = ("-", "--", "-.", ":")
 """For contacts within the heights that an answer is repeated with, in rising order."""
 
 
+@in_own_style
 def plot_mesh_block(block: MeshBlock, path: str | PathLike[str]) -> Path:
     """Draw the contacts of a block in plan, and k_r towards every azimuth.
 
@@ -51,7 +53,8 @@ def plot_mesh_block(block: MeshBlock, path: str | PathLike[str]) -> Path:
     _draw_plan(plan, block, weakest)
     _draw_polar(polar, block, weakest)
     figure.suptitle(
-        f"{block.name}: least $k_r$ = {weakest.kr:.4g} towards {weakest.azimuth_deg:.0f}°, "
+        f"{as_written(block.name, 60)}: "
+        f"least $k_r$ = {weakest.kr:.4g} towards {weakest.azimuth_deg:.0f}°, "
         f"$p^2$ = {weakest.p2:.3g} s$^{{-2}}$, contacts within {block.hull.contact_mm:g} mm",
         fontsize=11,
     )

@@ -15,7 +15,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.measures import STATED
 from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import answer_given
+from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 

@@ -10,7 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import MODE_COLOURS, mode_title, new_figure, plot_path, save_figure
+from rbfrag.plots.canvas import (
+    MODE_COLOURS,
+    in_own_style,
+    mode_title,
+    new_figure,
+    plot_path,
+    save_figure,
+)
 from rbfrag.plots.labels import halo
 from rbfrag.solver.block.arrays import BlockArray
 from rbfrag.solver.stability.arrays import StabilityArray, stability_arrays
@@ -18,6 +25,7 @@ from rbfrag.solver.stability.modes import LOCKED, MODES, STABLE, UNSTABLE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.contour import ContourSet
     from matplotlib.text import Text
 
 FloatArray = NDArray[np.float64]
@@ -35,6 +43,8 @@ _HATCHED = (
 )
 _LEVELS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0)
 _NARROW_G = 0.4
+_PLACES = 80
+_VALUE_APART_PX = 2.0
 # An image keeps vector files small.
 _WHOLE_CHART: dict[str, Any] = {
     "extent": (-90.0, 90.0, -90.0, 90.0),
@@ -45,6 +55,7 @@ _WHOLE_CHART: dict[str, Any] = {
 _FINE_LEVELS = tuple(0.05 * i for i in range(1, 60))
 
 
+@in_own_style
 def plot_modes(
     path: str | PathLike[str],
     *,
@@ -89,7 +100,7 @@ def plot_modes(
     axes = figure.add_subplot()
     chart = _Chart(axes, nodes, is_block, stability)
     _draw_regions(chart)
-    values = _draw_yields(chart)
+    contours = _draw_yields(chart)
     covered = _draw_blocks(axes, nodes, *shown)
     names = _name_regions(chart, back_fracture, covered)
     _explain_hatches(chart)
@@ -102,7 +113,8 @@ def plot_modes(
     axes.set_ylabel(r"angle of the toe, $\alpha_3$ [°]")
     figure.suptitle(title or _title(phi_deg, phi_back_deg, beta_deg, back_fracture), fontsize=10)
     figure.draw_without_rendering()  # the extents of texts are known once the layout is
-    _hide_illegible(axes, values, names)
+    for lines, here in contours:
+        _write_values(chart, lines, here, names)
     return save_figure(figure, path)
 
 
@@ -171,9 +183,9 @@ def _draw_regions(chart: _Chart) -> None:
             )  # fmt: skip
 
 
-def _draw_yields(chart: _Chart) -> list[Text]:
-    """Draw the contours; return their values."""
-    labels: list[Text] = []
+def _draw_yields(chart: _Chart) -> list[tuple[ContourSet, NDArray[np.bool_]]]:
+    """Draw the contours; return those of each mode and where it has them."""
+    drawn: list[tuple[ContourSet, NDArray[np.bool_]]] = []
     values = chart.stability.yield_acceleration
     # Mode by mode: between topple and confined topple the yield jumps.
     for code, mode in enumerate(MODES):
@@ -185,10 +197,8 @@ def _draw_yields(chart: _Chart) -> list[Text]:
             levels=_LEVELS if np.ptp(values[here]) > _NARROW_G else _FINE_LEVELS,
             colors=MODE_COLOURS[mode], linewidths=1.0, zorder=3,
         )  # fmt: skip
-        labels += chart.axes.clabel(lines, fontsize=7.5, fmt="%g", inline_spacing=3)
-    for label in labels:
-        label.set(**halo(1.5))
-    return labels
+        drawn.append((lines, here))
+    return drawn
 
 
 def _name_regions(chart: _Chart, back_fracture: bool, covered: NDArray[np.bool_]) -> list[Text]:
@@ -203,7 +213,7 @@ def _name_regions(chart: _Chart, back_fracture: bool, covered: NDArray[np.bool_]
             continue
         text = mode_title(mode)
         if mode == "slump" and not back_fracture:
-            text = "turns back\nabout the heel"
+            text = "turns\nback"
         values = chart.stability.yield_acceleration[stable]
         if values.size and np.ptp(values) < 1e-9:
             text += f"\n{values[0]:.3f} g"
@@ -215,17 +225,40 @@ def _name_regions(chart: _Chart, back_fracture: bool, covered: NDArray[np.bool_]
     return names
 
 
-def _hide_illegible(axes: Axes, values: list[Text], names: list[Text]) -> None:
-    """Hide the contour values that a region's name, the chart's edge or another value covers."""
-    frame = axes.get_window_extent()
-    boxes = [name.get_window_extent() for name in names]
-    for value in values:
-        box = value.get_window_extent()
-        inside = frame.contains(*box.min) and frame.contains(*box.max)
-        if not inside or any(box.overlaps(other) for other in boxes):
-            value.set_visible(False)
+def _write_values(
+    chart: _Chart, lines: ContourSet, here: NDArray[np.bool_], texts: list[Text]
+) -> None:
+    """Write the values of contours where their region is widest, off all texts; append them.
+
+    A line without such a place has no value beside it.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    axes = chart.axes
+    to_rim: Any = distance_transform_edt(np.pad(here, 1))
+    for level, path in zip(lines.levels, lines.get_paths(), strict=True):
+        places = np.asarray(path.vertices)
+        if not places.size:
+            continue
+        places = places[:: max(1, len(places) // _PLACES)]
+        column, row = np.clip(((places + 90.0) / _STEP_DEG).astype(int), 0, len(here) - 1).T
+        value = axes.text(
+            0.0, 0.0, f"{level:g}", ha="center", va="center", fontsize=7.5,
+            color=lines.get_edgecolor()[0], zorder=4, **halo(2.0),
+        )  # fmt: skip
+        value.set_in_layout(False)
+        taken = [text.get_window_extent() for text in texts]
+        for i in np.argsort(-to_rim[row + 1, column + 1], kind="stable"):
+            value.set_position(places[i])
+            box = value.get_window_extent().padded(_VALUE_APART_PX)
+            corners = axes.transData.inverted().transform(box.corners())
+            column_of, row_of = np.floor((corners + 90.0) / _STEP_DEG).astype(int).T
+            inside = (np.abs(corners) < 90.0).all() and here[row_of, column_of].all()
+            if inside and not any(box.overlaps(other) for other in taken):
+                texts.append(value)
+                break
         else:
-            boxes.append(box)
+            value.remove()
 
 
 def _explain_hatches(chart: _Chart) -> None:

@@ -16,8 +16,7 @@ from rbfrag.db.models import load_model
 from rbfrag.db.queries import combination_table
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.measures import MEASURES
-from rbfrag.fragility.predict import spectral
+from rbfrag.fragility.measures import MEASURES, spectral
 from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.motions.polarity import POLARITIES, Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion

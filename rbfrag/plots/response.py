@@ -9,8 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import BLUE, light_grid, mode_title, new_figure, save_figure
-from rbfrag.plots.labels import write_near
+from rbfrag.plots.canvas import (
+    BLUE,
+    in_own_style,
+    light_grid,
+    mode_title,
+    new_figure,
+    save_figure,
+)
+from rbfrag.plots.labels import as_written, write_near
 from rbfrag.solver.results import FloatArray, Outcome, Response, ResponseHistory
 
 if TYPE_CHECKING:
@@ -28,6 +35,7 @@ TALLEST_SHOWN = 6.0
 """Rotation over the critical angle beyond which a toppling block is of no interest."""
 
 
+@in_own_style
 def plot_response(
     response: Response,
     path: str | os.PathLike[str],
@@ -114,7 +122,7 @@ def _panels(
 
 
 def _title(name: str, reverse: bool, verdict: str) -> str:
-    return f"{name}{', reversed' if reverse else ''}\n{verdict}"
+    return f"{as_written(name + (', reversed' if reverse else ''), 85)}\n{verdict}"
 
 
 def _window(time_s: FloatArray, ratio: FloatArray, response: Response) -> tuple[float, float]:
@@ -144,6 +152,7 @@ def _verdict(response: Response, p2: float, kr: float) -> str:
 ROTATION = "#b7791f"
 
 
+@in_own_style
 def plot_motion(
     response: Response, path: str | os.PathLike[str], *, title: str = "", reverse: bool = False
 ) -> None:
@@ -162,8 +171,10 @@ def plot_motion(
     history = response.history
     if history is None or history.displacement_m is None or history.strength_g is None:
         raise InputError("this response holds no displacements in time: ask for its history")
+    known = np.isfinite(history.strength_g)
+    label = f"strength of the block{'' if known.all() else ', while its contacts hold'}"
     figure, upper, lower = _panels(
-        history, history.strength_g, "strength of the block", _least_top(history.strength_g)
+        history, history.strength_g, label, _least_top(history.strength_g)
     )
     largest = float(np.abs(history.displacement_m).max())
     factor, unit = (
@@ -222,6 +233,7 @@ def _motion_verdict(response: Response) -> str:
     return where
 
 
+@in_own_style
 def plot_rocking(
     response: Response, path: str | os.PathLike[str], *, title: str = "", reverse: bool = False
 ) -> None:
@@ -255,7 +267,7 @@ def plot_rocking(
     lower.plot(history.time_s, ratio, color=BLOCK, lw=1.2)
     lower.plot(
         history.impact_s, np.zeros(history.impact_s.size), "|", color="black", ms=6, mew=0.7,
-        label=f"{history.impact_s.size} impacts",
+        label="impacts",
     )  # fmt: skip
     lower.legend(loc="upper right", fontsize=8, framealpha=0.9)
     for balance, name in ((1.0, "balance on the toe"), (-1.0, "balance on the heel")):

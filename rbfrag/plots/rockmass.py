@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy as np
 from rbfrag.plots.canvas import (
     MODE_COLOURS,
     MODE_LINES,
+    in_own_style,
     light_grid,
     mode_title,
     new_figure,
@@ -21,7 +21,7 @@ from rbfrag.plots.canvas import (
     plot_path,
     save_figure,
 )
-from rbfrag.plots.labels import write_near
+from rbfrag.plots.labels import as_written, write_near
 from rbfrag.rockmasses.counts import (
     Crossing,
     crossings,
@@ -45,6 +45,7 @@ TITLE_WIDTH = 90
 """Letters of a line of the title, so that the label of a record is not cut at the edges."""
 
 
+@in_own_style
 def plot_rockmass(
     realisations: Realisations, path: str | PathLike[str], *, title: str = ""
 ) -> Path:
@@ -131,6 +132,7 @@ PARTS = (
 """Parts of a bar: what they are made of, what they are called, and their colours."""
 
 
+@in_own_style
 def plot_failures(
     shaken: ShakenMass, path: str | PathLike[str], *, level: float = 0.95, title: str = ""
 ) -> Path:
@@ -235,7 +237,7 @@ def _shaken_title(shaken: ShakenMass) -> str:
     turned = "" if limits.rotation_deg is None else f"by more than {limits.rotation_deg:g}° or "
     about = f"{shaken.shaking.motion.label}: {shaken.realisations.n_blocks:,} blocks of a rock mass"
     return (
-        f"{fill(about, TITLE_WIDTH)}\n"
+        f"{as_written(about, TITLE_WIDTH)}\n"
         f"a slide fails beyond {limits.displacement_m:g} m, "
         f"a block that turns {turned}past recovery"
     )

@@ -14,6 +14,7 @@ from rbfrag.plots.canvas import (
     MODE_COLOURS,
     RED,
     ROCK,
+    in_own_style,
     light_grid,
     mode_title,
     new_figure,
@@ -53,6 +54,7 @@ class YieldLine(NamedTuple):
     end_deg: float
 
 
+@in_own_style
 def plot_rotation(
     block: Block,
     path: str | PathLike[str],
@@ -97,7 +99,9 @@ def plot_rotation(
         theta = np.linspace(0.0, end_deg, _POINTS)
         k = law.yield_g(block, theta, **planes, back_follows=share)
         shown = np.where(np.isfinite(k), k, np.nan)
-        label = "the back plane stays" if share == 0.0 else f"it turns by {share:g} of the rotation"
+        label = {0.0: "the back plane stays", 1.0: "it turns with the block"}.get(
+            share, f"it turns by {share:g} of the rotation"
+        )
         axes.plot(theta, shown, style, color=colour, lw=1.8, label=label)
         least = int(np.argmin(k))
         if 0 < least < k.size - 1:

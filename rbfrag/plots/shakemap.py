@@ -11,9 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots.canvas import (
+    in_own_style,
+    new_figure,
+    plot_path,
+    save_figure,
+)
 from rbfrag.plots.coast import draw_coast
-from rbfrag.plots.labels import write_near
+from rbfrag.plots.labels import as_written, write_near
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +32,7 @@ LEAST = 1e-3
 _KM_PER_DEGREE = 111.195
 
 
+@in_own_style
 def plot_shakemap(
     lon: FloatArray,
     lat: FloatArray,
@@ -85,7 +91,8 @@ def plot_shakemap(
     draw_coast(axes, west, east, south, north)
     _scale(axes, west, east, south, north, middle)
     axes.set(xlabel="longitude [°]", ylabel="latitude [°]")
-    axes.set_title(title, fontsize=10)
+    lines = (as_written(line, 65) for line in title.splitlines())
+    axes.set_title("\n".join(lines), fontsize=10)
     bar = figure.colorbar(drawn, ax=axes, extend="min", label="probability of toppling", shrink=0.9)
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     return save_figure(figure, path)

@@ -16,6 +16,7 @@ from rbfrag.motions.polarity import POLARITIES, Polarity
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import (
+    in_own_style,
     legend_below,
     light_grid,
     logarithmic,
@@ -24,6 +25,7 @@ from rbfrag.plots.canvas import (
     save_figure,
     written_numbers,
 )
+from rbfrag.plots.labels import as_written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,6 +48,7 @@ def block_size_m(p2: ArrayLike) -> NDArray[np.float64]:
     return size
 
 
+@in_own_style
 def plot_spectrum(
     motions: Sequence[GroundMotion],
     path: str | PathLike[str],
@@ -80,7 +83,8 @@ def plot_spectrum(
         for polarity in polarities:
             x = toppling_spectrum(motion, sizes, polarity)
             highest = max(highest, float(np.max(x)))
-            label = name if len(polarities) == 1 or polarity == "forward" else None
+            first = polarity == polarities[0]
+            label = as_written(name, 42) if first else None
             axes.plot(sizes, x, LINES[polarity], color=colour, lw=1.7, label=label)
         axes.axhline(motion.pgv_m_s, color=colour, lw=0.9, ls=":")
         highest = max(highest, motion.pgv_m_s)

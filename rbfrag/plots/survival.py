@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from rbfrag.hazards.survival import BranchSurvival, SurvivalAnswer
 from rbfrag.plots.canvas import (
     BLUE,
     RED,
+    in_own_style,
     legend_below,
     light_grid,
     new_figure,
@@ -25,17 +26,21 @@ from rbfrag.plots.canvas import (
     written_numbers,
 )
 from rbfrag.plots.hazard import measure_title
-from rbfrag.plots.labels import write_near
+from rbfrag.plots.labels import as_written, write_near
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _COLOURS = (BLUE, "#d98c1f", "#4c8f4c", "#8c2d4f", "#2c9fad", "#7a6fae", "#6b6b6b", "#b59a2e")
 _LINES = ("-", "--", "-.", ":")
+_MOST_NAMED = 10
+"""More curves are drawn alike, and of their branches those of most weight are named."""
+
 _FACTORS = np.geomspace(1e-4, 1e4, 401)
 _LEAST_RATE = 1e-7
 
 
+@in_own_style
 def plot_survival(
     curves: Sequence[HazardCurve], answer: SurvivalAnswer, path: str | PathLike[str]
 ) -> Path:
@@ -68,20 +73,24 @@ def plot_survival(
     return save_figure(figure, path)
 
 
-def _style(i: int) -> dict[str, str]:
+def _style(i: int, curves: int) -> dict[str, Any]:
+    if curves > _MOST_NAMED:
+        return {"color": "#8a8a8a", "lw": 0.6, "alpha": 0.7}
     n = len(_COLOURS)
-    return {"color": _COLOURS[i % n], "linestyle": _LINES[i // n % len(_LINES)]}
+    return {"color": _COLOURS[i % n], "linestyle": _LINES[i // n], "lw": 1.4}
 
 
 def _short(name: str) -> str:
     """Return a name without the folders of a file."""
-    return name.rpartition("/")[2]
+    return as_written(name.rpartition("/")[2], 24, lines=2)
 
 
 def _draw_curves(axes: Axes, curves: Sequence[HazardCurve], answer: SurvivalAnswer) -> None:
     for i, (curve, branch) in enumerate(zip(curves, answer.branches, strict=True)):
         label = _short(branch.name)
-        axes.loglog(curve.levels, curve.annual_rate, label=label, lw=1.5, **_style(i))
+        if len(curves) > _MOST_NAMED:
+            label = "_named by none" if i else f"each of {len(curves)} curves"
+        axes.loglog(curve.levels, curve.annual_rate, label=label, **_style(i, len(curves)))
     highest = max(float(curve.annual_rate.max()) for curve in curves)
     lowest = min(float(curve.annual_rate.min()) for curve in curves)
     axes.set_ylim(max(lowest, _LEAST_RATE), 2.0 * highest)
@@ -92,7 +101,8 @@ def _draw_curves(axes: Axes, curves: Sequence[HazardCurve], answer: SurvivalAnsw
 
 def _draw_survival(axes: Axes, answer: SurvivalAnswer) -> None:
     for i, branch in enumerate(answer.branches):
-        axes.semilogx(_FACTORS, _percent(branch.standing), lw=1.3, **_style(i))
+        style = _style(i, len(answer.branches))
+        axes.semilogx(_FACTORS, _percent(branch.standing), **style)
     if len(answer.branches) > 1:
         axes.semilogx(
             _FACTORS, _percent(answer.standing), color="black", lw=2.2, label=answer.hazard
@@ -118,12 +128,17 @@ def _percent(standing: Standing) -> NDArray[np.float64]:
 
 
 def _draw_weights(axes: Axes, branches: Sequence[BranchSurvival]) -> None:
+    named = sorted(branches, key=lambda one: -(one.weight_given_standing or 0.0))[:_MOST_NAMED]
+    title = "branches"
+    if len(named) < len(branches):
+        branches, title = named, f"{_MOST_NAMED} of {len(branches)} branches"
     at = np.arange(len(branches))
     before = [100.0 * (one.weight or 0.0) for one in branches]
     after = [100.0 * (one.weight_given_standing or 0.0) for one in branches]
     axes.barh(at - 0.2, before, 0.38, color="#bbbbbb", label="weight before")
     axes.barh(at + 0.2, after, 0.38, color=RED, label="weight given standing")
-    axes.set_yticks(at, [_short(one.name) for one in branches])
+    size = 10.0 if len(branches) <= 5 else 8.0
+    axes.set_yticks(at, [_short(one.name) for one in branches], fontsize=size)
     axes.invert_yaxis()
     axes.set_xlabel("weight [%]")
-    axes.set_title("branches", fontsize=10)
+    axes.set_title(title, fontsize=10)

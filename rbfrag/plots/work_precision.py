@@ -6,7 +6,13 @@ import os
 from collections.abc import Sequence
 from typing import Protocol
 
-from rbfrag.plots.canvas import light_grid, logarithmic, new_figure, save_figure
+from rbfrag.plots.canvas import (
+    in_own_style,
+    light_grid,
+    logarithmic,
+    new_figure,
+    save_figure,
+)
 from rbfrag.plots.labels import write_near
 
 ROUNDING = 1e-16
@@ -49,6 +55,7 @@ class Point(Protocol):
         """Median time [s]."""
 
 
+@in_own_style
 def plot_work_precision(
     points: Sequence[Point], path: str | os.PathLike[str], *, title: str = ""
 ) -> None:

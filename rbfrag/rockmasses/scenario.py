@@ -15,7 +15,9 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.checks import refusals
 from rbfrag.fragility.intervals import checked_level
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.predict import Model, answer_given, predict
+from rbfrag.fragility.model import Model
+from rbfrag.fragility.predict import predict
+from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.rockmasses.joint_sets import Realisations
 from rbfrag.solver.quantity import positive

@@ -9,8 +9,9 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import ValidationError
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.comparison import prediction_document
 from rbfrag.fragility.lookup import find_model, models_in_memory
-from rbfrag.fragility.predict import answer_given, prediction_document
+from rbfrag.fragility.prediction import answer_given
 from rbfrag.service.documents import PredictAnswer, PredictArrays
 from rbfrag.service.parameters import (
     MEASURES,

@@ -53,6 +53,12 @@ def _texts(options: Any) -> dict[str, str]:
 
 def _described(engine: Engine) -> dict[str, Any]:
     inspector = inspect(engine)
+    with engine.connect() as connection:
+        without_rowid = set(
+            connection.scalars(
+                text("SELECT name FROM sqlite_master WHERE sql LIKE '%WITHOUT ROWID%'")
+            )
+        )
     return {
         table: {
             "columns": [
@@ -70,7 +76,7 @@ def _described(engine: Engine) -> dict[str, Any]:
                 (str(i["name"]), i["column_names"], i["unique"], _texts(i.get("dialect_options")))
                 for i in inspector.get_indexes(table)
             ),
-            "options": inspector.get_table_options(table),
+            "rowid": table not in without_rowid,
         }
         for table in inspector.get_table_names()
         if table != VERSION_TABLE

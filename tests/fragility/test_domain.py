@@ -21,7 +21,8 @@ from rbfrag.fragility.fit.fitting import fit_source
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.methods import SINGLE, method_named
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import Prediction, predict
+from rbfrag.fragility.predict import predict
+from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
 from tests.fragility.outcome_draws import drawn_outcomes
 

@@ -18,7 +18,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import ParameterErrors, packed, quantiles_of, student_half_width
 from rbfrag.fragility.methods import SINGLE, arrays, methods
 from rbfrag.fragility.model import NO_EVENT_RANGE, FragilityModel
-from rbfrag.fragility.predict import answer_given
+from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from tests.fragility.portfolio_draws import SHARED
 

@@ -8,7 +8,7 @@ import pytest
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import load_model, save_model, set_default
-from rbfrag.errors import DatabaseNotFoundError, InputError, UnknownModelError
+from rbfrag.errors import DatabaseNotFoundError, InputError, ModelError, UnknownModelError
 from rbfrag.fragility.lookup import SHIPPED, find_model, stored_rows
 from rbfrag.fragility.model_list import model_list
 from rbfrag.fragility.predict import predict
@@ -166,6 +166,30 @@ def test_the_best_score_answers_unless_another_was_chosen(scored, default, measu
     path = scored({"pgv": 0.20, "pga_tm": 0.15, "pgd_tm": 0.4}, default)
     for _ in range(2):
         assert find_model(None, measures, path).name == name
+
+
+def stored(path, rows):
+    with opened_database(path, create=True) as engine, engine.begin() as connection:
+        for each in rows:
+            save_model(connection, each)
+    return path
+
+
+def test_a_worse_model_that_is_not_known_here_hides_no_better_one(tmp_path, row):
+    one = row("pgv")
+    better = replace(one, diagnostics={**one.diagnostics, "scores": {"log_loss_held_out": 0.2}})
+    path = stored(tmp_path / "newer.db", [better, replace(one, name="newer", method="oracle")])
+    assert predict(3.0, 0.1, pgv_m_s=0.6, db=path).model == better.name
+    with pytest.raises(ModelError, match="update rbfrag"):
+        predict(3.0, 0.1, pgv_m_s=0.6, db=path, model="newer")
+
+
+def test_of_models_without_scores_the_better_method_answers(tmp_path):
+    names = ("wls-pgv", "lognormal-pgv", "bounded-pgv")
+    rows = [replace(each, diagnostics={}) for each in stored_rows(REFERENCE) if each.name in names]
+    assert len(rows) == len(names)
+    found = find_model(None, ["p2", "kr", "pgv_m_s"], stored(tmp_path / "unscored.db", rows))
+    assert found.name == "bounded-pgv"
 
 
 def test_the_first_fitted_is_no_default_by_being_first(scored):

@@ -14,7 +14,7 @@ from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.methods.overturning import BLOCK
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import Prediction, answer_given
+from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 
 G = 9.80665

@@ -11,7 +11,8 @@ from scipy.stats import norm
 
 from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import Prediction, predict
+from rbfrag.fragility.predict import predict
+from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
 
 G = 9.80665

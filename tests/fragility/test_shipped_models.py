@@ -18,7 +18,7 @@ from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.methods import arrays, method_named
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import answer_given
+from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 
 FloatArray = NDArray[np.float64]

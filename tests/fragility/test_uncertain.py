@@ -14,7 +14,8 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.fragility.methods import SINGLE, arrays, method_named, methods
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import Prediction, answer_given, predict
+from rbfrag.fragility.predict import predict
+from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.solver.scatter import fraction
 from tests.fragility.test_overturning import T2, one, stored

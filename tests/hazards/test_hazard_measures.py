@@ -12,7 +12,7 @@ from scipy.integrate import quad
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.predict import Prediction, answer_given
+from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.conversions import CONVERSIONS
 from rbfrag.hazards.curve import HazardCurve, hazard_curve

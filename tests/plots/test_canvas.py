@@ -2,9 +2,12 @@ import subprocess
 import sys
 
 import pytest
+from matplotlib import rc_context, rcParams
 
 from rbfrag.errors import InputError
-from rbfrag.plots.canvas import new_figure, plot_path, save_figure
+from rbfrag.plots import rotation
+from rbfrag.plots.canvas import new_figure, plot_path, save_figure, written_numbers
+from rbfrag.solver.block.geometry import Block
 
 BEGINNINGS = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
 
@@ -66,3 +69,33 @@ except MissingExtraError as error:
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert "pip install 'rbfrag[plot]'" in done.stdout, done.stderr
+
+
+def test_figures_do_not_depend_on_the_settings_of_the_user(tmp_path, caught):
+    figures = caught(rotation)
+    block = Block.from_angles(45.0, 65.0, 1.0)
+    mine = {"text.usetex": True, "axes.facecolor": "black", "font.size": 30.0, "lines.color": "red"}
+    for settings in ({}, mine):
+        with rc_context(settings):
+            rotation.plot_rotation(block, tmp_path / "a.png", beta_deg=0.0, phi_deg=35.0)
+            assert rcParams["text.usetex"] is bool(settings)
+    assert [figure.axes[0].xaxis.label.get_fontsize() for figure in figures] == [10.0, 10.0]
+    assert [figure.axes[0].get_facecolor() for figure in figures] == [(1.0, 1.0, 1.0, 1.0)] * 2
+
+
+@pytest.mark.parametrize(
+    ("ends", "written"),
+    [
+        ((0.5, 300.0), {"1", "10", "100"}),
+        ((5e-6, 2e-3), {"$10^{-5}$", "0.0001", "0.001"}),
+        ((5e4, 2e7), {"100000", "$10^{6}$", "$10^{7}$"}),
+    ],
+)
+def test_numbers_beside_a_logarithmic_axis(figure, ends, written):
+    axes = figure.axes[0]
+    axes.set_xscale("log")
+    written_numbers(axes.xaxis, 1.0)
+    axes.set_xlim(*ends)
+    shown = {axes.xaxis.get_major_formatter()(place) for place in axes.get_xticks()}
+    assert written <= shown
+    assert not [text for text in shown if "e" in text]

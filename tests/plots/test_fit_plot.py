@@ -93,7 +93,7 @@ def test_what_the_figure_says(table, model, tmp_path, drawn):
     assert variance.get_xlabel() == "peak ground velocity, PGV [m/s]"
     assert "[m/s]" in axes.get_ylabel()
     assert "360 critical blocks of 7 earthquakes" in figure.get_suptitle()
-    assert "40 whose critical block lies below the search limit" in figure.get_suptitle()
+    assert "40 critical blocks below the search limit" in figure.get_suptitle()
     assert len(axes.collections[0].get_offsets()) == 360
     assert sum(patch.get_height() for patch in above.patches) == 360
     assert sum(patch.get_width() for patch in beside.patches) == 360

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from rbfrag.plots.labels import settle_labels, write_near
+from rbfrag.plots.labels import as_written, settle_labels, write_near
 
 
 @pytest.fixture
@@ -52,3 +52,26 @@ def test_a_label_at_the_edge_stays_inside_and_a_fixed_one_where_it_is(axes) -> N
     assert frame.contains(*moved.get_window_extent().min)
     assert frame.contains(*moved.get_window_extent().max)
     assert fixed.xyann == (4, 4)
+
+
+def test_names_are_written_as_they_are(axes) -> None:
+    for name, shown in (
+        ("from $5 to $6", "from $5 to $6"),
+        ("_hidden", " _hidden"),
+        ("tab\tand\x07bell", "tab and bell"),
+    ):
+        (line,) = axes.plot([0.0, 1.0], [0.0, 1.0], label=as_written(name, 40))
+        axes.set_title(as_written(name, 40) + "\n$p^2$ = 3")
+        (written,) = axes.legend(handles=[line]).get_texts()
+        assert written.get_text().replace(r"\$", "$") == shown
+        assert line in axes.get_legend_handles_labels()[0]
+        axes.figure.draw_without_rendering()
+
+
+def test_a_long_name_has_lines_and_an_end() -> None:
+    lines = as_written("name " * 100, 30).split("\n")
+    assert len(lines) == 3
+    assert all(len(line) <= 30 for line in lines)
+    assert lines[-1].endswith("…")
+    unbroken = as_written("x" * 70, 30).split("\n")
+    assert [len(line) for line in unbroken] == [30, 30, 10]

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 
 from rbfrag.errors import InputError
 from rbfrag.plots import modes as module
+from rbfrag.plots.canvas import MODE_COLOURS
 from rbfrag.plots.modes import MOST_POINTS, plot_modes
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.modes import MODES
@@ -61,6 +63,32 @@ def test_a_name_stands_in_its_region(tmp_path, caught):
         found = stability(Block.from_angles(a1, a3, 1.0), beta_deg=20.0, phi_deg=35.0)
         assert text.get_text().split("\n")[0] == found.mode.replace("_", " ")
         assert found.state == "stable"
+
+
+@pytest.mark.parametrize("back", [True, False])
+@pytest.mark.parametrize(("phi", "beta"), [(35.0, 0.0), (40.0, 20.0), (50.0, -15.0)])
+def test_a_value_stands_on_its_contour_in_its_region(
+    phi, beta, back, tmp_path, caught, overlapping
+):
+    figures = caught(module)
+    plot_modes(tmp_path / "a.png", phi_deg=phi, beta_deg=beta, back_fracture=back)
+    (figure,) = figures
+    axes = figure.axes[0]
+    values = [text for text in axes.texts if text.get_fontsize() == 7.5]
+    assert len(values) > 3
+    by_colour = {colour: mode for mode, colour in MODE_COLOURS.items()}
+    for text in values:
+        a1, a3 = text.get_position()
+        found = stability(
+            Block.from_angles(a1, a3, 1.0), beta_deg=beta, phi_deg=phi, back_fracture=back
+        )
+        assert found.mode == by_colour[to_hex(text.get_color())]
+        assert found.yield_acceleration == pytest.approx(float(text.get_text()), rel=0.05, abs=0.01)
+    assert overlapping(figure, [*names(figure), *values]) == []
+    frame = axes.get_window_extent()
+    for box in (text.get_window_extent() for text in values):
+        assert frame.contains(*box.min)
+        assert frame.contains(*box.max)
 
 
 def test_a_few_blocks_are_points_and_many_a_histogram(tmp_path, caught):

@@ -133,7 +133,7 @@ def predict(
         )
         _show_summary(summary, json=printing.json)
         return
-    from rbfrag.fragility.predict import prediction_document
+    from rbfrag.fragility.comparison import prediction_document
 
     remarks: tuple[str, ...] = ()
     kind = failure.kind

@@ -234,6 +234,11 @@ class BlockParameters:
         uncertain = (self.size, self.strength, *self.fractions)
         return {f"{name}_sigma": name for name in uncertain if name is not None}
 
+    def criterion_of(self, diagnostics: Mapping[str, object]) -> float | None:
+        """Return a model's criterion of failure from what is stored; None for the usual one."""
+        value = diagnostics.get(self.criterion) if self.criterion is not None else None
+        return float(value) if isinstance(value, int | float) else None
+
     def filled(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return arrays with what a block has of itself where an option is NaN.
 

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from rbfrag.errors import InputError
+from rbfrag.fragility.comparison import prediction_document
 from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.measures import SPECTRAL, STATED
 from rbfrag.fragility.methods import TOPPLING_BLOCK
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import prediction_document
 from rbfrag.fragility.words import block_in_words, percent, prediction_in_words
 from rbfrag.hazards.answer import HazardAnswer, hazard
 from rbfrag.hazards.curve import HazardCurve
@@ -97,7 +97,7 @@ class Contents:
         versions: program, model and data.
         block: the block that is drawn.
         stability: how it stands.
-        drawn: what is drawn.
+        drawn: what the drawing is of, as its title.
         numbers: numbers of the block that the model reads.
         measures: the shaking, by name.
         model: the model that answered.
@@ -242,9 +242,9 @@ def _drawn(
         size = float(block_size_m(positive(numbers["p2"], "p2", "1/s²")))
         block = Block.rectangle(2.0 * size * math.cos(angle), 2.0 * size * math.sin(angle))
         conditions: dict[str, Any] = {"beta_deg": 0.0}
-        drawn = "the rectangle of this p² and k_r on a level base"
+        drawn = "The rectangle of this p² and k_r on a level base"
     else:
-        block, conditions, drawn = described.block, dict(described.conditions), "the block to scale"
+        block, conditions, drawn = described.block, dict(described.conditions), "The block to scale"
     conditions.setdefault("phi_deg", _ROUGH_DEG)
     if free:
         conditions["back_fracture"] = False

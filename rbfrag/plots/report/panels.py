@@ -32,7 +32,7 @@ class Panel(NamedTuple):
 
 def panels_of(contents: Contents) -> list[Panel]:
     """Return the pictures of a report, in their order."""
-    panels = [Panel("block", f"Block: {contents.drawn}", lambda part: _block(part, contents))]
+    panels = [Panel("block", contents.drawn, lambda part: _block(part, contents))]
     if contents.model.term.inputs[0] in AXIS:
         title = "Probability of failure of this block"
         panels.append(Panel("curve", title, lambda part: _curve(part, contents)))

@@ -8,7 +8,12 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.files import written_whole
-from rbfrag.plots.canvas import BLUE, freeze_layout, new_figure
+from rbfrag.plots.canvas import (
+    BLUE,
+    freeze_layout,
+    in_own_style,
+    new_figure,
+)
 from rbfrag.plots.labels import settle_labels
 from rbfrag.plots.report.contents import Contents, Table
 from rbfrag.plots.report.panels import panels_of
@@ -30,13 +35,17 @@ _STEP_IN = 0.158
 _TALLEST_ROW_IN = 3.7
 """Of pictures: two rows of them are spread over the page, one is not."""
 
-_WIDE, _NARROW, _FINE = 104, 80, 136
-"""Letters that a line holds of small text, of the first sentence and of the notes."""
+_TITLE, _WIDE, _NARROW, _FINE, _CELL = 48, 104, 80, 136, 30
+"""Letters that a line holds of the title, of small text, of the first sentence, of the notes, and
+that a cell does."""
+
+_TITLE_STEP_IN = 0.27
 
 _RC: Any = {"pdf.fonttype": 42, "font.size": 8.5, "axes.titlesize": 9}
 """Letters stay letters, so that the page can be searched and copied from."""
 
 
+@in_own_style
 def write_sheet(contents: Contents, title: str, date: str, target: Path) -> None:
     """Write a report as a page of A4, PDF or PNG by the suffix of the file.
 
@@ -62,7 +71,8 @@ def write_sheet(contents: Contents, title: str, date: str, target: Path) -> None
 
 
 def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
-    head_in = 0.85 + 0.17 * len(_head_lines(contents))
+    titles = wrap(title, _TITLE, max_lines=3, placeholder=" …")
+    head_in = 0.85 + _TITLE_STEP_IN * (len(titles) - 1) + 0.17 * len(_head_lines(contents))
     tables_in = 0.1 + _STEP_IN * max(map(_lines_of, contents.columns()))
     foot_in = 0.35 + 0.13 * len(_foot_lines(contents))
     panels = panels_of(contents)
@@ -71,7 +81,7 @@ def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
     heights = [head_in, tables_in, *[row_in] * len(rows)]
     heights.append(_HEIGHT_IN - sum(heights))
     parts = figure.subfigures(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
-    _write_head(parts[0], contents, title, date, head_in)
+    _write_head(parts[0], contents, titles, date, head_in)
     _write_tables(parts[1], contents, tables_in)
     for part, row in zip(parts[2:-1], rows, strict=True):
         # one picture alone is as wide as two
@@ -106,14 +116,24 @@ def _lines_of(tables: Sequence[Table]) -> float:
     return sum(1.5 + len(rows) for _, rows in tables)
 
 
-def _write_head(part: SubFigure, contents: Contents, title: str, date: str, tall_in: float) -> None:
+def _write(part: SubFigure, x: float, y: float, text: str, **style: Any) -> None:
+    """Write letters as they are, the index of k_r where it belongs."""
+    shown = text.replace("k_r", "k\N{LATIN SUBSCRIPT SMALL LETTER R}")
+    part.text(x, y, shown, va="center", parse_math=False, **style)
+
+
+def _write_head(
+    part: SubFigure, contents: Contents, titles: Sequence[str], date: str, tall_in: float
+) -> None:
     y = 1.0 - 0.42 / tall_in
-    part.text(_LEFT, y, title, fontsize=15, fontweight="bold", color=BLUE, va="center")
-    part.text(_RIGHT, y, date, fontsize=9, ha="right", va="center")
-    y -= 0.33 / tall_in
+    _write(part, _RIGHT, y, date, fontsize=9, ha="right")
+    for line in titles:
+        _write(part, _LEFT, y, line, fontsize=15, fontweight="bold", color=BLUE)
+        y -= _TITLE_STEP_IN / tall_in
+    y -= (0.33 - _TITLE_STEP_IN) / tall_in
     for line, is_first in _head_lines(contents):
         size, weight = (11, "bold") if is_first else (9, "normal")
-        part.text(_LEFT, y, line, fontsize=size, fontweight=weight, va="center")
+        _write(part, _LEFT, y, line, fontsize=size, fontweight=weight)
         y -= (0.2 if is_first else 0.165) / tall_in
 
 
@@ -122,11 +142,12 @@ def _write_tables(part: SubFigure, contents: Contents, tall_in: float) -> None:
     for x, wide, tables in zip((_LEFT, 0.56), (0.235, 0.19), contents.columns(), strict=True):
         y = 1.0 - 0.5 * step
         for heading, rows in tables:
-            part.text(x, y, heading, fontsize=9, fontweight="bold", color=BLUE, va="center")
+            _write(part, x, y, heading, fontsize=9, fontweight="bold", color=BLUE)
             for name, value in rows:
                 y -= step
-                part.text(x, y, name, fontsize=8.2, va="center")
-                part.text(x + wide, y, value, fontsize=8.2, va="center")
+                _write(part, x, y, name, fontsize=8.2)
+                shown = value if len(value) <= _CELL else f"{value[: _CELL - 1]}…"
+                _write(part, x + wide, y, shown, fontsize=8.2)
             y -= 1.5 * step
 
 
@@ -134,5 +155,5 @@ def _write_foot(part: SubFigure, contents: Contents, tall_in: float) -> None:
     lines = _foot_lines(contents)
     y = 0.25 / tall_in + 0.13 * (len(lines) - 1) / tall_in
     for line in lines:
-        part.text(_LEFT, y, line, fontsize=6.8, color="#333333", va="center")
+        _write(part, _LEFT, y, line, fontsize=6.8, color="#333333")
         y -= 0.13 / tall_in

@@ -9,7 +9,11 @@ from html import escape
 from pathlib import Path
 
 from rbfrag.files import write_text
-from rbfrag.plots.canvas import freeze_layout, new_figure
+from rbfrag.plots.canvas import (
+    freeze_layout,
+    in_own_style,
+    new_figure,
+)
 from rbfrag.plots.labels import settle_labels
 from rbfrag.plots.report.contents import Contents, Table
 from rbfrag.plots.report.panels import Panel, panels_of
@@ -39,6 +43,7 @@ sub { font-size: 75%; line-height: 0; }
 """
 
 
+@in_own_style
 def write_html(contents: Contents, title: str, date: str, target: Path) -> None:
     """Write a report as a page that needs nothing but itself.
 

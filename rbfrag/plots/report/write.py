@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rbfrag.errors import InputError
 from rbfrag.files import output_path
-from rbfrag.fragility.predict import spectral
+from rbfrag.fragility.measures import spectral
 from rbfrag.hazards.curve_file import CurveLike
 from rbfrag.plots.canvas import new_figure
 from rbfrag.plots.report.contents import Contents, RateQuestion, contents_of
@@ -109,7 +109,7 @@ def report(
         "tm_s": tm_s, "pgd_m": pgd_m,
     }  # fmt: skip
     given = {name: value for name, value in stated.items() if value is not None}
-    given |= spectral(sa_g or {})  # type: ignore[arg-type]
+    given |= spectral(sa_g or {})
     write_report(
         out, described, given, kind=kind, model=model, level=level, db=db, title=title, date=date,
         rate=RateQuestion(curve, imt, site, component, years=years),

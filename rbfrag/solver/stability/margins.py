@@ -134,7 +134,6 @@ class Finding:
         mode: failure mode.
         state: state.
         k: yield acceleration of the mode.
-        ky: yield acceleration of sliding.
         beta_deg: dip of the base [deg].
         phi_deg: friction angle of the base [deg].
         phi_back_deg: friction angle of the back plane [deg].
@@ -147,7 +146,6 @@ class Finding:
     mode: ModeName
     state: StateName
     k: float
-    ky: float
     beta_deg: float
     phi_deg: float
     phi_back_deg: float

@@ -1,0 +1,283 @@
+"""The probability that a block fails, by one model: the answer, and what gives it.
+
+For single numbers neither numpy nor any other library is loaded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.intervals import Quantiles, checked_level, quantiles_of
+from rbfrag.fragility.methods import SINGLE
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.unknown_outcomes import NOTABLE_SHARE, in_words
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from numpy.typing import ArrayLike
+
+    from rbfrag.fragility.checks import Finding, Judgement
+    from rbfrag.fragility.prediction_array import PredictionArray
+
+_SINGLE_TYPES = (float, int, str, bytes)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Probability that one block fails in one motion.
+
+    Args:
+        kind: how the block fails.
+        probability: P, between 0 and 1.
+        ci_low: lower end of the confidence interval of P: how well the share of such blocks that
+            fail over all earthquakes and sites is known.
+        ci_high: upper end of it.
+        event_low: lower end of the share of such blocks at many sites that fails in one single
+            earthquake; None where the model does not know what its blocks share.
+        event_high: upper end of it.
+        level: confidence level of the interval, and probability of the range of one earthquake.
+        model: name of the model that answered.
+        term: its intensity term.
+        method: how it was fitted.
+        failure: what the probability is one of, in words.
+        y_m_s: velocity k g/p of the block [m/s]; None where it has no size.
+        intensity_m_s: the intensity term of the motion [m/s].
+        in_domain: True when block and motion lie in the ranges that were fitted.
+        warnings: sentences about suspicious input or an answer to be doubted.
+        pgv_over_pga_s: PGV over PGA [s] where both are known, else None: what tells long from
+            short pulses where Tm is not known.
+        median_displacement_m: the displacement that is exceeded with P = 1/2 [m]; None where the
+            kind has none, where the block does not move and where it is uncertain.
+        unknown_share: of the outcomes that the model was fitted to, of like strength and shaking,
+            the share that is not known because blocks left their model before they failed; None
+            where all are known.
+        block_sd: standard deviation of P over what an uncertain block may be; None where it is
+            certain.
+        data: the database that the model is of; None of a model that was given itself.
+    """
+
+    kind: str
+    probability: float
+    ci_low: float
+    ci_high: float
+    event_low: float | None
+    event_high: float | None
+    level: float
+    model: str
+    term: str
+    method: str
+    failure: str
+    y_m_s: float | None
+    intensity_m_s: float
+    in_domain: bool
+    warnings: tuple[str, ...] = ()
+    pgv_over_pga_s: float | None = None
+    median_displacement_m: float | None = None
+    unknown_share: float | None = None
+    block_sd: float | None = None
+    data: str | None = field(default=None, compare=False)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract."""
+        return {**vars(self), "warnings": list(self.warnings)}
+
+    # not Tabular: `rbfrag predict` starts without its module
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Yield the one row, so that ``pandas.DataFrame(answer)`` is the table."""
+        yield from self.to_frame().to_dict("records")
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the answer as a pandas table of one row."""
+        from rbfrag.frames import columns_of, frame_of
+
+        return frame_of(columns_of(self))
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows."""
+        from rbfrag.frames import html_of
+
+        return html_of(self.to_frame())
+
+
+@dataclass(frozen=True)
+class MotionPrediction(Prediction):
+    """Probability that one block fails in a recorded motion of unknown direction.
+
+    Every number of :class:`Prediction` is the mean of the two polarities.
+
+    Args:
+        forward: the answer where positive samples drive forward rotation.
+        reverse: the answer where they drive backward.
+    """
+
+    forward: Prediction | None = None
+    reverse: Prediction | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the answer under the keys of the JSON contract, and both polarities."""
+        result = super().as_dict()
+        both = {name: result.pop(name) for name in ("forward", "reverse")}
+        result["polarities"] = {
+            name: None if answer is None else answer.as_dict() for name, answer in both.items()
+        }
+        return result
+
+
+def answer_given(
+    model: FragilityModel,
+    given: Mapping[str, ArrayLike],
+    level: float,
+    *,
+    nan: Literal["propagate", "raise"] = "propagate",
+    interval: bool = True,
+    weights: ArrayLike | None = None,
+) -> Prediction | PredictionArray:
+    """Return the answer of one model for values by name; see :func:`predict`."""
+    for name in model.method.block.names:
+        if name not in given:
+            raise InputError(
+                f"{name} is missing: a block of kind {model.kind} is given by "
+                f"{' and '.join(model.method.block.names)}"
+            )
+    quantiles = quantiles_of(checked_level(level))
+    if weights is not None:
+        from rbfrag.fragility.uncertain import drawn_model
+
+        model, given = drawn_model(model, given, weights)
+    elif not model.method.block.sigmas.keys().isdisjoint(given):
+        # Kept apart: most questions are about certain blocks, and need no numpy.
+        from rbfrag.fragility.uncertain import uncertain_model
+
+        model, given = uncertain_model(model, given)
+    singles: dict[str, float] = {}
+    for name, value in given.items():
+        if type(value) is float:  # for speed
+            singles[name] = value  # type: ignore[unreachable]
+        elif is_single(value):
+            singles[name] = single(name, value)
+        else:
+            break
+    else:
+        return _answer_single(model, singles, quantiles)
+    # Kept apart so that single numbers do not load numpy.
+    from rbfrag.fragility.prediction_array import predict_many
+
+    return predict_many(model, given, quantiles, interval=interval, refuse_nan=nan == "raise")
+
+
+def is_single(value: object) -> bool:
+    """Return whether a value is one number (or something else that is no array)."""
+    if isinstance(value, _SINGLE_TYPES):
+        return True
+    shape = getattr(value, "shape", None)
+    if shape is not None:
+        return len(shape) == 0
+    return not hasattr(value, "__len__") and not hasattr(value, "__iter__")
+
+
+def single(name: str, value: object) -> float:
+    """Return a value as a float."""
+    if isinstance(value, bool | str | bytes):
+        raise InputError(f"{name} = {value!r} is not a number: give a number or an array")
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} = {value!r} is not a number: give a number or an array") from None
+
+
+def _answer_single(
+    model: FragilityModel, given: dict[str, float], quantiles: Quantiles
+) -> Prediction:
+    method, warnings = model.method, model.notes
+    try:
+        values = model.with_ratios(method.block.completed(given, model.term, SINGLE))
+        clear = not model.uncertain and is_clear(model, values)
+    except (ArithmeticError, ValueError):  # the checks find the words
+        clear = False
+    if clear:
+        answer = model.answer(values, quantiles, SINGLE, given)
+        x, in_domain = values["intensity_m_s"], True
+    else:
+        judgement, sentences = _answer_with_diagnostics(model, given, quantiles)
+        answer, values, x, _, in_domain, _ = judgement
+        warnings = (*warnings, *sentences)
+    probability, low, high, event_low, event_high, eta, log_sigma, block_sd, _ = answer
+    median = None
+    if method.median_of is not None and eta is not None:
+        # the asked value, not the one that is adjusted for the base's dip
+        median = given[method.median_of] * math.exp(eta * math.exp(log_sigma))
+    share = None
+    if model.unknown is not None:
+        share = model.unknown.share(values)
+        if share >= NOTABLE_SHARE:
+            warnings = (*warnings, in_words(share))
+    return Prediction(
+        model.row.kind,
+        probability,
+        low,
+        high,
+        event_low,
+        event_high,
+        quantiles.level,
+        model.row.name,
+        model.term.name,
+        method.name,
+        model.row.kind if method.failure is None else method.failure(given, model.criterion),
+        values.get("y_m_s"),
+        x,
+        in_domain,
+        warnings,
+        values.get("pgv_over_pga_s"),
+        median,
+        share,
+        block_sd,
+        model.data,
+    )
+
+
+def is_clear(model: FragilityModel, values: Mapping[str, float]) -> bool:
+    """Return whether there is nothing to say about a question but its probability."""
+    for name, low, high in model.clear_ranges(values):
+        if not low <= values[name] <= high:
+            return False
+    block, method = model.method.block, model.method
+    if "pga_g" in values and block.at_rest.holds(values):
+        return False
+    for bound in model.form.bounds:
+        if bound.holds(values):
+            return False
+    for bound in (*block.refuses, *block.doubts):
+        if bound.holds(values):
+            return False
+    if method.doubts is not None and any(
+        holds for holds, _, _ in method.doubts(model.parameters, values, SINGLE)
+    ):
+        return False
+    return model.spread is None or model.spread.holds(values, SINGLE)
+
+
+def _answer_with_diagnostics(
+    model: FragilityModel, given: dict[str, float], quantiles: Quantiles
+) -> tuple[Judgement, list[str]]:
+    # Kept apart: most questions need no words.
+    from rbfrag.fragility.checks import answer_with_findings
+
+    sentences: list[str] = []
+
+    def say(holds: bool, finding: Finding) -> None:
+        if holds:
+            sentences.append(finding.about(finding.value))
+
+    def refuse(holds: bool, finding: Finding) -> None:
+        if holds:
+            raise InputError(finding.about(finding.value))
+
+    judgement = answer_with_findings(
+        model, given, tuple(given), quantiles, SINGLE,
+        say=say, refuse=refuse, unstable=refuse, nothing=False,
+    )  # fmt: skip
+    return judgement, sentences
