@@ -95,7 +95,7 @@ def update_rows(
         DatabaseError: such a row was altered; a digest of the changed row would hide that.
     """
     for row in connection.execute(select(table).where(where).with_for_update()).mappings().all():
-        refuse_altered(table, row)
+        refuse_altered(table, {**row})
         changed = _digested(table, {**row, **values})
         connection.execute(
             update(table)
