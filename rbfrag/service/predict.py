@@ -111,7 +111,7 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
             "term": answers.term,
             "method": answers.method,
             "data": answers.data,
-            "warnings": list(answers.notes),
+            "warnings": [*answers.notes, *_unusable(answers)],
         }
     )
 
@@ -131,6 +131,20 @@ def _numbers_of_rectangles(
     free_standing = kind is not None and model_of_kind(kind).free_standing
     numbers = rectangle_columns(columns, free_standing=free_standing)
     return {BLOCK_COLUMNS[name]: values.tolist() for name, values in numbers.items()}
+
+
+def _unusable(answers: Any) -> tuple[str, ...]:
+    """Return how many elements have no answer, as of tables, and the first of them."""
+    import numpy as np
+
+    from rbfrag.fragility.unusable import unusable_in_words
+
+    missing = np.flatnonzero(np.isnan(answers.probability)).tolist()
+    first = missing[:1]
+    return unusable_in_words(
+        len(missing), answers.probability.size, [f"element {i}" for i in first],
+        [answers.reason[i] for i in first],
+    )  # fmt: skip
 
 
 def _with_null(values: Any) -> list[float | None]:

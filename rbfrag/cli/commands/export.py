@@ -36,12 +36,17 @@ class FunctionOptions(BlocksOptions):
 
     def keywords(self) -> tuple[dict[str, Any], tuple[str, ...]]:
         """Return the keywords of `rbfrag.export`, and what is to be said of the blocks."""
-        table, is_class, remarks = self.toppling_blocks(name=self.name)
+        given = self.toppling_blocks()
         keywords = {
-            "blocks": table, "one_class": is_class, "imt": self.imt, "name": self.name,
-            "levels": self.levels, "model": self.model, "db": self.db,
+            "one_class": given.is_class, "imt": self.imt, "name": self.name, "levels": self.levels,
+            "model": self.model, "db": self.db,
         }  # fmt: skip
-        return keywords, remarks
+        if given.rows is None and not given.is_class:
+            return {**keywords, "p2": given.columns["p2_1_s2"], "kr": given.columns["kr"]}, (
+                given.remarks
+            )
+        keywords["blocks"] = given.question
+        return keywords, given.remarks
 
 
 @app.command("nrml", epilog="Example:  rbfrag export nrml --height 2.4 --width 0.5 --out block.xml")

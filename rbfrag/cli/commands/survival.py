@@ -88,10 +88,13 @@ def survival(
     weighted again by what the standing blocks say of each.
     """
     from rbfrag.hazards.curve_file import as_curves
+    from rbfrag.hazards.model_blocks import ALL_STAND
     from rbfrag.hazards.survival import survival as answered
 
     check_files(plot=plot)
-    table, _, remarks = blocks.toppling_blocks(standing)
+    table, _, remarks, rows = blocks.toppling_blocks(standing)
+    if rows is not None:
+        rows.whole(ALL_STAND)
     read = as_curves(curves, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
     answer = answered(
         read, table["p2_1_s2"], table["kr"], age_years=known.age, age_sd_years=known.age_sd,
