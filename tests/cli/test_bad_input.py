@@ -11,11 +11,6 @@ from tests.cli.conftest import Refuses, Shell
 from tests.synthetic import shaking, write_at2, write_suite
 
 
-@pytest.fixture
-def record(tmp_path: Path) -> Path:
-    return write_at2(tmp_path / "record.AT2", shaking(3))
-
-
 @pytest.mark.parametrize("value", ["0", "-1", "nan", "inf"])
 @pytest.mark.parametrize("option", ["--p2", "--kr"])
 def test_block_values(refuses: Refuses, record: Path, option: str, value: str) -> None:

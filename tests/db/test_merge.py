@@ -126,7 +126,6 @@ class TestTogether:
 
     @settings(
         max_examples=8,
-        deadline=None,
         suppress_health_check=[HealthCheck.function_scoped_fixture],
     )
     @given(
