@@ -21,7 +21,8 @@ from rbfrag.db.model_file import read_models
 from rbfrag.db.models import save_model
 from rbfrag.exchange.batch import predict_table
 from rbfrag.exchange.block_draws import read_draws
-from rbfrag.exchange.block_table import waiting_blocks, write_block_table
+from rbfrag.exchange.block_rows import waiting_blocks
+from rbfrag.exchange.block_table import write_block_table
 from rbfrag.exchange.fragility_function import (
     FragilityFunction,
     discrete_function,

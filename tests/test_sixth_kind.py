@@ -65,10 +65,10 @@ class Falls(Kind):
         ground = measures.pga_g * STANDARD_GRAVITY_M_S2
         return math.sqrt(case.p2) * measures.pgv_m_s / ground * Y_OVER_PGV
 
-    def run_cases(self, motion, vertical, polarity, cases, **asked):
+    def run_cases(self, shaking, cases, request):
         results = []
         for case in cases:
-            k = self.grid(case, motion)
+            k = self.grid(case, shaking.motion)
             words = tuple("toppled" if each < 1.0 else "stable" for each in k)
             results.append(CaseResult(None, SearchPoints(k, np.where(k < 1.0, np.nan, 0.0), words)))
         return results

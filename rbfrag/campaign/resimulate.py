@@ -29,7 +29,7 @@ from rbfrag.db.stored_combination import (
     stored_combination,
 )
 from rbfrag.errors import RbfragError
-from rbfrag.solver.kind import Case
+from rbfrag.solver.kind import Case, CaseRequest, Shaking
 from rbfrag.solver.kinds import model_of_kind
 from rbfrag.solver.results import (
     MAP_DEPTH,
@@ -183,32 +183,29 @@ def _compute(connection: Connection, stored: StoredCombination) -> ComputedAgain
     values = stored.values
     kind = model_of_kind(str(values["kind"]))
     case = Case(kind.kind, values["p2"], stored.block, stored.settings)
-    polarity = values["polarity"]
     motion = load_motion(connection, stored.motion_id)
     vertical = None
     if stored.vertical_motion_id is not None:
         vertical = load_motion(connection, stored.vertical_motion_id)
-    (answer,) = kind.run_cases(
-        motion,
-        vertical,
-        polarity,
-        [case],
+    shaking = Shaking(motion, vertical, values["polarity"])
+    request = CaseRequest(
         search=values["status"] != "not_searched",
         grid=bool((stored.grid >= 0).any()),
         full_map=stored.intervals.k_lo.size > 0,
         map_depth=stored.campaign_settings.get("map_depth") or MAP_DEPTH,
     )
+    (answer,) = kind.run_cases(shaking, [case], request)
     ends = ends_of(answer.grid)
     if answer.critical is not None:
         ends = {**ends_of(answer.critical.points), **ends}
     others = tuple(k for k in stored.points.kr_over_pga.tolist() if k not in ends)
     if others:
-        ends |= ends_of(kind.run_blocks(motion, vertical, polarity, case, others))
+        ends |= ends_of(kind.run_blocks(shaking, case, others))
 
     def error(k_over_pga: float) -> float:
         if "store_responses" not in kind.campaign_options:
             return 0.0
-        alone = kind.history(motion, vertical, polarity, case, k_over_pga)
+        alone = kind.history(shaking, case, k_over_pga)
         if not alone.peak_theta_rad or alone.peak_theta_n is None:
             return 0.0
         return alone.error_estimate * alone.peak_theta_n / alone.peak_theta_rad

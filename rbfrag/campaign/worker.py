@@ -11,7 +11,7 @@ from rbfrag.db.responses import ResponseRecord
 from rbfrag.db.rows import MotionRow
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
-from rbfrag.solver.kind import Case
+from rbfrag.solver.kind import Case, CaseRequest, Shaking
 from rbfrag.solver.kinds import model_of_kind
 from rbfrag.solver.results import (
     MAP_DEPTH,
@@ -181,44 +181,35 @@ def _run_group(work: MotionWork, tasks: list[Task]) -> list[TaskResult]:
     first = tasks[0]
     kind = model_of_kind(first.planned.case.kind)
     vertical = None if first.planned.vertical_id is None else work.vertical
-    polarity = first.planned.polarity
+    shaking = Shaking(work.motion, vertical, first.planned.polarity)
     search = first.search or first.full_map
     answers: list[tuple[CriticalResult | None, SearchPoints | None]] = [(None, None)] * len(tasks)
     if search or first.grid:
-        results_of_cases = kind.run_cases(
-            work.motion,
-            vertical,
-            polarity,
-            [task.planned.case for task in tasks],
-            search=search,
-            grid=first.grid,
-            full_map=first.full_map,
-            map_depth=work.map_depth,
-        )
+        request = CaseRequest(search, first.grid, first.full_map, work.map_depth)
+        cases = [task.planned.case for task in tasks]
+        results_of_cases = kind.run_cases(shaking, cases, request)
         answers = [(each.critical, each.grid) for each in results_of_cases]
     results = []
     for task, (critical, grid) in zip(tasks, answers, strict=True):
         blocks = None
         if task.blocks:
             case = task.planned.case
-            blocks = kind.run_blocks(work.motion, vertical, polarity, case, task.blocks)
+            blocks = kind.run_blocks(shaking, case, task.blocks)
         ratios = list(task.histories)
         value = task.critical_k_over_pga if critical is None else critical.kr_over_pga
         if task.critical_history and value is not None:
             ratios.append(value)
-        histories = (_history(work, task.planned, vertical, k) for k in dict.fromkeys(ratios))
+        histories = (_history(work, task.planned, shaking, k) for k in dict.fromkeys(ratios))
         results.append(TaskResult(task, critical, grid, blocks, tuple(histories)))
     return results
 
 
 def _history(
-    work: MotionWork, planned: PlannedCase, vertical: GroundMotion | None, k_over_pga: float
+    work: MotionWork, planned: PlannedCase, shaking: Shaking, k_over_pga: float
 ) -> ResponseRecord:
-    motion, case = work.motion, planned.case
+    motion, vertical, case = work.motion, shaking.vertical, planned.case
     assert case.p2 is not None
-    response = model_of_kind(case.kind).history(
-        motion, vertical, planned.polarity, case, k_over_pga
-    )
+    response = model_of_kind(case.kind).history(shaking, case, k_over_pga)
     return ResponseRecord(
         natural_key=planned.history_key(
             motion, None if vertical is None else vertical.sha256, k_over_pga

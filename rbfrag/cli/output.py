@@ -59,6 +59,12 @@ def print_table(
         print("  ".join(fields).rstrip())
 
 
+def print_rows(rows: Sequence[Mapping[str, object]]) -> None:
+    """Print rows under their names; reasons only where there is one."""
+    names = [name for name in rows[0] if name != "reason" or any(row[name] for row in rows)]
+    print_table(names, [[row[name] for name in names] for row in rows])
+
+
 def _cut(text: str, size: int) -> str:
     return text if len(text) <= size else f"{text[: size - 1]}…"
 

@@ -13,15 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.exchange.block_rows import foreign_reasons
 from rbfrag.exchange.block_table import (
     BLOCK_COLUMNS,
     NUMBERS,
     RECTANGLE,
     is_of_rectangles,
     rectangle_columns,
+    rectangle_reasons,
 )
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
-from rbfrag.exchange.tables.files import table_parts, table_path, table_source, table_writer
+from rbfrag.exchange.tables.files import (
+    place_word,
+    table_parts,
+    table_path,
+    table_source,
+    table_writer,
+)
 from rbfrag.exchange.tables.parts import Part
 from rbfrag.files import reading, written_whole
 from rbfrag.fragility.lookup import block_of, find_model
@@ -30,6 +38,7 @@ from rbfrag.fragility.methods import TOPPLING_BLOCK, methods
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
 from rbfrag.solver.kinds import model_of_kind
 
 FloatArray = NDArray[np.float64]
@@ -45,10 +54,11 @@ OF_UNCERTAIN = "block_sd"
 DEVIATIONS = tuple(sorted({sigma for method in methods() for sigma in method.block.sigmas}))
 """Columns of standard deviations of blocks of any kind, of which an empty cell is 0."""
 
+_OR_SIDES = dict.fromkeys(("p2_1_s2", "kr"), ", nor height_m and width_m")
+"""What a table of toppling blocks may have instead of a column."""
+
 NUMERIC = (*BLOCK_COLUMNS, *DEVIATIONS, *RECTANGLE, *STATED)
 """Columns that hold numbers."""
-
-OTHER_MODE = "the block's mode is {mode}: the {kind} model says nothing about it"
 
 
 def predict_table(
@@ -85,7 +95,8 @@ def predict_table(
         Counts: rows, answered, without an answer, in_domain; kind, model, term, method; warnings.
 
     Raises:
-        InputError: a file that cannot be read or written, a missing column.
+        InputError: a file that cannot be read or written, a missing column, no row that can be
+            answered.
     """
     origin, goal = table_source(source), table_path(target)
     if origin.exists() and goal.exists() and origin.samefile(goal):
@@ -105,7 +116,7 @@ def predict_table(
             )
             counts = np.zeros(3, dtype=np.int64)
             formulas: list[str] = []
-            first_bad = ""
+            refused: dict[str, str] = {}
             for part in parts:
                 answer = _answer(part, names, given, chosen, level)
                 cells = {
@@ -120,13 +131,17 @@ def predict_table(
                     formulas = formulas or formula_warnings(cells)
                 write(replace(part, cells=cells), answer)
                 finite = np.isfinite(answer["probability"])
-                if not first_bad and not finite.all():
-                    i = int(np.argmin(finite))
-                    first_bad = f"line {part.lines[i]}: {answer['reason'][i]}"
+                for i in np.flatnonzero(~finite)[: FIRST - len(refused)].tolist():
+                    refused[f"{place_word(origin)} {part.lines[i]}"] = answer["reason"][i]
                 counts += [finite.size, int(finite.sum()), int(answer["in_domain"].sum())]
+            rows, answered, inside = counts.tolist()
+            if not rows:
+                raise InputError(f"{origin}: there is no block in the file")
+            if not answered:
+                refuse(str(origin), [*refused], [*refused.values()], rows)
     except csv.Error as error:
         raise InputError(f"{origin}: not a CSV file: {error}") from None
-    rows, answered, inside = counts.tolist()
+    unusable = unusable_in_words(rows - answered, rows, [*refused], [*refused.values()])
     return {
         "rows": rows,
         "answered": answered,
@@ -136,19 +151,8 @@ def predict_table(
         "model": chosen.name,
         "term": chosen.term.name,
         "method": chosen.row.method,
-        "warnings": [*chosen.notes, *_without(rows - answered, rows, first_bad), *formulas],
+        "warnings": [*chosen.notes, *unusable, *formulas],
     }
-
-
-def _without(missing: int, rows: int, first: str) -> tuple[str, ...]:
-    """Return how many rows have no answer, and the first of them."""
-    if not missing:
-        return ()
-    which, has = ("this is", "has") if missing == 1 else ("the first is", "have")
-    return (
-        f"{missing:,} of {rows:,} rows {has} no answer, and the column reason says why; "
-        f"{which} {first}",
-    )
 
 
 def _columns(
@@ -173,8 +177,8 @@ def _columns(
     for column, name in columns.items():
         if name in block.names and name not in given and column not in header:
             raise InputError(
-                f"{origin}: there is no column {column}; the columns are "
-                f"{', '.join(header) or 'none'}"
+                f"{origin}: there is no column {column}{_OR_SIDES.get(column, '')}; the columns "
+                f"are {', '.join(header) or 'none'}"
             )
     doubled = [name for name in header if header.count(name) > 1]
     if doubled:
@@ -209,6 +213,7 @@ def _answer(
         faults = others | faults
     if "height_m" in values:
         free_standing = model_of_kind(model.kind).free_standing
+        faults = rectangle_reasons(values) | faults
         numbers_of = rectangle_columns(values, free_standing=free_standing)
         values = {name: value for name, value in values.items() if name not in RECTANGLE}
         for column, value in numbers_of.items():
@@ -224,10 +229,7 @@ def _answer(
     answer[OF_UNCERTAIN] = np.zeros(predicted.probability.shape)
     if predicted.block_sd is not None:
         answer[OF_UNCERTAIN] = predicted.block_sd
-    for i, mode in enumerate(part.cells.get("mode", ())):
-        text = "" if mode is None else str(mode).strip()
-        if text not in ("", model_of_kind(model.kind).mode):
-            faults[i] = OTHER_MODE.format(mode=text.replace("_", " "), kind=model.kind)
+    faults |= foreign_reasons(part.cells, model.kind)
     bad = [*faults]
     for name in (*NUMBERS_OF_ANSWERS, OF_UNCERTAIN):
         answer[name][bad] = np.nan

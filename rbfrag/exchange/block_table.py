@@ -1,15 +1,14 @@
-"""The block table that commands pass to each other, as CSV, Parquet or GeoJSON points."""
+"""The columns of a table of blocks, in a file, as GeoJSON points or as given; rectangles in it."""
 
 from __future__ import annotations
 
 import csv
 import math
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import ExitStack
-from functools import partial
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +17,18 @@ from rbfrag.errors import InputError, checked_name
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts
 from rbfrag.exchange.points import SUFFIXES as GEOJSON
 from rbfrag.exchange.points import read_points
-from rbfrag.exchange.tables.files import table_parts, table_path, table_source, table_writer
-from rbfrag.exchange.tables.parts import Part, cells_of
-from rbfrag.files import is_number, reading, written_whole
+from rbfrag.exchange.tables.files import (
+    place_word,
+    table_parts,
+    table_path,
+    table_source,
+    table_writer,
+)
+from rbfrag.exchange.tables.parts import Part, Parts, cells_of
+from rbfrag.files import reading, written_whole
+from rbfrag.fragility.unusable import in_list
 from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.described import rectangle_numbers
-from rbfrag.solver.kinds import model_of_kind
 
 NUMBERS = ("p2_1_s2", "kr")
 """Columns of a block that topples."""
@@ -47,8 +52,8 @@ SIGMAS = ("p2_sigma", "kr_sigma")
 RECTANGLE = ("height_m", "width_m", "dip_deg")
 """Columns of a rectangle, which are read where those are not all there; the dip may be missing."""
 
-PORTFOLIO = ("count", "loss", "loss_sigma")
-"""Columns of how many like blocks a row is, what a failure costs, and how that scatters."""
+TABLE = "a block table"
+"""What messages say that a file should hold."""
 
 
 def write_block_table(
@@ -95,49 +100,134 @@ def read_columns(
             a table that has such rows.
 
     Raises:
-        InputError: the file cannot be read, lacks a column, or a cell holds no number; the
-            message names the line.
+        InputError: the file cannot be read, lacks a column, or cells hold no numbers; the
+            message names the lines.
         MissingExtraError: a Parquet file without pyarrow, a workbook without openpyxl.
     """
-    source = table_source(path)
+    table = read_cells(path, (*names, *optional), texts, needed=names)
+    if faults is not None:
+        faults.update(table.faults)
+    elif table.faults:
+        wrong = {table.place(i): fault for i, fault in sorted(table.faults.items())}
+        raise InputError(f"{path}, {in_list(wrong, wrong.values())}")
+    return table.columns
+
+
+class Cells(NamedTuple):
+    """The cells of some columns.
+
+    Args:
+        columns: arrays of numbers, NaN where there is none, and of texts, by name.
+        faults: what is wrong with rows, by their index.
+        lines: number of each row in its file.
+        word: what that is the number of: line, row or feature.
+    """
+
+    columns: dict[str, NDArray[Any]]
+    faults: dict[int, str]
+    lines: Sequence[int]
+    word: str
+
+    def place(self, i: int) -> str:
+        """Return where a row stands, as its file shows it."""
+        return f"{self.word} {self.lines[i]}"
+
+
+def read_cells(
+    source: str | os.PathLike[str] | Mapping[str, Any],
+    numbers: Sequence[str],
+    texts: Sequence[str],
+    *,
+    needed: Sequence[str] = (),
+) -> Cells:
+    """Return the cells of some columns of a table, of those that it has.
+
+    Args:
+        source: a table's file, a file of GeoJSON points, or columns by name.
+        numbers: columns of numbers.
+        texts: columns of texts.
+        needed: those that must be there.
+    """
+    with ExitStack() as stack:
+        name, word, header, parts = _opened(source, numbers, stack)
+        for each in needed:
+            if each not in header:
+                have = ", ".join(header) or "none"
+                raise InputError(f"{name}: there is no column {each}; the columns are {have}")
+        collected: dict[str, list[NDArray[Any]]] = {
+            each: [np.empty(0, dtype=object if each in texts else np.float64)]
+            for each in (*numbers, *texts)
+            if each in header
+        }
+        faults: dict[int, str] = {}
+        lines: list[int] = []
+        for part in parts:
+            wrong = dict(part.faults)
+            for each, arrays in collected.items():
+                if each in texts:
+                    cells = [
+                        checked_name(as_written(str(cell).strip()), f"{name}: a cell of {each}")
+                        for cell in cells_of(part.cells[each])
+                    ]
+                    arrays.append(np.array(cells, dtype=object))
+                else:
+                    values, others = part.numbers(each)
+                    wrong = others | wrong
+                    arrays.append(values)
+            faults |= {len(lines) + i: fault for i, fault in wrong.items()}
+            lines.extend(part.lines)
+        columns = {each: np.concatenate(arrays) for each, arrays in collected.items()}
+        return Cells(columns, faults, lines, word)
+
+
+def _opened(
+    source: str | os.PathLike[str] | Mapping[str, Any], numbers: Sequence[str], stack: ExitStack
+) -> tuple[str, str, list[str], Parts]:
+    """Return what a table is called, what its rows are, its columns and its parts."""
+    if isinstance(source, str | os.PathLike):
+        path = Path(source)
+        if path.suffix.lower() in GEOJSON:
+            part = read_points(path)
+            return str(path), "feature", [*part.cells], iter([part])
+        path = table_source(path)
+        stack.enter_context(_reading(path))
+        header, parts, _ = table_parts(path, numbers, stack)
+        return str(path), place_word(path), header, parts
+    part = given_part(source)
+    return "blocks", "row", [*part.cells], iter([part])
+
+
+@contextmanager
+def _reading(source: Path) -> Iterator[None]:
     try:
-        with reading(source, "a block table"), ExitStack() as stack:
-            wanted = (*names, *optional)
-            header, parts, _ = table_parts(source, wanted, stack)
-            for name in names:
-                if name not in header:
-                    have = ", ".join(header) or "none"
-                    raise InputError(f"{source}: there is no column {name}; the columns are {have}")
-            collected: dict[str, list[NDArray[Any]]] = {
-                name: [np.empty(0, dtype=object if name in texts else np.float64)]
-                for name in (*wanted, *texts)
-                if name in header
-            }
-            done = 0
-            for part in parts:
-                wrong = dict(part.faults)
-                for name, arrays in collected.items():
-                    if name in texts:
-                        cells = [
-                            checked_name(
-                                as_written(str(cell).strip()), f"{source}: a cell of {name}"
-                            )
-                            for cell in cells_of(part.cells[name])
-                        ]
-                        arrays.append(np.array(cells, dtype=object))
-                    else:
-                        values, others = part.numbers(name)
-                        wrong = others | wrong
-                        arrays.append(values)
-                if wrong and faults is None:
-                    i = min(wrong)
-                    raise InputError(f"{source}, line {part.lines[i]}: {wrong[i]}")
-                if faults is not None:
-                    faults.update({done + i: fault for i, fault in wrong.items()})
-                done += len(part.lines)
-            return {name: np.concatenate(arrays) for name, arrays in collected.items()}
+        with reading(source, TABLE):
+            yield
     except csv.Error as error:
         raise InputError(f"{source}: not a CSV file: {error}") from None
+
+
+def given_part(columns: Mapping[str, Any]) -> Part:
+    """Return columns by name, such as a pandas table, as the rows of a table."""
+    cells = {str(name): np.ravel(np.asarray(column)) for name, column in columns.items()}
+    if len({column.size for column in cells.values()}) > 1:
+        sizes = ", ".join(f"{name} {column.size}" for name, column in cells.items())
+        raise InputError(f"the columns of the blocks differ in length: {sizes}")
+    size = next((column.size for column in cells.values()), 0)
+    return Part(
+        range(1, size + 1),
+        {
+            name: column.astype(np.float64)
+            if column.dtype.kind in "iuf"
+            else [None if _is_missing(cell) else cell for cell in column.tolist()]
+            for name, column in cells.items()
+        },
+    )
+
+
+def _is_missing(cell: object) -> bool:
+    """Whether a cell is empty, as Python, numpy and pandas have it."""
+    is_nan = isinstance(cell, float) and math.isnan(cell)
+    return cell is None or is_nan or type(cell).__name__ in ("NAType", "NaTType")
 
 
 def is_of_rectangles(names: Collection[str]) -> bool:
@@ -172,188 +262,15 @@ def rectangle_columns(
         }
 
 
-def waiting_blocks(
-    path: str | os.PathLike[str], kind: str | None = None
-) -> dict[str, NDArray[Any]]:
-    """Return the blocks of a table (.csv, .xlsx, .parquet) or of GeoJSON points as columns.
-
-    Args:
-        path: file with ``p2_1_s2`` [1/s²] and ``kr``, or ``height_m`` and ``width_m`` (and
-            ``dip_deg``), and ``block_id``, ``p2_sigma``, ``kr_sigma``, ``weight``, ``lon`` and
-            ``lat`` [deg] if it has them; a table also ``restitution``, ``site_id``, ``kind``,
-            ``count``, ``loss`` and ``loss_sigma``.
-        kind: kind of the rows of a table that state none; of a free-standing kind rectangles are
-            not backed by a slope.
-
-    Returns:
-        Columns of one length; ``block_id`` are texts, numbers from 1 on where there are none.
-
-    Raises:
-        InputError: the file cannot be read, is empty, or a block is none that waits for an
-            earthquake: p² or k_r not above zero, a place off the map, a weight below zero; the
-            message names it.
-        MissingExtraError: a Parquet file without pyarrow.
-    """
-    columns = _points(path, kind) if _is_points(path) else _rows(path, kind, None)
-    reasons = _reasons(columns)
-    bad = np.flatnonzero(reasons != "")
-    if bad.size:
-        others = f"; so it is with {bad.size - 1:,} more rows" if bad.size > 1 else ""
-        block = columns["block_id"][bad[0]]
-        raise InputError(f"{path}: block {block} {reasons[bad[0]]}{others}")
-    return _weighed(columns, path)
-
-
-def blocks_and_refused(
-    path: str | os.PathLike[str], kind: str | None = None
-) -> tuple[dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
-    """Return the blocks of a table, and its rows that are none, with their reasons.
-
-    Args:
-        path: as for :func:`waiting_blocks`.
-        kind: likewise.
-
-    Returns:
-        Columns of the blocks, and of the other rows with ``reason``; both with ``row``, the index
-        in the table.
-
-    Raises:
-        InputError: the file cannot be read, or no row of it is a block.
-    """
-    faults: dict[int, str] = {}
-    columns = _points(path, kind) if _is_points(path) else _rows(path, kind, faults)
-    reasons = _reasons(columns)
-    for i, fault in faults.items():
-        reasons[i] = fault
-    columns |= {"row": np.arange(reasons.size), "reason": reasons}
-    sound = np.asarray(reasons == "", dtype=bool)
-    if not sound.any():
-        waiting_blocks(path, kind)  # refuses the first
-    blocks = {name: column[sound] for name, column in columns.items() if name != "reason"}
-    return _weighed(blocks, path), {name: column[~sound] for name, column in columns.items()}
-
-
-def _is_points(path: str | os.PathLike[str]) -> bool:
-    return str(path).lower().endswith(GEOJSON)
-
-
-def _weighed(
-    columns: dict[str, NDArray[Any]], path: str | os.PathLike[str]
-) -> dict[str, NDArray[Any]]:
-    if columns["kr"].size == 0:
-        raise InputError(f"{path}: there is no block in the file")
-    if "weight" in columns and not columns["weight"].sum() > 0.0:
-        raise InputError(f"{path}: the weights of the blocks sum to zero")
-    return columns
-
-
-def _reasons(columns: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
-    """Return why rows are no blocks that wait for an earthquake; empty texts for those that are."""
-    p2, kr = columns["p2_1_s2"], columns["kr"]
-    reasons = np.full(kr.size, "", dtype=object)
-
-    def say(good: NDArray[np.bool_], text: Callable[[int], str]) -> None:
-        for i in np.flatnonzero(~good & (reasons == "")).tolist():
-            reasons[i] = text(i)
-
-    with np.errstate(invalid="ignore"):
-        say(
-            (p2 > 0.0) & (kr > 0.0) & np.isfinite(p2) & np.isfinite(kr),
-            lambda i: (
-                f"has p2_1_s2 = {p2[i]:g} and kr = {kr[i]:g}: a block that waits for an "
-                "earthquake has both above zero (an unstable one has already failed)"
-            ),
+def rectangle_reasons(columns: Mapping[str, Any]) -> dict[int, str]:
+    """Return by index which lengths and dips are those of no rectangle, in words."""
+    reasons: dict[int, str] = {}
+    for name in RECTANGLE:
+        values = np.asarray(columns.get(name, ()), dtype=np.float64)
+        low, high, wanted = (
+            (-90.0, 90.0, "between -90 and 90") if name == "dip_deg" else (0.0, np.inf, "above 0")
         )
-        if "lon" in columns:
-            lon, lat = columns["lon"], columns["lat"]
-            say(
-                (np.abs(lon) <= 180.0) & (np.abs(lat) <= 90.0),
-                lambda i: f"at lon = {lon[i]:g}, lat = {lat[i]:g} lies off the map",
-            )
-        for name in {*SIGMAS} & {*columns}:
-            sigma = columns[name]
-            say(
-                (sigma >= 0.0) & (sigma < math.inf),
-                partial(_negative, name, sigma),
-            )
-        if "weight" in columns:
-            say(columns["weight"] >= 0.0, lambda _: "has a weight below zero")
+        for i in np.flatnonzero(~((values > low) & (values < high))).tolist():
+            text = "is empty" if np.isnan(values[i]) else f"= {values[i]:g} is not {wanted}"
+            reasons.setdefault(i, f"{name} {text}")
     return reasons
-
-
-def _points(path: str | os.PathLike[str], kind: str | None) -> dict[str, NDArray[Any]]:
-    points = read_points(path)
-    columns: dict[str, NDArray[Any]] = {
-        "lon": np.array([lon for lon, _, _ in points]),
-        "lat": np.array([lat for _, lat, _ in points]),
-        "block_id": np.array(
-            [
-                checked_name(str(p.get("block_id", i + 1)), f"{path}: a block")
-                for i, (_, _, p) in enumerate(points)
-            ],
-            dtype=object,
-        ),
-    }
-    properties = [p for _, _, p in points]
-    rectangles = any(is_of_rectangles(p) for p in properties)
-    for name in ("height_m", "width_m") if rectangles else NUMBERS:
-        columns[name] = _numbers(path, name, [p.get(name) for p in properties])
-    if rectangles:
-        columns["dip_deg"] = _numbers(path, "dip_deg", [p.get("dip_deg", 0.0) for p in properties])
-        columns |= _rectangles(columns, kind)
-    return columns
-
-
-def _numbers(path: str | os.PathLike[str], name: str, values: list[Any]) -> NDArray[np.float64]:
-    for i, value in enumerate(values):
-        if not is_number(value):
-            raise InputError(f"{path}, features[{i}]: {name} = {value!r} is not a number")
-    return np.array(values, dtype=np.float64)
-
-
-def _negative(name: str, sigma: NDArray[np.float64], i: int) -> str:
-    return f"has {name} = {sigma[i]:g}: give 0 or more"
-
-
-def _rows(
-    path: str | os.PathLike[str], kind: str | None, faults: dict[int, str] | None
-) -> dict[str, NDArray[Any]]:
-    columns = read_columns(
-        path,
-        (),
-        optional=(*NUMBERS, *SIGMAS, *RECTANGLE, *PORTFOLIO, "lon", "lat", "weight", "restitution"),
-        texts=("block_id", "site_id", "kind"),
-        faults=faults,
-    )
-    if is_of_rectangles(columns):
-        columns |= _rectangles(columns, kind)
-    for name in NUMBERS:
-        if name not in columns:
-            raise InputError(
-                f"{path}: there is no column {name}: a table of blocks has p2_1_s2 and kr, or "
-                "height_m and width_m"
-            )
-    for name in {*SIGMAS} & {*columns}:
-        columns[name] = np.nan_to_num(columns[name], nan=0.0, posinf=math.inf)
-    if ("lon" in columns) != ("lat" in columns):
-        raise InputError(f"{path}: lon and lat go together: give both columns, or neither")
-    if "block_id" not in columns:
-        columns["block_id"] = np.array(
-            [str(i + 1) for i in range(columns["kr"].size)], dtype=object
-        )
-    return columns
-
-
-def _rectangles(columns: Mapping[str, NDArray[Any]], kind: str | None) -> dict[str, NDArray[Any]]:
-    """Return the numbers of rectangles, each by its kind: those of free-standing ones differ."""
-    backed = rectangle_columns(columns)
-    kinds = columns.get("kind", [""] * backed["kr"].size)
-    known = [str(one) or kind for one in kinds]
-    free = np.array([one is not None and model_of_kind(one).free_standing for one in known])
-    if not free.any():
-        return backed
-    free_standing = rectangle_columns(columns, free_standing=True)
-    numbers_of = {name: np.where(free, free_standing[name], backed[name]) for name in NUMBERS}
-    stated = columns.get("restitution", np.full(free.size, np.nan))
-    own = np.where(free & np.isnan(stated), free_standing["restitution"], stated)
-    return {**numbers_of, "restitution": own}

@@ -9,10 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from rbfrag.exchange.block_table import waiting_blocks
+from rbfrag.errors import InputError, UnknownModelError
+from rbfrag.exchange.block_rows import PORTFOLIO, BlockRows, read_blocks
 from rbfrag.exchange.openquake_events import JobFiles, read_events
 from rbfrag.files import as_path
+from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import Model
+from rbfrag.fragility.unusable import FROM_SUMS
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.losses import LossAnswer, Run, event_losses
 from rbfrag.hazards.portfolio import Portfolio
@@ -70,23 +73,25 @@ def losses(
         run: does the parts of the work; None for this process.
         on_progress: called with the numbers of events done and of all.
 
+    A block that cannot be used, as one of a site that the events do not have, has no rate but its
+    reason, and is left out of all sums.
+
     Raises:
-        InputError: a file that cannot be used, files of different jobs, a site or event that is
-            unknown, a row that is there twice, or a block that is none; the message names the line.
+        InputError: a file that cannot be used, files of different jobs, an event that is unknown,
+            a row that is there twice, or no block that can be used; the message names the line.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    if not isinstance(blocks, Mapping):
+    if not hasattr(blocks, "items"):
         blocks = as_path(blocks, "blocks", "a table of blocks")
     job = JobFiles.of(folder, files)
-    columns = blocks if isinstance(blocks, Mapping) else waiting_blocks(blocks, kind)
-    if "block_id" not in columns:
-        names = [str(i + 1) for i in range(len(columns["kr"]))]
-        columns = {**columns, "block_id": np.array(names, dtype=object)}
+    rows = read_blocks(blocks, kind, reads=PORTFOLIO)
     meaning = component_named("single" if component is None else component)
     events = read_events(job, imts=imt, investigation_time=investigation_time, ses=ses)
+    measures = tuple(events.measures)
+    rows = _with_models(_at_sites(rows, events.site_ids), measures, kind, model, db)
     portfolio = Portfolio.of(
-        columns, events.site_ids, tuple(events.measures), meaning, kind=kind, model=model, db=db
+        rows.blocks, events.site_ids, measures, meaning, kind=kind, model=model, db=db
     )
     about = (
         "the measures are taken as those of single components, which the models are fitted on; "
@@ -97,8 +102,58 @@ def losses(
         if meaning.name != "single"
         else "the measures are of a single component, as the models are"
     )
-    events = replace(events, warnings=(*events.warnings, about))
-    return event_losses(
-        events, portfolio, samples=0 if expected else samples, seed=seed, level=level, run=run,
-        on_progress=on_progress,
+    texts = (*rows.unusable_in_words(FROM_SUMS), *_without_loss(rows), *events.warnings, about)
+    answer = event_losses(
+        replace(events, warnings=texts), portfolio, samples=0 if expected else samples, seed=seed,
+        level=level, run=run, on_progress=on_progress,
     )  # fmt: skip
+    if "loss" in rows.blocks:
+        answer.block_rates[2, np.isnan(rows.blocks["loss"])] = np.nan
+    return replace(answer, refused=rows.refused_by_row())
+
+
+def _at_sites(rows: BlockRows, site_ids: Sequence[str]) -> BlockRows:
+    """Return the table without blocks of sites that the events do not have."""
+    if "site_id" not in rows.blocks:
+        return rows
+    names, sites = rows.blocks["site_id"], set(site_ids)
+    have = f"{', '.join(map(repr, site_ids[:5]))}{' …' if len(site_ids) > 5 else ''}"
+    return rows.without(
+        np.array([name not in sites for name in names], dtype=bool),
+        lambda i: (
+            f"the block stands at the site {names[i]!r}, which the event set does not have; its "
+            f"sites are {have} (identifiers are texts: '0012' is not 12)"
+        ),
+    )
+
+
+def _with_models(
+    rows: BlockRows,
+    measures: Sequence[str],
+    kind: str | None,
+    model: Model | None,
+    db: str | PathLike[str] | None,
+) -> BlockRows:
+    """Return the table without blocks of kinds that there is no model of, if there is any."""
+    if "kind" not in rows.blocks:
+        return rows
+    kinds, without = rows.blocks["kind"], {}
+    for own in dict.fromkeys(kinds.tolist()):
+        try:
+            find_model(model, ("p2", "kr", *measures), db, kind=own or kind)
+        except (InputError, UnknownModelError) as error:
+            without[own] = error
+    if len(without) == len(set(kinds.tolist())):
+        raise without[kinds[0]]
+    return rows.without(np.isin(kinds, [*without]), lambda i: str(without[kinds[i]]))
+
+
+def _without_loss(rows: BlockRows) -> tuple[str, ...]:
+    """Return what is to be said of blocks whose loss is an empty cell."""
+    empty = int(np.isnan(rows.blocks.get("loss", np.empty(0))).sum())
+    if not empty:
+        return ()
+    return (
+        f"{empty:,} of {rows.blocks['row'].size:,} blocks state no loss and count none: losses are "
+        "lower bounds",
+    )

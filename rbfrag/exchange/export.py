@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_fragility import block_functions
+from rbfrag.exchange.block_rows import Blocks
 from rbfrag.exchange.fragility_function import FragilityFunction
-from rbfrag.exchange.map_answer import Blocks, given_blocks
+from rbfrag.exchange.map_answer import given_blocks
 from rbfrag.exchange.nrml import nrml_text
 from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text, without_dashes
 from rbfrag.exchange.share_fragility import share_functions
@@ -22,6 +23,9 @@ from rbfrag.fragility.model import Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.curve import ANSWERED
 from rbfrag.hazards.measure_type import openquake_type
+
+EACH_NEEDED = "an exposure model needs a function of each"
+"""Why a table with a row that cannot be used is refused."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -92,7 +96,7 @@ def nrml(
         DatabaseError: the database cannot be read.
     """
     target = output_path(out, (".xml",), "NRML file")
-    table, measure = given_blocks(p2, kr, blocks), _measure(imt)
+    table, measure = given_blocks(p2, kr, blocks).whole(EACH_NEEDED), _measure(imt)
     single = one_class or (blocks is None and len(table["kr"]) == 1)
     notes: Sequence[str] = ()
     if shares is not None:
@@ -146,7 +150,7 @@ def pelicun(
     """
     target = output_path(out, (".csv",), "fragility table")
     beside = output_path(str(target.with_suffix(".json")), (".json",), "description")
-    table, measure = given_blocks(p2, kr, blocks), _measure(imt)
+    table, measure = given_blocks(p2, kr, blocks).whole(EACH_NEEDED), _measure(imt)
     single = one_class or (blocks is None and len(table["kr"]) == 1)
     functions, about = block_functions(
         _names(table, name, single), table["p2_1_s2"], table["kr"], measure,
@@ -176,7 +180,7 @@ def _measure(imt: str) -> str:
     return measure
 
 
-def _names(table: dict[str, Any], name: str, single: bool) -> list[str]:
+def _names(table: Mapping[str, Any], name: str, single: bool) -> list[str]:
     return [name] if single else [str(each) for each in table["block_id"]]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -11,17 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_table import waiting_blocks
+from rbfrag.exchange.block_rows import PLACE, BlockRows, Blocks, read_blocks
 from rbfrag.exchange.shakemap import ShakeMapEvent, at_places, read_shakemap
-from rbfrag.files import as_path
 from rbfrag.fragility.model import Model
+from rbfrag.fragility.unusable import FROM_MEAN, FROM_SUMS
 from rbfrag.frames import Tabular
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.map_failures import MapFailures, Places, map_failures
 from rbfrag.hazards.site_probability import site_probability
-
-Blocks = str | PathLike[str] | Mapping[str, Any]
-"""A table of blocks: its file, or its columns by name, such as a pandas table."""
 
 NOTABLE = 1e-4
 """P above which a place outside the fitted ranges is warned of."""
@@ -34,7 +31,7 @@ class ShakeMapAnswer(Tabular):
     Args:
         columns: one row a node, or a block at its own place: ``lon`` and ``lat`` [deg], the
             measures, ``probability``, ``ci_low``, ``ci_high``, ``event_low``, ``event_high``,
-            ``in_domain``; of blocks ``block_id`` and ``reason``. NaN off the map.
+            ``in_domain``; of blocks ``block_id`` and ``reason``. NaN of one that cannot be used.
         failures: how many of all blocks fail together.
         about: event, model, and what was read, under the keys of the JSON contract.
         warnings: what to know about the answer.
@@ -61,7 +58,7 @@ class ShakeMapAnswer(Tabular):
         best = int(np.nanargmax(probability))
         return {
             **self.about,
-            "places": int(lon.size),
+            "places": int(np.isfinite(probability).sum()),
             "places_above_1_percent": int(np.nansum(probability > 0.01)),
             "largest_probability": float(probability[best]),
             "largest_at_lon": float(lon[best]),
@@ -118,40 +115,36 @@ def shakemap(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    table = given_blocks(p2, kr, blocks, restitution=restitution, kind=kind)
+    rows = given_blocks(
+        p2, kr, blocks, restitution=restitution, kind=kind, reads=(*PLACE, "weight")
+    )
     meaning = component_named(component)
     shaken = read_shakemap(grid, uncertainty=uncertainty, allow_partial=allow_partial)
-    warnings = list(shaken.warnings)
-    own = "lon" in table
+    own = "lon" in rows.blocks
     if own:
-        lon, lat = table["lon"], table["lat"]
-        measures, std_ln, on_map = at_places(shaken, lon, lat)
-        if not on_map.all():
-            warnings.append(
-                f"{int((~on_map).sum())} of {on_map.size} blocks lie off the map and have no answer"
-            )
+        measures, std_ln, on_map = at_places(shaken, rows.blocks["lon"], rows.blocks["lat"])
+        rows = rows.without(~on_map, lambda _: "the block lies off the map")
+        measures, std_ln = (
+            {name: values[on_map] for name, values in each.items()} for each in (measures, std_ln)
+        )
+        lon, lat = rows.blocks["lon"], rows.blocks["lat"]
     else:
         lon, lat = shaken.lon, shaken.lat
         measures, std_ln = shaken.measures, shaken.std_ln
-        on_map = np.ones(lon.size, dtype=bool)
-    if not on_map.any():
-        raise InputError(f"{grid}: none of the blocks lies on the map")
+    table = rows.blocks
+    warnings = [*rows.unusable_in_words(FROM_SUMS if own else FROM_MEAN), *shaken.warnings]
     warnings.append(
         f"the map's measures are taken as {meaning.title}; Beyer and Bommer (2006) relate them "
         "to one component"
         if meaning.name != "single"
         else "the map is taken to be of one component"
     )
-    here = on_map if own else slice(None)
-    a, b = table["p2_1_s2"][here], table["kr"][here]
-    options_of: dict[str, Any] = {
-        name: table[name][here] for name in ("restitution",) if name in table
-    }
+    a, b = table["p2_1_s2"], table["kr"]
+    options_of: dict[str, Any] = {name: table[name] for name in ("restitution",) if name in table}
     weight = table.get("weight")
     answer = site_probability(
-        {name: values[on_map] for name, values in measures.items()}, a, b,
-        component=meaning, weight=None if own else weight, own_block=own,
-        std_ln={name: values[on_map] for name, values in std_ln.items()}, kind=kind,
+        measures, a, b, component=meaning, weight=None if own else weight, own_block=own,
+        std_ln=std_ln, kind=kind,
         model=model, level=level, db=db, **options_of,
     )  # fmt: skip
     shaking, chosen = answer.shaking, answer.shaking.model
@@ -168,8 +161,7 @@ def shakemap(
     names = table.get("site_id") if own else None
     failures = map_failures(
         answer, a, b,
-        Places.of(lon[on_map], lat[on_map], None if names is None else names[on_map]),
-        weight=None if weight is None else weight[here], draws=draws, seed=seed, **options_of,
+        Places.of(lon, lat, names), weight=weight, draws=draws, seed=seed, **options_of,
     )  # fmt: skip
     warnings += failures.warnings
     outside = int((~answer.in_domain & (answer.probability > NOTABLE)).sum())
@@ -178,11 +170,6 @@ def shakemap(
             f"at {outside} places with P > {NOTABLE:g} shaking or block lie outside the ranges "
             "that the model was fitted on (in_domain)"
         )
-
-    def placed(values: NDArray[Any], empty: Any = np.nan) -> NDArray[Any]:
-        whole = np.full(on_map.size, empty)
-        whole[on_map] = values
-        return whole
 
     columns: dict[str, NDArray[Any]] = {"block_id": table["block_id"]} if own else {}
     columns |= {
@@ -193,15 +180,16 @@ def shakemap(
             for name, values in measures.items()
             if name in ("pgv_m_s", "pga_g", *shaking.names)
         },
-        "probability": placed(answer.probability),
-        "ci_low": placed(answer.ci_low),
-        "ci_high": placed(answer.ci_high),
-        "event_low": placed(answer.event_low),
-        "event_high": placed(answer.event_high),
-        "in_domain": placed(answer.in_domain, False),
+        "probability": answer.probability,
+        "ci_low": answer.ci_low,
+        "ci_high": answer.ci_high,
+        "event_low": answer.event_low,
+        "event_high": answer.event_high,
+        "in_domain": answer.in_domain,
     }
     if own:
-        columns["reason"] = np.where(on_map, "", "the block lies off the map").astype(object)
+        columns["reason"] = np.full(lon.size, "", dtype=object)
+        columns = rows.with_refused(columns)
     event = shaken.event
     return ShakeMapAnswer(
         columns=columns,
@@ -235,46 +223,28 @@ def given_blocks(
     *,
     restitution: ArrayLike | None = None,
     kind: str | None = None,
-) -> dict[str, NDArray[Any]]:
-    """Return the blocks of a question as columns, with ``block_id``.
-
-    Arguments as for :func:`shakemap`.
+    reads: Collection[str] = (),
+) -> BlockRows:
+    """Return the blocks of a question; arguments as for :func:`shakemap` and `read_blocks`.
 
     Raises:
-        InputError: blocks given in no way or in two, or one that waits for no earthquake.
+        InputError: blocks given in no way or in two, or none that waits for an earthquake.
     """
-    if blocks is None:
-        given = {"p2_1_s2": p2, "kr": kr, "restitution": restitution}
-        missing = [name for name in ("p2_1_s2", "kr") if given[name] is None]
-        if missing:
-            raise InputError(
-                f"{'p2' if p2 is None else 'kr'} is missing: give p2 and kr, or a table of blocks"
-            )
-        arrays = np.broadcast_arrays(*(v for v in given.values() if v is not None))
-        known = [name for name, value in given.items() if value is not None]
-        table: dict[str, Any] = {
-            name: np.ravel(np.asarray(each, dtype=np.float64))
-            for name, each in zip(known, arrays, strict=True)
-        }
-    elif p2 is not None or kr is not None or restitution is not None:
-        raise InputError("blocks says all of the blocks: leave p2, kr and restitution out")
-    elif hasattr(blocks, "items"):
-        table = {str(name): np.asarray(column) for name, column in blocks.items()}
-    else:
-        table = dict(waiting_blocks(as_path(blocks, "blocks", "a table of blocks"), kind))
-    for name in ("p2_1_s2", "kr"):
-        if name not in table:
-            raise InputError(f"blocks has no column {name}: it needs p2_1_s2 [1/s²] and kr")
-        refused = ~((table[name] > 0.0) & np.isfinite(table[name]))
-        if refused.any():
-            raise InputError(
-                f"{name} = {table[name][refused][0]:g} is not above zero: such a block is none "
-                "that waits for an earthquake"
-            )
-    if "block_id" not in table:
-        names = [str(i + 1) for i in range(table["kr"].size)]
-        table["block_id"] = np.array(names, dtype=object)
-    return table
+    if blocks is not None:
+        if p2 is not None or kr is not None or restitution is not None:
+            raise InputError("blocks says all of the blocks: leave p2, kr and restitution out")
+        return read_blocks(blocks, kind, reads=reads, one_kind=True)
+    if p2 is None or kr is None:
+        raise InputError(
+            f"{'p2' if p2 is None else 'kr'} is missing: give p2 and kr, or a table of blocks"
+        )
+    given = {"p2_1_s2": p2, "kr": kr, "restitution": restitution}
+    known = {name: value for name, value in given.items() if value is not None}
+    try:
+        arrays = np.broadcast_arrays(*known.values())
+    except ValueError:
+        raise InputError("p2, kr and restitution differ in length") from None
+    return read_blocks(dict(zip(known, arrays, strict=True)), kind, one_kind=True)
 
 
 def _name_of(event: ShakeMapEvent) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, MissingExtraError
+from rbfrag.exchange.tables.parts import Part
 from rbfrag.files import is_number, json_document, source_text, written_whole
 
 SUFFIXES = (".geojson", ".json")
@@ -21,8 +22,11 @@ SUFFIXES = (".geojson", ".json")
 _ROWS = 1 << 13
 
 
-def read_points(path: str | os.PathLike[str]) -> list[tuple[float, float, dict[str, Any]]]:
-    """Return longitude, latitude and properties of every point of a FeatureCollection."""
+def read_points(path: str | os.PathLike[str]) -> Part:
+    """Return the features of a FeatureCollection as rows of a table: lon, lat [deg], properties.
+
+    A feature that is no point has no place: its lon and lat are NaN.
+    """
     text = source_text(path, "GeoJSON")
     try:
         document = json_document(text)
@@ -31,29 +35,30 @@ def read_points(path: str | os.PathLike[str]) -> list[tuple[float, float, dict[s
     features = document.get("features") if isinstance(document, dict) else None
     if not isinstance(features, list) or document.get("type") != "FeatureCollection":
         raise InputError(f"{path}: not a GeoJSON FeatureCollection")
-    points = []
+    lon, lat = places = np.full((2, len(features)), np.nan)
+    rows: list[Mapping[str, Any]] = []
     for i, feature in enumerate(features):
-        where = f"{path}, features[{i}]"
-        geometry = feature.get("geometry") if isinstance(feature, dict) else None
-        if not isinstance(geometry, dict) or geometry.get("type") != "Point":
-            raise InputError(f"{where}: the geometry is no Point")
-        place = geometry.get("coordinates")
-        if not isinstance(place, list) or len(place) < 2 or not all(map(is_number, place[:2])):
-            raise InputError(f"{where}: coordinates are no [longitude, latitude]")
-        lon, lat = float(place[0]), float(place[1])
-        if not (abs(lon) <= 180.0 and abs(lat) <= 90.0):
-            raise InputError(f"{where}: lon = {lon:g}, lat = {lat:g} lies off the map")
-        properties = feature.get("properties") or {}
-        if not isinstance(properties, dict):
-            raise InputError(f"{where}: properties are no object")
-        points.append((lon, lat, properties))
-    return points
+        known = _object(feature)
+        geometry = _object(known.get("geometry"))
+        place = geometry.get("coordinates") if geometry.get("type") == "Point" else None
+        if isinstance(place, list) and len(place) >= 2 and all(map(is_number, place[:2])):
+            places[:, i] = place[:2]
+        rows.append(_object(known.get("properties")))
+    names = dict.fromkeys(name for row in rows for name in row)
+    cells: dict[str, Any] = {name: [row.get(name) for row in rows] for name in names}
+    return Part(range(1, len(rows) + 1), {**cells, "lon": lon, "lat": lat})
+
+
+def _object(value: object) -> Mapping[str, Any]:
+    return value if isinstance(value, dict) else {}
 
 
 def write_points(
     columns: Mapping[str, NDArray[Any]], about: Mapping[str, Any], target: Path
 ) -> None:
     """Write rows with lon and lat as points; the other columns are their properties.
+
+    A row without a place on the map has no geometry.
 
     Args:
         columns: arrays of one length by name, ``lon`` and ``lat`` [deg] among them.
@@ -71,12 +76,12 @@ def write_points(
         for start in range(0, size, _ROWS):
             some = slice(start, start + _ROWS)
             lists = [_finite_or_null(columns[name][some]) for name in names]
-            places = zip(columns["lon"][some].tolist(), columns["lat"][some].tolist())  # noqa: B905
+            places = _places(columns, some)
             lines = [
                 json.dumps(
                     {
                         "type": "Feature",
-                        "geometry": {"type": "Point", "coordinates": list(place)},
+                        "geometry": place and {"type": "Point", "coordinates": place},
                         "properties": dict(zip(names, row, strict=True)),
                     },
                     ensure_ascii=False,
@@ -93,6 +98,13 @@ def _finite_or_null(column: NDArray[Any]) -> list[Any]:
     if column.dtype.kind == "f":
         return [value if np.isfinite(value) else None for value in values]
     return values
+
+
+def _places(columns: Mapping[str, NDArray[Any]], some: slice) -> list[list[float] | None]:
+    """Return longitude and latitude of some rows; None for what has no place on the map."""
+    pairs = np.column_stack([columns["lon"][some], columns["lat"][some]])
+    on_map = (np.abs(pairs) <= (180.0, 90.0)).all(axis=1)
+    return [p if known else None for p, known in zip(pairs.tolist(), on_map, strict=True)]
 
 
 def pyogrio() -> Any:
@@ -117,8 +129,8 @@ def write_geopackage(columns: Mapping[str, NDArray[Any]], layer: str, target: Pa
     # well-known binary: little-endian, type 1 (point), x, y
     points = np.array(
         [
-            struct.pack("<BIdd", 1, 1, x, y)
-            for x, y in zip(columns["lon"].tolist(), columns["lat"].tolist(), strict=True)
+            None if place is None else struct.pack("<BIdd", 1, 1, *place)
+            for place in _places(columns, slice(None))
         ],
         dtype=object,
     )

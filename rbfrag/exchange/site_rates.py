@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
+from rbfrag.exchange.block_rows import BlockRows
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
 
@@ -37,8 +38,8 @@ def blocks_at_sites(
     columns: Mapping[str, Any],
     *,
     site_chosen: bool = False,
-) -> tuple[list[SiteBlocks], tuple[str, ...]]:
-    """Return the sites with their curves and blocks, and what is to be said of it.
+) -> tuple[list[SiteBlocks], tuple[str, ...], dict[int, str]]:
+    """Return the sites with their curves and blocks, what is to be said, and blocks without.
 
     Blocks are joined by ``site_id`` where the table has it and the curves name their sites;
     otherwise all blocks are taken at each site.
@@ -48,8 +49,11 @@ def blocks_at_sites(
         columns: columns of the blocks.
         site_chosen: one site of several was asked for: blocks of others are left out.
 
+    Returns:
+        The sites, remarks, and by index the reasons of blocks of sites that have no curve.
+
     Raises:
-        InputError: files of other sites, or a block of a site that has no curve.
+        InputError: files of other sites, or no block at any of them.
     """
     by_site: dict[tuple[Any, ...], list[HazardCurve]] = {}
     for curves in files:
@@ -66,31 +70,32 @@ def blocks_at_sites(
     has_ids = wanted is not None and any(wanted)
     if wanted is None or not has_ids or not all(have):
         everywhere = [SiteBlocks(tuple(curves), columns) for curves in by_site.values()]
-        return everywhere, _not_joined(has_ids, have, len(columns["block_id"]))
-    known = set(have)
-    missing = [i for i, name in enumerate(wanted) if name not in known]
-    if missing and not site_chosen:
-        raise InputError(
-            f"block {columns['block_id'][missing[0]]} stands at site "
-            f"{str(wanted[missing[0]])!r}, of which there is no curve; there are {', '.join(have)}"
-        )
+        return everywhere, _not_joined(has_ids, have, len(columns["block_id"])), {}
+    known, shown = set(have), f"{', '.join(have[:5])}{' …' if len(have) > 5 else ''}"
+    missing = {
+        i: f"the block stands at site {str(name)!r}, of which there is no curve; there are {shown}"
+        for i, name in enumerate(wanted)
+        if name not in known
+    }
     sites = []
     for curves in by_site.values():
         own = np.flatnonzero(wanted == curves[0].site)
         if own.size:
             here = {name: np.asarray(values)[own] for name, values in columns.items()}
             sites.append(SiteBlocks(tuple(curves), here))
+    if not sites and not site_chosen and missing:
+        raise InputError(f"no block can be used: {next(iter(missing.values()))}")
     if not sites:
         raise InputError(f"no block stands at site {', '.join(have)}")
     remarks = ["blocks stand at the sites of the curves by their site_id"]
-    if missing:
+    if missing and site_chosen:
         remarks.append(f"{len(missing)} blocks of other sites are left out")
     if len(sites) > 1:
         remarks.append(
             "rates of several sites do not make a rate of all of them: curves do not tell which "
             "earthquakes shake both; use  rbfrag losses  on an event set"
         )
-    return sites, tuple(remarks)
+    return sites, tuple(remarks), {} if site_chosen else missing
 
 
 def _key(curve: HazardCurve) -> tuple[Any, ...]:
@@ -110,17 +115,15 @@ def _not_joined(has_ids: bool, sites: Sequence[str], blocks: int) -> tuple[str, 
 
 
 def rate_columns(
-    sites: Sequence[SiteBlocks],
-    answers: Sequence[HazardAnswer],
-    refused: Mapping[str, Any] | None = None,
+    sites: Sequence[SiteBlocks], answers: Sequence[HazardAnswer], rows: BlockRows | None = None
 ) -> dict[str, NDArray[Any]]:
     """Return the columns of the table of annual rates, one row a site and block.
 
     Args:
         sites: the sites.
         answers: the answers, one a site.
-        refused: rows of the table of blocks that are none, with their ``reason``. They come last,
-            at one site in the order of the table.
+        rows: the table of blocks; what cannot be used of it has its ``reason``, at one site in the
+            order of the table, at several at the end.
     """
     nothing = float("nan")
     parts: dict[str, list[NDArray[Any]]] = {}
@@ -152,19 +155,8 @@ def rate_columns(
     columns = {name: np.concatenate(values) for name, values in parts.items()}
     size = columns["block_id"].size
     columns["reason"] = np.full(size, "", dtype=object)
-    if not refused:
+    if rows is None:
         return columns
-    more = refused["row"].size
-    own = {
-        "block_id": refused["block_id"], "p2_1_s2": refused["p2_1_s2"], "kr": refused["kr"],
-        "site": refused.get("site_id", np.full(more, "", dtype=object)),
-        "reason": refused["reason"],
-    }  # fmt: skip
-    joined = {
-        name: np.concatenate([column, own.get(name, np.full(more, nothing))])
-        for name, column in columns.items()
-    }
-    if len(sites) > 1:
-        return joined
-    order = np.argsort([*sites[0].columns["row"], *refused["row"]], kind="stable")
-    return {name: column[order] for name, column in joined.items()}
+    refused = {**rows.refused, "site": rows.refused.get("site_id", np.full(rows.refused_count, ""))}
+    row = sites[0].columns["row"] if len(sites) == 1 else np.full(size, -1)
+    return replace(rows, refused=refused).with_refused(columns, row)

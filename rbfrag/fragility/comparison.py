@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 from rbfrag.fragility.lookup import find_model, suited_models
 from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel, Model
-from rbfrag.fragility.prediction import Prediction, answer_given, is_clear
+from rbfrag.fragility.prediction import Prediction, answer_given, is_clear, single_numbers
+from rbfrag.fragility.words import percent
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 LEAST_APART = 1e-3
 """Intervals that do not overlap are told of where the higher of them begins above this P."""
+
+MOST_LISTED = 3
+"""Of more models than these that answer otherwise, the least and the greatest answer are told."""
 
 
 def candidate_models(
@@ -48,25 +52,26 @@ def answer_compared(
 ) -> Prediction | PredictionArray:
     """Return the first model's answer; of single numbers it says which others answer otherwise."""
     first, *others = models
+    singles = single_numbers(given)
+    given = given if singles is None else singles
     answer = answer_given(first, given, level, nan=nan, interval=interval, weights=weights)
     if type(answer) is not Prediction:
         return answer
-    apart = [each for each in others if not _surely_agrees(each, given, answer)]
-    return _with_disagreement(answer, [_one_of(each, given, level, weights) for each in apart])
+    if singles is not None and answer.block_sd is None:
+        others = [each for each in others if not _surely_agrees(each, singles, answer)]
+    return _with_disagreement(answer, [_one_of(each, given, level, weights) for each in others])
 
 
-def _surely_agrees(
-    model: FragilityModel, given: Mapping[str, ArrayLike], first: Prediction
-) -> bool:
-    """Return whether a model's P is within the first one's interval: faster than its answer."""
-    if model.uncertain or any(type(value) is not float for value in given.values()):
-        return False
-    singles = cast("dict[str, float]", given)
+def _surely_agrees(model: FragilityModel, given: dict[str, float], first: Prediction) -> bool:
+    """Return whether a model's P of a certain block is within the first one's interval.
+
+    That is faster than its answer.
+    """
     try:
-        values = model.with_ratios(model.method.block.completed(singles, model.term, SINGLE))
+        values = model.with_ratios(model.method.block.completed(given, model.term, SINGLE))
         if not is_clear(model, values):
             return False
-        probability = model.answer(values, None, SINGLE, singles).probability
+        probability = model.answer(values, None, SINGLE, given).probability
     except (ArithmeticError, ValueError):
         return False
     return bool(first.ci_low <= probability <= first.ci_high)
@@ -90,18 +95,23 @@ def _with_disagreement(first: Prediction, others: Sequence[Prediction]) -> Predi
     ]
     if not apart:
         return first
-    listed = ", ".join(f"{_percent(other)} by {other.model}" for other in apart)
+    if len(apart) <= MOST_LISTED:
+        listed = ", ".join(map(_in_words, apart))
+    else:
+        by_probability = sorted(apart, key=lambda other: other.probability)
+        low, high = _in_words(by_probability[0]), _in_words(by_probability[-1])
+        listed = f"{len(apart)} others from {low} to {high}"
     text = (
-        f"the answers do not agree: {_percent(first)} by {first.model}, but {listed}, whose "
+        f"the answers do not agree: {_in_words(first)}, but {listed}, whose "
         "intervals do not overlap with its own: this shaking is not what is usual for the "
         "measures that those read, or a measure is wrong"
     )
     return replace(first, warnings=(*first.warnings, text))
 
 
-def _percent(answer: Prediction) -> str:
-    p, low, high = (100.0 * x for x in (answer.probability, answer.ci_low, answer.ci_high))
-    return f"{p:.2g} % ({low:.2g} to {high:.2g} %)"
+def _in_words(answer: Prediction) -> str:
+    p, low, high = map(percent, (answer.probability, answer.ci_low, answer.ci_high))
+    return f"{p} ({low} to {high}) by {answer.model}"
 
 
 def prediction_document(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -13,6 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel, Model
+from rbfrag.fragility.unusable import (
+    FROM_MEAN,
+    FROM_SUMS,
+    block_reasons,
+    elements,
+    refuse_elements,
+    unusable_in_words,
+)
 from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import checked_years, failure_rate, probability_in
 from rbfrag.hazards.branch_weights import Weights, stated_weights
@@ -67,7 +75,7 @@ class BranchRate:
             "name": self.name,
             "weight": self.weight,
             "annual_rate_any": self.annual_rate_any,
-            "expected_failures_per_year": float(self.annual_rate.sum()),
+            "expected_failures_per_year": float(np.nansum(self.annual_rate)),
         }
 
 
@@ -99,6 +107,7 @@ class HazardAnswer(Tabular):
         quantiles: quantiles of the rates over branches with weights, by their probability,
             `annual_rate` of shape (m,), and `annual_rate_any`; empty without weights.
         warnings: what to know about the answer.
+        reason: why a block cannot be used, shape (m,); empty text elsewhere.
     """
 
     annual_rate: FloatArray
@@ -121,6 +130,7 @@ class HazardAnswer(Tabular):
     branches: tuple[BranchRate, ...]
     quantiles: Mapping[float, Mapping[str, Any]]
     warnings: tuple[str, ...]
+    reason: NDArray[np.object_]
 
     @property
     def annual_rate_any(self) -> float | None:
@@ -128,12 +138,14 @@ class HazardAnswer(Tabular):
 
         None for several blocks whose dependence is not known: `joint` has its bounds.
         """
-        return float(self.annual_rate[0]) if self.joint is None else self.joint.annual_rate_any
+        if self.joint is not None:
+            return self.joint.annual_rate_any
+        return float(np.nansum(self.annual_rate))  # of the one that can be used
 
     @property
     def expected_failures_per_year(self) -> float:
-        """Mean number of failures a year of all blocks [1/a], the sum of their rates."""
-        return float(self.annual_rate.sum())
+        """Mean number of failures a year of all blocks [1/a], the sum of the rates known."""
+        return float(np.nansum(self.annual_rate))
 
 
 def hazard(
@@ -166,6 +178,9 @@ def hazard(
 
     Several blocks stand at one site and share its earthquakes: their rates add up to the failures
     expected a year, and `joint` has the rate of earthquakes in which any of them fails.
+
+    A block that cannot be used, such as one of k_r <= 0 or NaN, has the rate NaN and its `reason`;
+    it is left out of sums, which a warning says.
 
     Several curves are branches of one logic tree with `weights`: rates and probabilities are the
     weighted means, `quantiles` their distribution. Without weights the first curve answers.
@@ -200,7 +215,7 @@ def hazard(
 
     Raises:
         InputError: no model reads the curve's measure, curves of several measures or sites, weights
-            that do not add up to 1, or a value that cannot be used.
+            that do not add up to 1, or no block that can be used.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
@@ -209,20 +224,32 @@ def hazard(
     weight = checked_weights(stated_weights(weights, curves), len(curves))
     p2s, krs = (np.ravel(values) for values in np.broadcast_arrays(p2, kr))
     checked_years(years)
-    counts = _checked_counts(at_least, p2s.size)
     reading = Shaking.of(
         curves[0], convert=convert, convert_sigma=convert_sigma, component=component
     )
     known = ("p2", "kr") if restitution is None else ("p2", "kr", "restitution")
     chosen = find_model(model, (*known, reading.name), db, kind=kind)
-    stated = None if restitution is None else np.broadcast_to(restitution, p2s.shape)
-    warnings = list(reading.warnings)
+    columns = {"p2": p2s, "kr": krs}
+    if restitution is not None:
+        columns["restitution"] = np.broadcast_to(restitution, p2s.shape)
+    columns = {name: column.astype(np.float64) for name, column in columns.items()}
+    reason = block_reasons(chosen.method.block, columns)
+    refuse_elements(reason)
+    sound = np.asarray(reason == "", dtype=bool)
+    columns = {name: column[sound] for name, column in columns.items()}
+    size = columns["kr"].size
+    counts = _checked_counts(at_least, size)
+    unusable = unusable_in_words(
+        p2s.size - size, p2s.size, elements(reason), reason[~sound].tolist(),
+        FROM_MEAN if one_class else FROM_SUMS,
+    )  # fmt: skip
+    warnings = [*unusable, *reading.warnings]
     for one in curves:
         warnings.extend(one.warnings)
         warnings.extend(quantile_warning(one, "a rate"))
     if chosen.term.advice:
         warnings.append(chosen.term.advice)
-    blocks = _Site.of(p2s, krs, stated, reading, chosen, level, curves, counts, one_class=one_class)
+    blocks = _Site.of(columns, reading, chosen, level, curves, counts, one_class=one_class)
     each = [blocks.under(one, years) for one in curves]
     parts = (
         each[:1]
@@ -242,8 +269,7 @@ def hazard(
     joints = [part.joint for part in parts if part.joint is not None]
     if joints:
         warnings.append(
-            f"annual_rate_any: all {p2s.size} blocks are taken as those of one site, of unknown "
-            "azimuth"
+            f"annual_rate_any: all {size} blocks are taken as those of one site, of unknown azimuth"
         )
     if joints and blocks.thresholds is None:
         why = (
@@ -261,22 +287,32 @@ def hazard(
             f"quadrature of a rate may be off by {100.0 * worst:.2g} %: its P changes abruptly "
             "between levels of the curve"
         )
+
+    def placed(values: FloatArray) -> FloatArray:
+        """Return values of the blocks that can be used among those of all."""
+        if one_class or sound.all():
+            return values
+        whole = np.full((sound.size, *values.shape[1:]), np.nan)
+        whole[sound] = values
+        return whole
+
     return HazardAnswer(
-        **mean,
-        probability=np.asarray(probability),
+        **{name: placed(values) for name, values in mean.items()},
+        probability=placed(np.asarray(probability)),
         years=years,
         level=level,
         model=chosen.name,
         term=chosen.term.name,
         method=chosen.row.method,
         edges=widest.edges,
-        contribution=contribution,
+        contribution=placed(contribution),
         measure=curves[0].measure,
         joint=JointRate.mean(joints, shares) if joints else None,
         curve_kind="weighted branches" if weight is not None else curves[0].statistic or None,
-        branches=_branches(curves, each, weight),
-        quantiles=_quantiles(parts, shares) if weight is not None else {},
+        branches=_branches(curves, each, weight, placed),
+        quantiles=_quantiles(parts, shares, placed) if weight is not None else {},
         warnings=tuple(dict.fromkeys(warnings)),
+        reason=np.full(1, "", dtype=object) if one_class else reason,
     )
 
 
@@ -319,9 +355,7 @@ class _Site:
     @classmethod
     def of(
         cls,
-        p2: FloatArray,
-        kr: FloatArray,
-        restitution: FloatArray | None,
+        columns: Mapping[str, FloatArray],
         reading: Shaking,
         model: FragilityModel,
         level: float,
@@ -330,17 +364,16 @@ class _Site:
         *,
         one_class: bool,
     ) -> _Site:
-        """Return the blocks; arguments as those of `hazard`."""
+        """Return the blocks: p2, kr and, if stated, restitution; others as those of `hazard`."""
+        p2 = columns["p2"]
         starts = [0] if one_class else range(0, p2.size, _CHUNK)
         length = p2.size if one_class else _CHUNK
         blocks = [
             ModelBlocks.certain(
-                p2[i : i + length],
-                kr[i : i + length],
+                **{name: column[i : i + length] for name, column in columns.items()},
                 shaking=reading,
                 model=model,
                 level=level,
-                restitution=None if restitution is None else restitution[i : i + length],
             )
             for i in starts
         ]
@@ -429,7 +462,10 @@ def _contribution(parts: Sequence[_Rates], shares: FloatArray, edges: FloatArray
 
 
 def _branches(
-    curves: Sequence[HazardCurve], each: Sequence[_Rates], weight: FloatArray | None
+    curves: Sequence[HazardCurve],
+    each: Sequence[_Rates],
+    weight: FloatArray | None,
+    placed: Callable[[FloatArray], FloatArray],
 ) -> tuple[BranchRate, ...]:
     if len(curves) == 1:
         return ()
@@ -437,17 +473,19 @@ def _branches(
         BranchRate(
             curve_name(curve),
             None if weight is None or np.isnan(weight[i]) else float(weight[i]),
-            rates.annual_rate,
+            placed(rates.annual_rate),
             float(rates.annual_rate[0]) if rates.joint is None else rates.joint.annual_rate_any,
         )
         for i, (curve, rates) in enumerate(zip(curves, each, strict=True))
     )
 
 
-def _quantiles(parts: Sequence[_Rates], shares: FloatArray) -> dict[float, dict[str, Any]]:
+def _quantiles(
+    parts: Sequence[_Rates], shares: FloatArray, placed: Callable[[FloatArray], FloatArray]
+) -> dict[float, dict[str, Any]]:
     rates = weighted_quantiles(np.stack([part.annual_rate for part in parts]), shares, QUANTILES)
     result: dict[float, dict[str, Any]] = {
-        q: {"annual_rate": row} for q, row in zip(QUANTILES, rates, strict=True)
+        q: {"annual_rate": placed(row)} for q, row in zip(QUANTILES, rates, strict=True)
     }
     any_rates = [None if part.joint is None else part.joint.annual_rate_any for part in parts]
     if all(one is not None for one in any_rates):

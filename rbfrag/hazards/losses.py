@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import Any
 
@@ -111,13 +111,15 @@ class LossAnswer(Tabular):
         loss_variance: its variance, shape (laws, n); NaN where it was not computed.
         any_fails: probability of any failure, shape (laws, n); NaN likewise.
         bounds: the same under full dependence and independence, shape (2, n).
-        block_rates: rate of each row of the table, its standard error, and its loss, shape
-            (3, rows).
+        block_rates: rate of each row of the table that can be used, its standard error, and its
+            loss, NaN where it states none, shape (3, rows).
         exceedance: how often numbers of failures are reached, by law.
         loss_exceedance: how often losses are.
         quantiles: of failures and of the loss of a scenario at 5, 50 and 95 %, by law, shape
             (laws, 2, 3); empty where there are none.
         warnings: what to know about the answer.
+        refused: rows of the table that could not be used, by their index: ``block_id``, ``site_id``
+            and ``reason``.
     """
 
     events: EventSet
@@ -136,6 +138,7 @@ class LossAnswer(Tabular):
     loss_exceedance: Mapping[str, tuple[Exceedance, ...]]
     quantiles: FloatArray
     warnings: tuple[str, ...]
+    refused: Mapping[int, Mapping[str, str]] = field(default_factory=dict)
 
     def mean(self, values: FloatArray) -> float:
         """Return the weighted sum over the events: a rate [1/a], or a mean given the event."""
@@ -265,16 +268,23 @@ class LossAnswer(Tabular):
             if self.events.is_scenario
             else ("average_annual_failures", "average_annual_loss")
         )
-        names = (self.portfolio.block_ids, self.portfolio.site_ids)
-        return [
-            {
-                "block_id": block, "site_id": site, failures: rate, f"{failures}_error": error,
-                **({loss: cost} if self.has_losses else {}),
-            }
-            for block, site, rate, error, cost in zip(
-                *names, *self.block_rates.tolist(), strict=True
-            )
-        ]  # fmt: skip
+        names = ("block_id", "site_id", failures, f"{failures}_error", loss, "reason")
+        answered = zip(
+            self.portfolio.block_ids, self.portfolio.site_ids, *self.block_rates.tolist(),
+            strict=True,
+        )  # fmt: skip
+        rows: list[dict[str, Any]] = [
+            {**dict.fromkeys(names), **self.refused[i]}
+            if i in self.refused
+            else dict(zip(names, (*next(answered), ""), strict=True))
+            for i in range(len(self.portfolio.block_ids) + len(self.refused))
+        ]
+        for row in rows:
+            if not self.has_losses:
+                del row[loss]
+            elif row[loss] != row[loss]:  # none is stated
+                row[loss] = None
+        return rows
 
     def table_columns(self) -> dict[str, NDArray[Any]]:
         """Return the table of events, one row each, also of those that shook no site."""

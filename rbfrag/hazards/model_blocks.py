@@ -18,6 +18,7 @@ from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.uncertain import normal_steps
+from rbfrag.fragility.unusable import block_reasons, refuse_elements
 from rbfrag.hazards.annual_rate import Fragility
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.shaking import Shaking
@@ -30,6 +31,9 @@ TABLE_STEP, SMOOTH_STEP = 0.01, 0.02
 """Greatest step of ln x between the nodes of a table of P, as it is and smoothed by scatter."""
 
 FEWEST_NODES = 65
+
+ALL_STAND = "that all of them stand is the question"
+"""Why blocks of which one cannot be used are refused."""
 
 _OF_ROCKING = ("p2", "kr", "restitution")
 _SIGMA_POINTS, _SIGMA_REACH = 15, 5.0
@@ -145,23 +149,19 @@ class ModelBlocks:
         values = np.broadcast_arrays(
             *(np.atleast_1d(np.asarray(one, dtype=np.float64)) for one in columns.values())
         )
-        for name, value in zip(list(columns)[:-1], values, strict=False):
-            least = 0.0 if name.endswith("sigma") else np.nextafter(0.0, 1.0)
-            wrong = ~(np.isfinite(value) & (value >= least))
-            if wrong.any():
-                raise InputError(
-                    f"{name} = {value[wrong][0]:g}: give "
-                    + ("0 or more" if least == 0.0 else "a finite number above 0")
-                )
-        medians = (values[0], values[1])
-        z, weight = _standard_draws(values[2:5], draws, seed)
-        p2s, krs = (lognormal(z[i], medians[i], values[2 + i]) for i in (0, 1))
         stated = None if restitution is None else values[5]
         names = ("p2", "kr", shaking.name) if stated is None else (*_OF_ROCKING, shaking.name)
         chosen = find_model(model, names, db, kind=kind)
+        given = dict(zip(columns, values, strict=True))
         if stated is None:
+            del given["restitution"], given["restitution_sigma"]
             if values[4].any():
                 raise InputError("restitution_sigma goes with restitution: give its mean, too")
+        refuse_elements(block_reasons(chosen.method.block, given), ALL_STAND)
+        medians = (values[0], values[1])
+        z, weight = _standard_draws(values[2:5], draws, seed)
+        p2s, krs = (lognormal(z[i], medians[i], values[2 + i]) for i in (0, 1))
+        if stated is None:
             return cls(p2s, krs, weight, medians, shaking, chosen, level)
         own = _with_own(chosen, medians, stated)
         scattered = fraction(z[2], own, values[4])
@@ -268,20 +268,9 @@ class ModelBlocks:
 def _with_own(
     model: FragilityModel, medians: tuple[FloatArray, FloatArray], stated: FloatArray
 ) -> FloatArray:
-    """Return restitutions, with that of the block itself where none is stated.
-
-    Raises:
-        InputError: one that no block has.
-    """
+    """Return restitutions, with that of the block itself where none is stated."""
     p2, kr = medians
     own = model.method.block.filled({"p2": p2, "kr": kr, "restitution": stated})["restitution"]
-    wrong = ~((own > 0.0) & (own <= 1.0))
-    if wrong.any():
-        raise InputError(
-            f"restitution = {own[wrong][0]:g}: give the speed after an impact over that before it, "
-            "above 0 and up to 1 (a block that comes to rest at its first impact is outside the "
-            "model)"
-        )
     return np.asarray(own)
 
 

@@ -93,10 +93,10 @@ class Portfolio:
         """Return the blocks of a table.
 
         Args:
-            columns: ``block_id``, ``p2_1_s2`` [1/s²] and ``kr`` of each row, and, if there are,
-                ``site_id``, ``kind``, ``count`` (like blocks, each with an azimuth of its own),
-                ``weight`` (what a failure counts), ``loss``, ``loss_sigma``, ``p2_sigma``,
-                ``kr_sigma`` and options of the kind such as ``restitution``.
+            columns: ``block_id``, ``p2_1_s2`` [1/s²] and ``kr`` of each row that can be used, and,
+                if there are, ``site_id``, ``kind``, ``count`` (like blocks, each with an azimuth of
+                its own), ``weight`` (what a failure counts), ``loss``, ``loss_sigma``,
+                ``p2_sigma``, ``kr_sigma`` and options of the kind such as ``restitution``.
             site_ids: names of the sites of the event set.
             measures: what is known of the shaking, by the names of :func:`rbfrag.predict`.
             component: what its values mean.
@@ -105,22 +105,14 @@ class Portfolio:
             db: as in :func:`rbfrag.predict`.
 
         Raises:
-            InputError: a site that is none of the event set, a count, loss or sigma that is none,
-                or no model that reads the measures.
+            InputError: no sites of the blocks, more blocks than are answered, or no model that
+                reads the measures.
         """
         names = columns["block_id"]
         n = len(names)
 
         def numbers(name: str, missing: float) -> FloatArray:
-            values = np.asarray(columns.get(name, np.full(n, missing)), dtype=np.float64)
-            values = np.where(np.isnan(values), missing, values)
-            wrong = ~((values >= 0.0) & (values < np.inf))
-            if wrong.any():
-                i = int(np.flatnonzero(wrong)[0])
-                raise InputError(
-                    f"block {names[i]} has {name} = {values[i]:g}: give a number not below zero"
-                )
-            return values
+            return np.asarray(np.nan_to_num(columns.get(name, np.full(n, missing)), nan=missing))
 
         sites = _site_indices(columns, site_ids)
         kinds = _kinds(columns, n, kind)
@@ -130,13 +122,6 @@ class Portfolio:
         }
         places = {one: i for i, one in enumerate(chosen)}
         count, weight = numbers("count", 1.0), numbers("weight", 1.0)
-        wrong = (count != np.rint(count)) | (count < 1.0)
-        if wrong.any():
-            i = int(np.flatnonzero(wrong)[0])
-            raise InputError(
-                f"block {names[i]} has count = {count[i]:g}: give the number of like blocks, a "
-                "whole number from 1 on, or a weight"
-            )
         if count.sum() > MOST_BLOCKS:
             raise InputError(
                 f"there are {count.sum():g} blocks, by their counts: at most {MOST_BLOCKS} are "
@@ -287,13 +272,6 @@ def _site_indices(columns: Mapping[str, Any], site_ids: Sequence[str]) -> IntArr
             f"site of each block, such as {', '.join(map(repr, site_ids[:3]))}"
         )
     index = {name: i for i, name in enumerate(site_ids)}
-    for block, name in zip(names, columns["site_id"], strict=True):
-        if str(name) not in index:
-            raise InputError(
-                f"block {block} stands at the site {str(name)!r}, which the event set does not "
-                f"have; its sites are {', '.join(map(repr, site_ids[:5]))}"
-                f"{' …' if len(site_ids) > 5 else ''} (identifiers are texts: '0012' is not 12)"
-            )
     return np.array([index[str(name)] for name in columns["site_id"]], dtype=np.int64)
 
 

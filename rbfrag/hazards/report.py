@@ -15,17 +15,21 @@ def as_dict(
     names: Sequence[Sequence[str | None]],
     answers: Sequence[HazardAnswer],
     remarks: Sequence[str] = (),
+    refused: Mapping[int, Mapping[str, str]] | None = None,
 ) -> dict[str, Any]:
     """Return the answer under the keys of the JSON contract.
 
     One block at one site is an object with its contributions; at several sites a list in it.
     Several blocks are a list in it beside what they do in common, at several sites a list of that.
+    Those that cannot be used stand in the list without numbers, at several sites at its end.
 
     Args:
         curves: a curve of each site.
         names: identifiers of the blocks of each site.
         answers: the answers, one a site.
         remarks: warnings that go before those of the answers.
+        refused: rows of the table of blocks that cannot be used, by their index: ``block_id``,
+            ``site_id`` and ``reason``.
     """
     rows = [
         {
@@ -52,7 +56,8 @@ def as_dict(
         "curve_kind": first.curve_kind,
     }
     warnings = [*remarks, *_warnings(curves, answers)]
-    if any(len(own) > 1 for own in names):
+    if refused or any(len(own) > 1 for own in names):
+        rows = _with_refused(rows, refused or {}, in_order=len(answers) == 1)
         sites = [_of_site(curve, one) for curve, one in zip(curves, answers, strict=True)]
         common = sites[0] if len(sites) == 1 else {"sites": sites}
         return {**common, **shared, "blocks": rows, "warnings": warnings}
@@ -70,6 +75,24 @@ def as_dict(
     return {
         **rows[0], **shared, **branches, "contributions": contributions, "warnings": warnings,
     }  # fmt: skip
+
+
+def _with_refused(
+    rows: list[dict[str, Any]], refused: Mapping[int, Mapping[str, str]], *, in_order: bool
+) -> list[dict[str, Any]]:
+    """Return the rows with their reasons, and those that cannot be used among them."""
+    empty = dict.fromkeys(rows[0])
+    answered = iter([{**row, "reason": ""} for row in rows])
+    others = {
+        i: {**empty, "site": about.get("site_id"), "block_id": about["block_id"],
+            "reason": about["reason"]}
+        for i, about in refused.items()
+    }  # fmt: skip
+    if not in_order:
+        return [*answered, *others.values()]
+    places = range(max(len(rows) + len(refused), *refused, 0) + 1)
+    merged = (others[i] if i in others else next(answered, None) for i in places)
+    return [row for row in merged if row is not None]
 
 
 def _warnings(curves: Sequence[HazardCurve], answers: Sequence[HazardAnswer]) -> list[str]:
@@ -130,4 +153,20 @@ def rate_in_words(document: Mapping[str, Any]) -> str:
     return (
         f"The block fails {once_in(rate)} on average{interval if min(ends) > 1e-8 else ''}, with a "
         f"probability of {percent(document['probability'])} in {document['years']:g} years."
+    )
+
+
+def beyond_in_words(answer: HazardAnswer) -> tuple[str, ...]:
+    """Return what shaking beyond the end of a curve may do to one block, where that is much.
+
+    Args:
+        answer: an answer about one block.
+    """
+    rate = float(answer.annual_rate[0])
+    most = rate + float(answer.above_at_most[0] - answer.above[0])
+    if not most > 2.0 * rate:
+        return ()
+    return (
+        "The curve ends too early to tell: with the stronger shaking that it leaves out it may be "
+        f"up to {once_in(most)}.",
     )

@@ -57,6 +57,8 @@ def plot_shakemap(
     plot_path(path)
     if not np.isfinite(probability).any():
         raise InputError("there is no probability to draw")
+    if shape is None:
+        lon, lat, probability = (each[np.isfinite(probability)] for each in (lon, lat, probability))
     west, east, south, north = _frame(lon, lat, probability, epicentre)
     middle = math.cos(math.radians(0.5 * (south + north)))
     wide = max((east - west) * middle, 1e-3)

@@ -7,14 +7,12 @@ from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity, driving_acceleration_g
 from rbfrag.motions.quality import quality_flags
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 BLOCK = 16
 """Nodes per block of the table of maxima that rest is skipped by."""
@@ -77,6 +75,7 @@ class Excitation:
         least value is at a node. Minus infinity where a jump is still to come: nothing is
         decided before it.
         """
+        # the last entry is the rest after the record, where q = 0
         filled = np.append(self.q, 0.0)
         filled[self.jump_node : self.w.size] = -np.inf
         return np.ascontiguousarray(np.minimum.accumulate(filled[::-1])[::-1][:-1])

@@ -36,6 +36,7 @@ from rbfrag.solver.integrator.impulses import Corners, work_of
 from rbfrag.solver.integrator.one_freedom.equation import Pose
 from rbfrag.solver.integrator.one_freedom.state import record_of
 from rbfrag.solver.kind import BlockOnPlanes
+from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import FloatArray, ModeChange, Outcome
 
 STEP_S = 2e-4
@@ -149,6 +150,7 @@ def free_motion(
     block = site.block
     assert block is not None
     contact = block.toe if at_toe else block.heel
+    # the method is of first order: the difference of both is the error of the finer one
     coarse, coarse_rows = _run(site, excited, release, 2.0 * STEP_S, stop_at_landing)
     fine, rows = _run(site, excited, release, STEP_S, stop_at_landing)
     slips, slips_coarse = (
@@ -159,6 +161,7 @@ def free_motion(
         _extremes(release.pose.turned_rad, each[3]) for each in (rows, coarse_rows)
     )
     outcome, sentence = _ending(fine)
+    # whether it fails hangs on the step: closer to critical than the error
     if (fine.stop in (BACKWARD, FORWARD)) != (coarse.stop in (BACKWARD, FORWARD)):
         outcome, sentence = Outcome.UNDETERMINED, Outcome.UNDETERMINED.advice
     return FreeMotion(
@@ -166,8 +169,8 @@ def free_motion(
         sentence=sentence,
         time_s=fine.time_s,
         pose=_pose(block, fine.motion, contact),
-        started_s=None if math.isnan(fine.moved_s) else fine.moved_s,
-        landed_s=None if math.isnan(fine.landed_s) else fine.landed_s,
+        started_s=finite_or_none(fine.moved_s),
+        landed_s=finite_or_none(fine.landed_s),
         backward_rad=max(0.0, turns[1]),
         forward_rad=max(0.0, -turns[0]),
         slip_m=slips[1],
@@ -182,6 +185,7 @@ def free_motion(
 
 def gap_m(block: Block, pose: Pose) -> float:
     """Return the gap between the heel and its back plane, along the base [m]."""
+    # normal distance of the heel from its plane, less that which a missing corner leaves at rest
     gamma = math.radians(block.gamma_deg)
     normal = (math.sin(gamma), math.cos(gamma))
     low = [a - b for a, b in zip(block.lowest_on_back, block.heel, strict=True)]
@@ -233,6 +237,7 @@ def _corners(site: BlockOnPlanes, block: Block) -> Corners:
     """Return the pairs of corner and plane: those with the base first."""
     arms = np.array(block.outline)
     gamma = math.radians(block.gamma_deg)
+    # of base and back plane, into the block; each plane touches its nearest corner at rest
     normals = [(0.0, 1.0), (math.sin(gamma), math.cos(gamma))]
     from_heel = arms - np.array(block.heel)
     planes = 2 if site.back_fracture else 1
@@ -318,7 +323,7 @@ def _changes(rows: FloatArray) -> tuple[ModeChange, ...]:
     changes: list[ModeChange] = []
     since, doing, last = 0.0, "", ""
     for now, vx, vy, spin, bits in zip(rows[0], rows[4], rows[5], rows[6], rows[7], strict=True):
-        if vx == 0.0 and vy == 0.0 and spin == 0.0:
+        if vx == 0.0 and vy == 0.0 and spin == 0.0:  # rest changes nothing of what it does
             continue
         name = _named(int(bits), spin)
         if name != doing:
@@ -358,6 +363,7 @@ def released(time_s: float, pose: Callable[[float], Pose], position: float, rate
     here = pose(position)
     if rate == 0.0:
         return Release(time_s, here)
+    # by central differences of the poses, whose error is of second order in the time between
     half = 0.5 * _MOMENT_S * rate
     before, after = pose(position - half), pose(position + half)
     vx, vy = ((b - a) / _MOMENT_S for a, b in zip(before.centroid_m, after.centroid_m, strict=True))

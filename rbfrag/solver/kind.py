@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -17,7 +18,7 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.excitation import Excitation
+from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.results import (
     MAP_DEPTH,
     POLARITIES,
@@ -88,9 +89,19 @@ class Shaking:
     motion: GroundMotion
     vertical: GroundMotion | None
     polarity: Polarity
-    history: bool
+    history: bool = False
     remarks: tuple[str, ...] = ()
     start: BlockState | None = None
+
+    @cached_property
+    def excitation(self) -> Excitation:
+        """Both components at common nodes, polarity applied."""
+        return excitation(self.motion, self.vertical, self.polarity)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What an answer should say about the block and about the motion."""
+        return (*self.remarks, *motion_remarks(self.motion, self.vertical, self.excitation))
 
 
 @dataclass(frozen=True)
@@ -134,6 +145,23 @@ class Case:
     p2: float | None
     block: Mapping[str, object] | None = None
     settings: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class CaseRequest:
+    """What of a case is to be computed.
+
+    Args:
+        search: look for the critical value; False where it is known.
+        grid: run the outcome grid; False where it is known.
+        full_map: map what fails and what does not, too.
+        map_depth: width of k/PGA that a map may leave undecided at a border.
+    """
+
+    search: bool = True
+    grid: bool = True
+    full_map: bool = False
+    map_depth: float = MAP_DEPTH
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,52 +274,18 @@ class Kind:
         return np.empty(0)
 
     def run_cases(
-        self,
-        motion: GroundMotion,
-        vertical: GroundMotion | None,
-        polarity: Polarity,
-        cases: Sequence[Case],
-        *,
-        search: bool = True,
-        grid: bool = True,
-        full_map: bool = False,
-        map_depth: float = MAP_DEPTH,
+        self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest
     ) -> list[CaseResult]:
-        """Return critical value and outcome grid of every case under one motion.
-
-        Args:
-            motion: horizontal ground motion.
-            vertical: vertical motion of the same recording, upward positive.
-            polarity: ``forward`` or ``reverse``.
-            cases: the cases.
-            search: look for the critical values; False where they are known.
-            grid: run the outcome grids; False where they are known.
-            full_map: map what fails and what does not, too.
-            map_depth: width of k/PGA that a map may leave undecided at a border.
-        """
+        """Return critical value and outcome grid of every case under one motion."""
         raise NotImplementedError
 
-    def run_blocks(
-        self,
-        motion: GroundMotion,
-        vertical: GroundMotion | None,
-        polarity: Polarity,
-        case: Case,
-        k_over_pga: Sequence[float],
-    ) -> SearchPoints:
+    def run_blocks(self, shaking: Shaking, case: Case, k_over_pga: Sequence[float]) -> SearchPoints:
         """Run blocks of stated strengths k/PGA, falling: those of the campaign option `grid`."""
         raise InputError(
             f"no block of k/PGA {k_over_pga[0]!r} belongs to a campaign of {self.kind}"
         )
 
-    def history(
-        self,
-        motion: GroundMotion,
-        vertical: GroundMotion | None,
-        polarity: Polarity,
-        case: Case,
-        k_over_pga: float,
-    ) -> Response:
+    def history(self, shaking: Shaking, case: Case, k_over_pga: float) -> Response:
         """Return the motion in time of one block: the campaign option `store_responses`."""
         raise InputError(f"campaigns of {self.kind} keep no histories")
 

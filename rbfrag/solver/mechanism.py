@@ -11,8 +11,9 @@ import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
+from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.free_motion import (
+    FreeHistory,
     FreeMotion,
     Release,
     free_motion,
@@ -59,9 +60,9 @@ class MechanismKind(Kind):
             InputError: the base has cohesion.
         """
         mechanism = self._without_cohesion(site)
-        excited = excitation(shaking.motion, shaking.vertical, shaking.polarity)
+        excited = shaking.excitation
         whole = whole_run(mechanism, site, excited, history=shaking.history, start=shaking.start)
-        return _response(self.kind, whole, excited, shaking)
+        return _response(self.kind, whole, shaking)
 
     def runner(self, site: BlockOnPlanes) -> Runner:
         """Return a function that says how the block ends under an excitation."""
@@ -69,6 +70,7 @@ class MechanismKind(Kind):
 
         def run(excited: Excitation) -> RunEnd:
             whole = whole_run(mechanism, site, excited)
+            # of a block that has failed a peak is only where the run was stopped
             failed = whole.outcome is Outcome.TOPPLED
             return RunEnd(
                 outcome=whole.outcome,
@@ -175,6 +177,7 @@ class WholeRun:
         known = () if self.run is None else self.run.sentences
         if self.free is None:
             return known
+        # the end of its mechanism is not the end of the block any more
         if self.run is not None and self.run.ending:
             known = known[:-1]
         impact = [FALLS_ON_ITS_BASE.format(self.free.landed_s)] if self.free.landed_s else []
@@ -187,6 +190,7 @@ class WholeRun:
         if pose is None or self.outcome is not Outcome.STABLE:
             return None
         position, error = None, self.error
+        # only the first phase can be entered at rest: what comes after it goes on step by step
         if self.free is None and self.run is not None and self.run.phase is self.mechanism.first:
             position = self.run.x
         return BlockState(
@@ -225,6 +229,7 @@ def whole_run(
         start: the state that the motion finds; None for the first place.
     """
     run, release = None, None
+    # a start without a coordinate is one that no mechanism describes
     if start is None or start.position is not None:
         at = (0.0, 0.0) if start is None or not start.position else (start.position, start.error)
         run = follow(mechanism, excited, history=history, start=at)
@@ -241,8 +246,9 @@ def whole_run(
     return WholeRun(mechanism, site, start, run, free)
 
 
-def _response(kind: str, whole: WholeRun, excited: Excitation, shaking: Shaking) -> Response:
+def _response(kind: str, whole: WholeRun, shaking: Shaking) -> Response:
     """Return the answer about a block that was followed."""
+    excited = shaking.excitation
     failed = whole.outcome is Outcome.TOPPLED
     peak_rad = None if failed else whole.peak_rad
     critical = whole.mechanism.critical
@@ -267,11 +273,7 @@ def _response(kind: str, whole: WholeRun, excited: Excitation, shaking: Shaking)
         steps=steps,
         samples_moved=moved,
         samples_total=int(np.count_nonzero(excited.interval_s)),
-        warnings=(
-            *shaking.remarks,
-            *motion_remarks(shaking.motion, shaking.vertical, excited),
-            *whole.sentences,
-        ),
+        warnings=(*shaking.warnings, *whole.sentences),
         history=_history(whole, excited) if shaking.history else None,
         final_theta_rad=abs(at_end.turned_rad) if peak_rad is not None and at_end else None,
         displacement_m=at_end.displacement_m - before_m if at_end else None,
@@ -316,64 +318,51 @@ def _of_mechanism(mechanism: Mechanism, history: MotionHistory) -> _Kept:
     )
 
 
+def _of_free(history: FreeHistory) -> _Kept:
+    # a rotation is shown without its sense, and so is its rate
+    sign = np.where(history.turned_rad < 0.0, -1.0, 1.0)
+    return _Kept(
+        history.time_s,
+        history.turned_rad,
+        sign * history.spin_rad_s,
+        history.slip_m,
+        history.slip_m_s,
+        history.centroid_m,
+        # a block without a mechanism has no one strength
+        np.full_like(history.time_s, np.nan),
+    )
+
+
 def _history(whole: WholeRun, excited: Excitation) -> ResponseHistory:
     """Put the nodes of rest, which the kernels skip, back between those of motion."""
-    mechanism, free = whole.mechanism, whole.free
+    mechanism = whole.mechanism
     parts = []
     if whole.run is not None and whole.run.history is not None:
         parts.append(_of_mechanism(mechanism, whole.run.history))
-    if free is not None:
-        there = free.history
-        sign = np.where(there.turned_rad < 0.0, -1.0, 1.0)
-        parts.append(
-            _Kept(
-                there.time_s,
-                there.turned_rad,
-                sign * there.spin_rad_s,
-                there.slip_m,
-                there.slip_m_s,
-                there.centroid_m,
-                np.full_like(there.time_s, np.nan),
-            )
-        )
+    if whole.free is not None:
+        parts.append(_of_free(whole.free.history))
     kept = _Kept(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     time_s = kept.time_s
-    moves = (kept.spin_rad_s, kept.slip_m_s)
-    if not time_s.size or (
-        excited.time_s[-1] > time_s[-1] and all(values[-1] == 0.0 for values in moves)
-    ):
-        rest = excited.time_s
-    else:
-        rest = excited.time_s[excited.time_s < time_s[-1]]
-    rest = rest[~np.isin(rest, time_s)]
+    rest = _nodes_of_rest(kept, excited)
+    order = np.argsort(np.concatenate([time_s, rest]), kind="stable")
+    at_s = np.concatenate([time_s, rest])[order]
     last = np.searchsorted(time_s, rest, side="right") - 1
-    known = last >= 0
-    first = mechanism.first
-    at_start, position = first.pose(0.0), 0.0
-    if whole.start is not None:
-        state = whole.start
-        at_start = Pose(state.turned_rad, state.centroid_m, state.displacement_m)
-        position = math.nan if state.position is None else state.position
-    strength = first.forward.threshold(position) if position == position else math.nan
 
     def merged(moving: FloatArray, before: float | tuple[float, float]) -> FloatArray:
+        """Return values at all times: at rest those of the motion before, or of the first place."""
         resting = np.full((rest.size, *moving.shape[1:]), before, dtype=np.float64)
         if moving.size:
-            there = moving[np.maximum(last, 0)]
-            resting = np.where(known if moving.ndim == 1 else known[:, None], there, resting)
+            known = last >= 0 if moving.ndim == 1 else (last >= 0)[:, None]
+            resting = np.where(known, moving[np.maximum(last, 0)], resting)
         together: FloatArray = np.concatenate([moving, resting])[order]
         return together
 
-    order = np.argsort(np.concatenate([time_s, rest]), kind="stable")
-    at_s = np.concatenate([time_s, rest])[order]
-    spin, speed = (np.concatenate([values, np.zeros(rest.size)])[order] for values in moves)
-    k_h = np.interp(at_s, excited.time_s, excited.k_h, right=0.0)
-    k_v = np.interp(at_s, excited.time_s, excited.w - 1.0, right=0.0)
-    # of a jump, the first entry at its time shows what was before
-    for jump in np.flatnonzero(excited.interval_s == 0.0):
-        before = int(np.searchsorted(at_s, excited.time_s[jump]))
-        if before + 1 < at_s.size and at_s[before] == at_s[before + 1] == excited.time_s[jump]:
-            k_h[before], k_v[before] = excited.k_h[jump], excited.w[jump] - 1.0
+    spin, speed = (
+        np.concatenate([values, np.zeros(rest.size)])[order]
+        for values in (kept.spin_rad_s, kept.slip_m_s)
+    )
+    at_start, strength = _at_start(whole)
+    k_h, k_v = _accelerations(excited, at_s)
     turned = merged(kept.turned_rad, at_start.turned_rad)
     return ResponseHistory(
         time_s=at_s,
@@ -387,6 +376,37 @@ def _history(whole: WholeRun, excited: Excitation) -> ResponseHistory:
         turned_rad=turned,
         strength_g=merged(kept.strength_g, strength),
     )
+
+
+def _nodes_of_rest(kept: _Kept, excited: Excitation) -> FloatArray:
+    """Return the times of the nodes that were skipped [s]."""
+    time_s = kept.time_s
+    nodes_s = excited.time_s
+    # a block that has not come to rest has failed, or left the model: nothing follows
+    if time_s.size and (time_s[-1] >= nodes_s[-1] or kept.spin_rad_s[-1] or kept.slip_m_s[-1]):
+        nodes_s = nodes_s[nodes_s < time_s[-1]]
+    return nodes_s[~np.isin(nodes_s, time_s)]
+
+
+def _at_start(whole: WholeRun) -> tuple[Pose, float]:
+    """Return where the motion finds the block, and its strength there; NaN if it is not known."""
+    state, first = whole.start, whole.mechanism.first
+    if state is None:
+        return first.pose(0.0), first.forward.threshold(0.0)
+    strength = math.nan if state.position is None else first.forward.threshold(state.position)
+    return Pose(state.turned_rad, state.centroid_m, state.displacement_m), strength
+
+
+def _accelerations(excited: Excitation, at_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return k_h and k_v [g] at times of which each jump has two."""
+    k_h = np.interp(at_s, excited.time_s, excited.k_h, right=0.0)
+    k_v = np.interp(at_s, excited.time_s, excited.w - 1.0, right=0.0)
+    # of a jump, the first entry at its time shows what was before
+    for jump in np.flatnonzero(excited.interval_s == 0.0):
+        before = int(np.searchsorted(at_s, excited.time_s[jump]))
+        if before + 1 < at_s.size and at_s[before] == at_s[before + 1] == excited.time_s[jump]:
+            k_h[before], k_v[before] = excited.k_h[jump], excited.w[jump] - 1.0
+    return k_h, k_v
 
 
 @dataclass(frozen=True, eq=False)
@@ -480,6 +500,7 @@ def _leaves_g(mechanism: Mechanism) -> float:
     leaves = math.inf
     for condition in mechanism.first.forward.conditions:
         per_k_h, per_w = condition.per_k_h(0.0), condition.per_w(0.0)
+        # a force that k_h only strengthens opens no contact
         if per_k_h < 0.0:
             leaves = min(leaves, -per_w / per_k_h)
     return leaves

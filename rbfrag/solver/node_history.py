@@ -35,15 +35,18 @@ def node_history(
             nodes), shape (4, n).
         toppled: whether the history ends with the last of them.
     """
+    # nodes that the kernel skipped are nodes of rest: zero in both
     at_node = rows[3] >= 0.0
     theta = np.zeros(longer.time_s.size)
     rate = np.zeros(longer.time_s.size)
     moved = rows[3, at_node].astype(np.int64)
     theta[moved] = rows[1, at_node]
     rate[moved] = rows[2, at_node]
+    # all of the record, and of the free motion after it what the run went through
     shown = max(excited.time_s.size, int(moved[-1]) + 1) if moved.size else excited.time_s.size
     if toppled and moved.size:
         shown = int(moved[-1]) + 1
+    # a stable order: at one time the node comes before the event
     event = rows[:3, ~at_node]
     time_s = np.concatenate([longer.time_s[:shown], event[0]])
     order = np.argsort(time_s, kind="stable")

@@ -71,3 +71,8 @@ def vertical_g(value: object) -> float:
             "which the model of a block in contact does not cover: give a value above -1"
         )
     return result
+
+
+def finite_or_none(value: float | None) -> float | None:
+    """Return a number, or None where there is none: kernels and formulas say NaN or infinity."""
+    return value if value is not None and math.isfinite(value) else None

@@ -14,6 +14,7 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.files import written_whole
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import CriticalResult, FloatArray, Part, Response, ResponseHistory
 
 HISTORY_COLUMNS = (
@@ -229,7 +230,7 @@ def _sliding(result: CriticalResult) -> dict[str, Any]:
 
 def _scaled(result: CriticalResult) -> dict[str, Any]:
     its = result.of_kind
-    scale, limit, leaves_g = its["scale"], its["scale_limit"], its["leaves_g"]
+    scale = its["scale"]
     y_m_s = None
     if scale is not None:
         y_m_s = its["yield_g"] / scale * STANDARD_GRAVITY_M_S2 / math.sqrt(result.p2)
@@ -241,7 +242,7 @@ def _scaled(result: CriticalResult) -> dict[str, Any]:
         "upper": scale,
         "status": result.status,
         "starts_scale": its["starts_scale"],
-        "scale_limit": limit if math.isfinite(limit) else None,
+        "scale_limit": finite_or_none(its["scale_limit"]),
         "certified": result.certified,
         "reentrant": result.reentrant,
         "n_runs": result.n_runs,
@@ -250,5 +251,5 @@ def _scaled(result: CriticalResult) -> dict[str, Any]:
         "y_m_s": y_m_s,
         its["yield_name"]: its["yield_g"],
         "ps2": result.p2,
-        "leaves_g": leaves_g if math.isfinite(leaves_g) else None,
+        "leaves_g": finite_or_none(its["leaves_g"]),
     }

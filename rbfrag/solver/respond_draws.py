@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError
 from rbfrag.frames import Tabular
@@ -19,10 +19,8 @@ from rbfrag.solver.excitation import excitation, motion_remarks
 from rbfrag.solver.kind import RunEnd
 from rbfrag.solver.quantity import not_negative, positive
 from rbfrag.solver.respond import known_by_numbers
-from rbfrag.solver.results import Outcome
+from rbfrag.solver.results import FloatArray, Outcome
 from rbfrag.solver.scatter import fraction, lognormal
-
-FloatArray = NDArray[np.float64]
 
 LEVEL = 0.95
 """Level of the interval of the share."""

@@ -286,7 +286,7 @@ def no_intervals() -> OutcomeIntervals:
     return OutcomeIntervals(np.empty(0), np.empty(0), ())
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class CriticalResult(Tabular):
     """The critical block of one motion: the strongest one that it brings down.
 
@@ -332,19 +332,19 @@ class CriticalResult(Tabular):
     pga_g: float
     status: Status
     search_limit: float
-    kr_over_pga: float | None
-    lower: float | None
-    upper: float | None
-    kr: float | None
-    y_m_s: float | None
-    certified: bool
-    k_up_over_pga: float | None
-    undecided: float | None
-    island_width: float | None
-    kr_over_pga_resolved: float | None
-    reentrant: bool | None
-    n_runs: int
-    warnings: tuple[str, ...]
+    kr_over_pga: float | None = None
+    lower: float | None = None
+    upper: float | None = None
+    kr: float | None = None
+    y_m_s: float | None = None
+    certified: bool = False
+    k_up_over_pga: float | None = None
+    undecided: float | None = None
+    island_width: float | None = None
+    kr_over_pga_resolved: float | None = None
+    reentrant: bool | None = None
+    n_runs: int = 0
+    warnings: tuple[str, ...] = ()
     points: SearchPoints
     intervals: OutcomeIntervals = field(default_factory=no_intervals)
     of_kind: Mapping[str, Any] = field(default_factory=dict)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 _LEAST_FRACTION = 1e-12
 

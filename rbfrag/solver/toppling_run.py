@@ -13,7 +13,7 @@ from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
 from rbfrag.solver.integrator.single_run import HANDED, TOPPLED, Run, run_toppling
 from rbfrag.solver.integrator.taylor import ORDER, PH_MAX
 from rbfrag.solver.node_history import node_history, with_free_motion
-from rbfrag.solver.quantity import positive
+from rbfrag.solver.quantity import finite_or_none, positive
 from rbfrag.solver.results import Outcome, Polarity, Response, ResponseHistory
 
 OUTCOMES = (Outcome.STABLE, Outcome.TOPPLED, Outcome.UNDETERMINED, Outcome.JUMP)
@@ -67,8 +67,8 @@ def respond(
         peak_theta_n=run.peak_rad / theta_c if known else None,
         peak_theta_rad=run.peak_rad if known else None,
         critical_angle_deg=math.degrees(theta_c),
-        started_s=_time_or_none(run.started_s),
-        toppled_s=_time_or_none(run.verdict_s) if outcome is Outcome.TOPPLED else None,
+        started_s=finite_or_none(run.started_s),
+        toppled_s=finite_or_none(run.verdict_s) if outcome is Outcome.TOPPLED else None,
         error_estimate=run.error_rad,
         steps=run.steps,
         samples_moved=run.samples_moved,
@@ -124,10 +124,6 @@ def _history(excited: Excitation, *, p2: float, kr: float) -> ResponseHistory:
     run = Run(*run_toppling(longer.nodes, kr, p, ORDER, PH_MAX, rows, _TO_THE_END, np.empty(9)))
     kept = rows[:, : run.history_length]
     return node_history(excited, longer, kept, toppled=run.outcome == TOPPLED)
-
-
-def _time_or_none(time_s: float) -> float | None:
-    return time_s if math.isfinite(time_s) else None
 
 
 def _warnings(

@@ -158,7 +158,7 @@ def test_pelicun_has_a_description_beside_the_table(shell: Shell) -> None:
         ),
         (("--p2", "3"), "--kr is missing"),
         (("--blocks", "none.csv"), "no such file"),
-        (("--blocks", "bad.csv"), "block A7 has p2_1_s2 = 3 and kr = -1"),
+        (("--blocks", "bad.csv"), "line 2 (block A7): kr = -1 is not above zero"),
         (("--blocks", "twice.csv"), "'A7' is there twice"),
     ],
 )

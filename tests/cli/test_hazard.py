@@ -43,6 +43,16 @@ def test_one_block(shell: Shell, curve: Path) -> None:
     assert found["annual_rate"] == pytest.approx(1e-3 * (0.566 / 0.72) ** -2, rel=0.05)
 
 
+def test_a_curve_that_ends_too_early_is_no_answer(shell: Shell, curve: Path) -> None:
+    asked = ("--p2", "3", "--kr", "0.1", "--component", "single")
+    assert "too early" not in shell("hazard", curve, *asked).stdout
+    Path("map.csv").write_text("PGV [m/s],return_period_years\n0.1,475\n0.2,2475\n")
+    printed = shell("hazard", "map.csv", *asked).stdout
+    # shaking above 0.2 m/s comes once in 2,475 years and may fail the block each time
+    assert "The curve ends too early to tell" in printed
+    assert "it may be up to once in 2,500 years." in printed
+
+
 def test_shares_are_printed_between_the_levels(shell: Shell, curve: Path) -> None:
     printed = shell("hazard", curve, "--p2", "3", "--kr", "0.1", "--component", "single").stdout
     lines = printed.split("share_%")[1].strip().splitlines()
@@ -68,8 +78,8 @@ def test_a_row_that_is_no_block_has_its_reason(shell: Shell, curve: Path, name: 
         "block_id,p2_1_s2,kr\nA7,3,0.1\nbad,x,0.1\nB2,10,0.3\nflat,3,-0.1\nshort,3\n"
     )
     done = shell("hazard", curve, "--blocks", "blocks.csv", "--out", name)
-    assert "3 of 5 rows are no block that waits for an earthquake" in done.stderr
-    assert "the first: block bad p2_1_s2 = 'x' is not a number" in done.stderr
+    assert "3 of 5 blocks could not be used and are left out of all sums" in done.stderr
+    assert "the first is line 3 (block bad): p2_1_s2 = 'x' is not a number" in done.stderr
     names = ("annual_rate", "block_id", "reason")
     found = read_columns(name, names[:1], texts=names[1:])
     assert found["block_id"].tolist() == ["A7", "bad", "B2", "flat", "short"]
@@ -107,6 +117,9 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     printed = shell("hazard", curve, "--blocks", "blocks.csv", "--years", "100").stdout
     assert f"{once_in(found['annual_rate_any'])} on average" in printed
     assert f"{found['expected_failures_per_year']:.2g} failures a year are expected" in printed
+    assert printed.startswith("At least one of the blocks")
+    assert "numerical_error" not in printed
+    assert f"Most often fail A7 ({once_in(each[0])}) and B2 ({once_in(each[1])})." in printed
 
 
 def test_numbers_of_failures_that_are_asked_for(shell: Shell, curve: Path) -> None:

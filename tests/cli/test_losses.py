@@ -103,10 +103,8 @@ def test_what_is_refused(refuses: Refuses, job: Path) -> None:
         "losses", job, *blocks, "--expected", "--plot", "a.svg"
     )
     assert "--jobs" in refuses("losses", job, *blocks, "--jobs", "0")
-    Path("blocks.csv").write_text(BLOCKS.replace("0012", "12"))
+    Path("blocks.csv").write_text("".join(BLOCKS.replace("0012", "12").splitlines(True)[:2]))
     assert "stands at the site '12'" in refuses("losses", job, *blocks)
-    Path("blocks.csv").write_text(BLOCKS.replace(",1,100", ",1,much"))
-    assert "line 2" in refuses("losses", job, *blocks)
 
 
 def test_a_scenario(shell: Shell, job: Path) -> None:

@@ -48,7 +48,7 @@ def test_a_map_is_answered_as_by_the_shell(shell: Shell, tmp_path: Path) -> None
     with pytest.raises(rbfrag.InputError, match="kr is missing"):
         rbfrag.shakemap(grid, 3.0)
     with pytest.raises(rbfrag.InputError, match="kr = 0 is not above zero"):
-        rbfrag.shakemap(grid, 3.0, [0.1, 0.0])
+        rbfrag.shakemap(grid, 3.0, 0.0)
 
 
 @pytest.mark.parametrize(("name", "ending"), [("nrml", ".xml"), ("pelicun", ".csv")])

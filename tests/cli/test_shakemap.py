@@ -51,7 +51,7 @@ def test_blocks_at_their_places(shell: Shell, grid: Path) -> None:
     assert first["block_id"] == "A"
     assert float(first["probability"]) == pytest.approx(told["expected_failures"])
     assert second["probability"] == ""
-    assert any("1 of 2 blocks lie off the map" in text for text in told["warnings"])
+    assert any("1 of 2 blocks could not be used" in text for text in told["warnings"])
     points = {
         "type": "FeatureCollection",
         "features": [
@@ -67,9 +67,7 @@ def test_blocks_at_their_places(shell: Shell, grid: Path) -> None:
     assert same["expected_failures"] == told["expected_failures"]
 
 
-def test_rows_that_are_no_blocks_have_their_reason(
-    shell: Shell, grid: Path, refuses: Refuses
-) -> None:
+def test_rows_that_are_no_blocks_have_their_reason(shell: Shell, grid: Path) -> None:
     rows = "A,3,0.1,20.0,40.5\nB,3,x,20.0,40.5\nC,3,0.1,30.0,40.5\nD,3,0.1,999,40.5\n"
     Path("b.csv").write_text(f"block_id,p2_1_s2,kr,lon,lat\n{rows}")
     told = shell.json("shakemap", grid, "--blocks", "b.csv", "--out", "a.xlsx", *SINGLE)
@@ -80,12 +78,9 @@ def test_rows_that_are_no_blocks_have_their_reason(
         "", "kr = 'x' is not a number", "the block lies off the map",
     ]  # fmt: skip
     assert "lon = 999" in found["reason"][3]
-    assert "2 of 4 rows are no block" in " ".join(told["warnings"])
+    assert "3 of 4 blocks could not be used" in " ".join(told["warnings"])
     shell("shakemap", grid, "--blocks", "b.csv", "--out", "a.geojson", *SINGLE)
-    assert len(json.loads(Path("a.geojson").read_text())["features"]) == 2
-    Path("c.csv").write_text("p2_1_s2,kr\n3,0.1\n3,x\n")
-    message = refuses("shakemap", grid, "--blocks", "c.csv", "--out", "c.csv", *SINGLE)
-    assert "1 of 2 rows is no block" in message
+    assert len(json.loads(Path("a.geojson").read_text())["features"]) == 4
 
 
 def test_a_class_of_blocks_with_uncertainty(shell: Shell, grid: Path) -> None:
@@ -124,10 +119,16 @@ def test_geopackage(shell: Shell, grid: Path) -> None:
         (("--p2", "3", "--kr", "0.1", "--out", "a.csv", "--component", "x"), "'x' is not known"),
         (("--out", "a.csv"), "--p2 is missing"),
         (("--out", "a.csv", "--blocks", "half.csv"), "lon and lat go together"),
-        (("--out", "a.csv", "--blocks", "bad.csv"), "block 1 has p2_1_s2 = 3 and kr = 0"),
-        (("--out", "a.csv", "--blocks", "far.csv"), "block 1 at lon = 200"),
-        (("--out", "a.csv", "--blocks", "off.csv"), "none of the blocks lies on the map"),
-        (("--out", "a.csv", "--blocks", "bad.geojson"), "features[0]: the geometry is no Point"),
+        (("--out", "a.csv", "--blocks", "bad.csv"), "line 2: kr = 0 is not above zero"),
+        (
+            ("--out", "a.csv", "--blocks", "far.csv"),
+            "line 2: lon = 200, lat = 40 is no place",
+        ),
+        (("--out", "a.csv", "--blocks", "off.csv"), "line 2: the block lies off the map"),
+        (
+            ("--out", "a.csv", "--blocks", "bad.geojson"),
+            "feature 1: lon = nan, lat = nan",
+        ),
         (("--p2", "3", "--kr", "0.1", "--out", "a.csv", "--uncertainty", "grid.xml"), "STDPGV"),
     ],
 )
@@ -138,7 +139,9 @@ def test_refusals(
     Path("bad.csv").write_text("p2_1_s2,kr\n3,0\n")
     Path("far.csv").write_text("p2_1_s2,kr,lon,lat\n3,0.1,200,40\n")
     Path("off.csv").write_text("p2_1_s2,kr,lon,lat\n3,0.1,100,40\n")
-    Path("bad.geojson").write_text('{"type": "FeatureCollection", "features": [{}]}')
+    Path("bad.geojson").write_text(
+        '{"type": "FeatureCollection", "features": [{"properties": {"p2_1_s2": 3, "kr": 0.1}}]}'
+    )
     assert words in refuses("shakemap", grid, *options)
     assert not Path("a.csv").exists()
 

@@ -156,4 +156,4 @@ def test_refusals(
 def test_a_sigma_below_zero_is_refused_by_name(refuses: Callable[..., str], curve: str) -> None:
     Path("one.csv").write_text("block_id,p2_1_s2,kr,kr_sigma\nA7,3,0.1,-0.2\n")
     message = refuses("survival", curve, "--blocks", "one.csv", "--age", "100")
-    assert "block A7 has kr_sigma = -0.2" in message
+    assert "line 2 (block A7): kr_sigma = -0.2 is negative" in message

@@ -132,7 +132,7 @@ def test_old_answers_are_replaced(answer: Answer, tmp_path: Path) -> None:
     [
         (TABLE.replace("p2_1_s2", "p2"), "there is no column p2_1_s2"),
         (TABLE.replace("block_id", "kr"), "the column kr is there twice"),
-        ("", "there is no column p2_1_s2; the columns are none"),
+        ("", "no column p2_1_s2, nor height_m and width_m; the columns are none"),
     ],
 )
 def test_bad_tables_are_refused(answer: Answer, tmp_path: Path, text: str, words: str) -> None:
@@ -150,7 +150,7 @@ def test_a_bad_row_far_down_is_answered_with_its_reason(answer: Answer, tmp_path
     source.write_text("\n".join([HEAD, *lines]))
     told = answer(source, target)
     assert (told["rows"], told["answered"], told["without_answer"]) == (100_000, 99_998, 2)
-    assert "2 of 100,000 rows have no answer" in str(told["warnings"])
+    assert "2 of 100,000 blocks could not be used" in str(told["warnings"])
     assert "line 70002: kr = '?' is not a number" in str(told["warnings"])
     rows = rows_of(target)
     assert {row["probability"] for row in rows[:70_000]} == {rows[-1]["probability"]} != {""}

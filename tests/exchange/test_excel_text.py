@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rbfrag.exchange.batch import predict_table
-from rbfrag.exchange.block_table import waiting_blocks, write_block_table
+from rbfrag.exchange.block_rows import waiting_blocks
+from rbfrag.exchange.block_table import write_block_table
 from rbfrag.exchange.excel_text import as_text, as_written, formula_warnings
 from tests.cli.conftest import Shell
 from tests.synthetic import shaking, write_at2

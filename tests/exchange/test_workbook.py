@@ -15,7 +15,8 @@ import pytest
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.batch import predict_table
-from rbfrag.exchange.block_table import read_columns, waiting_blocks, write_block_table
+from rbfrag.exchange.block_rows import waiting_blocks
+from rbfrag.exchange.block_table import read_columns, write_block_table
 from rbfrag.exchange.tables import workbook
 
 HEAD = ("block_id", "p2_1_s2", "kr", "pgv_m_s", "remark")
@@ -56,8 +57,8 @@ def test_a_workbook_is_answered_row_by_row_as_csv_is(tmp_path: Path) -> None:
     book.save(source)
     told = answer(source, tmp_path / "out.xlsx")
     assert (told["rows"], told["answered"]) == (6, 1)
-    assert "5 of 6 rows have no answer" in str(told["warnings"])
-    assert "line 3: kr is the date 2024-03-01" in str(told["warnings"])
+    assert "5 of 6 blocks could not be used" in str(told["warnings"])
+    assert "row 3: kr is the date 2024-03-01" in str(told["warnings"])
     rows = rows_of(tmp_path / "out.xlsx")
     plain = tmp_path / "plain.csv"
     plain.write_text("p2_1_s2,kr,pgv_m_s\n3,0.1,0.6\n")
@@ -144,8 +145,8 @@ def test_one_bad_row_of_many(tmp_path: Path) -> None:
     write_block_table({"p2_1_s2": np.full(size, 3.0), "kr": kr}, source)
     told = answer(source, target, pgv_m_s=0.6)
     assert (told["rows"], told["without_answer"]) == (size, 1)
-    assert "1 of 10,000 rows has no answer" in str(told["warnings"])
-    assert "line 5434: kr = '?' is not a number" in str(told["warnings"])
+    assert "1 of 10,000 blocks could not be used" in str(told["warnings"])
+    assert "row 5434: kr = '?' is not a number" in str(told["warnings"])
 
 
 @pytest.mark.parametrize(
@@ -174,7 +175,7 @@ def test_without_openpyxl_the_extra_is_named(tmp_path: Path) -> None:
 import sys
 sys.modules["openpyxl"] = None
 from rbfrag.errors import MissingExtraError
-from rbfrag.exchange.block_table import waiting_blocks
+from rbfrag.exchange.block_rows import waiting_blocks
 from rbfrag.exchange.tables.files import table_path
 for act in (lambda: table_path("a.xlsx"), lambda: waiting_blocks("a.xlsx")):
     try:

@@ -13,12 +13,12 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import binom, binomtest, chi2
 
+from benchmarks.joint_law import JointFailures
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError
 from rbfrag.exchange.event_losses import losses
 from rbfrag.exchange.openquake_events import JobFiles, read_events
-from rbfrag.fragility.joint_law import JointFailures
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.predict import predict
 from rbfrag.hazards import event_counts
@@ -156,9 +156,9 @@ def test_counts_and_weights(job: Path) -> None:
     costs = [one.average_annual_loss for one in (once, many, heavy)]
     assert costs == pytest.approx([0.5, 1.5, 1.25])
     assert [one.value for one in many.exceedance["the model's copula"]] == [1.0, 2.0, 3.0]
-    with pytest.raises(InputError, match=r"block 1 has count = 1\.5"):
+    with pytest.raises(InputError, match=r"row 1: count = 1\.5"):
         answered(job, table([0.05], "007", count=1.5))
-    with pytest.raises(InputError, match="block 1 has loss = -1"):
+    with pytest.raises(InputError, match="row 1: loss = -1"):
         answered(job, table([0.05], "007", loss=-1.0))
 
 
@@ -357,7 +357,7 @@ def test_blocks_that_nothing_shakes(job: Path) -> None:
 
 
 def test_blocks_that_cannot_be_placed(job: Path) -> None:
-    with pytest.raises(InputError, match=r"block 1 stands at the site '12'.*'0012' is not 12"):
+    with pytest.raises(InputError, match=r"row 1: .* at the site '12'.*'0012' is not 12"):
         answered(job, table([0.4], "12"))
     blocks = table([0.4], "0012")
     del blocks["site_id"]

@@ -28,9 +28,7 @@ SCENARIOS = st.fixed_dictionaries(
 )
 
 
-@settings(
-    max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(values=SCENARIOS, level=st.sampled_from([0.5, 0.95, 0.999]))
 def test_one_block_is_answered_as_by_the_command_line(client, database, capsys, values, level):
     answer = client.get("/v1/predict", params={**values, "level": level})
@@ -43,9 +41,7 @@ def test_one_block_is_answered_as_by_the_command_line(client, database, capsys, 
     assert answer.json()["ci_high"] == own.ci_high
 
 
-@settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rows=st.lists(SCENARIOS.map(lambda s: {**s, "pga": 0.5}), min_size=1, max_size=20))
 def test_lists_are_answered_within_rounding_of_single_blocks(client, rows):
     names = ("p2", "kr", "pgv")
@@ -98,6 +94,7 @@ def test_a_list_says_which_element_cannot_be_used(client):
         ("p2=3&kr=0.1&pgv=0.6&pgv=0.7", "pgv is given twice"),
         ("p2=3&kr=0.1&pgv=0.6&pvg=0.7", "there is no parameter 'pvg'"),
         ("p2=3&kr=a tenth&pgv=0.6", "kr = 'a tenth' is not a number"),
+        ("p2=3&kr=0.1&pgv=1,000", "pgv = '1,000' is not a number: write decimals after a point"),
         ("p2=3&kr=0.1&pgv=0.6&level=95", "level = 95"),
         ("p2=3&kr=0.1&pgv=0.6&model=", "model is empty"),
         ("p2=3&kr=%ff&pgv=0.6", "kr = '\N{REPLACEMENT CHARACTER}' is not a number"),

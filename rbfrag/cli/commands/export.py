@@ -11,7 +11,6 @@ from rbfrag.cli.output import print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import command_group, option, stacked
-from rbfrag.cli.parameters.values import number_list
 
 if TYPE_CHECKING:
     from rbfrag.exchange.export import ExportAnswer
@@ -36,12 +35,17 @@ class FunctionOptions(BlocksOptions):
 
     def keywords(self) -> tuple[dict[str, Any], tuple[str, ...]]:
         """Return the keywords of `rbfrag.export`, and what is to be said of the blocks."""
-        table, is_class, remarks = self.toppling_blocks(name=self.name)
+        given = self.toppling_blocks()
         keywords = {
-            "blocks": table, "one_class": is_class, "imt": self.imt, "name": self.name,
-            "levels": self.levels, "model": self.model, "db": self.db,
+            "one_class": given.is_class, "imt": self.imt, "name": self.name, "levels": self.levels,
+            "model": self.model, "db": self.db,
         }  # fmt: skip
-        return keywords, remarks
+        if given.rows is None and not given.is_class:
+            return {**keywords, "p2": given.columns["p2_1_s2"], "kr": given.columns["kr"]}, (
+                given.remarks
+            )
+        keywords["blocks"] = given.question
+        return keywords, given.remarks
 
 
 @app.command("nrml", epilog="Example:  rbfrag export nrml --height 2.4 --width 0.5 --out block.xml")
@@ -60,7 +64,7 @@ def nrml(
     from rbfrag.exchange.export import nrml as written
 
     keywords, remarks = blocks.keywords()
-    wanted = None if shares is None else number_list(shares, "--shares")
+    wanted = None if shares is None else options.number_list(shares, "--shares")
     _print(written(out, **keywords, shares=wanted), remarks, json=json)
 
 

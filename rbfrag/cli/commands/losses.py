@@ -14,6 +14,7 @@ from rbfrag.cli.output import (
     check_files,
     print_json,
     print_pairs,
+    print_rows,
     print_table,
     print_warnings,
     write_table,
@@ -200,6 +201,5 @@ def _print(answer: LossAnswer, *, verbose: bool) -> None:
                 shown = [row if verbose else rounded_values(row) for row in thin]
                 print_table(names, [[row[name] for name in names] for row in shown])
     print()
-    shown = [row if verbose else rounded_values(row) for row in rows]
-    print_table(list(rows[0]), [list(row.values()) for row in shown])
+    print_rows([row if verbose else rounded_values(row) for row in rows])
     print_warnings(warnings)

@@ -10,7 +10,6 @@ from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnin
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
 from rbfrag.cli.parameters.stack import argument, option, stacked
-from rbfrag.errors import InputError
 
 EXAMPLE = (
     "Example:  rbfrag shakemap grid.xml --height 2.4 --width 0.5 --out map.geojson --plot map.png"
@@ -75,62 +74,36 @@ def shakemap(
     slope; free-standing ones fail at weaker shaking: --kind rocking. How many of all fail together
     is drawn.
     """
+    from rbfrag.exchange.block_rows import PLACE
     from rbfrag.exchange.map_answer import shakemap as answered
     from rbfrag.files import output_path
 
     target = output_path(out, SUFFIXES, "map")
     check_files(table=out if excel_text else None, plot=plot, excel_text=excel_text)
-    (class_blocks, _, remarks), refused = (
-        (blocks.toppling_blocks(standing, n=n), {})
-        if blocks.blocks is None
-        else blocks.blocks_and_refused(standing)
-    )
-    if refused and "lon" not in class_blocks:
-        raise InputError(f"{blocks.blocks}: {remarks[0]}: the mean needs all of them")
+    given = blocks.toppling_blocks(standing, n=n, reads=(*PLACE, "weight"))
     answer = answered(
-        grid, blocks=class_blocks, kind=standing.kind, uncertainty=meaning.uncertainty,
+        grid, blocks=given.question, kind=standing.kind, uncertainty=meaning.uncertainty,
         component=meaning.component, allow_partial=meaning.allow_partial, draws=drawing.draws,
         seed=drawing.seed, model=answering.model, level=answering.level, db=answering.db,
     )  # fmt: skip
-    warnings = [*remarks, *taken_as_medians(class_blocks), *answer.warnings]
-    written = dict(answer.columns)
-    if refused and target.suffix.lower() in TABLES:
-        written = _with_refused(written, class_blocks["row"], refused)
+    warnings = [*given.remarks, *taken_as_medians(given.columns), *answer.warnings]
     about = {**answer.about, "warnings": warnings}
-    _write(written, about, target, excel_text=excel_text)
+    _write(dict(answer.columns), about, target, excel_text=excel_text)
     if plot is not None:
-        from rbfrag.plots.shakemap import plot_shakemap
+        from rbfrag.plots.plot import shakemap as draw
 
-        plot_shakemap(
-            answer.columns["lon"], answer.columns["lat"], answer.columns["probability"], plot,
-            title=answer.title, epicentre=answer.epicentre, shape=answer.shape,
-        )  # fmt: skip
+        draw(answer, plot)
     document = {**answer.as_dict(), "file": str(target), "warnings": warnings}
     if printing.json:
         print_json(document)
         return
-    for sentence in map_in_words(document, own="lon" in class_blocks):
+    for sentence in map_in_words(document, own="lon" in given.columns):
         print(sentence)
     print()
     del document["warnings"]
     short = rounded_values({name: document[name] for name in SHORT})
     print_pairs(document if printing.verbose else short)
     print_warnings(warnings)
-
-
-def _with_refused(columns: dict[str, Any], rows: Any, refused: dict[str, Any]) -> dict[str, Any]:
-    """Return the table with the rows that are no blocks, in the order of the table of blocks."""
-    import numpy as np
-
-    order = np.argsort(np.concatenate([rows, refused["row"]]), kind="stable")
-    size = refused["row"].size
-    empty = {"in_domain": np.zeros(size, dtype=bool)}
-    return {
-        name: np.concatenate([column, refused.get(name, empty.get(name, np.full(size, np.nan)))])[
-            order
-        ]
-        for name, column in columns.items()
-    }
 
 
 def _write(

@@ -17,7 +17,6 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import StandingOptions, TableOptions
-from rbfrag.cli.parameters.curve import CurveOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.cli.sentences import rounded
 
@@ -70,7 +69,7 @@ def survival(
     blocks: TableOptions,
     standing: StandingOptions,
     known: Uncertainty,
-    meaning: CurveOptions,
+    meaning: options.Curve,
     answering: options.Answering,
     weights: str | None = option(
         "Weights of the branches: 0.5,0.3,0.2 in the order of the curves, or OpenQuake's file of "
@@ -88,10 +87,13 @@ def survival(
     weighted again by what the standing blocks say of each.
     """
     from rbfrag.hazards.curve_file import as_curves
+    from rbfrag.hazards.model_blocks import ALL_STAND
     from rbfrag.hazards.survival import survival as answered
 
     check_files(plot=plot)
-    table, _, remarks = blocks.toppling_blocks(standing)
+    table, _, remarks, rows = blocks.toppling_blocks(standing)
+    if rows is not None:
+        rows.whole(ALL_STAND)
     read = as_curves(curves, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
     answer = answered(
         read, table["p2_1_s2"], table["kr"], age_years=known.age, age_sd_years=known.age_sd,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from rbfrag.exchange.block_rows import BlockRows
     from rbfrag.rockmasses.joint_sets import RockMass
 
 WAYS = (
@@ -38,8 +40,10 @@ class ShapeOptions:
     )
     width: _Number = option("Width of a rectangular block along its base [m].")
     dip: _Number = option("Dip of the base of a rectangular block [deg], its --beta. Default: 0.")
-    alpha1: _Number = option("Angle of the heel [deg], with --alpha3 and --r3.")
-    alpha3: _Number = option("Angle of the toe [deg].")
+    alpha1: _Number = option(
+        "Angle from the normal of the base to the line centroid-heel [deg], with --alpha3 and --r3."
+    )
+    alpha3: _Number = option("The same of the toe [deg].")
     r3: _Number = option("Distance from centroid to toe [m].")
     s1: _Number = option("Spacing of the base fractures [m], with --s2 and --gamma.")
     s2: _Number = option("Spacing of the back fractures [m].")
@@ -113,8 +117,8 @@ class NumberOptions:
 class UncertaintyOptions:
     """How well a block is known; the option that states a value states its median."""
 
-    p2_sigma: _Number = option("Standard deviation of ln p².")
-    kr_sigma: _Number = option("Standard deviation of ln k_r.")
+    p2_sigma: _Number = option("Standard deviation of ln p²; 0.1 is some 10 %.")
+    kr_sigma: _Number = option("Standard deviation of ln k_r; 0.1 is some 10 %.")
     ky_sigma: _Number = option("Standard deviation of ln k_y.")
     restitution_sigma: _Number = option("Standard deviation of the restitution.")
     block_draws: str | None = option(
@@ -207,22 +211,28 @@ class TableOptions(BlockOptions):
     )
 
     def toppling_blocks(
-        self, standing: StandingOptions | None = None, *, name: str | None = None
+        self,
+        standing: StandingOptions | None = None,
+        *,
+        name: str | None = None,
+        reads: Collection[str] = (),
     ) -> TopplingBlocks:
         """Return the blocks that the options describe.
 
         Args:
             standing: how they stand; None for backed by a slope.
             name: identifier of a single block.
+            reads: which further columns of a table the command reads, as for `read_blocks`.
         """
         import numpy as np
 
         standing = standing or StandingOptions()
         if self.blocks is not None:
-            from rbfrag.exchange.block_table import waiting_blocks
+            from rbfrag.exchange.block_rows import read_blocks
 
-            table = waiting_blocks(self.blocks, standing.kind)
-            return TopplingBlocks(standing.completed(table), False, ())
+            rows = read_blocks(self.blocks, standing.kind, reads=reads, one_kind=True)
+            rows = replace(rows, blocks=standing.completed({**rows.blocks}))
+            return TopplingBlocks(rows.blocks, False, (), rows)
         from rbfrag.solver.quantity import positive
 
         values, remarks = self.toppling(standing.kind)
@@ -234,31 +244,6 @@ class TableOptions(BlockOptions):
         if standing.restitution is None and "restitution" in values:
             columns["restitution"] = np.array([values["restitution"]])
         return TopplingBlocks(standing.completed(columns), False, remarks)
-
-    def blocks_and_refused(
-        self, standing: StandingOptions
-    ) -> tuple[TopplingBlocks, dict[str, Any]]:
-        """Return the blocks, and the rows of a table that are none, with their reasons.
-
-        Args:
-            standing: how they stand.
-        """
-        if self.blocks is None:
-            return self.toppling_blocks(standing), {}
-        from rbfrag.exchange.block_table import blocks_and_refused
-
-        table, refused = blocks_and_refused(self.blocks, standing.kind)
-        size = refused["row"].size
-        if not size:
-            return TopplingBlocks(standing.completed(table), False, ()), {}
-        rows = (
-            f"{size:,} of {size + table['row'].size:,} rows {'are' if size > 1 else 'is'} no block"
-        )
-        remark = (
-            f"{rows} that waits for an earthquake, and without answer; the first: block "
-            f"{refused['block_id'][0]} {refused['reason'][0]}"
-        )
-        return TopplingBlocks(standing.completed(table), False, (remark,)), refused
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -274,6 +259,7 @@ class BlocksOptions(TableOptions):
         standing: StandingOptions | None = None,
         *,
         name: str | None = None,
+        reads: Collection[str] = (),
         n: int | None = None,
     ) -> TopplingBlocks:
         """Return the blocks that the options describe.
@@ -281,10 +267,11 @@ class BlocksOptions(TableOptions):
         Args:
             standing: how they stand; None for backed by a slope.
             name: identifier of a single block.
+            reads: which further columns of a table the command reads, as for `read_blocks`.
             n: number of realisations of the rock mass; None for what its file says.
         """
         if self.rockmass is None:
-            return super().toppling_blocks(standing, name=name)
+            return super().toppling_blocks(standing, name=name, reads=reads)
         if standing is not None and standing.is_free:
             raise InputError(
                 f"--rockmass does not go with --kind {standing.kind}: its blocks are backed by the "
@@ -297,18 +284,28 @@ class TopplingBlocks(NamedTuple):
     """Toppling blocks that a command answers for.
 
     Args:
-        columns: ``block_id``, ``p2_1_s2`` [1/s²] and ``kr``, and of a table that has them
-            ``weight``, ``lon`` and ``lat`` [deg].
+        columns: ``block_id``, ``p2_1_s2`` [1/s²] and ``kr``, and of a table that has them the
+            columns that are read.
         is_class: they stand for one class, the stable toppling blocks of a rock mass.
         remarks: warnings.
+        rows: the table that they are of, with what cannot be used of it; None without one.
     """
 
-    columns: dict[str, Any]
+    columns: Mapping[str, Any]
     is_class: bool
     remarks: tuple[str, ...]
+    rows: BlockRows | None = None
+
+    @property
+    def question(self) -> BlockRows | dict[str, Any]:
+        """What says of the blocks all that an answer reads of them."""
+        if self.rows is not None:
+            return self.rows
+        # a class has more blocks than names
+        return {name: values for name, values in self.columns.items() if name != "block_id"}
 
 
-def taken_as_medians(columns: dict[str, Any]) -> tuple[str, ...]:
+def taken_as_medians(columns: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what a command says that leaves standard deviations of blocks aside."""
     sigmas = ("p2_sigma", "kr_sigma")
     stated = [name for name in sigmas if name in columns and columns[name].any()]
@@ -371,7 +368,7 @@ def charted_blocks(
     if blocks is not None:
         from rbfrag.exchange.block_table import read_columns
 
-        columns = read_columns(blocks, names)
+        columns = read_columns(blocks, names, faults={})
     elif rockmass is not None:
         from rbfrag.rockmasses.file import read_rock_mass
         from rbfrag.rockmasses.report import block_columns

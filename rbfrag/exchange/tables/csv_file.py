@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 from rbfrag.errors import MissingExtraError
 from rbfrag.exchange.tables import parts
 from rbfrag.exchange.tables.parquet import arrow_array, arrow_columns
-from rbfrag.exchange.tables.parts import Part, Parts, Write, cells_of, columns_to_write, pyarrow
+from rbfrag.exchange.tables.parts import (
+    TEXTS,
+    Part,
+    Parts,
+    Write,
+    cells_of,
+    columns_to_write,
+    pyarrow,
+)
 
 _PEEK = 1 << 16
 _BOM = b"\xef\xbb\xbf"
@@ -72,6 +80,8 @@ def csv_parts(
     file = stack.enter_context(origin.open(newline="", encoding="utf-8-sig"))
     reader = csv.reader(file, delimiter=dialect.delimiter)
     header = [cell.strip() for cell in next(reader, [])]
+    while header and not header[-1]:  # spreadsheets write delimiters behind the last column
+        header.pop()
     if fast and dialect.delimiter == ",":
         with suppress(MissingExtraError):
             arrow, _ = pyarrow()
@@ -92,23 +102,45 @@ def _by_arrow(
             read_options=arrow_csv.ReadOptions(
                 column_names=header, skip_rows=1, block_size=1 << 25, use_threads=False
             ),
-            parse_options=arrow_csv.ParseOptions(newlines_in_values=True),
-            convert_options=arrow_csv.ConvertOptions(column_types=kinds, strings_can_be_null=False),
+            parse_options=arrow_csv.ParseOptions(newlines_in_values=True, ignore_empty_lines=False),
+            convert_options=arrow_csv.ConvertOptions(
+                column_types=kinds, strings_can_be_null=False, null_values=[""]
+            ),
         )
         for batch in batches:
+            if not _is_a_line_each(batch, arrow):
+                break
             cells: dict[str, Any] = {}
             for name, column in zip(header, batch.columns, strict=True):
                 if name in numeric:
                     cells[name] = np.array(column.to_numpy(zero_copy_only=False))
                 else:
-                    cells[name] = column.to_pylist() if name == "mode" else column
+                    cells[name] = column.to_pylist() if name in TEXTS else column
             if batch.num_rows:
                 yield Part(range(first, first + batch.num_rows), cells)
             first += batch.num_rows
             done += batch.num_rows
+        else:
+            return
     except arrow.ArrowException:
-        # cell by cell from the first row that was not handed out
-        yield from _cell_by_cell(header, reader, Dialect(), done)
+        pass
+    # cell by cell from the first row that was not handed out
+    yield from _cell_by_cell(header, reader, Dialect(), done)
+
+
+def _is_a_line_each(batch: Any, arrow: Any) -> bool:
+    """Whether each row is one line of the file, and none of them is blank."""
+    from pyarrow import compute
+
+    blank = np.ones(batch.num_rows, dtype=bool)
+    for column in batch.columns:
+        if not arrow.types.is_string(column.type):
+            blank &= compute.is_null(column).to_numpy(zero_copy_only=False)
+            continue
+        if compute.any(compute.match_substring(column, "\n")).as_py():
+            return False
+        blank &= compute.equal(column, "").to_numpy(zero_copy_only=False)
+    return not blank.any()
 
 
 def _cell_by_cell(header: list[str], reader: Any, dialect: Dialect, done: int = 0) -> Parts:
@@ -121,14 +153,20 @@ def _cell_by_cell(header: list[str], reader: Any, dialect: Dialect, done: int = 
         columns = map(list, zip(*rows, strict=True))
         return Part(lines, dict(zip(header, columns, strict=True)), faults, dialect.decimal)
 
-    for number, row in enumerate(row for row in reader if row):
-        if number < done:
+    number, end = 0, reader.line_num
+    for row in reader:
+        line, end = end + 1, reader.line_num
+        if not row or (width > 1 and not "".join(row).strip()):
+            continue  # a blank line, which spreadsheets write with all its delimiters
+        number += 1
+        if number <= done:
             continue
         if len(row) != width:
-            faults[len(rows)] = f"{len(row)} cells under {width} columns"
+            if len(row) < width or any(row[width:]):
+                faults[len(rows)] = f"{len(row)} cells under {width} columns"
             row = [*row[:width], *[""] * (width - len(row))]
         rows.append(row)
-        lines.append(reader.line_num)
+        lines.append(line)
         if len(rows) == parts.ROWS:
             yield part()
             rows, lines, faults = [], [], {}

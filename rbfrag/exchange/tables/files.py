@@ -29,6 +29,11 @@ def table_source(path: str | os.PathLike[str]) -> Path:
     return source
 
 
+def place_word(source: Path) -> str:
+    """Return what the numbers of a table's rows count: lines of CSV, rows of a sheet."""
+    return "line" if source.suffix.lower() == ".csv" else "row"
+
+
 def table_path(path: str | os.PathLike[str]) -> Path:
     """Return the path if a table can be written there; ask before long work."""
     target = output_path(path, SUFFIXES, "table")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.tables import parts
-from rbfrag.exchange.tables.parts import Part, Parts, Write, pyarrow
+from rbfrag.exchange.tables.parts import TEXTS, Part, Parts, Write, pyarrow
 
 
 def parquet_parts(
@@ -39,14 +39,19 @@ def parquet_parts(
         for group in batches():
             cells: dict[str, Any] = {}
             for name, column in zip(header, group.columns, strict=True):
-                if name in numeric:
+                is_text = arrow.types.is_string(column.type) or arrow.types.is_large_string(
+                    column.type
+                )
+                if name in TEXTS or (name in numeric and is_text):
+                    cells[name] = column.to_pylist()
+                elif name in numeric:
                     try:
                         column = column.cast(arrow.float64()).to_numpy(zero_copy_only=False)
                     except arrow.ArrowException:
                         raise InputError(f"{origin}: the column {name} holds no numbers") from None
                     cells[name] = np.array(column, dtype=np.float64)
                 else:
-                    cells[name] = column.to_pylist() if name == "mode" else column
+                    cells[name] = column
             yield Part(range(first, first + group.num_rows), cells)
             first += group.num_rows
 

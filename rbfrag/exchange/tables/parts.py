@@ -15,13 +15,16 @@ from rbfrag.errors import MissingExtraError
 ROWS = 1 << 18
 """Rows that are read, answered and written at a time."""
 
+TEXTS = ("mode", "kind")
+"""Columns of texts that are looked into: which model may answer."""
+
 
 @dataclass(frozen=True, eq=False)
 class Part:
     """Some rows of a table.
 
     Args:
-        lines: number of each row's line, or row of the sheet, in its file.
+        lines: number of each row in its file: of its first line in CSV, of its row of the sheet.
         cells: columns by name: arrays of numbers, lists of cells, or arrays of Arrow.
         faults: what is wrong with a whole row, by its index.
         decimal: what stands before the decimals of a number that is a text.

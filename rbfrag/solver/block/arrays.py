@@ -19,11 +19,10 @@ from rbfrag.solver.block.formulas import (
     tan_deg,
     tangents_from_spacings,
 )
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 CHUNK = 1 << 14
-"""Elements of one piece."""
+"""Elements of one chunk."""
 
 
 def common_shape(given: dict[str, ArrayLike]) -> tuple[dict[str, FloatArray], tuple[int, ...]]:
@@ -53,11 +52,11 @@ def in_chunks(
     inputs: Sequence[NDArray[Any]],
     outputs: Sequence[NDArray[Any]],
 ) -> None:
-    """Fill the outputs with what a formula makes of the inputs, piece by piece.
+    """Fill the outputs with what a formula makes of the inputs, chunk by chunk.
 
     Args:
-        formula: takes one piece of each input, or the number where an input is a single one
-            among many; returns one piece for each output.
+        formula: takes one chunk of each input, or the number where an input is a single one
+            among many; returns one chunk for each output.
         inputs: arrays that broadcast to the shape of the outputs.
         outputs: arrays to fill, contiguous, all of one shape.
     """

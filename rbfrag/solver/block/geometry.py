@@ -280,6 +280,7 @@ class Block:
         """Whether the back plane hinders a rotation about the toe (for a whole heel, γ > 90°)."""
         if self.lowest_on_back == self.heel:
             return self.cot_gamma < 0.0
+        # without a corner at the heel: whether the lowest contact would turn into its plane
         rise_m = self.lowest_on_back[1] - self.toe[1]
         return rise_m + self.cot_gamma * (self.toe[0] - self.lowest_on_back[0]) < 0.0
 
@@ -338,6 +339,7 @@ def _parallelogram(
 ) -> Block:
     cot = cot_gamma(t1, t3)
     h = half_s1_m
+    # (3.6), (3.7): r1 cos α1 = r3 cos α3 = S1/2; (3.3): r2 = -r3, and the fourth corner is -r1
     heel, toe = (h * t1, -h), (h * t3, -h)
     back = (-toe[0], h)
     front = (-heel[0], h)
@@ -354,6 +356,7 @@ def _parallelogram(
         toe=toe,
         lowest_on_back=heel,
         area_m2=base_m * 2.0 * h,
+        # (r1² + r3²)/6, that of a parallelogram by its half diagonals
         inertia_m2=(heel[0] * heel[0] + toe[0] * toe[0] + 2.0 * h * h) / 6.0,
         outline=(heel, toe, front, back),
         is_parallelogram=True,

@@ -132,6 +132,7 @@ def _on_back_plane(
     tolerance: float,
 ) -> list[int]:
     """Return the vertices on the back plane, after proving that the block rests against it."""
+    # distances from the plane through the back contact, into the block positive
     sine = 1.0 / math.sqrt(1.0 + cot * cot)
     x0, y0 = points[back]
     off = [sine * ((x - x0) + (y - y0) * cot) for x, y in points]
@@ -144,6 +145,7 @@ def _on_back_plane(
             f"behind that plane; the tolerance is {tolerance:.4g} m ({CONTACT_TOLERANCE:g} of the "
             "block's size)"
         )
+    # the edge along the plane has two ends: a block with one contact leans on a corner
     on_back = [i for i in range(len(points)) if off[i] <= tolerance]
     if len(on_back) < 2:
         raise InputError(

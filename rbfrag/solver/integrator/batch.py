@@ -13,8 +13,8 @@ from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.integrator.single_run import HANDED, run_toppling
 from rbfrag.solver.integrator.taylor import PH_MAX
 from rbfrag.solver.integrator.vectorised import run_batch
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
@@ -102,6 +102,7 @@ def simulate_many(excitation: Excitation, *, p2: ArrayLike, kr: ArrayLike) -> Ru
     run_batch(excitation.nodes, flat_kr, p, PH_MAX, whole, real)
     return Runs(
         outcome=whole[0].reshape(shape),
+        # the critical angle of the model is atan(k_r), whatever the dip
         theta_n=(real[0] / np.arctan(flat_kr)).reshape(shape),
         peak_rad=real[0].reshape(shape),
         started_s=real[1].reshape(shape),

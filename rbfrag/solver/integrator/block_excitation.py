@@ -12,15 +12,14 @@ from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.compiled import kernel
 from rbfrag.solver.integrator.spans import COLUMNS, LENGTHS, SPAN_PH, fill_spans
 from rbfrag.solver.integrator.taylor import PH_MAX
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 
 @kernel
 def remaining_excitation(
     interval_s: FloatArray, k_h: FloatArray, p: float, remaining: FloatArray
 ) -> tuple[float, int]:
-    """Fill what of the drive is still to come; return its maximum and the node after it.
+    """Fill the remaining excitation; return its maximum and the node after it.
 
     `remaining` at a node is G(t) = p integral_t^inf k_h(s) exp(-p (s - t)) ds, by G' = p (G - k_h)
     from the end backwards. In the linear model without vertical motion a block topples from
@@ -76,8 +75,7 @@ class BlockExcitation(NamedTuple):
         q: k_h/(1 + k_v) at the nodes, shape (n,).
         tail_min_q: least q from each node on, rest after the record included, shape (n,).
         block_max_q: greatest q of each block of nodes.
-        remaining: what of the drive is to come (`rbfrag.solver.integrator.block_excitation`), shape
-            (n,).
+        remaining: remaining excitation at the nodes (:func:`remaining_excitation`), shape (n,).
         remaining_max: greatest of it.
         remaining_max_node: node after it.
         spans: rows of `rbfrag.solver.integrator.spans`, of one length after the other.

@@ -5,9 +5,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rbfrag.solver.integrator.compiled import fused_kernel, inner_kernel, within
 from rbfrag.solver.integrator.taylor import (
     OF_ACCELERATION,
@@ -17,8 +14,7 @@ from rbfrag.solver.integrator.taylor import (
     rotation,
     value,
 )
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 REFINEMENTS = 8
 """Steps of Newton for a landing; two are nearly always enough."""

@@ -1,7 +1,7 @@
 """One excursion of one block, from a given state to the event that ends it.
 
-The search for critical values runs many short pieces of motion with the same kernel; a
-piece here has no error estimate, no peak and no history, only what happens to the block.
+The search for critical values runs many short excursions with the same kernel; one here has no
+error estimate, no peak and no history, only what happens to the block.
 A position in a record is a pair (interval i, fraction tau in [0, 1]); node i is (i, 0).
 """
 
@@ -9,9 +9,6 @@ from __future__ import annotations
 
 import math
 from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.solver.integrator.block_excitation import BlockExcitation
 from rbfrag.solver.integrator.compiled import inner_kernel, within
@@ -24,10 +21,8 @@ from rbfrag.solver.integrator.events import (
 )
 from rbfrag.solver.integrator.spans import span_step
 from rbfrag.solver.integrator.state import Place, State, StepExcitation, at_rest, excitation_over
-from rbfrag.solver.integrator.taylor import ORDER, lean_step, turn, value
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from rbfrag.solver.integrator.taylor import ORDER, even_parts, lean_step, turn, value
+from rbfrag.solver.results import FloatArray
 
 IMPACT, TOPPLED, IN_AIR, STOPPED, ORDER_LOST = 0, 1, 2, 3, 4
 
@@ -98,7 +93,7 @@ def order_lost(
     a0, da, w0, dw = shaking
     a1 = a0 + da
     w1 = w0 + dw
-    # D is linear in the drive: its least value over the step is at one of the ends
+    # D is linear in k_h and w: its least value over the step is at one of the ends
     least = min(
         min(a0 * s0 + w0 * c0, a1 * s0 + w1 * c0), min(a0 * s1 + w0 * c1, a1 * s1 + w1 * c1)
     )
@@ -108,26 +103,18 @@ def order_lost(
 
 
 @within
-def take_span(
-    spans: FloatArray,
-    lengths: IntArray,
-    first_rows: IntArray,
-    p: float,
-    span_ph: float,
-    i: int,
-    stop: int,
-    state: State,
-) -> tuple[int, State]:
+def take_span(excitation: BlockExcitation, i: int, stop: int, state: State) -> tuple[int, State]:
     """Go on by the longest span from node i that ends by `stop`; its length, 0 where none fits."""
+    spans = excitation.spans
     theta, rate, s, c = state
-    for level in range(lengths.size):
-        length = lengths[level]
+    for level in range(excitation.span_length.size):
+        length = excitation.span_length[level]
         # rows stand at multiples of their length
         if i % length != 0 or i + length > stop:
             continue
-        row = first_rows[level] + i // length
-        ph = p * spans[row, 0]
-        if not 0.0 < ph <= span_ph:
+        row = excitation.span_row[level] + i // length
+        ph = excitation.p * spans[row, 0]
+        if not 0.0 < ph <= excitation.span_ph:
             continue
         # |theta''| <= p² (|a| + w): the block cannot touch down in this span
         if theta + min(ph * rate, 0.0) - 0.5 * ph * ph * spans[row, 1] <= 0.0:
@@ -136,6 +123,19 @@ def take_span(
         s, c = turn(s, c, turned)
         return length, State(theta + turned, u_end / ph, s, c)
     return 0, state
+
+
+@within
+def impact_in_step(
+    theta: float, theta_end: float, u: FloatArray, u_start: float, u_end: float, v_end: float
+) -> float:
+    """Return the fraction of a step at which theta returns to 0, or -1; see `examine_step`."""
+    looks = theta_end <= 0.0 or (
+        not keeps_direction(u_start, u[1], u_end, v_end)
+        # of a peak nothing is asked: only a dip that may be an impact is looked into
+        and not simple_turn(theta, theta_end, u_start, u[1], u_end, v_end, math.inf, 0.0)
+    )
+    return examine_step(theta, u, ORDER, theta_end, u_end, v_end).impact if looks else -1.0
 
 
 @inner_kernel
@@ -179,9 +179,7 @@ def integrate_excursion(
     interval_s = excitation.interval_s
     k_h, w = excitation.k_h, excitation.w
     tail_min_q, u = excitation.tail_min_q, excitation.u
-    spans, lengths = excitation.spans, excitation.span_length
-    first_rows = excitation.span_row
-    span_ph = excitation.span_ph
+    lengths = excitation.span_length
     p, ph_max = excitation.p, excitation.ph_max
     i, tau = start
     theta, rate, s, c = state
@@ -193,9 +191,7 @@ def integrate_excursion(
     use_spans = rules.impacts and rules.order == ORDER_TRUSTED and lengths.size > 0
     while i < last and (i < stop.interval or (i == stop.interval and tau < stop.fraction)):
         if use_spans and tau == 0.0 and i % lengths[lengths.size - 1] == 0:
-            length, after = take_span(
-                spans, lengths, first_rows, p, span_ph, i, stop.interval, State(theta, rate, s, c)
-            )
+            length, after = take_span(excitation, i, stop.interval, State(theta, rate, s, c))
             if length > 0:
                 theta, rate, s, c = after
                 steps += 1
@@ -211,14 +207,11 @@ def integrate_excursion(
         # q is a ratio of straight lines: above kr at both nodes it is so between them
         if lifting and k_h[i + 1] - kr * w[i + 1] < 0.0:
             lifting = False
-        part = end - tau
-        ph = p * interval_s[i] * part
         # intervals are cut as in the single run, so that both see the same steps
-        parts = 1 if ph > 0.0 else 0  # nothing moves in an interval of no time
-        if ph > ph_max:
-            parts = math.ceil(ph / ph_max)
-            part /= parts
-            ph /= parts
+        part = end - tau
+        parts, part, ph = even_parts(p * interval_s[i] * part, part, ph_max)
+        if ph <= 0.0:  # nothing moves in an interval of no time
+            parts = 0
         for number in range(parts):
             at = tau + number * part
             shaking = excitation_over(k_h, w, i, at, part)
@@ -235,14 +228,8 @@ def integrate_excursion(
                 # lemma "lift": neither theta nor theta' falls below 0; rounding may say so
                 theta_end = max(theta_end, 0.0)
                 u_end = max(u_end, 0.0)
-            elif rules.impacts and (
-                theta_end <= 0.0
-                or (
-                    not keeps_direction(u_now, u[1], u_end, v_end)
-                    and not simple_turn(theta, theta_end, u_now, u[1], u_end, v_end, math.inf, 0.0)
-                )
-            ):
-                x = examine_step(theta, u, ORDER, theta_end, u_end, v_end).impact
+            elif rules.impacts:
+                x = impact_in_step(theta, theta_end, u, u_now, u_end, v_end)
                 if x >= 0.0:
                     rest = at_rest(kr)
                     # rounding may leave a rate above 0 at the root: a block does not close so

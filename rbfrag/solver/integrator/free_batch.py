@@ -57,6 +57,7 @@ def run_free_blocks(
         theta_n: filled with the peaks over their critical angles, shape (n,).
         sensitive: filled with 1 where the outcomes differ, shape (n,).
     """
+    # made once for all blocks: the coefficients of a step, and no history
     u = np.empty(9)
     no_rows = np.empty((4, 0))
     for j in range(outcome.size):
@@ -70,6 +71,7 @@ def run_free_blocks(
         if run.outcome == STABLE:
             theta_n[j] = max(run.forward.x / toe.theta_c, run.backward.x / heel.theta_c)
         sensitive[j] = 0
+        # one other outcome is enough: most sensitive blocks cost two runs, not three
         for i in (1, 2):
             if sensitive[j] == 0:
                 other = run_rocking(records[i], tails[i], toe, heel, rules, no_rows, u)

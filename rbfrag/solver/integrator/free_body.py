@@ -14,7 +14,7 @@ import math
 from typing import NamedTuple
 
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel
+from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel, within
 from rbfrag.solver.integrator.impulses import (
     CONVERGED,
     Corners,
@@ -24,6 +24,9 @@ from rbfrag.solver.integrator.impulses import (
 )
 from rbfrag.solver.integrator.one_freedom.state import Record
 from rbfrag.solver.results import FloatArray
+
+GOES_ON = -1
+"""A run that has not ended."""
 
 AT_REST, BACKWARD, FORWARD, THROWN, ENDLESS, LANDED = range(6)
 """How a run ends: at rest to the end; on its back edge; on its front face; by a jump of the ground;
@@ -41,6 +44,19 @@ FREE_MOST_S = 60.0
 
 STANDSTILL = 1e-8
 """Velocity over g h below which a block is at rest."""
+
+FREE_STEP_S = 0.05
+"""Time after the record that is integrated between two looks at whether the block rests [s]."""
+
+NEAR_M = 1e-9
+"""Gap up to which a corner counts as on its plane: rounding leaves as much [m]."""
+
+LET_OUT = 0.2
+"""Part of the depth of a corner below its plane by which a step lets it out: all of it at once
+would throw the block off."""
+
+KEEP = 5
+"""Steps between states that are kept."""
 
 
 class Frame(NamedTuple):
@@ -122,6 +138,7 @@ def one_step(
             it on them.
     """
     g = STANDARD_GRAVITY_M_S2
+    # the velocity without contacts, under the resultant of weight and inertia
     vx = at.vx + h * g * (w * frame.sine + a * frame.cosine)
     vy = at.vy + h * g * (a * frame.sine - w * frame.cosine)
     spin = at.spin
@@ -137,7 +154,8 @@ def one_step(
                       (at.vx - spin * ry) * nx + (at.vy + spin * rx) * ny)  # fmt: skip
         work.across[i] = 0.0
         work.along[i] = 0.0
-        if gap + 2.0 * h * fastest > 0.0 and gap > 1e-9:
+        # twice: impulses on other corners may turn this one towards its plane
+        if gap + 2.0 * h * fastest > 0.0 and gap > NEAR_M:
             continue
         k = active
         active += 1
@@ -147,10 +165,11 @@ def one_step(
         work.moment_t[k] = -rx * nx - ry * ny
         work.approach[k] = -((at.vx - at.spin * ry) * nx + (at.vy + at.spin * rx) * ny)
         # a corner above its plane may come down to it; one that rounding put below it is let out
-        work.least[k] = -gap / h if gap > 0.0 else -0.2 * gap / h
+        work.least[k] = -gap / h if gap > 0.0 else -LET_OUT * gap / h
     vx, vy, spin = after_impulses(
         corners, work, active, 1.0 / frame.inertia_m2, Velocity(vx, vy, spin), CONVERGED * g * h
     )
+    # what pushes touches; two corners on the base that were not there before are its whole fall
     touch = on_base = 0
     hardest = 0.0
     for k in range(active):
@@ -165,13 +184,35 @@ def one_step(
     return Motion(at.x + h * vx, at.y + h * vy, at.turned + h * spin, vx, vy, spin), touch
 
 
+class Loads(NamedTuple):
+    """Values of k_h/(1 + k_v) between which a block stays at rest where it is."""
+
+    low: float
+    high: float
+
+
+UNKNOWN = Loads(math.inf, -math.inf)
+"""Of a block whose rest has not been looked at."""
+
+
 @inner_kernel
 def rests(
-    corners: Corners, frame: Frame, at: Motion, h: float, a: float, w: float, work: Work
-) -> bool:
-    """Whether a block at rest stays so under two accelerations [g]."""
+    corners: Corners,
+    frame: Frame,
+    at: Motion,
+    h: float,
+    a: float,
+    w: float,
+    known: Loads,
+    work: Work,
+) -> tuple[bool, Loads]:
+    """Whether a block at rest stays so under two accelerations [g]; what is known of it then."""
+    q = a / w
+    # the loads that contacts with friction bear are a convex cone: one between two that they bear
+    if known.low <= q <= known.high:
+        return True, known
     after, _ = one_step(corners, frame, at, h, a, w, work)
-    return at_standstill(after, frame, h)
+    return at_standstill(after, frame, h), Loads(min(known.low, q), max(known.high, q))
 
 
 @inner_kernel
@@ -180,6 +221,28 @@ def at_standstill(at: Motion, frame: Frame, h: float) -> bool:
     least = STANDSTILL * STANDARD_GRAVITY_M_S2 * h
     turning = abs(at.spin) * math.sqrt(frame.inertia_m2)
     return abs(at.vx) <= least and abs(at.vy) <= least and turning <= least
+
+
+@within
+def kept(history: FloatArray, filled: int, now: float, at: Motion, touch: int) -> int:
+    """Fill one more column of a history that is not full; how many are filled."""
+    if filled >= history.shape[1]:
+        return filled
+    history[0, filled] = now
+    history[1, filled], history[2, filled], history[3, filled] = at.x, at.y, at.turned
+    history[4, filled], history[5, filled], history[6, filled] = at.vx, at.vy, at.spin
+    history[7, filled] = touch
+    return filled + 1
+
+
+@within
+def stop_of(frame: Frame, at: Motion, landed: bool) -> int:
+    """Return how a run ends after a step, or that it goes on."""
+    if landed:
+        return LANDED
+    if at.turned >= frame.backward_rad:
+        return BACKWARD
+    return FORWARD if at.turned <= -frame.forward_rad else GOES_ON
 
 
 @bare_kernel
@@ -215,18 +278,17 @@ def run_free(
     stopped_s, moved_s, landed_s = start_s, math.nan, math.nan
     resting = at_standstill(at, frame, h)
     end_s = time_s[-1]
-    every = 0
-    # the block stays at rest where k_h/(1 + k_v) is between these
-    low, high = math.inf, -math.inf
+    since_kept = 0
+    known = UNKNOWN
     while True:
         free = node >= last
-        if free and last < time_s.size - 1:
+        if free and last < time_s.size - 1:  # 1 + k_v <= 0 at the next node
             return FreeRun(THROWN, now, at, steps, filled, moved_s, landed_s)
         if free and now > end_s + FREE_MOST_S:
             return FreeRun(ENDLESS, now, at, steps, filled, moved_s, landed_s)
         a0 = a1 = 0.0
         w0 = w1 = 1.0
-        length = 0.05
+        length = FREE_STEP_S
         begin = now
         if not free:
             begin, length = time_s[node], time_s[node + 1] - time_s[node]
@@ -237,18 +299,17 @@ def run_free(
         if resting:
             part = (now - begin) / length
             a, w_now = a0 + part * (a1 - a0), w0 + part * (w1 - w0)
-            q = a / w_now
-            if low <= q <= high or rests(corners, frame, at, h, a, w_now, work):
-                if free:
-                    return FreeRun(AT_REST, stopped_s, at, steps, filled, moved_s, landed_s)
-                low, high = min(low, q), max(high, q)
-                q = a1 / w1
-                if low <= q <= high or rests(corners, frame, at, h, a1, w1, work):
-                    low, high = min(low, q), max(high, q)
-                    node += 1
-                    now = time_s[node]
-                    continue
-        low, high = math.inf, -math.inf
+            stays, known = rests(corners, frame, at, h, a, w_now, known, work)
+            if stays and free:
+                return FreeRun(AT_REST, stopped_s, at, steps, filled, moved_s, landed_s)
+            if stays:
+                # k_h/(1 + k_v) is monotone in the interval: rest at both ends is rest between
+                stays, known = rests(corners, frame, at, h, a1, w1, known, work)
+            if stays:
+                node += 1
+                now = time_s[node]
+                continue
+        known = UNKNOWN
         parts = max(1, math.ceil((begin + length - now) / h - 1e-9))
         size = (begin + length - now) / parts
         first = now
@@ -258,7 +319,7 @@ def run_free(
                 corners, frame, at, size, a0 + middle * (a1 - a0), w0 + middle * (w1 - w0), work
             )
             steps += 1
-            every += 1
+            since_kept += 1
             was = resting
             resting = at_standstill(at, frame, size)
             now = first + (n + 1) * size
@@ -270,23 +331,13 @@ def run_free(
                 moved_s = now - size
             if touch & LANDS and math.isnan(landed_s):
                 landed_s = now
-            if filled < history.shape[1] and (every >= KEEP or resting != was or n == parts - 1):
-                history[0, filled] = now
-                history[1, filled], history[2, filled], history[3, filled] = at.x, at.y, at.turned
-                history[4, filled], history[5, filled], history[6, filled] = at.vx, at.vy, at.spin
-                history[7, filled] = touch
-                filled += 1
-                every = 0
-            if stop_at_landing and not math.isnan(landed_s):
-                return FreeRun(LANDED, now, at, steps, filled, moved_s, landed_s)
-            if at.turned >= frame.backward_rad:
-                return FreeRun(BACKWARD, now, at, steps, filled, moved_s, landed_s)
-            if at.turned <= -frame.forward_rad:
-                return FreeRun(FORWARD, now, at, steps, filled, moved_s, landed_s)
+            # standstills and starts, and the end of every interval, whatever is due
+            if since_kept >= KEEP or resting != was or n == parts - 1:
+                filled = kept(history, filled, now, at, touch)
+                since_kept = 0
+            stop = stop_of(frame, at, stop_at_landing and not math.isnan(landed_s))
+            if stop != GOES_ON:
+                return FreeRun(stop, now, at, steps, filled, moved_s, landed_s)
         if not free:
             node += 1
             now = time_s[node]
-
-
-KEEP = 5
-"""Steps between states that are kept."""

@@ -90,6 +90,7 @@ def after_record(
         off: its error.
         slowest: speed after an impact below which the block rests [rad/s].
     """
+    # energy alone decides: (theta'/p)²/2 - (1 - cos x) is conserved about one corner
     forward, backward = Peak(0.0, 0.0), Peak(0.0, 0.0)
     corner = toe if side > 0 else heel
     rate, error = state.rate, abs(off.theta) + abs(off.rate)
@@ -110,7 +111,7 @@ def after_record(
         full = 2.0 * math.sin(0.5 * corner.theta_c)
         hit = math.sqrt(max(0.0, full * full - (border - rate) * (border + rate)))
         speed = hit * corner.p * corner.passed_on
-        if speed < slowest:
+        if speed < slowest:  # it rests, and nothing drives it any more
             break
         side = -side
         corner = toe if side > 0 else heel

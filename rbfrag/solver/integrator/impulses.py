@@ -26,6 +26,9 @@ CONVERGED = 1e-10
 SINGULAR = 1e-9
 """Pivot at which the linear equations are taken not to decide."""
 
+UNKNOWNS_MOST = 3
+"""Impulses that are unknown at most: as many as there are degrees of freedom."""
+
 OPEN, DOWN, UP, STUCK = range(4)
 """What a corner does: it does not push; it pushes and slips up or down its plane, so that
 friction is down or up it; it pushes and sticks."""
@@ -134,6 +137,7 @@ def after_impulses(
             i = int(work.pair[k])
             nx, ny = corners.normal_x[i], corners.normal_y[i]
             mn, mt = work.moment_n[k], work.moment_t[k]
+            # what this corner lacks of the least speed from its plane, as if it were alone
             speed = vx * nx + vy * ny + spin * mn
             push = max(across[i] - (speed - work.least[k]) * work.per_n[k], 0.0)
             part = push - across[i]
@@ -142,6 +146,7 @@ def after_impulses(
             vy += part * ny
             spin += part * mn * per_inertia
             change = max(change, abs(part))
+            # and what stops it along its plane, as far as Coulomb's law lets it
             speed = vx * ny - vy * nx + spin * mt
             limit = corners.friction[i] * push
             grip = min(max(along[i] - speed * work.per_t[k], -limit), limit)
@@ -158,6 +163,7 @@ def after_impulses(
             work.does[k] = does
         if change <= tolerance:
             break
+        # two sweeps agree on what each corner does: tried once for each such state
         tried = tried and same
         if same and not tried:
             tried = True
@@ -179,17 +185,21 @@ def _of_one(
     i = int(work.pair[0])
     nx, ny, friction = corners.normal_x[i], corners.normal_y[i], corners.friction[i]
     mn, mt = work.moment_n[0], work.moment_t[0]
+    # speed of the corner along and across its normal that unit impulses of both kinds give
     nn, nt = 1.0 + mn * mn * per_inertia, mn * mt * per_inertia
     tt = 1.0 + mt * mt * per_inertia
+    # friction would drive the corner into its plane as fast as the push lifts it (Painlevé)
     if nn - friction * abs(nt) <= SINGULAR:
         return False, free
     off = work.least[0] - (free.vx * nx + free.vy * ny + free.spin * mn)
-    if off <= 0.0:
+    if off <= 0.0:  # it parts from its plane by itself
         return True, free
     slips = free.vx * ny - free.vy * nx + free.spin * mt
+    # it sticks if Coulomb's law allows: both speeds are those that are asked for
     push = (off * tt + slips * nt) / (nn * tt - nt * nt)
     grip = -(slips + nt * push) / tt
     if not abs(grip) <= friction * push:
+        # it slips up its plane, friction down it; or the other way round
         push = off / (nn + friction * nt)
         grip = friction * push
         if slips + nt * push + tt * grip > 0.0:
@@ -212,7 +222,23 @@ def _solved(
     Returns:
         Whether there is one solution, which keeps to Coulomb's law; and the velocity.
     """
-    equations, columns = work.equations, work.columns
+    n = _fill_columns(corners, work, active, per_inertia)
+    if n > UNKNOWNS_MOST:
+        return False, free
+    _fill_equations(corners, work, active, n, free)
+    if not _eliminated(work.equations, n):
+        return False, free
+    velocity = _substituted(work, n, free)
+    if not _keeps_coulomb(corners, work, active, velocity):
+        return False, free
+    _put_impulses(corners, work, active)
+    return True, velocity
+
+
+@inner_kernel
+def _fill_columns(corners: Corners, work: Work, active: int, per_inertia: float) -> int:
+    """Fill the velocity that each unknown impulse gives; return their number, 4 for too many."""
+    columns = work.columns
     n = 0
     for k in range(active):
         if work.does[k] == OPEN:
@@ -221,8 +247,8 @@ def _solved(
         nx, ny = corners.normal_x[i], corners.normal_y[i]
         mn, mt = work.moment_n[k], work.moment_t[k]
         stuck = work.does[k] == STUCK
-        if n + (2 if stuck else 1) > 3:
-            return False, free
+        if n + (2 if stuck else 1) > UNKNOWNS_MOST:
+            return UNKNOWNS_MOST + 1
         # a slipping corner pushes along its normal and rubs along its plane in one proportion
         rubs = 0.0
         if not stuck:
@@ -231,34 +257,54 @@ def _solved(
         columns[n, 1] = ny - rubs * nx
         columns[n, 2] = (mn + rubs * mt) * per_inertia
         n += 1
-        if stuck:
+        if stuck:  # its friction is an unknown of its own
             columns[n, 0], columns[n, 1], columns[n, 2] = ny, -nx, mt * per_inertia
             n += 1
+    return n
+
+
+@inner_kernel
+def _fill_equations(corners: Corners, work: Work, active: int, n: int, free: Velocity) -> None:
+    """Fill an equation for each unknown: the speed of its corner at the end of the step."""
+    equations, columns = work.equations, work.columns
     row = 0
     for k in range(active):
         if work.does[k] == OPEN:
             continue
         i = int(work.pair[k])
-        nx, ny, mn, mt = (
-            corners.normal_x[i], corners.normal_y[i], work.moment_n[k], work.moment_t[k],
-        )  # fmt: skip
+        nx, ny = corners.normal_x[i], corners.normal_y[i]
+        mn, mt = work.moment_n[k], work.moment_t[k]
+        # across the plane the least that is permitted
         for j in range(n):
             equations[row, j] = columns[j, 0] * nx + columns[j, 1] * ny + columns[j, 2] * mn
         equations[row, 3] = work.least[k] - (free.vx * nx + free.vy * ny + free.spin * mn)
         row += 1
-        if work.does[k] == STUCK:
+        if work.does[k] == STUCK:  # along it none
             for j in range(n):
                 equations[row, j] = columns[j, 0] * ny - columns[j, 1] * nx + columns[j, 2] * mt
             equations[row, 3] = -(free.vx * ny - free.vy * nx + free.spin * mt)
             row += 1
+
+
+@inner_kernel
+def _eliminated(equations: FloatArray, n: int) -> bool:
+    """Bring n equations to triangular form; False where they do not decide."""
     for j in range(n):
+        # without friction they are symmetric and definite: pivots stay on the diagonal
         if not equations[j, j] > SINGULAR:
-            return False, free
+            return False
         for row in range(j + 1, n):
             factor = equations[row, j] / equations[j, j]
             for c in range(j + 1, n):
                 equations[row, c] -= factor * equations[j, c]
             equations[row, 3] -= factor * equations[j, 3]
+    return True
+
+
+@inner_kernel
+def _substituted(work: Work, n: int, free: Velocity) -> Velocity:
+    """Solve triangular equations, in place of their right sides; return the velocity."""
+    equations, columns = work.equations, work.columns
     vx, vy, spin = free
     for j in range(n - 1, -1, -1):
         impulse = equations[j, 3]
@@ -269,26 +315,41 @@ def _solved(
         vx += impulse * columns[j, 0]
         vy += impulse * columns[j, 1]
         spin += impulse * columns[j, 2]
+    return Velocity(vx, vy, spin)
+
+
+@inner_kernel
+def _keeps_coulomb(corners: Corners, work: Work, active: int, velocity: Velocity) -> bool:
+    """Whether impulses and velocity are such that each corner may do what it is taken to do."""
+    vx, vy, spin = velocity
     row = 0
     for k in range(active):
         i = int(work.pair[k])
         nx, ny = corners.normal_x[i], corners.normal_y[i]
         does = work.does[k]
         if does == OPEN:
+            # not pushed, it must not go below its plane
             if vx * nx + vy * ny + spin * work.moment_n[k] < work.least[k]:
-                return False, free
+                return False
             continue
-        push = equations[row, 3]
-        if push <= 0.0:
-            return False, free
+        push = work.equations[row, 3]
+        if push <= 0.0:  # planes do not pull
+            return False
         if does == STUCK:
-            if abs(equations[row + 1, 3]) > corners.friction[i] * push:
-                return False, free
+            if abs(work.equations[row + 1, 3]) > corners.friction[i] * push:
+                return False
         else:
+            # friction opposes the slip
             slips = vx * ny - vy * nx + spin * work.moment_t[k]
             if slips > 0.0 if does == DOWN else slips < 0.0:
-                return False, free
+                return False
         row += 2 if does == STUCK else 1
+    return True
+
+
+@inner_kernel
+def _put_impulses(corners: Corners, work: Work, active: int) -> None:
+    """Put the solution in the place of the impulses that sweeps have left."""
     row = 0
     for k in range(active):
         i = int(work.pair[k])
@@ -296,11 +357,10 @@ def _solved(
         work.across[i] = work.along[i] = 0.0
         if does == OPEN:
             continue
-        push = work.across[i] = equations[row, 3]
+        push = work.across[i] = work.equations[row, 3]
         if does == STUCK:
             row += 1
-            work.along[i] = equations[row, 3]
+            work.along[i] = work.equations[row, 3]
         else:
             work.along[i] = corners.friction[i] * (push if does == DOWN else -push)
         row += 1
-    return True, Velocity(vx, vy, spin)

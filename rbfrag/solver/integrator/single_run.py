@@ -12,10 +12,9 @@ at rest and the verdict is closed-form, by energy.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.solver.excitation import BLOCK, Nodes
 from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel, within
@@ -26,10 +25,22 @@ from rbfrag.solver.integrator.events import (
     simple_turn,
     upright_rate,
 )
-from rbfrag.solver.integrator.state import State, StepExcitation, at_rest, excitation_over
-from rbfrag.solver.integrator.taylor import MACHINE_EPSILON, taylor_step, turn, value
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.integrator.one_freedom.state import noted
+from rbfrag.solver.integrator.state import (
+    State,
+    StepExcitation,
+    at_rest,
+    excitation_over,
+    time_of_jump,
+)
+from rbfrag.solver.integrator.taylor import (
+    MACHINE_EPSILON,
+    even_parts,
+    taylor_step,
+    turn,
+    value,
+)
+from rbfrag.solver.results import FloatArray
 
 STABLE, TOPPLED, UNDETERMINED, JUMP = 0, 1, 2, 3
 
@@ -69,13 +80,15 @@ class Block(NamedTuple):
 
     Args:
         kr: rocking acceleration coefficient k_r.
-        cos_rest: cosine of its critical angle.
+        theta_c: critical angle [rad].
+        cos_rest: cosine of it.
         p: frequency parameter [1/s].
         order: degree of the Taylor step.
         ph_max: greatest p·h of one step.
     """
 
     kr: float
+    theta_c: float
     cos_rest: float
     p: float
     order: int
@@ -128,7 +141,7 @@ def lift_off(nodes: Nodes, kr: float, i: int, tau: float, last: int) -> tuple[in
         g0 = k_h[i] - w[i] * kr
         g1 = k_h[i + 1] - w[i + 1] * kr
         if interval_s[i] == 0.0 or (tau > 0.0 and g1 <= 0.0):
-            # nothing lifts in no time, nor where the drive is falling back
+            # nothing lifts in no time, nor where k_h is falling back
             i += 1
             tau = 0.0
         elif tau > 0.0:  # at rest inside the interval, after an impact
@@ -195,20 +208,6 @@ def drift_of_step(ph: float, error: float, truncation: float, theta_end: float) 
     return ph * error + truncation + 2.0 * MACHINE_EPSILON * abs(theta_end)
 
 
-@inner_kernel
-def noted(
-    rows: FloatArray, filled: int, time_s: float, theta: float, rate: float, node: int
-) -> int:
-    """Fill one more row of a history that is not full; how many are filled."""
-    if filled >= rows.shape[1]:
-        return filled
-    rows[0, filled] = time_s
-    rows[1, filled] = theta
-    rows[2, filled] = rate
-    rows[3, filled] = node
-    return filled + 1
-
-
 class Crossing(NamedTuple):
     """What the rest of an interval brought.
 
@@ -269,16 +268,13 @@ def cross_interval(
     steps = 0
     # a step holds the truncation at rounding only up to ph_max (see `taylor.PH_MAX`)
     whole = block.p * (nodes.interval_s[i] * (1.0 - tau))
-    parts, part, ph = 1, 1.0 - tau, whole
-    if whole > block.ph_max:  # a division takes as long as a tenth of a step
-        parts = math.ceil(whole / block.ph_max)
-        part, ph = part / parts, ph / parts
+    parts, part, ph = even_parts(whole, 1.0 - tau, block.ph_max)
     for number in range(parts):
         at = tau + number * part
         shaking = excitation_over(nodes.k_h, nodes.w, i, at, part)
         steps += 1
         u_start = ph * rate
-        # the step is exact for a straight drive up to its truncation: it ends at a kink, no further
+        # exact up to its truncation where k_h and k_v are straight lines: it ends at a kink
         turned, u_end, v_end = taylor_step(order, u, u_start, ph, s, c, shaking)
         theta_end = theta + turned
 
@@ -337,9 +333,48 @@ def cross_interval(
     )  # fmt: skip
 
 
+class Closed(NamedTuple):
+    """What follows an impact, which closes the contact of the block.
+
+    Args:
+        known: of the trajectory.
+        hidden: whether the error hides what comes then.
+        moving: whether motion restarts at once.
+    """
+
+    known: Known
+    hidden: bool
+    moving: bool
+
+
 @inner_kernel
 def after_impact(
-    known: Known, rate: float, threshold: float, c_rest: float, theta_c: float
+    nodes: Nodes, block: Block, i: int, tau: float, stuck: bool, known: Known, rate: float
+) -> Closed:
+    """Return what follows an impact at (i, tau).
+
+    Args:
+        nodes: the excitation.
+        block: the block.
+        i: the interval.
+        tau: fraction of it.
+        stuck: whether the block has not moved since it was there last.
+        known: what is known of the trajectory before it.
+        rate: theta'/p of the impact.
+    """
+    # k_h - (1 + k_v) k_r, a straight line: at both ends of the interval, and here
+    start = nodes.k_h[i] - nodes.w[i] * block.kr
+    end = nodes.k_h[i + 1] - nodes.w[i + 1] * block.kr
+    threshold = start + (end - start) * tau
+    known, hidden = errors_after_impact(known, rate, threshold, block)
+    # Stuck, the threshold is exceeded by less than rounding. A falling excitation leaves the block
+    # at rest; a rising one starts it as an upward crossing does
+    return Closed(known, hidden, end > start if stuck else threshold > 0.0 and tau < 1.0)
+
+
+@within
+def errors_after_impact(
+    known: Known, rate: float, threshold: float, block: Block
 ) -> tuple[Known, bool]:
     """Carry the errors through an impact, which takes away theta' and with it its error.
 
@@ -347,20 +382,19 @@ def after_impact(
         known: what is known of the trajectory before it.
         rate: theta'/p of the impact.
         threshold: k_h - (1 + k_v) k_r there.
-        c_rest: cosine of the critical angle.
-        theta_c: critical angle [rad].
+        block: the block.
 
     Returns:
         What is known after it, and whether the error hides what comes then.
     """
     error, drift, peak, peak_error = known
     impact = abs(rate)
-    push = max(threshold * c_rest, 0.0)  # theta''/p² at theta = 0
+    push = max(threshold * block.cos_rest, 0.0)  # theta''/p² at theta = 0
     if impact <= 2.0 * error or impact * impact <= 4.0 * push * drift:
         # a graze: whether it touches at all is below the error, and if it does not it
         # keeps its speed
         error += impact + math.sqrt(2.0 * push * drift)
-        return Known(error, drift, peak, peak_error), error > 0.25 * theta_c
+        return Known(error, drift, peak, peak_error), error > 0.25 * block.theta_c
     if threshold > 0.0:
         # motion restarts at once; only the error of its starting time is left
         late = 2.0 * drift / impact
@@ -404,10 +438,7 @@ def verdict(
     """Return outcome, peak, time of the verdict and error of a run that reached node `last`."""
     n = nodes.k_h.size
     if last < n - 1:
-        jump_s = nodes.time_s[0]
-        if last >= 0:  # 1 + k_v is a straight line to its zero
-            w0, w1 = nodes.w[last], nodes.w[last + 1]
-            jump_s = nodes.time_s[last] + nodes.interval_s[last] * w0 / (w0 - w1)
+        jump_s = time_of_jump(nodes.time_s, nodes.interval_s, nodes.w, last)
         return JUMP, math.nan, jump_s, known.error
     if lost:  # the block may be another one since an impact that the error hid
         return UNDETERMINED, math.nan, math.nan, known.error
@@ -415,6 +446,24 @@ def verdict(
         return STABLE, known.peak, math.nan, known.peak_error
     outcome, peak, error = after_record(state, known, theta_c)
     return outcome, peak, math.nan if outcome == STABLE else nodes.time_s[n - 1], error
+
+
+@within
+def hand_over(
+    run: Any,
+    i: int,
+    state: State,
+    known: Known,
+    started_s: float,
+    lost: bool,
+    steps: int,
+    samples: int,
+) -> None:
+    """Put down a run that moves at node i; arguments as in `run_toppling`."""
+    run.interval = i
+    run.theta, run.rate, run.sin, run.cos = state
+    run.error, run.drift, run.peak, run.peak_error = known
+    run.started_s, run.lost, run.steps, run.samples = started_s, lost, steps, samples
 
 
 @bare_kernel
@@ -443,11 +492,11 @@ def run_toppling(
             soon as the block moves at a node beyond; (0,) to run to the end.
         u: work, shape (9,).
     """
-    time_s, interval_s, k_h, w = nodes.time_s, nodes.interval_s, nodes.k_h, nodes.w
-    last = min(k_h.size, nodes.jump_node) - 1
-    theta_c = math.atan(kr)
+    time_s, interval_s = nodes.time_s, nodes.interval_s
+    # nothing is integrated through a jump: the model ends at the last node in contact
+    last = min(nodes.k_h.size, nodes.jump_node) - 1
     rest = at_rest(kr)
-    block = Block(kr, rest.cos, p, order, ph_max)
+    block = Block(kr, math.atan(kr), rest.cos, p, order, ph_max)
     keeps = rows.shape[1] > 0
     filled = steps = samples = 0
     counted = entered = -1  # interval counted last; the one at which a run was taken over
@@ -470,11 +519,7 @@ def run_toppling(
     while i < last and (keeps or math.isnan(decided_s)):
         # only at a node and in motion: the batch knows plain steps of whole intervals alone
         if hands_over and moving and tau == 0.0 and not lifting and i > entered:
-            run = handed[0]
-            run.interval = i
-            run.theta, run.rate, run.sin, run.cos = state
-            run.error, run.drift, run.peak, run.peak_error = known
-            run.started_s, run.lost, run.steps, run.samples = started_s, lost, steps, samples
+            hand_over(handed[0], i, state, known, started_s, lost, steps, samples)
             return PENDING, math.nan, started_s, math.nan, known.error, steps, samples, 0
         if not moving:
             i, tau, lifting = lift_off(nodes, kr, i, tau, last)
@@ -485,8 +530,7 @@ def run_toppling(
             lifted_s = time_s[i] + tau * interval_s[i]
             if math.isnan(started_s):
                 started_s = lifted_s
-            if keeps:
-                filled = noted(rows, filled, lifted_s, 0.0, 0.0, -1)
+            filled = noted(rows, filled, lifted_s, 0.0, 0.0, -1)
         if interval_s[i] * (1.0 - tau) <= 0.0:
             # a jump, or a start at the very end of the interval: what follows decides
             moving = state.theta != 0.0 or state.rate != 0.0
@@ -507,28 +551,20 @@ def run_toppling(
             if impact_at >= 0.0:
                 stuck = impact_at <= tau
                 tau = min(impact_at, 1.0)
-                g0 = k_h[i] - w[i] * kr
-                g1 = k_h[i + 1] - w[i + 1] * kr
-                g = g0 + (g1 - g0) * tau
-                known, hidden = after_impact(known, state.rate, g, rest.cos, theta_c)
+                known, hidden, moving = after_impact(nodes, block, i, tau, stuck, known, state.rate)
                 lost = lost or hidden
-                if keeps:
-                    filled = noted(rows, filled, time_s[i] + tau * interval_s[i], 0.0, 0.0, -1)
+                filled = noted(rows, filled, time_s[i] + tau * interval_s[i], 0.0, 0.0, -1)
                 state = rest
-                # Stuck, the threshold is exceeded by less than rounding. A falling drive leaves
-                # the block at rest; a rising one starts it as an upward crossing does.
-                moving = g1 > g0 if stuck else g > 0.0 and tau < 1.0
                 lifting = stuck and moving
                 if not moving and (stuck or tau >= 1.0):
                     i, tau = i + 1, 0.0
                 continue
         i, tau = i + 1, 0.0
         theta, rate, s, c = state
-        if keeps:
-            filled = noted(rows, filled, time_s[i], theta, rate * p, i)
+        filled = noted(rows, filled, time_s[i], theta, rate * p, i)
         # a history shows the fall as far as the block lies on its face
         if not math.isnan(decided_s):
-            if theta > theta_c + 0.5 * math.pi:
+            if theta > block.theta_c + 0.5 * math.pi:
                 break
         elif s < 0.0 and irrecoverable(rate, s, c, nodes.tail_min_q[i], known.error):
             decided_s = time_s[i]
@@ -536,5 +572,7 @@ def run_toppling(
 
     if not math.isnan(decided_s):
         return TOPPLED, math.nan, started_s, decided_s, decided_error, steps, samples, filled
-    outcome, peak, verdict_s, error = verdict(nodes, last, lost, moving, state, known, theta_c)
+    outcome, peak, verdict_s, error = verdict(
+        nodes, last, lost, moving, state, known, block.theta_c
+    )
     return outcome, peak, started_s, verdict_s, error, steps, samples, filled

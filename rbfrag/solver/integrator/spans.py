@@ -1,10 +1,10 @@
 """Several samples in one step, where a step of one sample would be far more accurate than needed.
 
-Over a span of m intervals of total length T, with tau in [0, 1] and P = (p T)², the drive a(tau)
-and the effective gravity w(tau) are replaced by their projections on cubic polynomials, which keep
-the moments of degree 0 to 3 exactly. What is left out, r = a - cubic, has no effect of first order:
-its double integral vanishes at the end of the span. Its greatest effect, through the rotation that
-it causes inside the span, is the quadratic form ::
+Over a span of m intervals of total length T, with tau in [0, 1] and P = (p T)², the driving
+acceleration a(tau) and the effective gravity w(tau) are replaced by their projections on cubic
+polynomials, which keep the moments of degree 0 to 3 exactly. What is left out, r = a - cubic, has
+no effect of first order: its double integral vanishes at the end of the span. Its greatest effect,
+through the rotation that it causes inside the span, is the quadratic form ::
 
     U(1) += P² int d g2 dtau,     theta(1) += P² int (1 - tau) d g2 dtau,
     d = a sin(phi) + w cos(phi),  g2 = double integral of a cos(phi) - w sin(phi)
@@ -17,13 +17,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
-from rbfrag.solver.integrator.compiled import fused_kernel, kernel
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from rbfrag.solver.integrator.compiled import fused_kernel, inner_kernel, kernel, within
+from rbfrag.solver.results import FloatArray
 
 SPAN_PH = 0.01
 """Greatest p·T of a span: its error is then below that of the margins of the certified search."""
@@ -46,18 +41,54 @@ _GAUSS5 = (
 )  # fmt: skip
 
 
-@kernel
-def _cubic(m0: float, m1: float, m2: float, m3: float) -> tuple[float, float, float, float]:
-    """Monomial coefficients on [0, 1] of the sum of (2k + 1) m_k P_k(2 tau - 1)."""
-    m1 *= 3.0
-    m2 *= 5.0
-    m3 *= 7.0
-    return (
-        m0 - m1 + m2 - m3,
-        2.0 * m1 - 6.0 * m2 + 12.0 * m3,
-        6.0 * m2 - 30.0 * m3,
-        20.0 * m3,
-    )
+@inner_kernel
+def _to_powers(moments: FloatArray) -> None:
+    """Put the powers of tau for Legendre moments: of the sum of (2k + 1) m_k P_k(2 tau - 1)."""
+    m0, m1, m2, m3 = moments[0], 3.0 * moments[1], 5.0 * moments[2], 7.0 * moments[3]
+    moments[0] = m0 - m1 + m2 - m3
+    moments[1] = 2.0 * m1 - 6.0 * m2 + 12.0 * m3
+    moments[2] = 6.0 * m2 - 30.0 * m3
+    moments[3] = 20.0 * m3
+
+
+@within
+def _add_moments(moments: FloatArray, weighted: float, z: float) -> None:
+    """Add a point to the Legendre moments of degree 0 to 3, z = 2 tau - 1."""
+    moments[0] += weighted
+    moments[1] += weighted * z
+    moments[2] += weighted * (1.5 * z * z - 0.5)
+    moments[3] += weighted * ((2.5 * z * z - 1.5) * z)
+
+
+@within
+def _add_products(
+    row: FloatArray, weight: float, left: float, a: float, v: float, a2: float, w2: float
+) -> None:
+    """Add a point to the integrals of X Y2 and, weighted by `left`, of (1 - tau) X Y2."""
+    row[10] += weight * a * a2
+    row[11] += weight * a * w2
+    row[12] += weight * v * a2
+    row[13] += weight * v * w2
+    row[14] += left * a * a2
+    row[15] += left * a * w2
+    row[16] += left * v * a2
+    row[17] += left * v * w2
+
+
+@inner_kernel
+def _take_away_cubics(row: FloatArray) -> None:
+    """Take the same integrals of the cubics away: what is left is what the cubics miss."""
+    a_0, a_1, a_2, a_3 = row[2], row[3], row[4], row[5]
+    w_0, w_1, w_2, w_3 = row[6], row[7], row[8], row[9]
+    # of degree 8 and 9, which five points of Gauss are exact to
+    for x, share in _GAUSS5:
+        y = 0.5 * (1.0 + x)
+        weight = 0.5 * share
+        a = a_0 + y * (a_1 + y * (a_2 + y * a_3))
+        v = w_0 + y * (w_1 + y * (w_2 + y * w_3))
+        a2 = y * y * (a_0 / 2.0 + y * (a_1 / 6.0 + y * (a_2 / 12.0 + y * a_3 / 20.0)))
+        w2 = y * y * (w_0 / 2.0 + y * (w_1 / 6.0 + y * (w_2 / 12.0 + y * w_3 / 20.0)))
+        _add_products(row, -weight, -weight * (1.0 - y), a, v, a2, w2)
 
 
 @kernel
@@ -73,26 +104,23 @@ def fill_spans(
         length: intervals of a span.
         rows: to be filled, shape (number of whole spans, COLUMNS).
     """
-    for row in range(rows.shape[0]):
+    for number in range(rows.shape[0]):
+        row = rows[number]
         # a first pass for the length, which the moments are taken over, and the bound of theta''
-        first = row * length
+        first = number * length
         whole = 0.0
         size = 0.0
         for i in range(first, first + length):
             whole += interval_s[i]
             size = max(size, abs(k_h[i]) + abs(w[i]))
         size = max(size, abs(k_h[first + length]) + abs(w[first + length]))
-        rows[row, :] = 0.0
-        rows[row, 0] = whole
-        rows[row, 1] = size
+        row[:] = 0.0
+        row[0] = whole
+        row[1] = size
         if whole <= 0.0:
             continue
-        # Legendre moments of a and w: the projection on cubics keeps them
-        a_0, a_1, a_2, a_3 = 0.0, 0.0, 0.0, 0.0
-        w_0, w_1, w_2, w_3 = 0.0, 0.0, 0.0, 0.0
-        # integrals of X Y2 and of (1 - tau) X Y2; rate and value of the double integrals
-        aa, aw, wa, ww = 0.0, 0.0, 0.0, 0.0
-        aa1, aw1, wa1, ww1 = 0.0, 0.0, 0.0, 0.0
+        a_moments, w_moments = row[2:6], row[6:10]
+        # rate and value of the double integrals of a and of w
         ra, rw, va, vw = 0.0, 0.0, 0.0, 0.0
         at = 0.0
         for i in range(first, first + length):
@@ -108,72 +136,23 @@ def fill_spans(
                 weight = 0.5 * share * part
                 a = k_h[i] + da * y
                 v = w[i] + dw * y
-                # Legendre polynomials on the whole span
+                # Legendre polynomials on the whole span: the projection on cubics keeps moments
                 z = 2.0 * (at + part * y) - 1.0
-                p2 = 1.5 * z * z - 0.5
-                p3 = (2.5 * z * z - 1.5) * z
-                a_0 += weight * a
-                a_1 += weight * a * z
-                a_2 += weight * a * p2
-                a_3 += weight * a * p3
-                w_0 += weight * v
-                w_1 += weight * v * z
-                w_2 += weight * v * p2
-                w_3 += weight * v * p3
+                _add_moments(a_moments, weight * a, z)
+                _add_moments(w_moments, weight * v, z)
                 h = part * y
                 # the double integrals so far, closed form inside an interval
                 a2 = va + h * (ra + h * (0.5 * k_h[i] + da * y * (1.0 / 6.0)))
                 w2 = vw + h * (rw + h * (0.5 * w[i] + dw * y * (1.0 / 6.0)))
-                left = weight * 0.5 * (1.0 - z)
-                aa += weight * a * a2
-                aw += weight * a * w2
-                wa += weight * v * a2
-                ww += weight * v * w2
-                aa1 += left * a * a2
-                aw1 += left * a * w2
-                wa1 += left * v * a2
-                ww1 += left * v * w2
+                _add_products(row, weight, weight * 0.5 * (1.0 - z), a, v, a2, w2)
             va += part * (ra + part * (0.5 * k_h[i] + da * (1.0 / 6.0)))
             vw += part * (rw + part * (0.5 * w[i] + dw * (1.0 / 6.0)))
             ra += part * (k_h[i] + 0.5 * da)
             rw += part * (w[i] + 0.5 * dw)
             at += part
-        a_0, a_1, a_2, a_3 = _cubic(a_0, a_1, a_2, a_3)
-        w_0, w_1, w_2, w_3 = _cubic(w_0, w_1, w_2, w_3)
-        # the same integrals of the cubics themselves, of degree 8 and 9, are taken away: what
-        # is left is what the cubics miss (five points are exact to degree 9)
-        for x, share in _GAUSS5:
-            y = 0.5 * (1.0 + x)
-            weight = 0.5 * share
-            a = a_0 + y * (a_1 + y * (a_2 + y * a_3))
-            v = w_0 + y * (w_1 + y * (w_2 + y * w_3))
-            a2 = y * y * (a_0 / 2.0 + y * (a_1 / 6.0 + y * (a_2 / 12.0 + y * a_3 / 20.0)))
-            w2 = y * y * (w_0 / 2.0 + y * (w_1 / 6.0 + y * (w_2 / 12.0 + y * w_3 / 20.0)))
-            left = weight * (1.0 - y)
-            aa -= weight * a * a2
-            aw -= weight * a * w2
-            wa -= weight * v * a2
-            ww -= weight * v * w2
-            aa1 -= left * a * a2
-            aw1 -= left * a * w2
-            wa1 -= left * v * a2
-            ww1 -= left * v * w2
-        rows[row, 2] = a_0
-        rows[row, 3] = a_1
-        rows[row, 4] = a_2
-        rows[row, 5] = a_3
-        rows[row, 6] = w_0
-        rows[row, 7] = w_1
-        rows[row, 8] = w_2
-        rows[row, 9] = w_3
-        rows[row, 10] = aa
-        rows[row, 11] = aw
-        rows[row, 12] = wa
-        rows[row, 13] = ww
-        rows[row, 14] = aa1
-        rows[row, 15] = aw1
-        rows[row, 16] = wa1
-        rows[row, 17] = ww1
+        _to_powers(a_moments)
+        _to_powers(w_moments)
+        _take_away_cubics(row)
 
 
 @fused_kernel
@@ -181,7 +160,7 @@ def span_step(
     spans: FloatArray, row: int, u0: float, ph: float, s0: float, c0: float
 ) -> tuple[float, float]:
     """Return theta(1) - theta(0) and U(1) of one span; arguments as of a single step."""
-    # A and D of the drive as in `taylor.series`, here of degree 3 in time
+    # A and D as in `taylor.series`, here of degree 3 in time
     big_p = ph * ph
     a, w = spans[row, 2], spans[row, 6]
     pa, pd = big_p * (a * c0 - w * s0), big_p * (a * s0 + w * c0)

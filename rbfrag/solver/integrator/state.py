@@ -5,12 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rbfrag.solver.integrator.compiled import bare_kernel, within
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 
 class Place(NamedTuple):
@@ -66,6 +62,15 @@ def excitation_over(
     dk = k_h[i + 1] - k_h[i]
     dw = w[i + 1] - w[i]
     return StepExcitation(k_h[i] + dk * at, dk * part, w[i] + dw * at, dw * part)
+
+
+@within
+def time_of_jump(time_s: FloatArray, interval_s: FloatArray, w: FloatArray, last: int) -> float:
+    """Return when 1 + k_v reaches zero [s], after the last node above it; -1 for none."""
+    jump_s: float = time_s[max(last, 0)]
+    if last >= 0:  # 1 + k_v is a straight line to its zero
+        jump_s += interval_s[last] * w[last] / (w[last] - w[last + 1])
+    return jump_s
 
 
 @bare_kernel

@@ -9,7 +9,7 @@ acceleration and w(tau) = w0 + dw tau the effective gravity, both in g::
     theta(tau) = theta + sum_k U[k] tau^(k+1)/(k+1)
 
 The step takes the same series in the angle delta turned since the start, whose sine and cosine
-begin with 0 and 1: with A = a c - w s and D = a s + w c, linear in tau like a and w, the drive is
+begin with 0 and 1: with A = a c - w s and D = a s + w c, linear in tau like a and w, theta''/p² is
 A cos(delta) + D sin(delta).
 
 The record is linear between samples, so no step crosses a kink. s and c are carried from
@@ -22,13 +22,9 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rbfrag.solver.integrator.compiled import fused_kernel, inner_kernel, within
 from rbfrag.solver.integrator.state import StepExcitation
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 ORDER = 8
 """Degree of the rotation-rate polynomial; the method's order of convergence."""
@@ -38,6 +34,24 @@ PH_MAX = 0.03
 of a step, and what is estimated for it, is then near the rounding of its result."""
 
 MACHINE_EPSILON = 2.220446049250313e-16
+
+
+@within
+def even_parts(ph: float, fraction: float, ph_max: float) -> tuple[int, float, float]:
+    """Split a stretch of an interval into steps that are short enough.
+
+    Args:
+        ph: p times its length.
+        fraction: of the interval.
+        ph_max: greatest p·h of one step.
+
+    Returns:
+        Number of steps; fraction of the interval and p·h of each.
+    """
+    if ph <= ph_max:  # a division takes as long as a tenth of a step
+        return 1, fraction, ph
+    parts = math.ceil(ph / ph_max)
+    return parts, fraction / parts, ph / parts
 
 
 @within
@@ -82,7 +96,7 @@ def series(
         turned += (1.0 / 12.0) * v3 + 0.05 * v4
         u_end += (1.0 / 3.0) * v3 + 0.25 * v4
         return turned, u_end, pa + v2 + v3 + v4, pa, u2, u3, u4, 0.0, 0.0, 0.0, 0.0
-    # below 0.004 p·h the fifth order is exact to 1e-12 of the drive (`lean_step`)
+    # below 0.004 p·h the fifth order is exact to 1e-12 of A (`lean_step`)
     v5 = pa1 * c3 + pd1 * s3 + pa * c4 + pd * s4
     u5 = 0.2 * v5
     if order == 5:
@@ -157,7 +171,7 @@ def taylor_step(
 def lean_step(
     u: FloatArray, u0: float, ph: float, s0: float, c0: float, shaking: StepExcitation
 ) -> tuple[float, float, float]:
-    """One step of the lowest order whose truncation is below 1e-12 of the drive.
+    """One step of the lowest order whose truncation is below 1e-12 of theta''/p² at its start.
 
     The first omitted coefficients are U[N+1] ~ (p·h)^N U[1]/(N+1)!, whatever the record.
     """

@@ -33,8 +33,8 @@ from rbfrag.solver.integrator.free_rocking import (
 from rbfrag.solver.integrator.one_freedom.rest import Thresholds, depart
 from rbfrag.solver.integrator.one_freedom.state import Peak, Record, higher, noted
 from rbfrag.solver.integrator.single_run import step_errors
-from rbfrag.solver.integrator.state import Place, State, StepExcitation
-from rbfrag.solver.integrator.taylor import taylor_step, turn
+from rbfrag.solver.integrator.state import Place, State, StepExcitation, time_of_jump
+from rbfrag.solver.integrator.taylor import even_parts, taylor_step, turn
 from rbfrag.solver.results import FloatArray
 
 UNDETERMINED, JUMP = 2, 3
@@ -128,6 +128,7 @@ def carried(off: Offset, ph: float, stiffness: float, noise: float) -> Offset:
         stiffness: D = k_h sin(phi) + (1 + k_v) cos(phi).
         noise: truncation and rounding of the step.
     """
+    # to second order in the step, which is enough for an estimate
     bend = 0.5 * ph * ph * stiffness
     theta = off.theta + ph * off.rate + bend * off.theta
     rate = off.rate + ph * stiffness * off.theta + bend * off.rate
@@ -173,10 +174,7 @@ def cross_interval(
     impact_at = -1.0
     steps = 0
     whole = corner.p * (record.interval_s[i] * (1.0 - tau))
-    parts, part, ph = 1, 1.0 - tau, whole
-    if whole > rules.ph_max:  # a division takes as long as a tenth of a step
-        parts = math.ceil(whole / rules.ph_max)
-        part, ph = part / parts, ph / parts
+    parts, part, ph = even_parts(whole, 1.0 - tau, rules.ph_max)
     for number in range(parts):
         at = tau + number * part
         shaking = StepExcitation(
@@ -285,7 +283,9 @@ def through_impact(
         crossing: how the block came to the impact.
     """
     rate = crossing.state.rate
+    # of theta' itself: theta'/p changes with the corner, whose p is its own
     speed = -rate * corner.p * corner.passed_on
+    # also where the block is so stocky that angular momentum would turn it back
     if speed < rules.slowest:
         return Landed(0, State(0.0, 0.0, corner.sin, corner.cos), Offset(0.0, 0.0), 0.0)
     i, tau = place.interval, place.fraction
@@ -296,14 +296,52 @@ def through_impact(
     return Landed(-side, State(0.0, rate_after, other.sin, other.cos), off, speed)
 
 
+@within
+def noted_impact(
+    rows: FloatArray, filled: int, time_s: float, rate: float, rate_after: float
+) -> int:
+    """Put an impact in a history: the rate before it, and the one that it leaves."""
+    filled = noted(rows, filled, time_s, 0.0, rate, EVENT)
+    return noted(rows, filled, time_s, 0.0, rate_after, IMPACT)
+
+
+class End(NamedTuple):
+    """How a run ended; see :class:`RockingRun`."""
+
+    outcome: int
+    side: int
+    verdict_s: float
+    forward: Peak
+    backward: Peak
+
+
 @inner_kernel
-def time_of_throw(record: Record) -> float:
-    """Return when 1 + k_v reaches zero [s]."""
-    at, w = record.last, record.w
-    thrown_s: float = record.time_s[max(at, 0)]
-    if at >= 0:  # 1 + k_v is a straight line to its zero
-        thrown_s += record.interval_s[at] * w[at] / (w[at] - w[at + 1])
-    return thrown_s
+def end_of_run(
+    record: Record,
+    toe: Corner,
+    heel: Corner,
+    rules: Rules,
+    side: int,
+    state: State,
+    off: Offset,
+    peaks: tuple[Peak, Peak],
+    impacts: int,
+) -> End:
+    """Return how a run ends that nothing decided before its last node; arguments as there."""
+    forward, backward = peaks
+    last = record.last
+    if last < record.k_h.size - 1:  # the vertical motion throws the block
+        thrown_s = time_of_jump(record.time_s, record.interval_s, record.w, last)
+        return End(JUMP, 0, thrown_s, forward, backward)
+    if impacts > rules.most_impacts:
+        return End(UNDETERMINED, 0, math.nan, forward, backward)
+    if side == 0:
+        return End(STABLE, 0, math.nan, forward, backward)
+    free = after_record(toe, heel, side, state, off, rules.slowest)
+    verdict_s = record.time_s[last] if free.outcome == TOPPLED else math.nan
+    forward = higher(forward, free.forward.x, free.forward.error)
+    backward = higher(backward, free.backward.x, free.backward.error)
+    return End(free.outcome, free.side, verdict_s, forward, backward)
 
 
 @bare_kernel
@@ -330,7 +368,7 @@ def run_rocking(
         u: work, shape (9,).
     """
     time_s, interval_s, last = record.time_s, record.interval_s, record.last
-    # the drive forward is k_h - w tan(theta_c), backward it is -(k_h + w tan(theta_c))
+    # theta'' at rest is that of k_h - w tan(theta_c) forward, of -(k_h + w tan(theta_c)) backward
     level = Thresholds(1.0, toe.kr, 1.0, -heel.kr, True)
     keeps = rows.shape[1] > 0
     filled = steps = samples = impacts = 0
@@ -357,7 +395,7 @@ def run_rocking(
                 started_s = now_s
             filled = noted(rows, filled, now_s, 0.0, 0.0, EVENT)
         if interval_s[i] * (1.0 - tau) <= 0.0:
-            # a jump, or a start at the very end of the interval: what follows decides
+            # nothing moves in no time: of a jump, or a start at the very end, what follows decides
             side = 0 if state.theta == 0.0 and state.rate == 0.0 else side
             i, tau, lifting = i + 1, 0.0, False
             if side != 0:
@@ -380,16 +418,17 @@ def run_rocking(
         else:
             backward = crossing.peak
         if crossing.impact_at >= 0.0:
+            # back on its base where it was lifted: rounding has undone the start
             stuck = crossing.impact_at <= tau
             tau = min(crossing.impact_at, 1.0)
             other = heel if side > 0 else toe
             landed = through_impact(record, Place(i, tau), side, corner, other, rules, crossing)
+            # a start that is undone has no speed, and is no impact
             if crossing.state.rate < 0.0:
                 impacts += 1
                 now_s = time_s[i] + tau * interval_s[i]
                 rate = side * crossing.state.rate * corner.p
-                filled = noted(rows, filled, now_s, 0.0, rate, EVENT)
-                filled = noted(rows, filled, now_s, 0.0, landed.side * landed.speed, IMPACT)
+                filled = noted_impact(rows, filled, now_s, rate, landed.side * landed.speed)
             barred = side if stuck and landed.side == 0 else 0
             side, state, off = landed.side, landed.state, landed.off
             corner = corner if side == 0 else other
@@ -407,21 +446,11 @@ def run_rocking(
         if crossing.fallen:
             break
 
-    outcome, fell, verdict_s = STABLE, 0, decided_s
-    if not math.isnan(decided_s):
-        outcome, fell = TOPPLED, side
-    elif last < record.k_h.size - 1:
-        outcome, verdict_s = JUMP, time_of_throw(record)
-    elif impacts > rules.most_impacts:
-        outcome = UNDETERMINED
-    elif side != 0:
-        free = after_record(toe, heel, side, state, off, rules.slowest)
-        outcome, fell = free.outcome, free.side
-        forward = higher(forward, free.forward.x, free.forward.error)
-        backward = higher(backward, free.backward.x, free.backward.error)
-        if outcome == TOPPLED:
-            verdict_s = time_s[last]
+    end = End(TOPPLED, side, decided_s, forward, backward)
+    if math.isnan(decided_s):
+        peaks = (forward, backward)
+        end = end_of_run(record, toe, heel, rules, side, state, off, peaks, impacts)
     return RockingRun(
-        outcome, fell, forward, backward, abs(off.theta), started_s, verdict_s, impacts, steps,
-        samples, filled,
+        end.outcome, end.side, end.forward, end.backward, abs(off.theta), started_s,
+        end.verdict_s, impacts, steps, samples, filled,
     )  # fmt: skip

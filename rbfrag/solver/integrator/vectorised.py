@@ -30,8 +30,8 @@ from rbfrag.solver.integrator.single_run import (
 )
 from rbfrag.solver.integrator.state import State, StepExcitation, excitation_over
 from rbfrag.solver.integrator.taylor import ORDER, SMALL_TURN, series, small_turn
+from rbfrag.solver.results import FloatArray
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 BATCH = 32

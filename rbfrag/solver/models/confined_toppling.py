@@ -1,9 +1,8 @@
 """A block that topples under an overhanging back plane: its toe slides out, its heel up that plane.
 
 The equation of two sliding contacts (`rbfrag.solver.integrator.one_freedom.two_contacts`) holds up
-to the
-first standstill, or until the base edge stands at right angles to the back plane, where the toe
-stops and free toppling follows. At a standstill the back plane holds the block only while
+to the first standstill, or until the base edge stands at right angles to the back plane, where the
+toe stops and free toppling follows. At a standstill the back plane holds the block only while
 
     k_h > (1 + k_v) tan(α3 - θ - β);
 
@@ -45,12 +44,14 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
             "describes it"
         )
     rocking = rocking_equation(block, site.beta_rad, site.phi_rad)
+    # where the base edge is normal to the back plane, and where the front face lies on the base
     square, flat = free_from(block), block.on_front_face_rad
     slip = toe_slip(block)
     start = (block.base_m, 0.0)
 
     def pose_with(slipped: Harmonics) -> Callable[[float], Pose]:
         def pose(theta: float) -> Pose:
+            # the centroid from the toe, which stays on the base
             arm = turning(block.toe, -1)
             out = slipped(theta)
             return Pose(-theta, (start[0] + out - arm.x(theta), -arm.y(theta)), out)
@@ -58,16 +59,19 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         return pose
 
     def after_confined(exit: Exit) -> Phase | Ending:
+        # after a standstill, where k_h < (1 + k_v) tan(α3 - θ - β): the heel leaves its plane
         if exit.reason == "reverse":
             return rocks_back(exit)
         if flat <= square:
             return _fallen(exit)
+        # here the toe has no speed: it stays, and is taken to hold (eq. 4.13 about it)
         stays = constant(slip(square))
         return Phase(
             name="topples freely about its toe",
             forward=rocking_equation(block, site.beta_rad),
             pose=pose_with(stays),
             after=after_free,
+            # no contact slips: no friction holds the block at a standstill
             sticks=False,
             impact="leaves",
             lowest=square,
@@ -110,6 +114,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         first=Phase(
             name="topples against its back plane",
             forward=confined,
+            # not followed in this phase: its onset ends it
             reverse=rocking,
             leaves_in_reverse=True,
             pose=pose_with(slip),
@@ -129,6 +134,7 @@ def equation(site: BlockOnPlanes) -> Equation:
     block = site.block
     assert block is not None
     gamma = math.radians(block.gamma_deg)
+    # (3.28, 3.29): the toe slides out and the heel up, so that friction pulls both back
     phi1, phi2 = site.phi_rad, site.phi_back_rad
     return two_contact_equation(
         base=Contact(
@@ -152,11 +158,13 @@ def toe_slip(block: Block) -> Harmonics:
     """Return how far the toe has slid out [m], so that the heel stays on its plane."""
     gamma = math.radians(block.gamma_deg)
     off_plane = _base_off_plane(block)
+    # what the rotation changes of the distance of the heel from its plane, the slip gives back
     return (constant(off_plane(0.0)) - off_plane) * (1.0 / math.sin(gamma))
 
 
 def free_from(block: Block) -> float:
     """Return the rotation at which the toe stops and the heel is free (γ - 90° by a whole heel)."""
+    # the slip of the toe is greatest where the derivative of a cos θ + b sin θ vanishes
     _, along, across, *_ = _base_off_plane(block).coefficients
     return math.atan2(-across, -along)
 
@@ -175,7 +183,9 @@ def _fallen(exit: Exit) -> Ending:
 def _seated_with_a_gap(site: BlockOnPlanes, block: Block, exit: Exit, slipped_at: float) -> Ending:
     """Return what is known of a block that is back on its base with a gap at the heel."""
     beta, phi = site.beta_rad, site.phi_rad
+    # on its base with a gap behind it the block next rocks forward about its toe at k_r, ...
     forward = math.tan(math.radians(block.alpha3_deg) - beta)
+    # ... or backward about its heel, or slides up the base, whichever takes less
     backward = max(
         math.tan(max(math.radians(block.alpha1_deg) - beta, -1.57)),
         -math.tan(phi + beta) if phi + beta < 0.5 * math.pi else -math.inf,

@@ -18,16 +18,16 @@ from typing import Any
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
+from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.free_batch import simulate_free
 from rbfrag.solver.integrator.free_rocking import Corner
 from rbfrag.solver.integrator.two_corners import RockingRun
 from rbfrag.solver.kind import (
     BlockOnPlanes,
     Case,
+    CaseRequest,
     CaseResult,
     Kind,
     Measures,
@@ -37,13 +37,11 @@ from rbfrag.solver.kind import (
     each_once,
     strengths_at,
 )
-from rbfrag.solver.quantity import number, positive
+from rbfrag.solver.quantity import finite_or_none, number, positive
 from rbfrag.solver.results import (
     DEFAULT_P2,
-    MAP_DEPTH,
     FloatArray,
     Outcome,
-    Polarity,
     Response,
     ResponseHistory,
     SearchPoints,
@@ -103,6 +101,7 @@ def free_block(site: BlockOnPlanes) -> FreeBlock:
 def _symmetric(p2: float, kr: float, given: float | None) -> FreeBlock:
     """Return the rectangle on level ground that has these numbers."""
     both = corner(kr, p2, restitution_of_rectangle(kr) if given is None else given)
+    # half of the sides: the base is level, and the centroid above its middle
     half, height = rectangle_r3_m(p2) * both.sin, rectangle_r3_m(p2) * both.cos
     return FreeBlock(both, both, 2.0 * half, (half, height), 0.0)
 
@@ -134,9 +133,11 @@ def _of_shape(block: Block, beta_rad: float, given: float | None) -> FreeBlock:
             )
     inertia = block.inertia_m2
     toe, heel = block.toe, block.heel
+    # moments of inertia about the corners, per mass: I_i = I_C + r_i²
     about_toe = inertia + (toe[0] * toe[0] + toe[1] * toe[1])
     about_heel = inertia + (heel[0] * heel[0] + heel[1] * heel[1])
-    # angular momentum about the corner that takes over, just before and just after the impact
+    # I_C + r1·r3, the angular momentum about the corner that takes over, over the speed before:
+    # it is the same after the impact, whose force passes through that corner (Housner 1963)
     kept = inertia + (heel[0] * toe[0] + heel[1] * toe[1])
     return FreeBlock(
         toe=_corner(balances[0][2], block.r3_m, about_toe, kept / about_heel, given),
@@ -150,6 +151,7 @@ def _of_shape(block: Block, beta_rad: float, given: float | None) -> FreeBlock:
 def _corner(
     balance: float, arm_m: float, inertia_m2: float, kept: float, given: float | None
 ) -> Corner:
+    # p_i² = g r_i/I_i, as (4.27) for the toe
     p2 = STANDARD_GRAVITY_M_S2 * arm_m / inertia_m2
     return corner(math.tan(balance), p2, kept if given is None else given)
 
@@ -178,10 +180,11 @@ class Rocking(Kind):
                 (0, 1].
         """
         block = self._block(site)
-        excited = excitation(shaking.motion, shaking.vertical, shaking.polarity)
+        excited = shaking.excitation
         refuse_endless(excited, max(block.toe.p, block.heel.p) ** 2)
         run = simulate(excited, block)
         outcome = OUTCOMES[run.outcome]
+        # of a block that has overturned a peak is only where the run was stopped
         known = outcome is Outcome.STABLE
         senses = peaks(run, outcome)
         ratios = (run.forward.x / block.toe.theta_c, run.backward.x / block.heel.theta_c)
@@ -193,15 +196,14 @@ class Rocking(Kind):
             peak_theta_n=max(ratios) if known else None,
             peak_theta_rad=max(run.forward.x, run.backward.x) if known else None,
             critical_angle_deg=math.degrees(block.toe.theta_c),
-            started_s=_time_or_none(run.started_s),
-            toppled_s=_time_or_none(run.verdict_s) if outcome is Outcome.TOPPLED else None,
+            started_s=finite_or_none(run.started_s),
+            toppled_s=finite_or_none(run.verdict_s) if outcome is Outcome.TOPPLED else None,
             error_estimate=error_of(run, outcome),
             steps=run.steps,
             samples_moved=run.samples_moved,
             samples_total=int(np.count_nonzero(excited.interval_s)),
             warnings=(
-                *shaking.remarks,
-                *motion_remarks(shaking.motion, shaking.vertical, excited),
+                *shaking.warnings,
                 *_warnings(block, site, run, outcome, sensitive, traced.motion),
             ),
             history=_posed(block, traced) if shaking.history else None,
@@ -280,22 +282,13 @@ class Rocking(Kind):
         return strengths_at(case.p2, measures, Y_OVER_PGV)
 
     def run_cases(
-        self,
-        motion: GroundMotion,
-        vertical: GroundMotion | None,
-        polarity: Polarity,
-        cases: Sequence[Case],
-        *,
-        search: bool = True,
-        grid: bool = True,
-        full_map: bool = False,
-        map_depth: float = MAP_DEPTH,
+        self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest
     ) -> list[CaseResult]:
         """Return the outcome grid of every case under one motion, all blocks in one call."""
-        strengths = [self.grid(case, motion) for case in cases]
-        if not grid or not any(map(len, strengths)):
+        strengths = [self.grid(case, shaking.motion) for case in cases]
+        if not request.grid or not any(map(len, strengths)):
             return [CaseResult(None, None)] * len(cases)
-        excited = excitation(motion, vertical, polarity)
+        excited = shaking.excitation
         blocks = [
             _symmetric(_size_of(case), kr, _factor_of(case) * restitution_of_rectangle(kr))
             for case, ratios in zip(cases, strengths, strict=True)
@@ -414,16 +407,13 @@ def _warnings(
 def _posed(block: FreeBlock, traced: RockingHistory) -> ResponseHistory:
     """Return the history with the place of the block, clockwise about its toe or back again."""
     theta = traced.motion.theta_rad
+    # about the toe forward, about the heel backward, both at rest on the base
     pivot = np.where(theta >= 0.0, block.toe_m, 0.0)
     arm = block.centroid_m[0] - pivot
     rise = block.centroid_m[1]
     c, s = np.cos(theta), np.sin(theta)
     centroid: FloatArray = np.stack([pivot + arm * c + rise * s, rise * c - arm * s], axis=1)
     return replace(traced.motion, centroid_m=centroid, turned_rad=-theta, impact_s=traced.impact_s)
-
-
-def _time_or_none(time_s: float) -> float | None:
-    return time_s if math.isfinite(time_s) else None
 
 
 MODEL = Rocking()

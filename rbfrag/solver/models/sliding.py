@@ -45,14 +45,15 @@ from rbfrag.solver.kind import (
     PLANES,
     BlockOnPlanes,
     Case,
+    CaseRequest,
     CaseResult,
     Measures,
+    Shaking,
     each_once,
 )
 from rbfrag.solver.mechanism import MechanismKind
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import (
-    MAP_DEPTH,
     SEARCH_LIMIT,
     CriticalResult,
     FloatArray,
@@ -92,6 +93,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
         )
     forward = _equation(site, 1.0)
     start = site.centroid_m
+    # both settings are forms of Newmark's block, which knows no rotation
     tips = _leans(site) and not (two_way or site.settings.get("horizontal", False))
 
     def pose(s: float) -> Pose:
@@ -133,6 +135,7 @@ def _leans(site: BlockOnPlanes) -> bool:
 def _tips_back(site: BlockOnPlanes) -> Equation:
     """Return the equation of the start of a rotation backward about the heel."""
     assert site.block is not None
+    # moments about the heel: k_h against (1 + k_v) tan(α1 - β); only its sign is read
     past_heel = math.radians(site.block.alpha1_deg) - site.beta_rad
     return Equation(
         inertia=constant(1.0),
@@ -144,6 +147,7 @@ def _tips_back(site: BlockOnPlanes) -> Equation:
 def _equation(site: BlockOnPlanes, sense: float) -> Equation:
     """Return the equation of motion down (1) or up (-1) the base."""
     phi, beta = sense * site.phi_rad, site.beta_rad
+    # (4.15) with the change of the normal force by the inertial one, N = m g (w cos β - k_h sin β)
     factor = math.cos(phi - beta) / math.cos(phi)
     horizontal = bool(site.settings.get("horizontal", False))
     if horizontal:
@@ -157,6 +161,7 @@ def _equation(site: BlockOnPlanes, sense: float) -> Equation:
         sentence="the block loses contact with its base",
     )
     return Equation(
+        # nothing depends on s: the engine solves such an equation exactly
         inertia=constant(1.0),
         driving=constant(driving),
         resistance=constant(driving * math.tan(phi - beta)),
@@ -209,6 +214,7 @@ def sliding_displacements(
 def slide_m(excited: Excitation, ky: float) -> float:
     """Return the permanent displacement down a level plane [m]; NaN where it is thrown."""
     run = follow(mechanism(level_plane(ky)), excited)
+    # downslope only: where it stops is the greatest displacement, too
     return run.x if run.outcome is Outcome.STABLE else math.nan
 
 
@@ -291,23 +297,14 @@ class Sliding(MechanismKind):
         return np.array(KY_OVER_PGA if measures.pga_g > 0.0 else (), dtype=np.float64)
 
     def run_cases(
-        self,
-        motion: GroundMotion,
-        vertical: GroundMotion | None,
-        polarity: Polarity,
-        cases: Sequence[Case],
-        *,
-        search: bool = True,
-        grid: bool = True,
-        full_map: bool = False,
-        map_depth: float = MAP_DEPTH,
+        self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest
     ) -> list[CaseResult]:
         """Return critical strength and displacements of every case under one motion."""
-        excited = excitation(motion, vertical, polarity)
+        excited = shaking.excitation
         thrown = excited.jump_node < excited.w.size
-        strengths = () if thrown else tuple(self.grid(cases[0], motion).tolist())
-        blocks = SlidingBlocks(excited, slide_m).points(strengths) if grid else None
-        if not search:
+        strengths = () if thrown else tuple(self.grid(cases[0], shaking.motion).tolist())
+        blocks = SlidingBlocks(excited, slide_m).points(strengths) if request.grid else None
+        if not request.search:
             return [CaseResult(None, blocks) for _ in cases]
         results = []
         for case in cases:
@@ -317,7 +314,7 @@ class Sliding(MechanismKind):
                 self.kind,
                 SlidingBlocks(excited, slide_m),
                 settings["displacement_m"],
-                polarity=polarity,
+                polarity=shaking.polarity,
                 search_limit=settings["search_limit"],
                 tolerance=settings["tolerance"],
                 warnings=excited.warnings,

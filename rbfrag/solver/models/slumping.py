@@ -32,9 +32,7 @@ from typing import Any
 import numpy as np
 
 from rbfrag.errors import InputError
-from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.one_freedom.equation import (
     Ending,
     Equation,
@@ -49,19 +47,19 @@ from rbfrag.solver.integrator.one_freedom.two_contacts import Contact, two_conta
 from rbfrag.solver.kind import (
     BlockOnPlanes,
     Case,
+    CaseRequest,
     CaseResult,
     Measures,
+    Shaking,
     each_once,
 )
 from rbfrag.solver.mechanism import ShakenMechanism, shaken_mechanism
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import (
-    MAP_DEPTH,
     SEARCH_LIMIT,
     CriticalResult,
     FloatArray,
     Outcome,
-    Polarity,
     no_intervals,
 )
 from rbfrag.solver.search.scale import (
@@ -92,6 +90,7 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
             "slumping in time is known for blocks whose heel lies on the back plane: the corner "
             "at the heel of this outline is missing"
         )
+    # past recovery: the back edge lies on the base, with a forward angle α1 + γ > φ1
     flat = block.on_back_edge_rad
     slip = heel_slip(block)
     path = centroid_path(block)
@@ -138,6 +137,7 @@ def equation(site: BlockOnPlanes, sense: float) -> Equation:
     block = site.block
     assert block is not None
     gamma = math.radians(block.gamma_deg)
+    # (3.24, 3.25): friction opposes the slip of both contacts, and changes sides with its sense
     phi1, phi2 = sense * site.phi_rad, sense * site.phi_back_rad
     return two_contact_equation(
         base=Contact(
@@ -160,6 +160,7 @@ def equation(site: BlockOnPlanes, sense: float) -> Equation:
 def heel_slip(block: Block) -> Harmonics:
     """Return how far the heel has slid down the base [m], so that contact 2 stays on its plane."""
     gamma = math.radians(block.gamma_deg)
+    # distance of contact 2 from the back plane, if the heel stayed where it is
     edge = turning(block.back) - turning(block.heel)
     off_plane = edge.x * math.sin(gamma) + edge.y * math.cos(gamma)
     return (constant(off_plane(0.0)) - off_plane) * (1.0 / math.sin(gamma))
@@ -277,22 +278,13 @@ class Slumping(ScaledKind):
         return RATIOS if measures.pga_g > 0.0 else np.empty(0)
 
     def run_cases(
-        self,
-        motion: GroundMotion,
-        vertical: GroundMotion | None,
-        polarity: Polarity,
-        cases: Sequence[Case],
-        *,
-        search: bool = True,
-        grid: bool = True,
-        full_map: bool = False,
-        map_depth: float = MAP_DEPTH,
+        self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest
     ) -> list[CaseResult]:
         """Return critical scale and outcome grid of every case under one motion.
 
         Cases of one block share their runs. The map is what the search saw; it costs nothing.
         """
-        excited = excitation(motion, vertical, polarity)
+        excited = shaking.excitation
         together: defaultdict[BlockClass, list[int]] = defaultdict(list)
         for number, case in enumerate(cases):
             together[_class_of(case)].append(number)
@@ -302,20 +294,18 @@ class Slumping(ScaledKind):
             rotations: list[Any] = [cases[i].settings["rotation_deg"] for i in numbers]
             shaken = self._shaken(block)
             searched: Sequence[CriticalResult | None] = [None] * len(numbers)
-            if search:
+            if request.search:
                 rules = scan_rules(*(settings[name] for name in RULES))
-                searched = critical_scales(
-                    motion, shaken, rotations, rules, vertical=vertical, polarity=polarity
-                )
-            ratios = self.grid(cases[numbers[0]], motion)[: None if grid else 0]
+                searched = critical_scales(shaking, shaken, rotations, rules)
+            ratios = self.grid(cases[numbers[0]], shaking.motion)[: None if request.grid else 0]
             scales = [shaken.yield_g / (k * excited.pga_g) for k in ratios.tolist()]
             ends = [follow(shaken.mechanism, excited.scaled(scale)) for scale in scales]
             for i, rotation, result in zip(numbers, rotations, searched, strict=True):
                 fails = rotation_rad(rotation, shaken)
                 runs = [scaled_run(*each, fails) for each in zip(ends, scales, strict=True)]
-                if result is not None and not full_map:
+                if result is not None and not request.full_map:
                     result = replace(result, intervals=no_intervals())
-                blocks = grid_points(ratios, runs, critical_rad(shaken)) if grid else None
+                blocks = grid_points(ratios, runs, critical_rad(shaken)) if request.grid else None
                 results[i] = CaseResult(result, blocks)
         return [results[i] for i in range(len(cases))]
 

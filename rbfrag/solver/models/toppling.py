@@ -23,6 +23,7 @@ from rbfrag.solver.kind import (
     SHAKING,
     BlockOnPlanes,
     Case,
+    CaseRequest,
     CaseResult,
     Kind,
     Measures,
@@ -32,14 +33,12 @@ from rbfrag.solver.kind import (
     each_once,
     strengths_at,
 )
-from rbfrag.solver.quantity import positive
+from rbfrag.solver.quantity import finite_or_none, positive
 from rbfrag.solver.results import (
     DEFAULT_P2,
-    MAP_DEPTH,
     SEARCH_LIMIT,
     CriticalResult,
     FloatArray,
-    Polarity,
     Response,
     SearchPoints,
 )
@@ -84,7 +83,7 @@ class Toppling(Kind):
             return RunEnd(
                 outcome=OUTCOMES[end.outcome],
                 moved=math.isfinite(end.started_s),
-                peak_rad=end.peak_rad if math.isfinite(end.peak_rad) else None,
+                peak_rad=finite_or_none(end.peak_rad),
                 peak_displacement_m=None,
                 error=end.error_rad,
             )
@@ -119,78 +118,59 @@ class Toppling(Kind):
         return strengths_at(case.p2, measures, Y_OVER_PGV)
 
     def run_cases(
-        self,
-        motion: GroundMotion,
-        vertical: GroundMotion | None,
-        polarity: Polarity,
-        cases: Sequence[Case],
-        *,
-        search: bool = True,
-        grid: bool = True,
-        full_map: bool = False,
-        map_depth: float = MAP_DEPTH,
+        self, shaking: Shaking, cases: Sequence[Case], request: CaseRequest
     ) -> list[CaseResult]:
         """Return critical block and outcome grid of every case under one motion."""
-        excited = kept_excitation(motion, vertical, polarity)
         results = []
         for case in cases:
             assert case.p2 is not None
             settings: dict[str, Any] = dict(case.settings)
             critical = blocks = None
-            if search:
+            if request.search:
                 critical = self.critical(
-                    motion,
+                    shaking.motion,
                     p2=case.p2,
-                    vertical=vertical,
-                    polarity=polarity,
+                    vertical=shaking.vertical,
+                    polarity=shaking.polarity,
                     search_limit=settings["search_limit"],
-                    full_map=full_map,
-                    map_depth=map_depth,
+                    full_map=request.full_map,
+                    map_depth=request.map_depth,
                 )
-            if grid:
-                blocks = run_blocks_at(excited, case.p2, self.grid(case, motion))
+            if request.grid:
+                blocks = run_blocks_at(shaking, case.p2, self.grid(case, shaking.motion))
             results.append(CaseResult(critical, blocks))
         return results
 
-    def run_blocks(
-        self,
-        motion: GroundMotion,
-        vertical: GroundMotion | None,
-        polarity: Polarity,
-        case: Case,
-        k_over_pga: Sequence[float],
-    ) -> SearchPoints:
+    def run_blocks(self, shaking: Shaking, case: Case, k_over_pga: Sequence[float]) -> SearchPoints:
         """Run blocks of stated k_r/PGA."""
         assert case.p2 is not None
-        excited = kept_excitation(motion, vertical, polarity)
-        return run_blocks_at(excited, case.p2, np.array(k_over_pga, dtype=np.float64))
+        return run_blocks_at(shaking, case.p2, np.array(k_over_pga, dtype=np.float64))
 
-    def history(
-        self,
-        motion: GroundMotion,
-        vertical: GroundMotion | None,
-        polarity: Polarity,
-        case: Case,
-        k_over_pga: float,
-    ) -> Response:
+    def history(self, shaking: Shaking, case: Case, k_over_pga: float) -> Response:
         """Return the motion in time of the block of that k_r/PGA."""
         assert case.p2 is not None
-        kr = k_over_pga * motion.pga_g
         return respond(
-            motion, p2=case.p2, kr=kr, vertical=vertical, polarity=polarity, history=True
+            shaking.motion,
+            p2=case.p2,
+            kr=k_over_pga * shaking.motion.pga_g,
+            vertical=shaking.vertical,
+            polarity=shaking.polarity,
+            history=True,
         )
 
 
-def run_blocks_at(excited: Excitation, p2: float, kr_over_pga: FloatArray) -> SearchPoints:
+def run_blocks_at(shaking: Shaking, p2: float, kr_over_pga: FloatArray) -> SearchPoints:
     """Run one block at each strength, in its order.
 
     Args:
-        excited: the excitation; its PGA must be positive.
+        shaking: the motion; its PGA must be positive.
         p2: frequency parameter p² [1/s²].
         kr_over_pga: block strengths over PGA.
     """
     from rbfrag.solver.integrator.batch import simulate_many
 
+    # that of the search: what it has worked out about the record is kept with it
+    excited = kept_excitation(shaking.motion, shaking.vertical, shaking.polarity)
     runs = simulate_many(excited, p2=p2, kr=kr_over_pga * excited.pga_g)
     return SearchPoints(
         kr_over_pga=kr_over_pga,
@@ -212,6 +192,7 @@ def _strength(site: BlockOnPlanes) -> float:
     if site.yield_g is not None:
         return site.yield_g
     assert site.block is not None
+    # (3.16): θc = α3 - β is what is left to the balance on the toe
     balance_deg = site.block.alpha3_deg - math.degrees(site.beta_rad)
     if not 0.0 < balance_deg < 90.0:
         raise InputError(

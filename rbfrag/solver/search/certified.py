@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.block_excitation import BlockExcitation, block_excitation
-from rbfrag.solver.results import MAP_DEPTH, RESOLUTION
+from rbfrag.solver.results import MAP_DEPTH, RESOLUTION, FloatArray
 from rbfrag.solver.search.lower_bound import all_topple_below
 from rbfrag.solver.search.march import (
     INTERVAL,
@@ -27,8 +27,6 @@ from rbfrag.solver.search.march import (
 )
 from rbfrag.solver.search.renewal import excursion_table, no_work
 from rbfrag.solver.search.upper_bound import NOTHING_FAILS, upper_bound
-
-FloatArray = NDArray[np.float64]
 
 MARGIN = 1e-10
 """Relative margin on k_r of the bounding trajectories: above the error of their steps."""

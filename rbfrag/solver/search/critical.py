@@ -10,10 +10,10 @@ K_up downwards. Where the argument does not hold, the answer is that of a scan, 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -89,10 +89,8 @@ def critical(
     pga = excitation.pga_g
     answer = CriticalResult(
         kind=kind, p2=p2, polarity=polarity, pga_g=pga, status="below_limit",
-        search_limit=search_limit, kr_over_pga=None, lower=None, upper=None, kr=None, y_m_s=None,
-        certified=False, k_up_over_pga=None, undecided=None, island_width=None,
-        kr_over_pga_resolved=None, reentrant=None, n_runs=0,
-        warnings=motion_remarks(motion, vertical, excitation), points=blocks.points(),
+        search_limit=search_limit, warnings=motion_remarks(motion, vertical, excitation),
+        points=blocks.points(),
     )  # fmt: skip
     # condition 1 of the proof
     if excitation.jump_node < excitation.w.size:
@@ -108,29 +106,17 @@ def critical(
     of_map = certified_map(excitation, p2=p2, bottom=bottom, full=full_map, map_depth=map_depth)
     bracket = bracket_of(of_map)
     undecided = (bracket.undecided if bracket else of_map.undecided_above(bottom)) / pga
-    warnings = list(answer.warnings)
-    certified = undecided <= SLIVERS
-    if not certified:
-        # a scan may have found what the search could not decide; neither is a proof
-        warnings.append(
-            f"not certified: {_reason(of_map, pga)}; {undecided:.3g} of k_r/PGA above the answer "
-            "is not proven safe"
-        )
-        bracket = _better(bracket, scan_down(blocks, of_map.k_up, bottom))
-    elif full_map and not of_map.complete:
-        # only the map below the answer is open, which the proof does not rest on
-        warnings.append(
-            f"the map was given up at {of_map.reached / pga:.6g} PGA, after its budget: what "
-            "lies below is undecided; the critical value is not touched by this"
-        )
     answer = replace(
         answer,
-        certified=certified,
+        certified=undecided <= SLIVERS,
         k_up_over_pga=of_map.k_up / pga if of_map.k_up > bottom else None,
         undecided=undecided,
         n_runs=of_map.runs,
-        warnings=tuple(warnings),
+        warnings=(*answer.warnings, *_doubts(of_map, pga, undecided, full_map)),
     )
+    if not answer.certified:
+        # a scan may have found what the search could not decide; neither is a proof
+        bracket = _better(bracket, scan_down(blocks, of_map.k_up, bottom))
     if full_map:
         intervals = outcome_intervals(of_map, pga, excitation.max_q, bottom)
         answer = replace(answer, reentrant=False, intervals=intervals)
@@ -155,6 +141,21 @@ def critical(
     # blocks run for themselves are kept with the answer, and count
     points = blocks.points()
     return replace(answer, points=points, n_runs=answer.n_runs + len(points.outcome))
+
+
+def _doubts(of_map: CertifiedMap, pga: float, undecided: float, full_map: bool) -> Iterator[str]:
+    """Yield what is not proven; `undecided` is the length of k_r/PGA above the answer."""
+    if undecided > SLIVERS:
+        yield (
+            f"not certified: {_reason(of_map, pga)}; {undecided:.3g} of k_r/PGA above the answer "
+            "is not proven safe"
+        )
+    elif full_map and not of_map.complete:
+        # only the map below the answer is open, which the proof does not rest on
+        yield (
+            f"the map was given up at {of_map.reached / pga:.6g} PGA, after its budget: what "
+            "lies below is undecided; the critical value is not touched by this"
+        )
 
 
 def _reason(of_map: CertifiedMap, pga_g: float) -> str:
@@ -206,8 +207,6 @@ def _islands(
     floor = surely_topples_below(block, excitation, bottom, lower)
     return islands_by_blocks(block, lower, floor, bottom, resolution)
 
-
-FloatArray = NDArray[np.float64]
 
 SCAN_POINTS = 160
 """Blocks of a descending scan, equally spaced in ln k_r."""

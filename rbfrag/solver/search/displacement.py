@@ -123,13 +123,8 @@ def critical_of(
         lower=low,
         upper=high,
         kr=None if low is None else low * excited.pga_g,
-        y_m_s=None,
         # the displacement falls with the strength: there is one border, and it is bracketed
         certified=status != "outside_model",
-        k_up_over_pga=None,
-        undecided=None,
-        island_width=None,
-        kr_over_pga_resolved=None,
         reentrant=False,
         n_runs=runs,
         warnings=warnings,

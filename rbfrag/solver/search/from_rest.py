@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.solver.integrator.block_excitation import BlockExcitation
 from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel
@@ -17,18 +16,17 @@ from rbfrag.solver.integrator.excursion import (
     excursion_from_rest,
 )
 from rbfrag.solver.integrator.state import Place
+from rbfrag.solver.results import FloatArray
 from rbfrag.solver.search.renewal import ExcursionTable, fails_after
 from rbfrag.solver.search.rises import next_start
-
-FloatArray = NDArray[np.float64]
 
 
 @inner_kernel
 def linear_distance(excitation: BlockExcitation, start: Place, excursion: Excursion) -> float:
     """How far in k_r an excursion was from the border, by the linear model: > 0 if it toppled.
 
-    The linear model says what becomes of the state at the end of the excursion under the rest
-    of the drive; referred back to its start, that is a distance in k_r. Good for a secant;
+    The linear model says what becomes of the state at the end of the excursion under the remaining
+    excitation; referred back to its start, that is a distance in k_r. Good for a secant;
     nothing is concluded from its size.
     """
     time_s, interval_s, remaining = excitation.time_s, excitation.interval_s, excitation.remaining

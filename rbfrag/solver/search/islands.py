@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.solver.integrator.block_excitation import BlockExcitation
 from rbfrag.solver.results import OutcomeIntervals
@@ -14,8 +13,6 @@ from rbfrag.solver.search.certified import CertifiedMap
 from rbfrag.solver.search.from_rest import first_change
 from rbfrag.solver.search.march import SAFE, TOPPLES
 from rbfrag.solver.search.renewal import excursion_table, no_work
-
-FloatArray = NDArray[np.float64]
 
 PROBES = 12
 """Single blocks looked at below the critical one, equally spaced in ln k_r."""

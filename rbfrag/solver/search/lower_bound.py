@@ -4,21 +4,18 @@ With x = theta'/p + 2 sin(phi/2), the motion obeys ::
 
     x' = -p cos(phi/2) x + p k_h cos(phi) - p k_v sin(phi)
 
-so that x is bounded from below by the drive alone, without regard to when a block began to rock. A
-block that leaves |phi| <= phi_m, tan(phi_m) the greatest of k_r and of what is to pull it back, has
-toppled; within, cos(phi), cos(phi/2) and sin(phi) have bounds. Since theta >= 0, no block that has
-not toppled falls back faster than theta'/p = x - 2 sin(theta_c/2). In a stretch of q > K a motion
-that starts from theta = 0 with that rate, and is carried on below 0 until it turns, bounds every
-block with k_r <= K from below from there on: those that impact meanwhile start again at once. If a
-block at rest there topples, all do.
+so that x is bounded from below by the excitation alone, without regard to when a block began to
+rock. A block that leaves |phi| <= phi_m, tan(phi_m) the greatest of k_r and of what is to pull it
+back, has toppled; within, cos(phi), cos(phi/2) and sin(phi) have bounds. Since theta >= 0, no block
+that has not toppled falls back faster than theta'/p = x - 2 sin(theta_c/2). In a stretch of q > K a
+motion that starts from theta = 0 with that rate, and is carried on below 0 until it turns, bounds
+every block with k_r <= K from below from there on: those that impact meanwhile start again at once.
+If a block at rest there topples, all do.
 """
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
-from numpy.typing import NDArray
 
 from rbfrag.solver.integrator.block_excitation import BlockExcitation
 from rbfrag.solver.integrator.compiled import bare_kernel, inner_kernel
@@ -30,8 +27,7 @@ from rbfrag.solver.integrator.excursion import (
     integrate_excursion,
 )
 from rbfrag.solver.integrator.state import Place, State, at_rest
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 RATIOS = (0.99, 0.96, 0.92, 0.86, 0.78, 0.68, 0.55, 0.4)
 """Ratios to the linear model's estimate of K_low that are tried in turn."""
@@ -106,7 +102,7 @@ def all_topple_below(
         bound: work array, shape (n,).
     """
     least_rate(excitation, top, bound)
-    # in the linear model a state topples if theta'/p + (drive to come) > theta_c - theta
+    # in the linear model a state topples if theta'/p + remaining excitation > theta_c - theta
     best = bottom
     node = -1
     for i in range(excitation.q.size - 1):

@@ -5,15 +5,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from rbfrag.solver.integrator.block_excitation import BlockExcitation
 from rbfrag.solver.integrator.compiled import inner_kernel
 from rbfrag.solver.integrator.single_run import next_lifting_node
 from rbfrag.solver.integrator.state import Place
-
-FloatArray = NDArray[np.float64]
+from rbfrag.solver.results import FloatArray
 
 LIFTED, TURNED_BACK, APART = 0, 1, 2
 

@@ -21,9 +21,9 @@ import numpy as np
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
-from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
+from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, follow
-from rbfrag.solver.kind import PLANES
+from rbfrag.solver.kind import PLANES, Shaking
 from rbfrag.solver.mechanism import MechanismKind, ShakenMechanism, shaken_mechanism
 from rbfrag.solver.quantity import number, positive
 from rbfrag.solver.results import (
@@ -191,9 +191,8 @@ class ScaledKind(MechanismKind):
             options.pop("bracket", BRACKET),
         )
         shaken = shaken_mechanism(options.pop("block"), kind=self.kind, **options)
-        (result,) = critical_scales(
-            motion, shaken, [rotation_deg], rules, vertical=vertical, polarity=polarity
-        )
+        shaking = Shaking(motion, vertical, polarity)
+        (result,) = critical_scales(shaking, shaken, [rotation_deg], rules)
         return result
 
 
@@ -226,32 +225,25 @@ def scan_rules(search_limit: float, scan_ratio: float, bracket: float) -> ScanRu
 
 
 def critical_scales(
-    motion: GroundMotion,
+    shaking: Shaking,
     shaken: ShakenMechanism,
     rotations_deg: Sequence[float | None],
     rules: ScanRules,
-    *,
-    vertical: GroundMotion | None = None,
-    polarity: Polarity = "forward",
 ) -> tuple[CriticalResult, ...]:
     """Return the smallest factors on a record that turn a block so far; they share their runs.
 
     Args:
-        motion: horizontal ground motion.
+        shaking: the motion; its vertical component is scaled with the horizontal one.
         shaken: the block.
         rotations_deg: peak rotations that count as failure [deg]; None among them for failure
             past recovery.
         rules: how far and how finely the scales are looked at.
-        vertical: vertical motion of the same recording, upward positive; scaled with the
-            horizontal one.
-        polarity: ``forward`` or ``reverse``.
 
     Raises:
         InputError: a rotation outside its range.
     """
     failures_rad = [rotation_rad(rotation_deg, shaken) for rotation_deg in rotations_deg]
-    excited = excitation(motion, vertical, polarity)
-    remarks = (*shaken.remarks, *motion_remarks(motion, vertical, excited))
+    excited = shaking.excitation
     pga_g = excited.pga_g
     scale_limit = shaken.yield_g / (rules.search_limit * pga_g) if pga_g > 0.0 else math.inf
     starts = first_motion(excited, shaken.yield_g)
@@ -269,7 +261,7 @@ def critical_scales(
             result = replace(start, certified=True)
         else:
             result = _search(start, run, rules)
-        answers.append(_answer(result, shaken, polarity, remarks))
+        answers.append(_answer(result, shaken, shaking))
     return tuple(answers)
 
 
@@ -443,16 +435,14 @@ def _result(
     )
 
 
-def _answer(
-    search: ScaleSearch, shaken: ShakenMechanism, polarity: Polarity, remarks: tuple[str, ...]
-) -> CriticalResult:
+def _answer(search: ScaleSearch, shaken: ShakenMechanism, shaking: Shaking) -> CriticalResult:
     k = None if search.scale is None else search.k_over_pga(search.scale)
     kr = None if k is None else k * search.pga_g
     critical = critical_rad(shaken)
     return CriticalResult(
         kind=shaken.kind,
         p2=shaken.p2,
-        polarity=polarity,
+        polarity=shaking.polarity,
         pga_g=search.pga_g,
         status=search.status,
         search_limit=search.k_over_pga(search.scale_limit) if search.pga_g > 0.0 else SEARCH_LIMIT,
@@ -463,12 +453,9 @@ def _answer(
         y_m_s=None if kr is None else kr * STANDARD_GRAVITY_M_S2 / math.sqrt(shaken.p2),
         certified=search.certified,
         k_up_over_pga=None if search.starts is None else search.k_over_pga(search.starts),
-        undecided=None,
-        island_width=None,
-        kr_over_pga_resolved=None,
         reentrant=search.reentrant,
         n_runs=len(search.runs),
-        warnings=(*remarks, *search.warnings),
+        warnings=(*shaken.remarks, *shaking.warnings, *search.warnings),
         points=search.points(critical),
         intervals=search.intervals(),
         of_kind={

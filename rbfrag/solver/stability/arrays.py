@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -17,7 +17,6 @@ from rbfrag.solver.block.arrays import (
     REASONS,
     BlockArray,
     CodeArray,
-    FloatArray,
     common_shape,
     in_chunks,
 )
@@ -29,25 +28,17 @@ from rbfrag.solver.block.formulas import (
     shape_factor,
     tan_deg,
 )
+from rbfrag.solver.results import FloatArray
 from rbfrag.solver.stability.modes import (
     CONFINED_TOPPLE,
     MODES,
-    SLIDE,
     SLUMP,
     STATES,
     TOPPLE,
-    confined_bond,
-    confined_topple,
+    Planes,
     mode_code,
     mode_code_without_back,
-    on_its_branch,
-    sliding_limit,
-    slump,
-    slump_bond,
     state_code,
-    toe_lifts,
-    wedges,
-    yield_coefficient,
 )
 
 NOTHING = -1
@@ -165,62 +156,30 @@ def stability_arrays(
             raise InputError("cohesion_pa needs density_kg_m3, the density of the rock")
         given |= {"cohesion_pa": cohesion_pa, "density_kg_m3": density_kg_m3}
     arrays, shape = common_shape({"blocks": blocks.tan_alpha1, **given})
-    functions = array_elementwise()
 
     def formula(
         t1: FloatArray, t3: FloatArray, h: FloatArray, bad: Any, *others: Any
     ) -> tuple[Any, ...]:
         there = dict(zip(given, others, strict=True))
         reason = _reasons(bad, t1.size, there)
+        # NaN and harmless planes give no warning and no mode by chance
         if reason.any():
             ok = reason == 0
             t1, t3, h = (np.where(ok, value, math.nan) for value in (t1, t3, h))
-            there = {name: _harmless(value, ok) for name, value in there.items()}
-        tb, mu1 = _tangent(there["beta_deg"]), _tangent(there["phi_deg"])
-        mu2 = _tangent(there["phi_back_deg"]) if "phi_back_deg" in there else mu1
-        weight = 1.0 + there["kv"]
-        cot = cot_gamma(t1, t3)
-        bond, limit = None, mu1
-        lifts: Any = False
+            there = {name: np.where(ok, value, 0.0) for name, value in there.items()}
+        bond = None
         if "cohesion_pa" in there:
             bond = _bond(t1, t3, h, there["cohesion_pa"], there["density_kg_m3"])
-            term = bond * np.sqrt(1.0 + tb * tb)
-            ky = yield_coefficient(mu1, 1.0, tb, weight, functions, term)
-            limit = sliding_limit(mu1, tb, weight, ky, bond, functions)
-        else:
-            ky = yield_coefficient(mu1, 1.0, tb, weight, functions)
-        if back_fracture:
-            mode = mode_code(t1, t3, limit, cot < 0.0, functions)
-            sine, cosine = _direction(mode, t1, t3, cot, mu1, mu2)
-            share = 0.0 if bond is None else term * _share_of_bond(mode, t1, t3, cot, mu2)
-            k = yield_coefficient(sine, cosine, tb, weight, functions, share)
-            confined = mode == CONFINED_TOPPLE
-            if confined.any():
-                branch = on_its_branch(k, ky, wedges(cot, mu1, mu2), functions)
-                k = np.where(confined, branch, k)
-            if bond is not None:
-                phi_back = there.get("phi_back_deg", there["phi_deg"])
-                beyond = phi_back > there["phi_deg"] + np.degrees(np.arctan2(1.0, cot))
-                reaction = _base_reaction(mode, t1, t3, cot, mu1, mu2)
-                slumps = mode == SLUMP
-                k = np.where(slumps, on_its_branch(k, ky, beyond, functions), k)
-                k = np.where(slumps & (reaction <= 0.0), -math.inf, k)
-                k = np.where(confined & (reaction <= 0.0), math.inf, k)
-                lifts = toe_lifts(k, reaction, cosine, mu2 - cot, tb, weight, bond, functions) & (
-                    confined & (bond > 0.0) & np.isfinite(k)
-                )
-            state = state_code(k, functions)
-        else:
-            mode = mode_code_without_back(t1, t3, limit, tb, functions)
-            k = np.where(mode == TOPPLE, yield_coefficient(t3, 1.0, tb, weight, functions), ky)
-            k = np.where(tb < t1, -math.inf, k)
-            state = state_code(k, functions)
-        r3 = h * np.sqrt(t3 * t3 + 1.0)
-        p2 = frequency_parameter(shape_factor(t1, t3), r3)
+        tb, mu1 = _tangent(there["beta_deg"]), _tangent(there["phi_deg"])
+        mu2 = _tangent(there["phi_back_deg"]) if "phi_back_deg" in there else mu1
+        planes = Planes(tb, mu1, mu2, 1.0 + there["kv"], array_elementwise(), bond)
+        mode, k, ky, lifts = _yields(t1, t3, planes, back_fracture)
+        state = state_code(k, planes.functions)
+        p2 = frequency_parameter(shape_factor(t1, t3), h * np.sqrt(t3 * t3 + 1.0))
         if reason.any():
             mode, state = np.where(ok, mode, NOTHING), np.where(ok, state, NOTHING)
             k, ky, p2 = (np.where(ok, value, math.nan) for value in (k, ky, p2))
-            lifts = np.where(ok, lifts, False)
+            lifts = lifts & ok
         return mode, state, k, ky, p2, reason, lifts
 
     codes = [np.empty(shape, dtype=np.int8) for _ in range(3)]
@@ -247,23 +206,43 @@ def _tangent(angle_deg: Any) -> Any:
     return tan_deg(angle_deg, array_elementwise())
 
 
-def _direction(
-    mode: NDArray[Any], t1: FloatArray, t3: FloatArray, cot: FloatArray, mu1: Any, mu2: Any
-) -> tuple[FloatArray, FloatArray]:
-    """Return sine and cosine of δ* of the governing mode; lengths in units of half the S1."""
-    sine = np.where(mode == TOPPLE, t3, mu1)
-    cosine = np.ones_like(sine)
-    for code in (SLUMP, CONFINED_TOPPLE):
-        here = mode == code
-        if not here.any():
+def _yields(
+    t1: FloatArray, t3: FloatArray, planes: Planes[Any], back_fracture: bool
+) -> tuple[NDArray[Any], FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Return modes, their yields, those of sliding, and where a bond lets the toe lift."""
+    cot, ky, limit = cot_gamma(t1, t3), planes.ky, planes.limit
+    k, lifts = np.array(np.broadcast_to(ky, t1.shape)), np.zeros(t1.shape, dtype=np.bool_)
+    if back_fracture:
+        mode = mode_code(t1, t3, limit, cot < 0.0, planes.functions)
+    else:
+        mode = mode_code_without_back(t1, t3, limit, planes.tan_beta, planes.functions)
+    for code in (TOPPLE, SLUMP, CONFINED_TOPPLE):
+        here = np.flatnonzero(mode == code)
+        if not here.size:
             continue
-        if code == SLUMP:
-            mechanism = slump(t1, -1.0, -t3, 1.0, cot, mu1, mu2)
+        own = _at(planes, here)
+        a1, a3, cot_here = t1[here], t3[here], cot[here]
+        # contacts in units of half the S1, as `Block.arms` has them
+        if code == TOPPLE:
+            k[here] = own.coefficient(a3, 1.0)
+        elif code == SLUMP:
+            k[here], _ = own.slump(a1, -1.0, -a3, 1.0, cot_here)
         else:
-            mechanism = confined_topple(t3, -1.0, t1, -1.0, cot, mu1, mu2)
-        sine = np.where(here, mechanism[0], sine)
-        cosine = np.where(here, mechanism[1], cosine)
-    return sine, cosine
+            k[here], lifts[here] = own.confined_topple(a3, -1.0, a1, -1.0, cot_here)
+    if not back_fracture:
+        # the weight passes upslope of the heel, and nothing stands there to lean on
+        k[planes.tan_beta < t1] = -math.inf
+    return mode, k, ky, lifts
+
+
+def _at(planes: Planes[Any], here: NDArray[np.intp]) -> Planes[Any]:
+    """Return the planes of some of the blocks; single numbers hold for all."""
+    names = ("tan_beta", "mu1", "mu2", "weight", "bond")
+    values = {name: getattr(planes, name) for name in names}
+    parts: dict[str, Any] = {
+        name: value[here] for name, value in values.items() if isinstance(value, np.ndarray)
+    }
+    return replace(planes, **parts)
 
 
 def _bond(t1: FloatArray, t3: FloatArray, h: FloatArray, cohesion: Any, density: Any) -> FloatArray:
@@ -271,25 +250,6 @@ def _bond(t1: FloatArray, t3: FloatArray, h: FloatArray, cohesion: Any, density:
     base = h * t3 - h * t1
     area = base * 2.0 * h
     return np.asarray(cohesion * base / (density * STANDARD_GRAVITY_M_S2 * area))
-
-
-def _share_of_bond(
-    mode: NDArray[Any], t1: FloatArray, t3: FloatArray, cot: FloatArray, mu2: Any
-) -> FloatArray:
-    """Return what a bond adds to the numerator of the governing yield, over that of sliding."""
-    share = np.where(mode == SLIDE, 1.0, 0.0)
-    share = np.where(mode == SLUMP, slump_bond(t1, -1.0, -t3, 1.0, cot, mu2), share)
-    confined = confined_bond(t3, -1.0, t1, -1.0, cot, mu2)
-    return np.asarray(np.where(mode == CONFINED_TOPPLE, confined, share))
-
-
-def _base_reaction(
-    mode: NDArray[Any], t1: FloatArray, t3: FloatArray, cot: FloatArray, mu1: Any, mu2: Any
-) -> FloatArray:
-    """Return the reaction of the base, up to a factor, of blocks that slump or topple confined."""
-    slumping = slump(t1, -1.0, -t3, 1.0, cot, mu1, mu2)[2]
-    confined = confined_topple(t3, -1.0, t1, -1.0, cot, mu1, mu2)[2]
-    return np.asarray(np.where(mode == SLUMP, slumping, confined))
 
 
 def _reasons(bad: CodeArray, size: int, given: Mapping[str, Any]) -> CodeArray:
@@ -300,10 +260,6 @@ def _reasons(bad: CodeArray, size: int, given: Mapping[str, Any]) -> CodeArray:
             if not np.all(usable):
                 reason[~usable & (reason == 0)] = code
     return reason
-
-
-def _harmless(value: Any, ok: NDArray[np.bool_]) -> Any:
-    return np.where(ok, value, 0.0)
 
 
 def slumping_p2(
@@ -336,6 +292,7 @@ def slumping_p2(
         np.radians(angle)
         for angle in (alpha1_deg, alpha3_deg, gamma_deg, beta_deg, phi_deg, phi_back_deg)
     )
+    # L_h, A, B, F, C' and D of docs/theory/slumping.md at rest, in this order
     back_edge = 2.0 * r1_m * np.cos(a1) / np.sin(gamma)
     on_base = r3_m * np.sin(a3 + gamma - phi2)
     on_back = r1_m * np.sin(a1 - phi1)

@@ -16,7 +16,9 @@ cot γ are enough.
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Generic, Literal
 
 from rbfrag.solver.block.formulas import Elementwise, N
 
@@ -82,7 +84,7 @@ def confined_topple(
 
 def yield_coefficient(
     sine: N,
-    cosine: N,
+    cosine: N | float,
     tan_beta: N,
     weight: N | float,
     functions: Elementwise[N],
@@ -103,8 +105,10 @@ def yield_coefficient(
         where δ* - β <= -90° (unstable without any finite k).
     """
     where = functions.where
+    # sine and cosine of δ* - β, over cos β
     numerator = (sine - cosine * tan_beta) * weight + bond
     denominator = cosine + sine * tan_beta
+    # beyond a level reaction no k balances it: bigger ones only press harder, or nothing holds
     level = denominator <= _SQUARE * abs(numerator)
     k = numerator / where(level, 1.0, denominator)
     result: N = where(level, where(numerator > 0.0, math.inf, -math.inf), k)
@@ -113,7 +117,14 @@ def yield_coefficient(
 
 def wedges(cot: N, mu1: N, mu2: N) -> Any:
     """Return whether both planes hold a confined topple between them: γ + φ1 + φ2 > 180°."""
+    # sin(γ + φ1 + φ2) over sin γ cos φ1 cos φ2, all three positive
     return (cot - mu2) * mu1 + cot * mu2 + 1.0 < 0.0
+
+
+def back_is_rougher(cot: N, mu1: N, mu2: N) -> Any:
+    """Return whether the back plane of a slump holds better than its base: φ2 > φ1 + γ."""
+    # sin(γ + φ1 - φ2) over the same
+    return (cot + mu2) * mu1 - cot * mu2 + 1.0 < 0.0
 
 
 def on_its_branch(k: N, ky: N, rises: object, functions: Elementwise[N]) -> N:
@@ -153,7 +164,9 @@ def mode_code(
     """
     where = functions.where
     rotates = where(confined, CONFINED_TOPPLE, TOPPLE)
+    # the resultant at which the base slides passes the toe inside: it slides before it rotates
     forward = where(tan_alpha3 >= limit, SLIDE, rotates)
+    # or behind the heel: the base alone holds no such resultant, and the back plane takes a part
     result: N = where(tan_alpha1 > limit, SLUMP, forward)
     return result
 
@@ -215,7 +228,9 @@ def sliding_limit(
         functions: the functions for this kind of number.
     """
     where = functions.where
+    # weight and inertia at the yield, normal and along the base, each over cos β
     normal = weight - ky * tan_beta
+    # a bond may hold until the inertial force lifts the block off its base
     pressed = normal > 0.0
     limit = where(pressed, (weight * tan_beta + ky) / where(pressed, normal, 1.0), math.inf)
     result: N = where((bond == 0.0) | (abs(ky) == math.inf), mu1, limit)
@@ -247,6 +262,87 @@ def toe_lifts(
     normal = (weight - k * tan_beta) / functions.sqrt(1.0 + tan_beta * tan_beta)
     pressed = normal * r_base + bond * pull
     return ((pressed <= 0.0) & (cosine > 0.0)) | ((pressed >= 0.0) & (cosine < 0.0))
+
+
+@dataclass(frozen=True)
+class Planes(Generic[N]):
+    """What the yield of a mechanism depends on besides its contacts.
+
+    Args:
+        tan_beta: tangent of the dip of the base.
+        mu1: tangent of the friction angle of the base.
+        mu2: tangent of the friction angle of the back plane.
+        weight: 1 + k_v.
+        functions: the functions for this kind of number.
+        bond: strength of the base's bond over the weight, c L/(ρ g A); None without cohesion.
+    """
+
+    tan_beta: N
+    mu1: N
+    mu2: N
+    weight: N | float
+    functions: Elementwise[N]
+    bond: N | None = None
+
+    def bonded(self, share: N | float) -> N | float:
+        """Return what the bond adds to the numerator of a yield, of which 1 m g adds `share`."""
+        if self.bond is None:
+            return 0.0
+        # over cos β, as the numerator is
+        return self.bond * self.functions.sqrt(1.0 + self.tan_beta * self.tan_beta) * share
+
+    def coefficient(self, sine: N, cosine: N | float, share: N | float = 0.0) -> N:
+        """Return :func:`yield_coefficient` on these planes; arguments as there and of `bonded`."""
+        bond = self.bonded(share)
+        return yield_coefficient(sine, cosine, self.tan_beta, self.weight, self.functions, bond)
+
+    @cached_property
+    def ky(self) -> N:
+        """Yield acceleration coefficient of sliding (eq. 3.17): δ* = φ1."""
+        return self.coefficient(self.mu1, 1.0, 1.0)
+
+    @property
+    def limit(self) -> N:
+        """Tangent of the angle of the resultant at which the base slides; see :func:`mode_code`."""
+        if self.bond is None:
+            return self.mu1
+        return sliding_limit(
+            self.mu1, self.tan_beta, self.weight, self.ky, self.bond, self.functions
+        )
+
+    def slump(self, heel_x: N, heel_y: N, back_x: N, back_y: N, cot: N) -> tuple[N, Any]:
+        """Return k_s, and whether the back contact cannot hold the block, which is then unstable.
+
+        The arguments are those of :func:`slump`.
+        """
+        contacts, where = (heel_x, heel_y, back_x, back_y, cot), self.functions.where
+        sine, cosine, r_base, _ = slump(*contacts, self.mu1, self.mu2)
+        share = 0.0 if self.bond is None else slump_bond(*contacts, self.mu2)
+        k = self.coefficient(sine, cosine, share)
+        k = on_its_branch(k, self.ky, back_is_rougher(cot, self.mu1, self.mu2), self.functions)
+        # moments balance only if the base pulls: nothing holds the block
+        untenable = r_base <= 0.0
+        return where(untenable, -math.inf, k), untenable
+
+    def confined_topple(self, toe_x: N, toe_y: N, low_x: N, low_y: N, cot: N) -> tuple[N, Any]:
+        """Return k_ct, and whether the bond lets the toe lift off first; see :func:`toe_lifts`.
+
+        The arguments are those of :func:`confined_topple`.
+        """
+        contacts, where = (toe_x, toe_y, low_x, low_y, cot), self.functions.where
+        sine, cosine, r_base, _ = confined_topple(*contacts, self.mu1, self.mu2)
+        share = 0.0 if self.bond is None else confined_bond(*contacts, self.mu2)
+        k = self.coefficient(sine, cosine, share)
+        k = on_its_branch(k, self.ky, wedges(cot, self.mu1, self.mu2), self.functions)
+        # α1 + γ + φ2 >= 180°: the heel jams, whatever pushes it
+        k = where(r_base <= 0.0, math.inf, k)
+        if self.bond is None:
+            return k, False
+        pull = toe_y * (cot - self.mu2)
+        lifts = toe_lifts(
+            k, r_base, cosine, pull, self.tan_beta, self.weight, self.bond, self.functions
+        )
+        return k, lifts & (self.bond > 0.0) & (abs(k) < math.inf)
 
 
 def words_of_mode(mode: str) -> str:

@@ -12,44 +12,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
-from rbfrag.solver.block.formulas import SCALAR, Elementwise, array_elementwise, tan_deg
+from rbfrag.solver.block.formulas import SCALAR, Elementwise, N, array_elementwise, tan_deg
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.block.polygon import Point
 from rbfrag.solver.quantity import angle, friction_angle, number, vertical_g
-from rbfrag.solver.stability.modes import (
-    ModeName,
-    confined_topple,
-    on_its_branch,
-    slump,
-    wedges,
-    yield_coefficient,
-)
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    FloatArray = NDArray[np.float64]
+from rbfrag.solver.stability.modes import ModeName, Planes, yield_coefficient
 
 
-@overload
-def kr_after_rotation(
-    block: Block, theta_deg: float, *, beta_deg: float, kv: float = ...
-) -> float: ...
-
-
-@overload
-def kr_after_rotation(
-    block: Block, theta_deg: FloatArray, *, beta_deg: float, kv: float = ...
-) -> FloatArray: ...
-
-
-def kr_after_rotation(
-    block: Block, theta_deg: float | FloatArray, *, beta_deg: float, kv: float = 0.0
-) -> float | FloatArray:
+def kr_after_rotation(block: Block, theta_deg: N, *, beta_deg: float, kv: float = 0.0) -> N:
     """Return k_r(θ) = (1 + k_v) tan(α3 - θ - β) of a block that has turned about its toe.
 
     Args:
@@ -73,46 +47,20 @@ def kr_after_rotation(
         return yield_coefficient(toe_x, -toe_y, tb, weight, functions)
 
     limit_deg = 180.0 - block.gamma_deg
-    k: float | FloatArray = _over(theta_deg, formula, limit_deg, "the front face meets the base")
+    k: N = _over(theta_deg, formula, limit_deg, "the front face meets the base")
     return k
 
 
-@overload
 def ks_after_rotation(
     block: Block,
-    theta_deg: float,
-    *,
-    beta_deg: float,
-    phi_deg: float,
-    phi_back_deg: float | None = ...,
-    kv: float = ...,
-    back_follows: float = ...,
-) -> float: ...
-
-
-@overload
-def ks_after_rotation(
-    block: Block,
-    theta_deg: FloatArray,
-    *,
-    beta_deg: float,
-    phi_deg: float,
-    phi_back_deg: float | None = ...,
-    kv: float = ...,
-    back_follows: float = ...,
-) -> FloatArray: ...
-
-
-def ks_after_rotation(
-    block: Block,
-    theta_deg: float | FloatArray,
+    theta_deg: N,
     *,
     beta_deg: float,
     phi_deg: float,
     phi_back_deg: float | None = None,
     kv: float = 0.0,
     back_follows: float = 0.0,
-) -> float | FloatArray:
+) -> N:
     """Return k_s(θ) of a slump that has turned backward (eqs. 3.24, 3.25 with turned arms).
 
     Args:
@@ -131,9 +79,9 @@ def ks_after_rotation(
     Raises:
         InputError: a value outside its range, or a block that does not slump.
     """
-    tb, mu1, mu2, weight = _surroundings(beta_deg, phi_deg, phi_back_deg, kv)
+    planes = _planes(beta_deg, phi_deg, phi_back_deg, kv)
     share = _share(back_follows)
-    if block.tan_alpha1 < mu1:
+    if block.tan_alpha1 < planes.mu1:
         raise InputError(
             f"alpha1 = {block.alpha1_deg:.6g} degrees is below phi_deg = {phi_deg:.6g}: the block "
             "does not slump, so that it has no k_s"
@@ -143,51 +91,23 @@ def ks_after_rotation(
         heel = _turned(block.arms.heel, cosine, sine)
         back = _turned(block.arms.back, cosine, sine)
         cot = _cot_of_back(block, -share * turn, functions)
-        x, y, r_base, _ = slump(*heel, *back, cot, mu1, mu2)
-        k = yield_coefficient(x, y, tb, weight, functions)
-        return functions.where(r_base <= 0.0, -math.inf, k)
+        return replace(planes, functions=functions).slump(*heel, *back, cot)[0]
 
     why = "the back edge meets the base plane"
-    k: float | FloatArray = _over(theta_deg, formula, block.gamma_deg, why)
+    k: N = _over(theta_deg, formula, block.gamma_deg, why)
     return k
 
 
-@overload
 def kct_after_rotation(
     block: Block,
-    theta_deg: float,
-    *,
-    beta_deg: float,
-    phi_deg: float,
-    phi_back_deg: float | None = ...,
-    kv: float = ...,
-    back_follows: float = ...,
-) -> float: ...
-
-
-@overload
-def kct_after_rotation(
-    block: Block,
-    theta_deg: FloatArray,
-    *,
-    beta_deg: float,
-    phi_deg: float,
-    phi_back_deg: float | None = ...,
-    kv: float = ...,
-    back_follows: float = ...,
-) -> FloatArray: ...
-
-
-def kct_after_rotation(
-    block: Block,
-    theta_deg: float | FloatArray,
+    theta_deg: N,
     *,
     beta_deg: float,
     phi_deg: float,
     phi_back_deg: float | None = None,
     kv: float = 0.0,
     back_follows: float = 0.0,
-) -> float | FloatArray:
+) -> N:
     """Return k_ct(θ) of a confined topple that has turned forward (eqs. 3.28, 3.29 corrected).
 
     Args:
@@ -206,10 +126,9 @@ def kct_after_rotation(
     Raises:
         InputError: a value outside its range, or a block that is not confined.
     """
-    tb, mu1, mu2, weight = _surroundings(beta_deg, phi_deg, phi_back_deg, kv)
-    ky = yield_coefficient(mu1, 1.0, tb, weight, SCALAR)
+    planes = _planes(beta_deg, phi_deg, phi_back_deg, kv)
     share = _share(back_follows)
-    if not block.confines or block.tan_alpha3 > mu1:
+    if not block.confines or block.tan_alpha3 > planes.mu1:
         raise InputError(
             f"alpha3 = {block.alpha3_deg:.6g}, gamma = {block.gamma_deg:.6g} and phi_deg = "
             f"{phi_deg:.6g} degrees: the block does not topple against its back plane (that takes "
@@ -220,15 +139,12 @@ def kct_after_rotation(
         toe = _turned(block.arms.toe, cosine, -sine)
         low = _turned(block.arms.lowest_on_back, cosine, -sine)
         cot = _cot_of_back(block, share * turn, functions)
-        x, y, r_base, _ = confined_topple(*toe, *low, cot, mu1, mu2)
-        k = yield_coefficient(x, y, tb, weight, functions)
-        k = on_its_branch(k, ky, wedges(cot, mu1, mu2), functions)
-        return functions.where(r_base <= 0.0, math.inf, k)
+        return replace(planes, functions=functions).confined_topple(*toe, *low, cot)[0]
 
     limit_deg = confined_limit_deg(block, back_follows=share)
     on_its_face = limit_deg == 180.0 - block.gamma_deg
     why = "the front face meets the base" if on_its_face else _FREE
-    k: float | FloatArray = _over(theta_deg, formula, limit_deg, why)
+    k: N = _over(theta_deg, formula, limit_deg, why)
     return k
 
 
@@ -309,15 +225,12 @@ def _cot_of_back(block: Block, turn: Any, functions: Elementwise[Any]) -> Any:
     return functions.where(turn == 0.0, cot, turned)
 
 
-def _surroundings(
-    beta_deg: float, phi_deg: float, phi_back_deg: float | None, kv: float
-) -> tuple[float, float, float, float]:
+def _planes(beta_deg: float, phi_deg: float, phi_back_deg: float | None, kv: float) -> Planes[Any]:
     tb = tan_deg(angle(beta_deg, "beta_deg", -90.0, 90.0), SCALAR)
-    mu1 = tan_deg(friction_angle(phi_deg, "phi_deg"), SCALAR)
-    if phi_back_deg is None:
-        return tb, mu1, mu1, 1.0 + vertical_g(kv)
-    mu2 = tan_deg(friction_angle(phi_back_deg, "phi_back_deg"), SCALAR)
-    return tb, mu1, mu2, 1.0 + vertical_g(kv)
+    mu1 = mu2 = tan_deg(friction_angle(phi_deg, "phi_deg"), SCALAR)
+    if phi_back_deg is not None:
+        mu2 = tan_deg(friction_angle(phi_back_deg, "phi_back_deg"), SCALAR)
+    return Planes(tb, mu1, mu2, 1.0 + vertical_g(kv), SCALAR)
 
 
 def _turned(arm: Point, cosine: Any, sine: Any) -> tuple[Any, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from rbfrag.errors import InputError
@@ -11,7 +12,14 @@ from rbfrag.frames import Tabular
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.formulas import SCALAR, tan_deg
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.quantity import angle, friction_angle, not_negative, positive, vertical_g
+from rbfrag.solver.quantity import (
+    angle,
+    finite_or_none,
+    friction_angle,
+    not_negative,
+    positive,
+    vertical_g,
+)
 from rbfrag.solver.stability.margins import (
     Finding,
     Margin,
@@ -27,18 +35,11 @@ from rbfrag.solver.stability.modes import (
     STATES,
     TOPPLE,
     ModeName,
+    Planes,
     StateName,
-    confined_bond,
-    confined_topple,
     mode_code,
     mode_code_without_back,
-    on_its_branch,
-    sliding_limit,
-    slump,
-    slump_bond,
     state_code,
-    toe_lifts,
-    wedges,
     yield_coefficient,
 )
 
@@ -146,52 +147,32 @@ def stability(
 
     tb, mu1, mu2 = (tan_deg(value, SCALAR) for value in (beta_deg, phi_deg, phi_back_deg))
     weight = 1.0 + kv
-    bond_term = bond * math.sqrt(1.0 + tb * tb)
+    planes = Planes(tb, mu1, mu2, weight, SCALAR, bond or None)
     t1, t3, cot = block.tan_alpha1, block.tan_alpha3, block.cot_gamma
-
-    ky = yield_coefficient(mu1, 1.0, tb, weight, SCALAR, bond_term)
-    limit = sliding_limit(mu1, tb, weight, ky, bond, SCALAR)
+    ky, limit = planes.ky, planes.limit
     if back_fracture:
         code = int(mode_code(t1, t3, limit, block.confines, SCALAR))
     else:
         code = int(mode_code_without_back(t1, t3, limit, tb, SCALAR))
+    # the weight passes upslope of the heel, and nothing stands there to lean on
     backward = not back_fracture and tb < t1
     untenable = lifts = False
+    k = ky
     if code == SLUMP and back_fracture:
-        contacts = (*block.arms.heel, *block.arms.back, cot)
-        sine, cosine, r_base, _ = slump(*contacts, mu1, mu2)
-        share = bond_term * slump_bond(*contacts, mu2) if bond else 0.0
-        k = yield_coefficient(sine, cosine, tb, weight, SCALAR, share)
-        k = on_its_branch(k, ky, phi_back_deg > phi_deg + block.gamma_deg, SCALAR)
-        if r_base <= 0.0:
-            untenable, k = True, -math.inf
+        k, untenable = planes.slump(*block.arms.heel, *block.arms.back, cot)
     elif code == CONFINED_TOPPLE:
-        contacts = (*block.arms.toe, *block.arms.lowest_on_back, cot)
-        sine, cosine, r_base, _ = confined_topple(*contacts, mu1, mu2)
-        share = bond_term * confined_bond(*contacts, mu2) if bond else 0.0
-        k = yield_coefficient(sine, cosine, tb, weight, SCALAR, share)
-        k = on_its_branch(k, ky, wedges(cot, mu1, mu2), SCALAR)
-        if r_base <= 0.0:
-            k = math.inf
-        if bond and math.isfinite(k):
-            pull = block.arms.toe[1] * (cot - mu2)
-            lifts = bool(toe_lifts(k, r_base, cosine, pull, tb, weight, bond, SCALAR))
+        k, lifts = planes.confined_topple(*block.arms.toe, *block.arms.lowest_on_back, cot)
     elif code == TOPPLE:
-        k = yield_coefficient(t3, 1.0, tb, weight, SCALAR)
-    else:
-        k = ky
+        # (3.16): δ* = α3
+        k = planes.coefficient(t3, 1.0)
     if backward:
         k = -math.inf
     state = STATES[int(state_code(k, SCALAR))]
-
-    def phi_for(alpha_deg: float) -> float:
-        return _friction_that_slides_at(alpha_deg, beta_deg, weight, bond)
 
     finding = Finding(
         mode=MODES[code],
         state=state,
         k=k,
-        ky=ky,
         beta_deg=beta_deg,
         phi_deg=phi_deg,
         phi_back_deg=phi_back_deg,
@@ -205,7 +186,7 @@ def stability(
         phi_deg=phi_deg,
         limit_deg=degrees_of(limit) if bond else phi_deg,
         back_fracture=back_fracture,
-        phi_for=phi_for,
+        phi_for=partial(_friction_that_slides_at, beta_deg=beta_deg, weight=weight, bond=bond),
     )
     return Stability(
         mode=MODES[code],
@@ -301,11 +282,11 @@ def stability_as_dict(block: Block, stability: Stability) -> dict[str, Any]:
         "mode": stability.mode,
         "state": stability.state,
         "p2": block.p2,
-        "kr": _finite(stability.kr),
-        "ky": _finite(stability.ky),
-        "ks": _finite(stability.ks),
-        "kct": _finite(stability.kct),
-        "yield_acceleration": _finite(stability.yield_acceleration),
+        "kr": finite_or_none(stability.kr),
+        "ky": finite_or_none(stability.ky),
+        "ks": finite_or_none(stability.ks),
+        "kct": finite_or_none(stability.kct),
+        "yield_acceleration": finite_or_none(stability.yield_acceleration),
         "alpha1_deg": block.alpha1_deg,
         "alpha3_deg": block.alpha3_deg,
         "gamma_deg": block.gamma_deg,
@@ -327,12 +308,8 @@ def stability_as_dict(block: Block, stability: Stability) -> dict[str, Any]:
     if stability.cohesion is not None:
         answer["cohesion"] = {
             "ratio": stability.cohesion.ratio,
-            "ky": _finite(stability.cohesion.ky),
+            "ky": finite_or_none(stability.cohesion.ky),
             "phi_equivalent_deg": stability.cohesion.phi_equivalent_deg,
-            "ky_equivalent": _finite(stability.cohesion.ky_equivalent),
+            "ky_equivalent": finite_or_none(stability.cohesion.ky_equivalent),
         }
     return answer
-
-
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None

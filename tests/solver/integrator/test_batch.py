@@ -28,10 +28,12 @@ def test_every_block_of_a_batch_has_the_numbers_of_its_single_run(with_vertical:
             alone = simulate(drive, p2=float(p2[i, 0]), kr=float(kr[j]))
             here = (
                 runs.outcome[i, j], runs.peak_rad[i, j], runs.started_s[i, j],
-                runs.verdict_s[i, j], runs.error_rad[i, j], runs.steps[i, j],
-                runs.samples_moved[i, j],
+                runs.verdict_s[i, j], runs.steps[i, j], runs.samples_moved[i, j],
             )  # fmt: skip
-            np.testing.assert_array_equal(np.array(here), np.array(alone[:7]))
+            *others, error, steps, samples = alone[:7]
+            np.testing.assert_array_equal(np.array(here), np.array([*others, steps, samples]))
+            # two compilations may round the estimate in its last bit (numba 0.60 does)
+            assert runs.error_rad[i, j] == pytest.approx(error, rel=1e-15, abs=0.0, nan_ok=True)
             outcomes.add(alone.outcome)
     assert len(outcomes) > 1
     np.testing.assert_array_equal(runs.theta_n, runs.peak_rad / np.arctan(kr))

@@ -41,6 +41,7 @@ from rbfrag.solver.integrator.one_freedom.state import (
 )
 from rbfrag.solver.integrator.one_freedom.step import CONDITIONS, ORDER, TURN_MAX, UNIFORM_ORDER
 from rbfrag.solver.integrator.state import Place
+from rbfrag.solver.quantity import finite_or_none
 from rbfrag.solver.results import FloatArray, Outcome
 
 PHASES_MAX = 1000
@@ -212,9 +213,9 @@ def follow(
         rate=entry.rate,
         peak_displacement_m=slipped,
         pose=phase.pose(entry.x) if following.in_place else None,
-        started_s=_or_none(started),
-        ended_s=_or_none(ended) if not math.isnan(started) or run.stop == JUMPED else None,
-        certain_s=_or_none(run.certain_s),
+        started_s=finite_or_none(started),
+        ended_s=finite_or_none(ended) if not math.isnan(started) or run.stop == JUMPED else None,
+        certain_s=finite_or_none(run.certain_s),
         error=peak.error,
         steps=steps,
         samples_moved=samples_moved,
@@ -361,7 +362,3 @@ def _refuse_endless(mechanism: Mechanism, excitation: Excitation, turn_max: floa
             f"the block is so small that one run would take {steps:.1g} steps over this record: "
             "check the unit of its size, which is in metres"
         )
-
-
-def _or_none(time_s: float) -> float | None:
-    return time_s if math.isfinite(time_s) else None

@@ -18,9 +18,6 @@ from rbfrag.solver.results import FloatArray
 DEGREE = 3
 """Highest harmonic."""
 
-SIZE = 2 * DEGREE + 1
-"""Numbers that a function is made of: 1, cos θ, sin θ, cos 2θ, sin 2θ, cos 3θ, sin 3θ."""
-
 Half = tuple[complex, complex, complex, complex]
 """Complex Fourier coefficients of the harmonics 0 to 3; those of -1 to -3 are their conjugates."""
 

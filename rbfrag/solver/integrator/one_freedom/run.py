@@ -45,7 +45,7 @@ from rbfrag.solver.integrator.one_freedom.state import (
     resting,
 )
 from rbfrag.solver.integrator.one_freedom.step import DRIVING, RESISTANCE, harmonic_sum, own_rate
-from rbfrag.solver.integrator.state import Place
+from rbfrag.solver.integrator.state import Place, time_of_jump
 from rbfrag.solver.results import FloatArray
 
 GOES_ON = -1
@@ -88,10 +88,10 @@ def run_phase(
     while stop == GOES_ON:
         if not moving:
             rest = leave_rest(record, rules, state, Place(node, tau), barred)
-            node, tau = rest.place.interval, rest.place.fraction
+            node, tau = rest.place
             state = resting(state, state.error_x, rest.sense, rest.smooth)
             line = line_at(record, node, free_s, 1.0)
-            stop, condition = stop_at_rest(record, rules, state, line, Place(node, tau))
+            stop, condition = stop_at_rest(record, rules, state, line, rest.place)
             now_s = line.start_s + tau * line.h
             # a start that a contact does not survive is one: the block moves, the model ends
             if math.isnan(started_s) and stop in (GOES_ON, VIOLATED):
@@ -170,15 +170,26 @@ def run_phase(
         filled = noted(history, filled, now_s, state.x, state.rate, -1 if free else node)
         certain_s = certain_at(record, rules, state, node, free, now_s, certain_s)
 
-    stop_s = time_of_jump(record) if stop == JUMPED else line.start_s + tau * line.h
-    if node >= record.last and stop != JUMPED:
-        # an interval of rest has no length of its own that another phase could go on in
-        free_s, tau = free_s + tau * line.h, 0.0
-    end = Entry(Place(node, tau), free_s, state.x, state.rate, state.error_x, state.error_rate)
+    stop_s, end = ended(record, stop, line, Place(node, tau), free_s, state)
     return PhaseRun(
         stop, condition, stop_s, end, peak, started_s, stopped_s, certain_s, steps, moved, impacts,
         filled,
     )  # fmt: skip
+
+
+@within
+def ended(
+    record: Record, stop: int, line: Line, place: Place, free_s: float, state: State
+) -> tuple[float, Entry]:
+    """Return when a phase ended, and how: what another one may be entered with."""
+    stop_s = line.start_s + place.fraction * line.h
+    if stop == JUMPED:
+        stop_s = time_of_jump(record.time_s, record.interval_s, record.w, record.last)
+    elif place.interval >= record.last:
+        # an interval of rest has no length of its own that another phase could go on in
+        free_s += place.fraction * line.h
+        place = Place(place.interval, 0.0)
+    return stop_s, Entry(place, free_s, state.x, state.rate, state.error_x, state.error_rate)
 
 
 @within
@@ -213,17 +224,6 @@ def placed(rules: PhaseRules, entry: Entry) -> State:
 def thrown(record: Record, node: int) -> bool:
     """Whether the ground falls away under the block before the next node (1 + k_v <= 0)."""
     return node >= record.last and record.last < record.k_h.size - 1
-
-
-@within
-def time_of_jump(record: Record) -> float:
-    """Return when 1 + k_v reaches zero [s]."""
-    at, w = record.last, record.w
-    # w is a straight line between the last node in contact and the next
-    jump_s: float = record.time_s[max(at, 0)]
-    if at >= 0:
-        jump_s += record.interval_s[at] * w[at] / (w[at] - w[at + 1])
-    return jump_s
 
 
 @within

@@ -259,8 +259,8 @@ def certain_since(
 ) -> float:
     """Return the time from which nothing turns the motion back; NaN while something may.
 
-    It is (4.19) for an equation of this form: the block moves forward, and the least drive of
-    all that is to come exceeds the resistance where it is.
+    It is (4.19) for an equation of this form: the block moves forward, and the least excitation
+    of all that is to come exceeds the resistance where it is.
 
     Args:
         since_s: the time so far, or NaN.

@@ -1,0 +1,148 @@
+"""Blocks of a table that cannot be used: why each, how many, and what is said of them.
+
+Every command that takes many blocks answers those that it can, gives the others NaN and the reason,
+and says by :func:`unusable_in_words` how many they are. An answer that needs all of them, or a
+table of which none can be used, is refused by :func:`refuse`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.checks import Finding, refusals
+from rbfrag.fragility.methods import BlockParameters
+
+FROM_SUMS = " and are left out of all sums, which are lower bounds"
+"""What becomes of such blocks where numbers of several are added."""
+
+FROM_MEAN = " and are left out of the mean"
+"""The same where the answer is a mean over blocks."""
+
+FIRST = 6
+"""So many of them are named."""
+
+_MOST_CHARACTERS = 260
+
+
+def block_reasons(
+    block: BlockParameters, values: Mapping[str, NDArray[np.float64]]
+) -> NDArray[np.object_]:
+    """Return why blocks wait for no earthquake, in the words of `predict`; empty for those that do.
+
+    Args:
+        block: what describes them.
+        values: its parameters, and options and standard deviations if there are any, by the names
+            of :func:`rbfrag.predict`, shape (m,) each; an option may be NaN for the block's own.
+    """
+    reasons = np.full(values[block.strength].shape, "", dtype=object)
+
+    def say(holds: Any, finding: Finding) -> None:
+        for i in np.flatnonzero(holds & (reasons == "")).tolist():
+            value = float(finding.value[i])
+            reasons[i] = finding.in_general() if value != value else finding.about(value)
+
+    names = [name for name in (*block.options, *block.sigmas) if name in values]
+    with np.errstate(all="ignore"):
+        own = block.filled(values)
+        for finding in refusals(own, (*block.names, *names), (block.strength, *block.options)):
+            say(finding.holds, finding)
+        at_rest = Finding(
+            own[block.strength] <= 0.0, block.strength, own[block.strength],
+            "is not above zero: the block is unstable and fails without an earthquake",
+        )  # fmt: skip
+        say(at_rest.holds, at_rest)
+        for bound in block.refuses:
+            if bound.about in names:
+                finding = Finding(bound.holds(own), bound.about, own[bound.about], bound.text)
+                say(finding.holds, finding)
+    return reasons
+
+
+def unusable_in_words(
+    count: int, total: int, places: Sequence[str], reasons: Sequence[str], effect: str = ""
+) -> tuple[str, ...]:
+    """Return what is said of blocks that could not be used; nothing where there are none.
+
+    Args:
+        count: their number.
+        total: that of all blocks.
+        places: where they stand, or the first.
+        reasons: why they could not be used.
+        effect: what becomes of them in numbers of several blocks; those of a mean have no row.
+    """
+    if not count:
+        return ()
+    number = f"{count:,} of {total:,} blocks could not be used{effect}"
+    if effect == FROM_MEAN:
+        return (f"{number}: {in_list(places, reasons)}",)
+    which = "it is" if count == 1 else "the first is"
+    return (f"{number}; the reasons stand in the column reason; {which} {places[0]}: {reasons[0]}",)
+
+
+def refuse(
+    source: str, places: Sequence[str], reasons: Sequence[str], total: int, why: str = ""
+) -> NoReturn:
+    """Refuse blocks of which some, or all, cannot be used.
+
+    Args:
+        source: what messages call them.
+        places: where those stand that cannot be used; if none can, of the first.
+        reasons: why each cannot be used.
+        total: number of all blocks.
+        why: why the others do not do; empty where there are no others.
+    """
+    if not why or len(places) == total:
+        listed = in_list(places[:FIRST], reasons[:FIRST])
+        if total == 1:
+            raise InputError(f"{source}: the block cannot be used: {listed}")
+        more = f", the first {FIRST}" if total > FIRST else ""
+        raise InputError(f"{source}: none of {total:,} blocks can be used{more}: {listed}")
+    raise InputError(
+        f"{source}: {len(places):,} of {total:,} blocks cannot be used, and {why}: "
+        f"{in_list(places, reasons)}: correct these rows or take them out"
+    )
+
+
+def refuse_elements(reasons: NDArray[np.object_], why: str = "") -> None:
+    """Refuse arrays of blocks, by their elements; without `why` only where none can be used.
+
+    Args:
+        reasons: of each element, empty where it can be used, shape (m,).
+        why: why the others do not do.
+    """
+    wrong = elements(reasons)
+    if reasons.size == 1 and wrong:
+        raise InputError(reasons[0])
+    if wrong and (why or len(wrong) == reasons.size):
+        refuse("blocks", wrong, [text for text in reasons.tolist() if text], reasons.size, why)
+
+
+def elements(reasons: NDArray[np.object_]) -> list[str]:
+    """Return where the elements of an array stand that cannot be used."""
+    return [f"element {i}" for i in np.flatnonzero(reasons != "").tolist()]
+
+
+def in_list(places: Iterable[str], reasons: Iterable[str]) -> str:
+    """Return blocks with their reasons as one phrase: alike ones together, as many as have room.
+
+    Args:
+        places: where each stands, as "line 3 (block A7)".
+        reasons: why it cannot be used.
+    """
+    alike: dict[str, list[str]] = {}
+    for place, reason in zip(places, reasons, strict=True):
+        alike.setdefault(reason, []).append(place)
+    text, unlisted = "", sum(map(len, alike.values()))
+    for reason, some in alike.items():
+        more = f" and {len(some) - FIRST:,} more" if len(some) > FIRST else ""
+        phrase = f"{', '.join(some[:FIRST])}{more}: {reason}"
+        if text and len(text) + len(phrase) > _MOST_CHARACTERS:
+            break
+        text += f"{'; ' if text else ''}{phrase}"
+        unlisted -= len(some)
+    return text + (f"; and {unlisted:,} more" if unlisted else "")
