@@ -59,6 +59,10 @@ TAKEN_NOT_TO_SLIP = (
 )
 
 
+LEAST_M, MOST_M = 0.05, 60.0
+"""Blocks smaller or larger than this are seldom meant: another unit may have been typed."""
+
+
 @dataclass(frozen=True)
 class DescribedBlock:
     """A block and what is known of its planes.
@@ -218,6 +222,16 @@ def kind_of(described: DescribedBlock, kind: str) -> str:
     return model_of_mode(model.mode, back_fracture=False).kind
 
 
+def _instead(described: DescribedBlock, mode: str) -> str:
+    """Return what to ask instead about a block of another mode."""
+    spell = described.spell
+    if mode == "slide":
+        return f"; predict with {spell('displacement_m')} tells how likely it slides so many metres"
+    if mode == "slump":
+        return f"; predict with {spell('kind')} slumping tells how likely it slumps"
+    return "; see  rbfrag block"
+
+
 def numbers_of_kind(
     described: DescribedBlock, kind: str
 ) -> tuple[dict[str, float], tuple[str, ...]]:
@@ -230,6 +244,16 @@ def numbers_of_kind(
     Raises:
         InputError: the block is of another mode, or no earthquake decides about it.
     """
+    values, remarks = _numbers_and_remarks(described, kind)
+    across_m = 2.0 * described.block.r3_m
+    if not LEAST_M <= across_m <= MOST_M:
+        remarks += (f"the block measures some {across_m:.2g} m: lengths are in m",)
+    return values, remarks
+
+
+def _numbers_and_remarks(
+    described: DescribedBlock, kind: str
+) -> tuple[dict[str, float], tuple[str, ...]]:
     from rbfrag.solver.kinds import model_of_kind, stands_free_of
     from rbfrag.solver.stability.single import stability
 
@@ -252,7 +276,7 @@ def numbers_of_kind(
     if model.free_standing:
         conditions["back_fracture"] = False
     result = stability(block, **conditions)
-    _refuse_other_blocks(result, model, origin)
+    _refuse_other_blocks(described, result, model)
     if model.free_standing:
         if conditions.get("cohesion_pa"):
             raise InputError(f"{origin}cohesion_pa does not go with {kind}: leave it out")
@@ -271,19 +295,23 @@ def numbers_of_kind(
     return values, (*result.warnings, *unbacked)
 
 
-def _refuse_other_blocks(result: Stability, model: Kind, origin: str) -> None:
+def _refuse_other_blocks(described: DescribedBlock, result: Stability, model: Kind) -> None:
     """Refuse a block of another mode than the model's, and one that no earthquake decides about."""
-    mode = words_of_mode(result.mode)
+    origin, mode = described.origin, words_of_mode(result.mode)
     yields = f"(yield {result.yield_acceleration:.4g} g"
     if result.mode != model.mode:
         raise InputError(
             f"{origin}its mode is {mode} {yields}, {result.state}), and the {model.kind} model "
-            "says nothing about it; see  rbfrag block"
+            f"says nothing about it{_instead(described, result.mode)}"
         )
     if result.state != "stable" or result.yield_acceleration <= 0.0:
         raise InputError(
-            f"{origin}the block is {result.state} in {mode} {yields}): no earthquake decides about "
-            "it"
+            f"{origin}the block is {result.state} in {mode} {yields}): "
+            + (
+                "it fails without an earthquake"
+                if result.state == "unstable"
+                else "no earthquake decides about it"
+            )
         )
 
 
