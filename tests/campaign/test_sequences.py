@@ -22,7 +22,7 @@ from rbfrag.db.merge.databases import merge_databases
 from rbfrag.db.motions import add_motion, load_motion, motion_rows
 from rbfrag.db.rows import EarthquakeInfo, MotionRow
 from rbfrag.errors import InputError, MergeConflictError, StoppedError
-from rbfrag.migrations.tables import fill_digests
+from rbfrag.migrations.before_release import fill_digests
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.models.slumping import FAMILY, BlockClass
 from rbfrag.solver.respond import respond
