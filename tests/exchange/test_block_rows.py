@@ -261,6 +261,17 @@ def test_cells_of_pandas() -> None:
     assert rows.refused["reason"][0].startswith("p2 is not a number")
 
 
+def test_columns_that_must_be_whole_are_refused_with_all_their_lines(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("kr,p2\n0.1,3\nx,3\n0.1\n?,3\n")
+    with pytest.raises(InputError) as refusal:
+        read_columns(path, ("kr",))
+    assert str(refusal.value) == (
+        f"{path}, line 3: kr = 'x' is not a number; line 4: 1 cells under 2 columns; "
+        "line 5: kr = '?' is not a number"
+    )
+
+
 def test_a_long_list_has_room_in_a_message() -> None:
     places = [f"line {i} (block {'n' * 60}{i})" for i in range(5000)]
     reasons = [f"kr = {i} is not a number" if i % 2 else "p2 is empty" for i in range(5000)]
