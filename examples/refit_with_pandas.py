@@ -2,7 +2,8 @@
 
     python examples/refit_with_pandas.py DATABASE
 
-Nothing is simulated: critical blocks of toppling and measures come out of the database. As an
+Nothing is simulated: critical blocks of toppling, those without vertical motion, and measures come
+out of the database. As an
 example the critical toppling velocity is regressed on PGV and Tm, ln y = a + b ln PGV + c ln Tm,
 each earthquake counting the same however many records it has.
 """
@@ -22,6 +23,7 @@ def refit(db: str) -> tuple[np.ndarray, float, pd.DataFrame]:
     motion = rbfrag.read_table("motion", db=db).set_index("id")
     recording = rbfrag.read_table("recording", db=db).set_index("id")
     rows = rbfrag.read_table("combination", db=db).query("kind == 'toppling' and status == 'found'")
+    rows = rows[rows["vertical_motion_id"].isna()]
     rows = rows.join(motion[["recording_id", "pgv_m_s", "tm_s"]], on="motion_id")
     rows = rows.join(recording["earthquake_id"], on="recording_id").dropna(subset=["tm_s"])
     weight = 1.0 / rows.groupby("earthquake_id")["y_m_s"].transform("size")

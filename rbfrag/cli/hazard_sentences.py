@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.cli.sentences import rounded
@@ -36,6 +36,19 @@ def rounded_values(values: Mapping[str, Any]) -> dict[str, Any]:
         name: float(f"{value:.3g}") if isinstance(value, float) else value
         for name, value in values.items()
     }
+
+
+def most_often(names: Sequence[str | None], rates: Sequence[float], most: int = 3) -> str:
+    """Return which of several blocks fail most often, the first of them, each with its rate.
+
+    Args:
+        names: identifiers of the blocks; a block without one is called by its number.
+        rates: how often each fails [1/a].
+        most: how many are named at most.
+    """
+    first = sorted(range(len(rates)), key=lambda i: -rates[i])[:most]
+    named = [f"{names[i] or f'block {i + 1}'} ({once_in(rates[i])})" for i in first]
+    return f"Most often fail {', '.join(named[:-1])} and {named[-1]}."
 
 
 def map_in_words(document: Mapping[str, Any], *, own: bool) -> Iterator[str]:

@@ -43,6 +43,9 @@ def response_in_words(answer: Mapping[str, Any], advice: str) -> Iterator[str]:
         advice: what its outcome means.
     """
     at_s = answer.get("toppled_s")
+    if "started_s" in answer and answer["started_s"] is None and answer["outcome"] == "stable":
+        yield "The motion does not move the block: it never exceeds its strength."
+        return
     yield advice if at_s is None else f"At {at_s:.2f} s the block topples. {advice}"
     if answer.get("peak_theta_n") is not None:
         ratio = answer["peak_theta_n"]

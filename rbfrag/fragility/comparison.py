@@ -11,6 +11,7 @@ from rbfrag.fragility.lookup import find_model, suited_models
 from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.fragility.prediction import Prediction, answer_given, is_clear
+from rbfrag.fragility.words import percent
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 LEAST_APART = 1e-3
 """Intervals that do not overlap are told of where the higher of them begins above this P."""
+
+MOST_LISTED = 3
+"""Of more models than these that answer otherwise, the least and the greatest answer are told."""
 
 
 def candidate_models(
@@ -90,18 +94,23 @@ def _with_disagreement(first: Prediction, others: Sequence[Prediction]) -> Predi
     ]
     if not apart:
         return first
-    listed = ", ".join(f"{_percent(other)} by {other.model}" for other in apart)
+    if len(apart) <= MOST_LISTED:
+        listed = ", ".join(map(_in_words, apart))
+    else:
+        by_probability = sorted(apart, key=lambda other: other.probability)
+        low, high = _in_words(by_probability[0]), _in_words(by_probability[-1])
+        listed = f"{len(apart)} others from {low} to {high}"
     text = (
-        f"the answers do not agree: {_percent(first)} by {first.model}, but {listed}, whose "
+        f"the answers do not agree: {_in_words(first)}, but {listed}, whose "
         "intervals do not overlap with its own: this shaking is not what is usual for the "
         "measures that those read, or a measure is wrong"
     )
     return replace(first, warnings=(*first.warnings, text))
 
 
-def _percent(answer: Prediction) -> str:
-    p, low, high = (100.0 * x for x in (answer.probability, answer.ci_low, answer.ci_high))
-    return f"{p:.2g} % ({low:.2g} to {high:.2g} %)"
+def _in_words(answer: Prediction) -> str:
+    p, low, high = map(percent, (answer.probability, answer.ci_low, answer.ci_high))
+    return f"{p} ({low} to {high}) by {answer.model}"
 
 
 def prediction_document(

@@ -29,8 +29,11 @@ def prediction_in_words(document: Mapping[str, Any]) -> tuple[str, ...]:
     if high == 0.0:
         return ("No such block fails.",)
     of_block = document.get("block_sd")
+    fails = "fails" if _count(p, of) in ("1", "fewer than 1") else "fail"
     sentences = [
-        f"Of {of:,} such blocks {_count(p, of)} fail{'s' * (_count(p, of) == '1')} "
+        f"Nearly all such blocks fail ({level})."
+        if _range(low, high, of) == "nearly all"
+        else f"Of {of:,} such blocks {_count(p, of)} {fails} "
         f"({_range(low, high, of)} as far as the data tell it, {level}).",
         "How many in one single earthquake is not known."
         if event_low is None
@@ -71,12 +74,18 @@ def block_in_words(method: str, given: Mapping[str, Any]) -> tuple[str, ...]:
     if not all(isinstance(value, (int, float)) for value in values.values()):
         return ()
     units = {block.size: " 1/s²"}
+    too_far = given.get("displacement_m")
+    limit = (
+        (f"It has failed when it has slid further than {too_far:g} m.",)
+        if isinstance(too_far, (int, float))
+        else ()
+    )
     numbers = " and ".join(
         f"{_SYMBOLS.get(name, name)} = {value:.3g}{units.get(name, '')}"
         for name, value in values.items()
     )
     stands = (f"{block.presumes[:1].upper()}{block.presumes[1:]}.",) if block.presumes else ()
-    return (f"The block has {numbers}.", *stands)
+    return (f"The block has {numbers}.", *limit, *stands)
 
 
 _SYMBOLS = {"p2": "p²", "ps2": "p_s²", "kr": "k_r", "ky": "k_y", "ks": "k_s"}

@@ -179,8 +179,8 @@ def hazard_curve(
         x, rate = x[~nothing], rate[~nothing]
     if x.size < 2:
         raise InputError(
-            f"{source}: {x.size} levels have a rate between zero and infinity: a curve needs at "
-            "least two"
+            f"{source}: a curve needs at least two levels with a rate between zero and infinity, "
+            f"and has {x.size}"
         )
     return HazardCurve(
         measure=measure,

@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -351,10 +352,13 @@ _LEVELS = {
 _SPECTRAL_COLUMN = re.compile(r"sa\(([0-9.]+)\)_g")
 _POE = re.compile(r"poe_([0-9.]+)_years?")
 
+_UNIT = re.compile(r"\s*[(\[]([^()\[\]]+)[)\]]$")
+"""A unit in brackets at the end of a column's name, as people write it: PGV [m/s]."""
+
 HEADER_HELP = (
     "the first line names both columns with their unit: pga_g, pga_m_s2, pgv_m_s, pgv_cm_s or "
-    f"sa(PERIOD)_g, and annual_rate or poe_YEARS_years, such as  pgv_m_s,annual_rate; answered are "
-    f"{ANSWERED}"
+    "sa(PERIOD)_g, and annual_rate, return_period_years or poe_YEARS_years, such as  "
+    f"pgv_m_s,annual_rate; answered are {ANSWERED}"
 )
 
 
@@ -362,8 +366,10 @@ def table_curves(text: str, source: str) -> list[HazardCurve]:
     """Return the curve of a two-column CSV file, as a list of one.
 
     The header says what the numbers are: levels ``pga_g``, ``pga_m_s2``, ``pgv_m_s``,
-    ``pgv_cm_s`` or ``sa(0.5)_g``; and ``annual_rate`` [1/a] or ``poe_50_years``, the
-    probability of exceedance in 50 years.
+    ``pgv_cm_s`` or ``sa(0.5)_g``, also with the unit in brackets; and ``annual_rate`` [1/a],
+    ``return_period_years`` or ``poe_50_years``, the probability of exceedance in 50 years. Between
+    semicolons numbers may have decimal commas. Levels may fall from row to row, as those of return
+    periods that do.
     """
     rows = [
         (number, [cell.strip() for cell in row])
@@ -372,11 +378,17 @@ def table_curves(text: str, source: str) -> list[HazardCurve]:
     ]
     if not rows:
         raise InputError(f"{source}: there is no curve: {HEADER_HELP}")
+    if ";" in rows[0][1][0]:
+        rows = [
+            (number, [cell.strip().replace(",", ".") for cell in ",".join(row).split(";")])
+            for number, row in rows
+        ]
     line, header = rows[0]
     if len(header) != 2:
         raise InputError(f"{source}, line {line}: {len(header)} columns, not two: {HEADER_HELP}")
-    measure, factor, period = _levels(header[0].lower(), f"{source}, line {line}")
-    years = _years(header[1].lower(), f"{source}, line {line}")
+    measure, factor, period = _levels(_with_unit(header[0]), f"{source}, line {line}")
+    of_periods = _with_unit(header[1]) in _RETURN_PERIODS
+    years = None if of_periods else _years(_with_unit(header[1]), f"{source}, line {line}")
     levels, values = [], []
     for number, row in rows[1:]:
         if len(row) != 2:
@@ -393,11 +405,35 @@ def table_curves(text: str, source: str) -> list[HazardCurve]:
                 f"{source}, line {number}: {values[-1]:g} is no probability: {header[1]} lies "
                 "between 0 and 1"
             )
+        if of_periods:
+            if not values[-1] > 0.0:
+                raise InputError(
+                    f"{source}, line {number}: a return period of {values[-1]:g} years is none: "
+                    "give years above zero"
+                )
+            values[-1] = 1.0 / values[-1]
+    if len(levels) > 1 and all(high > low for high, low in pairwise(levels)):
+        levels, values = levels[::-1], values[::-1]
     rates = np.array(values)
     if years is not None:
         with np.errstate(divide="ignore", over="ignore"):
             rates = rates_from_probabilities(rates, years)
     return [hazard_curve(measure, levels, rates, source=source, period_s=period)]
+
+
+_RETURN_PERIODS = frozenset(
+    {"return_period", "return_period_years", "return_period_a", "return_period_yr"}
+)
+
+
+def _with_unit(name: str) -> str:
+    """Return the name of a column in small letters, a unit in brackets spelled as in pgv_m_s."""
+    text = name.strip().lower()
+    unit = _UNIT.search(text)
+    if unit is None or not unit[1].strip(" 0123456789."):
+        return text.replace(" ", "_")
+    spelled = unit[1].strip().replace("/", "_").replace("²", "2").replace("^", "")
+    return f"{text[: unit.start()].strip()}_{spelled}".replace(" ", "_")
 
 
 def _levels(name: str, where: str) -> tuple[str, float, float | None]:

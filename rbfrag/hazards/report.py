@@ -154,3 +154,19 @@ def rate_in_words(document: Mapping[str, Any]) -> str:
         f"The block fails {once_in(rate)} on average{interval if min(ends) > 1e-8 else ''}, with a "
         f"probability of {percent(document['probability'])} in {document['years']:g} years."
     )
+
+
+def beyond_in_words(answer: HazardAnswer) -> tuple[str, ...]:
+    """Return what shaking beyond the end of a curve may do to one block, where that is much.
+
+    Args:
+        answer: an answer about one block.
+    """
+    rate = float(answer.annual_rate[0])
+    most = rate + float(answer.above_at_most[0] - answer.above[0])
+    if not most > 2.0 * rate:
+        return ()
+    return (
+        "The curve ends too early to tell: with the stronger shaking that it leaves out it may be "
+        f"up to {once_in(most)}.",
+    )

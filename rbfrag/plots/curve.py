@@ -72,6 +72,7 @@ def plot_curve(
     *,
     over: str | None = None,
     fixed: Mapping[str, float] | None = None,
+    restitution: float | None = None,
     level: float = 0.95,
     beside: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
 ) -> Path:
@@ -90,6 +91,7 @@ def plot_curve(
         over: the measure along the abscissa, by name; None for the one that the model's term
             names first.
         fixed: the other measures that the term reads, by name, held at one value.
+        restitution: that of a free-standing block, if it is stated.
         level: level of both bands.
         beside: other fragilities of the same measure to be drawn for comparison, by name:
             probabilities at levels of it.
@@ -119,7 +121,8 @@ def plot_curve(
         )
     figure = new_figure(7.0, 4.6 + _ROW_IN * math.ceil(len(beside or {}) / 2))
     axes = figure.add_subplot()
-    draw_curve(axes, model, {"p2": p2, "kr": kr}, varied, held, level=level, beside=beside)
+    block = {"p2": p2, "kr": kr} | ({} if restitution is None else {"restitution": restitution})
+    draw_curve(axes, model, block, varied, held, level=level, beside=beside)
     y = kr * STANDARD_GRAVITY_M_S2 / np.sqrt(p2)
     conditions = ", ".join(FIXED.get(name, name + " = {:g}").format(held[name]) for name in others)
     about = model.row.diagnostics

@@ -159,6 +159,8 @@ def curve(
     tm_s: float | None = None,
     pgd_m: float | None = None,
     sa_g: Mapping[float, float] | None = None,
+    kind: str | None = None,
+    restitution: float | None = None,
     model: str | None = None,
     level: float = 0.95,
     beside: Callable[[str], Mapping[str, Callable[[Any], Any]]] | None = None,
@@ -177,6 +179,9 @@ def curve(
         tm_s: mean period that is held [s].
         pgd_m: peak ground displacement that is held [m].
         sa_g: spectral accelerations that are held [g] by period [s].
+        kind: ``rocking`` for a free-standing block; None for one that a slope backs, or what the
+            model is of.
+        restitution: speed after an impact of a free-standing block over that before it.
         model: name of the model; None for the best for what is given.
         level: confidence level of the bands.
         beside: gives other fragilities to compare with, by name, for the measure that the curve
@@ -194,9 +199,9 @@ def curve(
         raise InputError(f"--over {over}: a curve runs over {', '.join(VARIED)}")
     if model is None:
         varied = varied or "pgv_m_s"
-        chosen = find_model(None, [varied, *held], db)
+        chosen = find_model(None, ["p2", "kr", varied, *held], db, kind=kind)
     else:
-        chosen = find_model(model, MEASURES, db)
+        chosen = find_model(model, MEASURES, db, kind=kind)
         varied = varied or chosen.term.inputs[0]
     if varied in held:
         raise InputError(
@@ -206,7 +211,15 @@ def curve(
     return _drawn(
         out,
         lambda path: plot_curve(
-            chosen, p2, kr, path, over=varied, fixed=held, level=level, beside=others
+            chosen,
+            p2,
+            kr,
+            path,
+            over=varied,
+            fixed=held,
+            restitution=restitution,
+            level=level,
+            beside=others,
         ),
     )
 

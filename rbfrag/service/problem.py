@@ -250,6 +250,9 @@ _SENTENCES = {
 }
 """What is wrong with a value and what to do, by the type of pydantic's error."""
 
+_SEPARATED = re.compile(r"[+-]?\d[\d.,'\u2019\s]*")
+_ONE_POINT = "write decimals after a point and nothing between thousands, as in 1234.5"
+
 
 def _sentence(name: str, error: Mapping[str, Any], words: str) -> str:
     kind, value, limits = error["type"], error["input"], error.get("ctx", {})
@@ -257,6 +260,8 @@ def _sentence(name: str, error: Mapping[str, Any], words: str) -> str:
         kind = "too_large"
     if kind == "literal_error":
         limits = {"expected": limits["expected"].replace("'", "").replace(", ", " or ")}
+    if kind == "float_parsing" and _SEPARATED.fullmatch(value):
+        words = _ONE_POINT
     form = _SENTENCES.get(kind, "{name} = {shown}: {msg}: {words}")
     about = {"name": name, "shown": _short.repr(value), "plain": str(value)[:60], "words": words}
     return form.format(**about, msg=error["msg"], **limits)

@@ -55,6 +55,10 @@ TAKEN_NOT_TO_SLIP = (
 )
 
 
+LEAST_M, MOST_M = 0.05, 60.0
+"""Blocks smaller or larger than this are seldom meant: another unit may have been typed."""
+
+
 @dataclass(frozen=True)
 class DescribedBlock:
     """A block and what is known of its planes.
@@ -214,6 +218,16 @@ def kind_of(described: DescribedBlock, kind: str) -> str:
     return model_of_mode(model.mode, back_fracture=False).kind
 
 
+def _instead(described: DescribedBlock, mode: str) -> str:
+    """Return what to ask instead about a block of another mode."""
+    spell = described.spell
+    if mode == "slide":
+        return f"; predict with {spell('displacement_m')} tells how likely it slides so many metres"
+    if mode == "slump":
+        return f"; predict with {spell('kind')} slumping tells how likely it slumps"
+    return "; see  rbfrag block"
+
+
 def numbers_of_kind(
     described: DescribedBlock, kind: str
 ) -> tuple[dict[str, float], tuple[str, ...]]:
@@ -226,6 +240,16 @@ def numbers_of_kind(
     Raises:
         InputError: the block is of another mode, or no earthquake decides about it.
     """
+    values, remarks = _numbers_and_remarks(described, kind)
+    across_m = 2.0 * described.block.r3_m
+    if not LEAST_M <= across_m <= MOST_M:
+        remarks += (f"the block measures some {across_m:.2g} m: lengths are in m",)
+    return values, remarks
+
+
+def _numbers_and_remarks(
+    described: DescribedBlock, kind: str
+) -> tuple[dict[str, float], tuple[str, ...]]:
     from rbfrag.solver.kinds import model_of_kind, stands_free_of
     from rbfrag.solver.mechanism import shaken_mechanism
     from rbfrag.solver.stability.single import stability
@@ -252,12 +276,16 @@ def numbers_of_kind(
     if result.mode != model.mode:
         raise InputError(
             f"{origin}its mode is {words_of_mode(result.mode)} {yields}, {result.state}), and the "
-            f"{kind} model says nothing about it; see  rbfrag block"
+            f"{kind} model says nothing about it{_instead(described, result.mode)}"
         )
     if result.state != "stable" or result.yield_acceleration <= 0.0:
         raise InputError(
-            f"{origin}the block is {result.state} in {words_of_mode(result.mode)} {yields}): no "
-            "earthquake decides about it"
+            f"{origin}the block is {result.state} in {words_of_mode(result.mode)} {yields}): "
+            + (
+                "it fails without an earthquake"
+                if result.state == "unstable"
+                else "no earthquake decides about it"
+            )
         )
     if model.free_standing:
         if conditions.get("cohesion_pa"):

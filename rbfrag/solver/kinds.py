@@ -27,7 +27,10 @@ def model_of_kind(kind: str) -> Kind:
     """Return the model of that name."""
     known = models()
     if kind not in known:
-        raise InputError(f"unknown kind {kind!r}: use one of {', '.join(sorted(known))}")
+        raise InputError(
+            f"unknown kind {kind!r}: use one of {', '.join(sorted(known))} "
+            "(rocking is free-standing, toppling backed by a slope)"
+        )
     return known[kind]
 
 

@@ -43,6 +43,16 @@ def test_one_block(shell: Shell, curve: Path) -> None:
     assert found["annual_rate"] == pytest.approx(1e-3 * (0.566 / 0.72) ** -2, rel=0.05)
 
 
+def test_a_curve_that_ends_too_early_is_no_answer(shell: Shell, curve: Path) -> None:
+    asked = ("--p2", "3", "--kr", "0.1", "--component", "single")
+    assert "too early" not in shell("hazard", curve, *asked).stdout
+    Path("map.csv").write_text("PGV [m/s],return_period_years\n0.1,475\n0.2,2475\n")
+    printed = shell("hazard", "map.csv", *asked).stdout
+    # shaking above 0.2 m/s comes once in 2,475 years and may fail the block each time
+    assert "The curve ends too early to tell" in printed
+    assert "it may be up to once in 2,500 years." in printed
+
+
 def test_shares_are_printed_between_the_levels(shell: Shell, curve: Path) -> None:
     printed = shell("hazard", curve, "--p2", "3", "--kr", "0.1", "--component", "single").stdout
     lines = printed.split("share_%")[1].strip().splitlines()
@@ -107,6 +117,9 @@ def test_a_table_of_blocks(shell: Shell, curve: Path) -> None:
     printed = shell("hazard", curve, "--blocks", "blocks.csv", "--years", "100").stdout
     assert f"{once_in(found['annual_rate_any'])} on average" in printed
     assert f"{found['expected_failures_per_year']:.2g} failures a year are expected" in printed
+    assert printed.startswith("At least one of the blocks")
+    assert "numerical_error" not in printed
+    assert f"Most often fail A7 ({once_in(each[0])}) and B2 ({once_in(each[1])})." in printed
 
 
 def test_numbers_of_failures_that_are_asked_for(shell: Shell, curve: Path) -> None:

@@ -55,6 +55,17 @@ def test_a_curve_runs_over_what_is_named(shell: Shell, refuses: Refuses, tmp_pat
     assert "pgv_m_s is what the curve runs over" in refuses("plot", "curve", *block, "--pgv", "0.6")
 
 
+def test_a_curve_of_a_free_standing_block(shell: Shell, refuses: Refuses, tmp_path: Path) -> None:
+    path = tmp_path / "free.svg"
+    shape = ("--db", REFERENCE, "--height", "1", "--width", "0.25", "--out", path)
+    for more in (("--kind", "rocking", "--restitution", "0.9"), ("--no-back",)):
+        done = shell("plot", "curve", *shape, *more)
+        assert "model rocking-pgv" in path.read_text(encoding="utf-8")
+        assert "no plane backs the block" not in done.stderr
+    told = refuses("plot", "curve", *shape, "--restitution", "0.9")
+    assert "restitution" in told
+
+
 def test_yield_over_rotation(shell: Shell, refuses: Refuses, tmp_path: Path) -> None:
     block = ("--alpha1", "45", "--alpha3", "65", "--r3", "1", "--beta", "0", "--phi", "35")
     answer = shell.json("plot", "rotation", *block, "--out", "r.png", "--back-follows", "0,1")

@@ -63,7 +63,10 @@ def test_a_slump_is_answered_as_from_python(shell: Shell, block: Path) -> None:
     [
         (("--kind", "sliding", "--ky", "0.1", *MOTION), "--displacement is missing"),
         (("--kind", "sliding", "--displacement", "0.1", *MOTION), "--ky is missing"),
-        (("--kind", "sliding", "--ky", "0.1", "--displacement", "0.1"), "nothing about the motion"),
+        (
+            ("--kind", "sliding", "--ky", "0.1", "--displacement", "0.1"),
+            "nothing about the shaking",
+        ),
         (("--kind", "slumping", "--ks", "0.1", *MOTION), "--ps2 is missing"),
         (("--kind", "slumping", "--kr", "0.1", *MOTION), "kind slumping reads ks and ps2"),
         (("--p2", "3", "--kr", "0.1", "--ky", "1", *MOTION), "ky does not go with kind toppling"),
@@ -87,7 +90,9 @@ def test_a_block_of_another_mode_is_refused(refuses: Refuses, block: Path) -> No
     block.write_text(SLIDE)
     asked = ("predict", "--block", block, *MOTION)
     assert "its mode is slide" in refuses(*asked, "--kind", "slumping")
+    assert "predict with --displacement tells how likely" in refuses(*asked)
     block.write_text(SLUMP)
+    assert "predict with --kind slumping tells how likely" in refuses(*asked)
     distance = ("--displacement", "0.1")
     assert "its mode is slump" in refuses(*asked, "--kind", "sliding", *distance)
 
@@ -120,3 +125,16 @@ def test_options_of_one_kind_do_not_go_with_another(refuses: Refuses) -> None:
     message = refuses("fit", "--kind", "sliding", "--term", "pgv", "--method", "wls")
     assert "method wls fits blocks known by p2 and kr, not those of kind sliding" in message
     assert "(--rotation)" in refuses("fit", "--term", "pgv", "--rotation", "2")
+
+
+def test_a_rectangle_in_another_unit_is_doubted(shell: Shell) -> None:
+    told = shell("predict", "--height", "240", "--width", "50", "--pgv", "0.6").stderr
+    assert "measures some 2.5e+02 m: lengths are in m" in told
+    assert "lengths are in m" not in shell("predict", "--height", "2.4", "--width", "0.5",
+                                           "--pgv", "0.6").stderr  # fmt: skip
+
+
+def test_a_block_that_fails_at_rest_is_said_to(refuses: Refuses) -> None:
+    steep = ("--height", "2", "--width", "0.5", "--dip", "40", "--phi", "35", "--pgv", "0.3")
+    assert "it fails without an earthquake" in refuses("predict", *steep)
+    assert "rocking is free-standing" in refuses("predict", *steep, "--kind", "free")

@@ -45,7 +45,13 @@ def test_three_statements_in_counts_of_blocks() -> None:
             1e-7,
             (1e-9, 1e-6),
             (0.0, 1e-5),
-            ("blocks fewer than 1 fail (fewer than 1 as", "0 to fewer than 1"),
+            ("blocks fewer than 1 fails (fewer than 1 as", "0 to fewer than 1"),
+        ),
+        (
+            0.99999,
+            (0.99998, 0.999999),
+            (0.9, 1.0),
+            ("Nearly all such blocks fail (95 %).", "9,000"),
         ),
         (0.0101, (0.01, 0.02), (0.01, 0.01), ("blocks 1 fails (1 to 2 as", "it is 1 of 100")),
         (0.5, (0.5, 0.5), (0.5, 0.5), ("50 fail (50 as", "it is 50 of 100")),
@@ -68,6 +74,7 @@ def test_the_block_is_named_with_how_it_is_taken_to_stand() -> None:
     assert "stand free" in block_in_words("overturning", {"p2": 7.1, "kr": 0.25})[1]
     assert block_in_words("displacement", {"ky": 0.1, "displacement_m": 0.3}) == (
         "The block has k_y = 0.1.",
+        "It has failed when it has slid further than 0.3 m.",
     )
     assert block_in_words("bounded", {"p2": [3.0, 4.0], "kr": 0.1}) == ()
 
@@ -98,3 +105,17 @@ def test_answers_whose_intervals_do_not_overlap_are_told_of(shell: Shell) -> Non
     assert document["data"] == "the reference that is shipped with rbfrag"
     agreed = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
     assert not any("do not agree" in text for text in agreed["warnings"])
+
+
+def test_of_many_answers_that_do_not_agree_two_are_told_of(shell: Shell) -> None:
+    motion = "--pgv 0.1 --pga 0.9 --tm 0.9 --pgd 1 --sa03 2 --sa10 2 --sa20 2 --sa30 2"
+    document = shell.json("predict", "--p2", "3", "--kr", "0.1", *motion.split())
+    first, *others = sorted(document["answers"], key=lambda each: each["probability"])
+    apart = [each for each in others if each["ci_low"] > first["ci_high"]]
+    assert len(apart) > 3
+    (told,) = [text for text in document["warnings"] if text.startswith("the answers do not agree")]
+    least, most = (f"{percent(each['probability'])} (" for each in (apart[0], apart[-1]))
+    assert f"but {len(apart)} others from {least}" in told
+    assert f" by {apart[0]['model']} to {most}" in told
+    assert len(told) < 400
+    assert "e+" not in told

@@ -9,6 +9,7 @@ import pytest
 
 import rbfrag
 from tests.cli.conftest import Refuses, Shell
+from tests.synthetic import shaking, write_at2
 
 ASKED = ("respond", "a.csv", "--units", "g", "--dt", "0.01", "--p2", "7")
 
@@ -65,3 +66,11 @@ def test_what_does_not_fit_is_refused(refuses: Refuses, more: tuple[str, ...], w
 def test_shapes_without_numbers_are_refused(refuses: Refuses) -> None:
     shape = ("--s1", "1", "--s2", "0.6", "--gamma", "25", "--beta", "20", "--phi", "40")
     assert "rockmass --motion" in refuses(*ASKED[:6], *shape, "--draws", "3")
+
+
+def test_what_never_moves_is_said_so(shell: Shell) -> None:
+    write_at2(Path("weak.AT2"), 0.01 * shaking(3))
+    block = ("--kind", "rocking", "--p2", "10", "--kr", "0.3")
+    assert "does not move the block" in shell("respond", "weak.AT2", *block).stdout
+    drawn = shell("respond", "weak.AT2", *block, "--kr-sigma", "0.1", "--draws", "20").stdout
+    assert "0 fail: 0 % (by the count alone 0 % to " in drawn

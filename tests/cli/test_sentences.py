@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rbfrag.cli.hazard_sentences import campaign_in_words, with_error
+from rbfrag.cli.hazard_sentences import campaign_in_words, most_often, with_error
 from rbfrag.cli.sentences import rock_mass_in_words, rounded, table_in_words
 from rbfrag.hazards.report import once_in, rate_in_words
 
@@ -99,3 +99,11 @@ def test_blocks_of_which_it_is_open_whether_they_fail_are_told() -> None:
             },
         }  # fmt: skip
         assert list(rock_mass_in_words(document))[1].endswith(end)
+
+
+def test_the_blocks_that_fail_most_often_come_first() -> None:
+    rates = [1e-3, 0.0, 4e-3, 2e-3, 1e-4]
+    assert most_often(["a", "b", None, "d", "e"], rates) == (
+        "Most often fail block 3 (once in 250 years), d (once in 500 years) and a (once in 1,000 "
+        "years)."
+    )

@@ -64,6 +64,8 @@ def test_the_python_of_the_pages_runs(
     (tmp_path / "records").mkdir()
     for name in ("record.AT2", "records/RRS228.AT2"):
         write_at2(tmp_path / name, shaking(3, npts=400))
+    logged = "\n".join(f"{0.1 * (i % 7)};{i % 5}".replace(".", ",") for i in range(50))
+    (tmp_path / "logger.csv").write_text(f"Quarry\n3 channels\ncm/s2\nNS;EW\n{logged}\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("RBFRAG_DB", raising=False)
     names: dict[str, object] = {"__name__": page.stem}

@@ -85,6 +85,27 @@ def test_two_columns(tmp_path: Path, header: str, row: str, level: float, rate: 
 
 
 @pytest.mark.parametrize(
+    ("text", "imt", "levels", "rates"),
+    [
+        ("SA(1.0) [g],return_period\n0.2,475\n0.4,2475\n", "SA(1)", [0.2, 0.4],
+         [1 / 475, 1 / 2475]),
+        ("PGV (cm/s);annual_rate\n20,5;0,01\n40;1e-3\n", "PGV", [0.205, 0.4], [0.01, 0.001]),
+        ("PGA [m/s²],Return Period [years]\n9.80665,2475\n4.903325,475\n", "PGA", [0.5, 1.0],
+         [1 / 475, 1 / 2475]),
+    ],
+)  # fmt: skip
+def test_two_columns_as_people_write_them(
+    tmp_path: Path, text: str, imt: str, levels: list[float], rates: list[float]
+) -> None:
+    path = tmp_path / "curve.csv"
+    path.write_text(text, encoding="utf-8")
+    (curve,) = read_hazard_curves(path)
+    assert curve.imt == imt
+    assert curve.levels == pytest.approx(levels, rel=1e-12)
+    assert curve.annual_rate == pytest.approx(rates, rel=1e-12)
+
+
+@pytest.mark.parametrize(
     ("text", "words"),
     [
         ("", "is empty"),
@@ -93,6 +114,7 @@ def test_two_columns(tmp_path: Path, header: str, row: str, level: float, rate: 
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.2\n", "line 3: 1 cells, not two"),
         ("pgv_m_s,annual_rate\n0.1,0.01\n0.2,x\n", "line 3: '0.2,x' are not two numbers"),
         ("pgv_m_s,poe_50_years\n0.1,1.5\n", "line 2: 1.5 is no probability"),
+        ("pgv_m_s,return_period\n0.1,0\n", "line 2: a return period of 0 years is none"),
         ("pgv_m_s,annual_rate,x\n", "line 1: 3 columns, not two"),
         (OPENQUAKE.replace("imt='PGV'", "imt='CAV'"), "line 1: intensity measure 'CAV'"),
         ("pgd_m,annual_rate\n0.1,0.01\n", r"'pgd_m' is not known.*PGV, PGA, SA\(0.3\), SA\(1\)"),

@@ -103,6 +103,7 @@ def test_a_list_says_which_element_cannot_be_used(client):
         ("p2=3&kr=0.1&pgv=0.6&pgv=0.7", "pgv is given twice"),
         ("p2=3&kr=0.1&pgv=0.6&pvg=0.7", "there is no parameter 'pvg'"),
         ("p2=3&kr=a tenth&pgv=0.6", "kr = 'a tenth' is not a number"),
+        ("p2=3&kr=0.1&pgv=1,000", "pgv = '1,000' is not a number: write decimals after a point"),
         ("p2=3&kr=0.1&pgv=0.6&level=95", "level = 95"),
         ("p2=3&kr=0.1&pgv=0.6&model=", "model is empty"),
         ("p2=3&kr=%ff&pgv=0.6", "kr = '\N{REPLACEMENT CHARACTER}' is not a number"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rbfrag.cli.hazard_sentences import rounded_values
+from rbfrag.cli.hazard_sentences import most_often, rounded_values
 from rbfrag.cli.output import (
     check_files,
     print_json,
@@ -21,9 +21,10 @@ from rbfrag.cli.parameters.curve import CurveOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.fragility.words import percent
-from rbfrag.hazards.report import once_in, rate_in_words
+from rbfrag.hazards.report import beyond_in_words, once_in, rate_in_words
 
 if TYPE_CHECKING:
+    from rbfrag.exchange.site_rates import SiteBlocks
     from rbfrag.hazards.answer import HazardAnswer
     from rbfrag.hazards.curve import HazardCurve
 
@@ -152,11 +153,12 @@ def hazard(
     if printing.json:
         print_json(document)
         return
-    _print(document, answers, first, verbose=printing.verbose)
+    _print(document, sites, answers, first, verbose=printing.verbose)
 
 
 def _print(
     document: dict[str, Any],
+    sites: list[SiteBlocks],
     answers: list[HazardAnswer],
     curves: list[HazardCurve],
     *,
@@ -166,9 +168,10 @@ def _print(
     branches = document.pop("branches", None)
     rows = document.pop("blocks", None) or document.pop("answers", None)
     if rows is not None:
-        for one, curve_of in zip(answers, curves, strict=True):
+        for own, one, curve_of in zip(sites, answers, curves, strict=True):
             if one.joint is not None:
                 print(_in_common(one, curve_of))
+                print(most_often(own.names, one.annual_rate.tolist()))
         document.pop("sites", None)
         for law, bound in document.pop("bounds", {}).items():
             document |= {f"{name}_{law}": value for name, value in bound.items()}
@@ -177,10 +180,12 @@ def _print(
         for some in (counts, branches, rows):
             if some:
                 print()
-                print_rows(some)
+                print_rows(some if verbose else [_short_row(row) for row in some])
     else:
         del document["contributions"]
         print(rate_in_words(document))
+        for sentence in beyond_in_words(answers[0]):
+            print(sentence)
         print()
         print_pairs(document if verbose else _short(document))
         if document["annual_rate"] > 0.0:
@@ -198,10 +203,15 @@ def _short(document: dict[str, Any]) -> dict[str, Any]:
     return rounded_values(known)
 
 
+def _short_row(row: dict[str, Any]) -> dict[str, Any]:
+    """Return a row of a table without what is shown with --verbose alone."""
+    return rounded_values({name: value for name, value in row.items() if name != "numerical_error"})
+
+
 def _in_common(answer: HazardAnswer, curve: HazardCurve) -> str:
     """Return what several blocks of one site do, in two sentences."""
     assert answer.joint is not None
-    where = f"{curve.place}: " if curve.place else ""
+    where = f"{curve.place}: at" if curve.place else "At"
     expected = (
         f"{answer.expected_failures_per_year:.2g} failures a year are expected of all "
         f"{answer.annual_rate.size} blocks, several of them in one earthquake."
@@ -209,7 +219,7 @@ def _in_common(answer: HazardAnswer, curve: HazardCurve) -> str:
     rate, chance = answer.joint.annual_rate_any, answer.joint.probability_any
     if rate is not None and chance is not None:
         return (
-            f"{where}at least one of the blocks fails in an earthquake {once_in(rate)} on average, "
+            f"{where} least one of the blocks fails in an earthquake {once_in(rate)} on average, "
             f"with a probability of {percent(chance)} in {answer.years:g} years. {expected}"
         )
     least, most = (
@@ -217,7 +227,7 @@ def _in_common(answer: HazardAnswer, curve: HazardCurve) -> str:
         for name in ("fully_dependent", "independent")
     )
     return (
-        f"{where}at least one of the blocks fails in {answer.years:g} years with a probability of "
+        f"{where} least one of the blocks fails in {answer.years:g} years with a probability of "
         f"{least} under full dependence and {most} if independent. {expected}"
     )
 

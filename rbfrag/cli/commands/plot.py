@@ -9,7 +9,7 @@ import typer
 
 from rbfrag.cli.output import print_json, print_table, print_warnings, say_when_compiling
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import WAYS, BlockOptions, NoBack, ShapeOptions
+from rbfrag.cli.parameters.block import WAYS, BlockOptions, NoBack, ShapeOptions, StandingOptions
 from rbfrag.cli.parameters.motion import find_motion, find_shaking
 from rbfrag.cli.parameters.stack import command_group, option, stacked
 from rbfrag.errors import InputError
@@ -89,6 +89,7 @@ def plot_curve(
     *,
     out: Out,
     block: BlockOptions,
+    standing: StandingOptions,
     held: options.Measures,
     over: str | None = option(
         "What the curve runs over: pgv, pga, pgd, sa03, sa10, sa20 or sa30. Default: pgv, or what "
@@ -109,7 +110,10 @@ def plot_curve(
     that may fail in one single earthquake. The other measures are held at the values given.
     """
     from rbfrag.fragility.measures import SPECTRAL
+    from rbfrag.fragility.methods import TOPPLING_BLOCK
     from rbfrag.plots import plot
+    from rbfrag.solver.described import kind_of
+    from rbfrag.solver.kinds import model_of_kind
 
     def others(measure: str) -> Any:
         if beside is None:
@@ -118,12 +122,19 @@ def plot_curve(
 
         return of_measure(beside, measure)
 
-    numbers, remarks = block.toppling()
+    kind, shape = standing.kind, block.described()
+    if kind is None and shape is not None:
+        kind = kind_of(shape, TOPPLING_BLOCK.kind)
+    numbers, remarks = block.toppling(kind)
+    if standing.restitution is not None:
+        if kind is None or not model_of_kind(kind).free_standing:
+            raise InputError("--restitution goes with blocks that stand free: --kind rocking")
+        numbers |= {"restitution": standing.restitution}
     fixed: dict[str, Any] = held.given()
     spectrum = {period: fixed.pop(name) for period, name in SPECTRAL.items() if name in fixed}
     plot.curve(
-        numbers["p2"], numbers["kr"], out, over=over, **fixed, sa_g=spectrum or None, model=model,
-        level=level, beside=others, db=db,
+        numbers.pop("p2"), numbers.pop("kr"), out, over=over, **fixed, sa_g=spectrum or None,
+        kind=kind, **numbers, model=model, level=level, beside=others, db=db,
     )  # fmt: skip
     print_warnings(remarks)
     print(out)

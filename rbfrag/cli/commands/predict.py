@@ -133,6 +133,11 @@ def predict(
         )
         _show_summary(summary, json=printing.json)
         return
+    if record.motion is None and not measures.given():
+        raise InputError(
+            "nothing about the shaking is given: state what is known of it, --pgv [m/s], --pga "
+            "[g], --tm [s], --sa10 [g] …, or  --motion FILE"
+        )
     from rbfrag.fragility.comparison import prediction_document
 
     remarks: tuple[str, ...] = ()

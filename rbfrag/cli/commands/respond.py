@@ -19,6 +19,7 @@ from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.cli.sentences import response_in_words
 from rbfrag.errors import InputError
+from rbfrag.fragility.words import percent
 from rbfrag.solver.described import TAKEN_NOT_TO_SLIP, TAKEN_TO_TOPPLE, toppling_rectangle
 
 if TYPE_CHECKING:
@@ -283,6 +284,11 @@ def _numbers_of(body: Block, what: dict[str, Any]) -> dict[str, float]:
     )
 
 
+def _end(share: float) -> str:
+    """Return the end of an interval in percent; what is rounding beside 0 is 0."""
+    return percent(share if share > 1e-9 else 0.0)
+
+
 def _show_shares(shares: DrawnResponses, *, json: bool) -> None:
     """Print the answer to --draws."""
     answer = shares.as_dict()
@@ -292,8 +298,8 @@ def _show_shares(shares: DrawnResponses, *, json: bool) -> None:
     warnings, outcomes = answer.pop("warnings"), answer.pop("outcomes")
     print(
         f"Of {shares.draws} blocks that it may be {shares.failed} fail: "
-        f"{100.0 * shares.share_failed:.3g} % (by the count alone {100.0 * shares.ci_low:.3g} to "
-        f"{100.0 * shares.ci_high:.3g} %)."
+        f"{percent(shares.share_failed)} (by the count alone {_end(shares.ci_low)} to "
+        f"{_end(shares.ci_high)})."
     )
     print()
     print_pairs(answer)

@@ -40,8 +40,10 @@ class ShapeOptions:
     )
     width: _Number = option("Width of a rectangular block along its base [m].")
     dip: _Number = option("Dip of the base of a rectangular block [deg], its --beta. Default: 0.")
-    alpha1: _Number = option("Angle of the heel [deg], with --alpha3 and --r3.")
-    alpha3: _Number = option("Angle of the toe [deg].")
+    alpha1: _Number = option(
+        "Angle from the normal of the base to the line centroid-heel [deg], with --alpha3 and --r3."
+    )
+    alpha3: _Number = option("The same of the toe [deg].")
     r3: _Number = option("Distance from centroid to toe [m].")
     s1: _Number = option("Spacing of the base fractures [m], with --s2 and --gamma.")
     s2: _Number = option("Spacing of the back fractures [m].")
@@ -115,8 +117,8 @@ class NumberOptions:
 class UncertaintyOptions:
     """How well a block is known; the option that states a value states its median."""
 
-    p2_sigma: _Number = option("Standard deviation of ln p².")
-    kr_sigma: _Number = option("Standard deviation of ln k_r.")
+    p2_sigma: _Number = option("Standard deviation of ln p²; 0.1 is some 10 %.")
+    kr_sigma: _Number = option("Standard deviation of ln k_r; 0.1 is some 10 %.")
     ky_sigma: _Number = option("Standard deviation of ln k_y.")
     restitution_sigma: _Number = option("Standard deviation of the restitution.")
     block_draws: str | None = option(

@@ -22,5 +22,6 @@ class CurveOptions:
         "motions."
     )
     component: str | None = option(
-        "What the curve's horizontal component means: single, geometric_mean, rotd50 or larger."
+        "What the curve's horizontal component means: single, geometric_mean, rotd50 or larger. "
+        "Left out: single, with a warning."
     )

@@ -19,7 +19,7 @@ from rbfrag.fragility.words import block_in_words, percent, prediction_in_words
 from rbfrag.hazards.answer import HazardAnswer, hazard
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
-from rbfrag.hazards.report import as_dict, once_in, rate_in_words
+from rbfrag.hazards.report import as_dict, beyond_in_words, once_in, rate_in_words
 from rbfrag.plots.canvas import mode_title
 from rbfrag.plots.model_lines import MORE_TERMS, ONE_NUMBER_TERMS, HeldMeasures, held_measures
 from rbfrag.plots.spectrum import block_size_m
@@ -176,7 +176,11 @@ def contents_of(
     return Contents(
         sentences=(
             *prediction_in_words(document),
-            *((rate_in_words(answered.document),) if answered else ()),
+            *(
+                (rate_in_words(answered.document), *beyond_in_words(answered.answer))
+                if answered
+                else ()
+            ),
             *block_in_words(document["method"], given),
         ),
         tables=tuple(_tables(described, kind, numbers, measures, document, answered)),

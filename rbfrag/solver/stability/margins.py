@@ -194,8 +194,8 @@ def _about_back_plane(block: Block, finding: Finding) -> Iterator[str]:
         )
     if finding.mode == "topple" and block.gamma_deg + finding.phi_back_deg > 90.0:
         yield (
-            "friction on the back plane could hold the heel back above k_r; the answer takes the "
-            "back plane to be free of pre-stress"
+            "friction against the rock behind could hold the block beyond k_r; the answer leaves "
+            "this help out"
         )
     if finding.mode == "slide" and finding.beta_deg < block.alpha1_deg:
         yield (

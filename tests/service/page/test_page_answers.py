@@ -312,6 +312,21 @@ def test_a_decimal_comma_is_a_point(open_page, ask, typed, read):
     assert page.input_value("#pgv") == typed
 
 
+@pytest.mark.parametrize("typed", ["1,000", "1.000,5", "1 000", "1'000", "12,500", "1,000,000"])
+def test_what_may_be_thousands_is_refused(open_page, typed):
+    opened = open_page()
+    page = opened.page
+    page.fill("#pgv", typed)
+    said = page.locator("#pgv-error")
+    expect(said).to_have_text(re.compile("write decimals after a point and nothing"))
+    assert typed in said.text_content()
+    expect(page.locator("#probability")).to_have_attribute("data-state", "none")
+    page.fill("#pgv", "0.6")
+    opened.settled()
+    assert probability_shown(page) == FIRST_ANSWER
+    forgive(opened, REFUSED)
+
+
 def test_each_field_explains_itself(open_page):
     opened = open_page("?p2=3&kr=0.1&pgv=0.6&tm=0.5&level=0.9")
     page = opened.page
@@ -400,6 +415,14 @@ def test_half_of_a_number_is_not_asked(open_page):
     opened.settled()
     assert not any("kr=0&" in each or "kr=0.&" in each for each in opened.requests)
     assert page.locator("#kr-error").text_content() == ""
+    page.focus("#pgv")
+    page.keyboard.press("Control+a")
+    for key in ".6":
+        page.keyboard.press(key)
+        page.wait_for_timeout(400)
+    opened.settled()
+    assert not any("pgv=." in each and "pgv=.6" not in each for each in opened.requests)
+    page.focus("#kr")
     page.keyboard.press("Control+a")
     page.keyboard.press("0")
     page.keyboard.press("Tab")  # now it is said that k_r is 0

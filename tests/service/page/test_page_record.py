@@ -169,6 +169,24 @@ def test_a_unit_that_the_file_leaves_open_is_asked_for(open_page):
     forgive(opened, "Failed to load resource")
 
 
+def test_half_of_an_interval_is_not_asked(open_page):
+    opened = open_page()
+    page = opened.page
+    column = "\n".join(f"{0.3 * math.sin(i / 16):.6f}" for i in range(200)) + "\n"
+    drop(page, "column.txt", column)
+    page.select_option("#units", "g")
+    expect(page.locator("#dt-error")).to_contain_text("dt")
+    page.focus("#dt")
+    for key in "0.01":
+        page.keyboard.press(key)
+        page.wait_for_timeout(600)
+    expect(page.locator("#spectrum-part")).to_be_visible()
+    expect(page.locator("#dt-error")).to_have_text("")
+    halves = ("dt=0&", "dt=0.&", "dt=0.0&")
+    assert not [each for each in opened.requests if any(half in each for half in halves)]
+    forgive(opened, "Failed to load resource")
+
+
 def test_the_traces_of_a_file_are_listed(open_page, tmp_path):
     motions = [
         GroundMotion(scale * np.sin(np.linspace(0.0, 6.3, 120)), 0.01, component=name)

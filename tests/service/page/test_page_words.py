@@ -67,9 +67,14 @@ def test_words_count_what_the_numbers_say(run):
 
 
 def test_a_decimal_comma_is_read_and_nothing_else_is_changed(run):
-    texts = ["0,1", " 12,5 ", ",5", "\u22125", "1e-3", "1,5e-3", "1,000,000", "0.1,2", "abc", "1,a"]
-    read = ["0.1", "12.5", ".5", "-5", "1e-3", "1.5e-3", "1,000,000", "0.1,2", "abc", "1,a"]
-    assert run("numbers.js", "plain", [[text] for text in texts]) == read
+    read = {
+        **{"0,1": "0.1", " 12,5 ": "12.5", ",5": ".5", "1,5e-3": "1.5e-3", "0,125": "0.125"},
+        **{"1,2500": "1.2500", "1000,125": "1000.125", "1,25": "1.25", "\u22125": "-5"},
+    }
+    either = ["1,000", "12,500", "-999,125", "1,000e-3", "1,000,000", "1.000,5", "1 000", "0.1,2"]
+    alike = [*either, "1e-3", "0.1", "1.000", "abc", "1,a"]
+    assert run("numbers.js", "plain", [[text] for text in read]) == list(read.values())
+    assert run("numbers.js", "plain", [[text] for text in alike]) == alike
 
 
 def test_readable_numbers_keep_their_value(run):

@@ -16,7 +16,7 @@ const NAMES = [
 
 /** Fields of which no 0 is answered. */
 const ABOVE_ZERO = new Set(
-  "height width p2 kr restitution displacement r3 s1 s2 tm level".split(" "),
+  "height width p2 kr restitution displacement r3 s1 s2 tm level dt".split(" "),
 );
 
 /** Names of fields as they stand in the service's sentences, with or without their unit. */
@@ -88,11 +88,11 @@ export function formFields(form, changed) {
  * Whether a field holds the beginning of a number, such as the 0 of 0.08, while it is typed.
  * @param {HTMLInputElement} input
  */
-function isHalfTyped(input) {
+export function isHalfTyped(input) {
   if (document.activeElement !== input || input.inputMode === "") return false;
   const text = input.value.trim();
   const nothing = ABOVE_ZERO.has(input.id) && /^\+?(0+[.,]?0*|[.,]0*)$/.test(text);
-  return nothing || /[e+,-]$/i.test(text);
+  return nothing || /(^|[+-])\.$|[e+,-]$/i.test(text);
 }
 
 /**

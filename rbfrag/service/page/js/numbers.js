@@ -39,14 +39,21 @@ export function forField(value) {
   return String(Number(value.toPrecision(FIELD_DIGITS)));
 }
 
+const DECIMAL_COMMA = /^[+-]?(\d+,\d*|,\d+)(e[+-]?\d+)?$/i;
+
+/** 1,000 is a thousand to one reader and 1 to another. */
+const EITHER_COMMA = /^[+-]?[1-9]\d{0,2},\d{3}(e|$)/i;
+
 /**
- * A text as the service reads it: a decimal comma is a point, a typographic minus a hyphen.
+ * A text as the service reads it: a decimal comma is a point, a typographic minus a hyphen. A comma
+ * that may as well part thousands is left, and the service refuses it.
  * @param {string} text
  * @returns {string}
  */
 export function plain(text) {
   const number = text.trim().replace(/^\u2212/, "-");
-  return /^[+-]?(\d+,\d*|,\d+)(e[+-]?\d+)?$/i.test(number) ? number.replace(",", ".") : number;
+  const decimal = DECIMAL_COMMA.test(number) && !EITHER_COMMA.test(number);
+  return decimal ? number.replace(",", ".") : number;
 }
 
 /**

@@ -2,7 +2,7 @@
 
 import { showWarnings } from "./answer.js";
 import { Refusal, Unreachable } from "./ask.js";
-import { nothingWrong, sayWrong } from "./fields.js";
+import { isHalfTyped, nothingWrong, sayWrong } from "./fields.js";
 import { afterPause, latest } from "./latest.js";
 import { quantity } from "./numbers.js";
 import { byId, textIn } from "./page.js";
@@ -107,7 +107,18 @@ export function recordPanel(tell) {
 
   recordsFrom(byId("drop"), /** @type {HTMLInputElement} */ (byId("record-file")), take);
   byId("example-record").addEventListener("click", () => take(syntheticPulse()));
-  for (const id of READING) byId(id).addEventListener("input", () => file && askSoon(file));
+  for (const id of READING) {
+    const input = /** @type {HTMLInputElement} */ (byId(id));
+    let half = false;
+    input.addEventListener("input", () => {
+      half = isHalfTyped(input);
+      if (file && !half) askSoon(file);
+    });
+    input.addEventListener("change", () => {
+      if (file && half) askSoon(file);
+      half = false;
+    });
+  }
   byId("take-pgv").addEventListener("click", () => spectrum && tell.takePgv(spectrum.pgv_m_s));
   byId("drop-record").addEventListener("click", () => {
     file = null;
