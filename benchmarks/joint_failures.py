@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from benchmarks.held_out import FOLDS, MODELS, STEP, Outcomes, Study, read, studied
+from benchmarks.joint_law import JointFailures
+from benchmarks.joint_orthant import none_fails
 from benchmarks.model_acceptance import Mark, acceptance_table
 from benchmarks.page import ROOT, parser, write_table
 from rbfrag.bench.tables import markdown
@@ -25,8 +27,6 @@ from rbfrag.fragility.dependence import Dependence, event_range
 from rbfrag.fragility.fit.dependence import PairTables, estimate_dependence
 from rbfrag.fragility.fit.pair_tables import ANGLES, PairTable
 from rbfrag.fragility.joint import FailureCount, Placement
-from rbfrag.fragility.joint_law import JointFailures
-from rbfrag.fragility.joint_orthant import none_fails
 from rbfrag.fragility.joint_sampling import JointSampler
 
 FloatArray = NDArray[np.float64]

@@ -9,11 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import settings
 
 ROOT = Path(__file__).resolve().parent.parent
 
 DIALECTS = ("sqlite", "postgresql")
 DATABASE = "database"
+
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 
 def missing(reason: str) -> None:

@@ -12,14 +12,8 @@ from benchmarks.claims.records import Points, line
 from rbfrag.db.rows import CombinationTable
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES
-from rbfrag.motions.pulses import (
-    half_sine,
-    rectangular,
-    rectangular_cycle,
-    sine_cycle,
-    triangle,
-)
 from rbfrag.solver.search.critical import critical
+from tests.physics.pulses import rectangle, rectangular_cycle, sine_lobes, triangle
 
 PERIODS = 12
 """Periods from the least to the greatest mean period of the records, equally spaced in ln T."""
@@ -39,16 +33,12 @@ def _triangular_cycle(amplitude_g: float, period_s: float) -> GroundMotion:
     )
 
 
-def _sampling(period_s: float) -> float:
-    return 0.5 * period_s / _SAMPLES_PER_LOBE
-
-
 PULSES: Mapping[str, Callable[[float, float], GroundMotion]] = {
-    "rectangular lobe": lambda a, t: rectangular(a, 0.5 * t),
-    "half-sine lobe": lambda a, t: half_sine(a, 0.5 * t, _sampling(t)),
-    "triangular lobe": lambda a, t: triangle(a, 0.5 * t),
-    "rectangular cycle": lambda a, t: rectangular_cycle(a, 0.5 * t),
-    "sine cycle": lambda a, t: sine_cycle(a, t, _sampling(t)),
+    "rectangular lobe": lambda a, t: rectangle(0.5 * t, a),
+    "half-sine lobe": lambda a, t: sine_lobes(0.5 * t, (a,), _SAMPLES_PER_LOBE),
+    "triangular lobe": lambda a, t: triangle(0.5 * t, a),
+    "rectangular cycle": lambda a, t: rectangular_cycle(0.5 * t, a),
+    "sine cycle": lambda a, t: sine_lobes(0.5 * t, (a, -a), _SAMPLES_PER_LOBE),
     "triangular cycle": _triangular_cycle,
 }
 """Pulses by name, of an amplitude [g] and a period [s]; a lobe is half a period long."""

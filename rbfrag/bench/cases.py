@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -114,7 +113,7 @@ def choose_cases(records: Records, number: int, *, seed: int = 1) -> tuple[Case,
 
 
 def choose_combinations(
-    records: Records, number: int, *, seed: int = 1, p2: Sequence[float] = DEFAULT_P2
+    records: Records, number: int, *, seed: int = 1
 ) -> tuple[tuple[GroundMotion, Polarity, float], ...]:
     """Draw (motion, polarity, p²) for critical searches; p² in turn, no motion twice in a row."""
     rng = np.random.default_rng(seed)
@@ -123,7 +122,7 @@ def choose_combinations(
         (
             records.motions[order[i % order.size]],
             POLARITIES[int(rng.integers(2))],
-            float(p2[i % len(p2)]),
+            float(DEFAULT_P2[i % len(DEFAULT_P2)]),
         )
         for i in range(number)
     )

@@ -17,7 +17,7 @@ from rbfrag.campaign.executors.local import prepare
 from rbfrag.campaign.worker import MotionWork, PlannedCase, Task, run_work
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import excitation
-from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.models.toppling import MODEL
 from rbfrag.solver.results import DEFAULT_P2, POLARITIES
 from rbfrag.solver.toppling_run import simulate
 
@@ -59,10 +59,10 @@ class WorkersRow:
 
 
 def record_length(
-    motion: GroundMotion, *, p2: float = 3.0, times: Sequence[int] = (1, 2, 4, 8, 16)
+    motion: GroundMotion, *, times: Sequence[int] = (1, 2, 4, 8, 16)
 ) -> tuple[LengthRow, ...]:
     """Time one run, of a block that stays, under a record with zeros before it, or repeated."""
-    kr = 0.5 * motion.pga_g
+    p2, kr = 3.0, 0.5 * motion.pga_g
     samples = motion.acceleration_g
     taylor_run(Case(motion, "forward", excitation(motion), p2, kr))  # compiles
     rows = []
@@ -90,7 +90,6 @@ def workers(
     *,
     processes: Sequence[int] = (1, 2),
     combinations: Sequence[int] = (12, 24, 48, 96),
-    kind: str = "toppling",
 ) -> tuple[WorkersRow, ...]:
     """Time sets of critical searches, as a campaign hands them to its workers.
 
@@ -101,11 +100,11 @@ def workers(
     for number in processes:
         context = get_context("spawn")
         with ProcessPoolExecutor(number, mp_context=context, initializer=prepare) as pool:
-            warm = [_work(motions[i % len(motions)], i, 1, kind) for i in range(4 * number)]
+            warm = [_work(motions[i % len(motions)], i, 1) for i in range(4 * number)]
             list(pool.map(run_work, warm))
             for count in combinations:
                 chosen = range(max(1, count // each))
-                work = [_work(motions[i % len(motions)], i, each, kind) for i in chosen]
+                work = [_work(motions[i % len(motions)], i, each) for i in chosen]
                 started = time.perf_counter()
                 done = sum(len(answer.results) for answer in pool.map(run_work, work))
                 seconds = time.perf_counter() - started
@@ -113,12 +112,12 @@ def workers(
     return tuple(rows)
 
 
-def _work(motion: GroundMotion, number: int, cases: int, kind: str) -> MotionWork:
+def _work(motion: GroundMotion, number: int, cases: int) -> MotionWork:
     planned = [
         PlannedCase(
             natural_key=f"{polarity} {case.p2}", polarity=polarity, vertical_id=None, case=case
         )
-        for case in model_of_kind(kind).cases()
+        for case in MODEL.cases()
         for polarity in POLARITIES
     ]
     tasks = tuple(Task(case) for case in planned[:cases])

@@ -9,7 +9,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from rbfrag.campaign.shake_rockmass import ShakingProgress, shake
+from rbfrag.campaign.shake_rockmass import shake
+from rbfrag.campaign.summary import CampaignProgress
 from rbfrag.errors import InputError
 from rbfrag.files import as_path
 from rbfrag.fragility.intervals import checked_level
@@ -98,7 +99,7 @@ def rockmass(
     level: float = 0.95,
     db: str | PathLike[str] | None = None,
     jobs: int | None = None,
-    on_progress: Callable[[ShakingProgress], None] | None = None,
+    on_progress: Callable[[CampaignProgress], None] | None = None,
 ) -> RockMassAnswer:
     """Draw blocks from two fracture sets, with their modes, yields and failures.
 

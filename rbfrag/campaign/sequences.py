@@ -5,17 +5,14 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from sqlalchemy import Engine
 
-from rbfrag.campaign.executors.local import CLUSTER, executor
-from rbfrag.campaign.interrupt import Stopped
-from rbfrag.campaign.machine import processor_and_compiler
+from rbfrag.campaign.carry_out import Workforce
 from rbfrag.campaign.motion_pairs import MotionPair, motion_pairs
-from rbfrag.campaign.summary import CampaignProgress, CampaignSummary, SequenceReport
-from rbfrag.db.campaigns import finish_campaign, start_campaign
+from rbfrag.campaign.summary import CampaignSummary, SequenceReport
 from rbfrag.db.engine import opened_database
 from rbfrag.db.keys import pair_key
 from rbfrag.db.motions import load_motion
@@ -28,7 +25,7 @@ from rbfrag.db.shock_pairs import (
     known_shock_pairs,
     shock_pair_rows,
 )
-from rbfrag.errors import InputError, StoppedError, WorkFailedError
+from rbfrag.errors import InputError
 from rbfrag.fragility.conditional import conditional_shares
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.kind import BlockOnPlanes, Case, Kind, Shaking
@@ -104,10 +101,7 @@ def simulate_sequences(
     suite: str | None,
     seed: int,
     draws: int,
-    jobs: int | None,
-    scheduler: str | None,
-    on_progress: Callable[[CampaignProgress], None] | None,
-    stopped: Stopped,
+    workforce: Workforce,
 ) -> CampaignSummary:
     """Store what pairs of motions do to the blocks of a kind, and tabulate it.
 
@@ -118,10 +112,7 @@ def simulate_sequences(
         suite: only the motions of this suite.
         seed: of the pairs that are drawn.
         draws: first motions that are drawn for each second one.
-        jobs: worker processes.
-        scheduler: address of a Dask scheduler.
-        on_progress: called after each pair of motions.
-        stopped: asked now and then whether to end.
+        workforce: who does the work.
     """
     if draws < 1:
         raise InputError(f"--draws must be at least 1, not {draws}")
@@ -134,58 +125,28 @@ def simulate_sequences(
             keys = [task.natural_key for each in plan for task in each.tasks]
             known = known_shock_pairs(connection, keys)
         todo = _remaining(plan, known)
-        total, done, runs = len(keys), len(known), 0
+        runs = 0
 
-        def tell() -> None:
-            if on_progress is not None:
-                seconds = time.perf_counter() - started
-                on_progress(CampaignProgress(done, total, len(known), seconds))
+        def store(campaign_id: int, results: PairResults) -> int:
+            nonlocal runs
+            with engine.begin() as connection:
+                insert_shock_pairs(connection, campaign_id, results.records)
+            runs += results.runs
+            return len(results.records)
 
-        with executor(run_pair, jobs, scheduler if todo else None, stopped) as execute:
-            settings = {
-                "kind": kind.kind,
-                "suite": suite,
-                "sequence": True,
-                "seed": seed,
-                "draws": draws,
-                "made_on": processor_and_compiler() if scheduler is None else CLUSTER,
-            }
-            with engine.begin() as connection:
-                campaign_id = start_campaign(connection, settings)
-            tell()
-            for results in execute(_work(engine, kind, todo), len(todo)):
-                if results.numerics_version != NUMERICS_VERSION:
-                    raise WorkFailedError(
-                        f"a worker computes with numerics version {results.numerics_version}, "
-                        f"this rbfrag with {NUMERICS_VERSION}: install the same version on all "
-                        "machines"
-                    )
-                with engine.begin() as connection:
-                    insert_shock_pairs(connection, campaign_id, results.records)
-                done += len(results.records)
-                runs += results.runs
-                tell()
-            if done < total:
-                raise StoppedError(f"stopped: {done} of {total} stored; the same command goes on")
-            with engine.begin() as connection:
-                finish_campaign(connection, campaign_id)
+        settings = {"kind": kind.kind, "suite": suite, "sequence": True, "seed": seed}
+        workforce.carry_out(
+            engine, {**settings, "draws": draws}, run_pair, _work(engine, kind, todo), len(todo),
+            store, total=len(keys), resumed=len(known), started=started,
+        )  # fmt: skip
         with engine.connect() as connection:
             rows = shock_pair_rows(connection, keys)
     of_station = sum(pair.pairing == "station" for pair in pairs)
     return CampaignSummary(
         kind=kind.kind,
-        combinations=total,
-        found=0,
-        below_limit=0,
-        no_motion=0,
-        outside_model=0,
-        not_searched=total,
-        certified=0,
-        reentrant=0,
+        combinations=len(keys),
+        not_searched=len(keys),
         runs=runs,
-        grid_runs=0,
-        responses=0,
-        without_vertical=0,
         seconds=time.perf_counter() - started,
         resumed=len(known),
         warnings=_warnings(len(pairs), of_station, seed),

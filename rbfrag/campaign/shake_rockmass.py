@@ -6,9 +6,9 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 
 from rbfrag.campaign.executors.local import run_locally
+from rbfrag.campaign.summary import CampaignProgress
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
@@ -26,25 +26,6 @@ WORTH_A_PROCESS = 500
 """Blocks below which a worker process takes longer to start than to work."""
 
 
-@dataclass(frozen=True)
-class ShakingProgress:
-    """How far the blocks have been run."""
-
-    done: int
-    total: int
-    seconds: float
-
-    @property
-    def rate_per_s(self) -> float:
-        """Blocks run per second, at all scales."""
-        return self.done / self.seconds if self.seconds > 0.0 else 0.0
-
-    @property
-    def seconds_left(self) -> float | None:
-        """Estimated time left [s]; None before anything is finished."""
-        return (self.total - self.done) / self.rate_per_s if self.rate_per_s else None
-
-
 def shake(
     blocks: Realisations,
     motion: GroundMotion,
@@ -54,21 +35,21 @@ def shake(
     polarity: Polarity = "forward",
     limits: FailureLimits | None = None,
     jobs: int | None = None,
-    on_progress: Callable[[ShakingProgress], None] | None = None,
+    on_progress: Callable[[CampaignProgress], None] | None = None,
 ) -> ShakenMass:
     """Run every block of a rock mass that a motion moves, each in its own mode.
 
     The answer does not depend on the number of workers.
 
     Args:
-        made: blocks of a rock mass.
+        blocks: blocks of a rock mass.
         motion: horizontal ground motion.
         scales: factors on the motion.
         vertical: vertical motion of the same recording, upward positive; scaled likewise.
         polarity: ``forward`` (positive samples drive out of the slope) or ``reverse``.
         limits: what counts as failure.
         jobs: worker processes; None for one per processor, where there is work enough for them.
-        on_progress: called at the beginning and after each chunk of work.
+        on_progress: called at the beginning and after each chunk of work; counts blocks.
 
     Raises:
         InputError: as for :func:`rbfrag.rockmasses.shaking.plan_shaking`; `jobs` below 1;
@@ -89,11 +70,11 @@ def shake(
     def reported(answers: Iterator[BlockOutcomes]) -> Iterator[BlockOutcomes]:
         done = 0
         if on_progress is not None and total:
-            on_progress(ShakingProgress(0, total, 0.0))
+            on_progress(CampaignProgress(0, total, 0, 0.0))
         for answer in answers:
             done += int(answer.place.size)
             if on_progress is not None:
-                on_progress(ShakingProgress(done, total, time.perf_counter() - started))
+                on_progress(CampaignProgress(done, total, 0, time.perf_counter() - started))
             yield answer
 
     answers = run_locally(

@@ -10,9 +10,9 @@ from typing import Any, Literal
 
 from sqlalchemy import Engine
 
-from rbfrag.campaign.executors.local import CLUSTER, check_workers, executor
+from rbfrag.campaign.carry_out import Workforce
+from rbfrag.campaign.executors.local import check_workers
 from rbfrag.campaign.interrupt import Stopped, never
-from rbfrag.campaign.machine import processor_and_compiler
 from rbfrag.campaign.plan import (
     CampaignPlan,
     MotionTasks,
@@ -32,21 +32,19 @@ from rbfrag.db.campaigns import (
     KnownCombination,
     add_grids,
     add_maps,
-    finish_campaign,
     insert_combinations,
     insert_points,
-    start_campaign,
 )
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion
 from rbfrag.db.queries import Vertical
 from rbfrag.db.responses import insert_responses
 from rbfrag.db.spectra import store_spectrum
-from rbfrag.errors import InputError, StoppedError, WorkFailedError
+from rbfrag.errors import InputError, WorkFailedError
 from rbfrag.solver.kind import Case
 from rbfrag.solver.kinds import models
 from rbfrag.solver.quantity import positive
-from rbfrag.solver.results import MAP_DEPTH, NUMERICS_VERSION, CriticalResult
+from rbfrag.solver.results import MAP_DEPTH, CriticalResult
 
 SAME_VALUE = 1e-9
 """Relative difference up to which a search that is repeated on another processor is the same."""
@@ -133,6 +131,7 @@ def simulate(
         StoppedError: `stopped` said so; what was finished is stored.
     """
     check_workers(jobs, scheduler)
+    workforce = Workforce(jobs, scheduler, on_progress, stopped)
     blocks = {"p2": p2, "rotations_deg": rotations_deg, "displacements_m": displacements_m,
               "family": family, "restitution_factors": restitution_factors}  # fmt: skip
     described = {name: value for name, value in blocks.items() if value is not None}
@@ -147,36 +146,28 @@ def simulate(
             one = "--map" if full_map else "--vertical"
             raise InputError(f"{one} does not go with --sequence: leave one of them out")
         return simulate_sequences(
-            models()[kind], cases, db=db, suite=suite, seed=seed, draws=draws, jobs=jobs,
-            scheduler=scheduler, on_progress=on_progress, stopped=stopped,
-        )  # fmt: skip
+            models()[kind], cases, db=db, suite=suite, seed=seed, draws=draws, workforce=workforce
+        )
     started = time.perf_counter()
     with opened_database(db) as engine:
         with engine.connect() as connection:
             plan = plan_campaign(connection, kind, cases, suite=suite, vertical=vertical)
             todo = remaining_work(connection, plan, wanted)
-        with executor(run_work, jobs, scheduler if todo.motions else None, stopped) as execute:
-            settings = {
-                "kind": kind,
-                "suite": suite,
-                "vertical": vertical,
-                **{name: list(value) for name, value in described.items() if name != "family"},
-                "grid": list(wanted.blocks),
-                "store_responses": list(map(str, store_responses or ())),
-                "map_depth": depth if full_map else None,
-                "made_on": processor_and_compiler() if scheduler is None else CLUSTER,
-            }
-            with engine.begin() as connection:
-                campaign_id = start_campaign(connection, settings)
-            run = _Run(engine, campaign_id, plan, todo, started, on_progress)
-            run.tell()
-            for done in execute(_work(engine, todo, depth), len(todo.motions)):
-                run.take(done)
-            if not run.is_done:
-                raise StoppedError(run.how_far())
-            with engine.begin() as connection:
-                finish_campaign(connection, campaign_id)
-    return run.summary()
+        settings = {
+            "kind": kind,
+            "suite": suite,
+            "vertical": vertical,
+            **{name: list(value) for name, value in described.items() if name != "family"},
+            "grid": list(wanted.blocks),
+            "store_responses": list(map(str, store_responses or ())),
+            "map_depth": depth if full_map else None,
+        }
+        run = _Run(engine, plan, todo)
+        workforce.carry_out(
+            engine, settings, run_work, _work(engine, todo, depth), len(todo.motions), run.take,
+            total=run.total, resumed=run.resumed, started=started,
+        )  # fmt: skip
+    return run.summary(time.perf_counter() - started)
 
 
 def _cases(kind: str, described: dict[str, Any], extras: Sequence[str]) -> tuple[Case, ...]:
@@ -199,44 +190,27 @@ def _cases(kind: str, described: dict[str, Any], extras: Sequence[str]) -> tuple
 class _Run:
     """The writer of one run, and its counts."""
 
-    def __init__(
-        self,
-        engine: Engine,
-        campaign_id: int,
-        plan: CampaignPlan,
-        todo: Todo,
-        started: float,
-        on_progress: Callable[[CampaignProgress], None] | None,
-    ) -> None:
+    def __init__(self, engine: Engine, plan: CampaignPlan, todo: Todo) -> None:
         self._engine = engine
-        self._campaign_id = campaign_id
         self._plan = plan
-        self._started = started
-        self._on_progress = on_progress
         self._known = dict(todo.known)
-        self._total = len(plan.cases)
-        self._resumed = self._done = self._total - todo.tasks
+        self.total = len(plan.cases)
+        self.resumed = self.total - todo.tasks
         self._runs = self._grid_runs = self._responses = 0
 
-    def take(self, done: MotionResults) -> None:
-        """Store the answers of one motion and count them."""
-        if done.numerics_version != NUMERICS_VERSION:
-            raise WorkFailedError(
-                f"a worker computes with numerics version {done.numerics_version}, this rbfrag "
-                f"with {NUMERICS_VERSION}: install the same version on all machines"
-            )
+    def take(self, campaign_id: int, done: MotionResults) -> int:
+        """Store the answers of one motion, count them and return their number."""
         for result in done.results:
             self._compare(result)
-        _store(self._engine, self._campaign_id, done)
+        _store(self._engine, campaign_id, done)
         for result in done.results:
-            self._done += 1
             self._runs += result.runs
             self._grid_runs += 0 if result.blocks is None else len(result.blocks.outcome)
             self._responses += len(result.responses)
             if result.task.search or result.task.full_map:
                 key = result.task.planned.natural_key
                 self._known[key] = _as_known(result.critical)
-        self.tell()
+        return len(done.results)
 
     def _compare(self, result: TaskResult) -> None:
         """Refuse a repeated search that contradicts what is stored."""
@@ -252,29 +226,13 @@ class _Run:
                 f"and {now.kr_over_pga!r}: look at the database with  rbfrag db check"
             )
 
-    @property
-    def is_done(self) -> bool:
-        """Whether everything asked for is stored."""
-        return self._done == self._total
-
-    def how_far(self) -> str:
-        """Return how far a run is that ends before its end."""
-        return f"stopped: {self._done} of {self._total} stored; the same command goes on"
-
-    def tell(self) -> None:
-        """Report progress."""
-        if self._on_progress is not None:
-            self._on_progress(
-                CampaignProgress(self._done, self._total, self._resumed, self._seconds())
-            )
-
-    def summary(self) -> CampaignSummary:
+    def summary(self, seconds: float) -> CampaignSummary:
         """Return what the campaign reports."""
         known = self._known.values()
         status = [each.status for each in known]
         return CampaignSummary(
             kind=self._plan.kind,
-            combinations=self._total,
+            combinations=self.total,
             found=status.count("found"),
             below_limit=status.count("below_limit"),
             no_motion=status.count("no_motion"),
@@ -286,13 +244,10 @@ class _Run:
             grid_runs=self._grid_runs,
             responses=self._responses,
             without_vertical=self._plan.without_vertical,
-            seconds=self._seconds(),
-            resumed=self._resumed,
+            seconds=seconds,
+            resumed=self.resumed,
             warnings=self._plan.warnings,
         )
-
-    def _seconds(self) -> float:
-        return time.perf_counter() - self._started
 
 
 def _as_known(result: CriticalResult | None) -> KnownCombination:

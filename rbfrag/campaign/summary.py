@@ -16,7 +16,7 @@ _COUNTS = ("blocks", "earthquakes", "of_station", "fails", "intact_fails", "unkn
 
 @dataclass(frozen=True)
 class CampaignProgress:
-    """How far a campaign is, in combinations."""
+    """How far a campaign is, in combinations; or the runs of a rock mass, in blocks."""
 
     done: int
     total: int
@@ -25,7 +25,7 @@ class CampaignProgress:
 
     @property
     def rate_per_s(self) -> float:
-        """Combinations finished per second by this run."""
+        """What is finished per second by this run."""
         computed = self.done - self.resumed
         return computed / self.seconds if self.seconds > 0.0 else 0.0
 
@@ -90,19 +90,19 @@ class CampaignSummary(Tabular):
 
     kind: str
     combinations: int
-    found: int
-    below_limit: int
-    no_motion: int
-    outside_model: int
-    not_searched: int
-    certified: int
-    reentrant: int
-    runs: int
-    grid_runs: int
-    responses: int
-    without_vertical: int
-    seconds: float
-    resumed: int
+    found: int = 0
+    below_limit: int = 0
+    no_motion: int = 0
+    outside_model: int = 0
+    not_searched: int = 0
+    certified: int = 0
+    reentrant: int = 0
+    runs: int = 0
+    grid_runs: int = 0
+    responses: int = 0
+    without_vertical: int = 0
+    seconds: float = 0.0
+    resumed: int = 0
     warnings: tuple[str, ...] = ()
     sequence: SequenceReport | None = None
 

@@ -92,24 +92,18 @@ class KnownCombination:
     mapped: bool = False
 
 
-def start_campaign(
-    connection: Connection,
-    settings: Mapping[str, object],
-    *,
-    numerics_version: str = NUMERICS_VERSION,
-) -> int:
+def start_campaign(connection: Connection, settings: Mapping[str, object]) -> int:
     """Record that a campaign begins, and return its id.
 
     Args:
         settings: what the user asked for; values that JSON can hold.
-        numerics_version: of the solver.
     """
     return insert_row(
         connection,
         campaign,
         {
             "settings": canonical_json(settings),
-            "numerics_version": numerics_version,
+            "numerics_version": NUMERICS_VERSION,
             "rbfrag_version": __version__,
             "started": utc_now(),
         },

@@ -21,6 +21,9 @@ REFERENCE = Path(__file__).parents[1] / "reference" / "reference.db"
 REVISIONS = ("0001", "0002", "0003", "0004", "0005", "0006", "0007")
 """Every schema revision this rbfrag knows, oldest first."""
 
+FIRST_RELEASE = "0007"
+"""The first revision of Alembic's chain; older ones go by rbfrag.migrations.before_release."""
+
 SCHEMA_REVISION = REVISIONS[-1]
 """The revision that this rbfrag works with."""
 
@@ -82,7 +85,7 @@ def check_revision(revision: str, where: str) -> None:
     """Refuse a database whose schema this rbfrag does not work with.
 
     Args:
-        found: the revision stored in the database.
+        revision: the revision stored in the database.
         where: the database as the user names it, for the message.
     """
     if revision == SCHEMA_REVISION:

@@ -42,7 +42,7 @@ class DatabaseInfo:
         rows: number of rows by table.
         combinations_by_status: number of combinations by status.
         numerics_versions: versions of the solver that made its combinations.
-        default_model: name of the model of the kind asked about that answers when none is named.
+        default_model: name of the model of toppling that answers when none is named.
     """
 
     revision: str
@@ -232,8 +232,8 @@ def outcome_grid(connection: Connection, combination_id: ArrayLike) -> OutcomeGr
     return OutcomeGrid(*grid)
 
 
-def database_info(connection: Connection, *, kind: str = "toppling") -> DatabaseInfo:
-    """Return what the database holds, counted, and which model of a kind is its default."""
+def database_info(connection: Connection) -> DatabaseInfo:
+    """Return what the database holds, counted, and which model of toppling is its default."""
     by_status = select(combination.c.status, func.count().label("number")).group_by(
         combination.c.status
     )
@@ -249,14 +249,14 @@ def database_info(connection: Connection, *, kind: str = "toppling") -> Database
             row.status: row.number for row in connection.execute(by_status.order_by("status"))
         },
         numerics_versions=tuple(sorted(connection.scalars(versions))),
-        default_model=_default_name(connection, kind),
+        default_model=_default_name(connection),
     )
 
 
-def _default_name(connection: Connection, kind: str) -> str | None:
-    """Return the name of the default of a kind; None without one, or where a model is damaged."""
+def _default_name(connection: Connection) -> str | None:
+    """Return the name of the default; None without one, or where a model is damaged."""
     try:
-        return load_model(connection, kind=kind).name
+        return load_model(connection).name
     except (DatabaseError, UnknownModelError):
         return None
 

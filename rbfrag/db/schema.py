@@ -1,6 +1,6 @@
 """The tables. Units are in the column names; natural unique keys hold no NULL.
 
-The tables are made by the migrations; a test proves that these definitions equal them. What each
+New databases are made from these definitions, and migrations bring older ones to them. What each
 table and column means stands beside it, for :mod:`rbfrag.db.data_dictionary`. Each row carries a
 digest of its values, which :mod:`rbfrag.db.insert` writes.
 """

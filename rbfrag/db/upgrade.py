@@ -20,12 +20,14 @@ import rbfrag.migrations
 from rbfrag.db.connect import database_label, raw_sqlite, unchecked_engine
 from rbfrag.db.location import (
     APPLICATION_ID,
+    FIRST_RELEASE,
     REVISIONS,
     SCHEMA_REVISION,
     VERSION_TABLE,
     check_revision,
     locate,
 )
+from rbfrag.db.schema import metadata
 from rbfrag.db.sqlite_file import explained_sqlite_error
 from rbfrag.errors import (
     DatabaseError,
@@ -33,6 +35,7 @@ from rbfrag.errors import (
     DatabaseReadOnlyError,
     NotADatabaseError,
 )
+from rbfrag.migrations.before_release import renew_tables
 
 _LOCK = APPLICATION_ID  # any number that is ours: two upgrades of one server take turns
 
@@ -63,11 +66,12 @@ def upgrade_database(db: str | PathLike[str] | None = None) -> tuple[str, str]:
 
 
 def migrate(engine: Engine) -> None:
-    """Run the missing migrations on an engine of :func:`rbfrag.db.engine.unchecked_engine`.
+    """Make the tables, or bring those that are there to the schema of this rbfrag.
 
     Args:
-        engine: opened for writing and, on SQLite, with foreign keys off: rebuilding a table
-            drops it, and with them on that would delete what points to it.
+        engine: of :func:`rbfrag.db.engine.unchecked_engine`, opened for writing and, on SQLite,
+            with foreign keys off: making a table anew drops it, and with them on that would
+            delete what points to it.
     """
     with engine.begin() as connection:
         if connection.dialect.name == "postgresql":
@@ -76,8 +80,17 @@ def migrate(engine: Engine) -> None:
         folder = Path(rbfrag.migrations.__file__).parent
         config.set_main_option("script_location", str(folder).replace("%", "%%"))
         config.attributes["connection"] = connection
-        command.upgrade(config, "head")
+        before = _revision_of_ours(connection)
+        if before is None:
+            metadata.create_all(connection, checkfirst=False)
+        elif before < FIRST_RELEASE:
+            renew_tables(connection)
+        else:
+            command.upgrade(config, "head")
+        if before is None or before < FIRST_RELEASE:
+            command.stamp(config, "head", purge=True)
         if connection.dialect.name == "sqlite":
+            connection.exec_driver_sql(f"PRAGMA application_id = {APPLICATION_ID}")
             _require_sound_references(connection)
 
 

@@ -10,12 +10,12 @@ from typing import Any
 
 from sqlalchemy import Connection, func, select
 
-from rbfrag.db.motions import load_motion, motion_row, motion_rows
+from rbfrag.db.motions import motion_row, motion_rows
+from rbfrag.db.queries import recordings_of_motions
 from rbfrag.db.rows import MotionRow
 from rbfrag.db.schema import motion, recording
 from rbfrag.errors import InputError
 from rbfrag.motions.direction import is_downward_name, lead_in_of, why_not_together
-from rbfrag.motions.ground_motion import GroundMotion
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def vertical_pairs(connection: Connection, *, suite: str | None = None) -> dict[
         suite: only the horizontal motions of this suite.
     """
     horizontals = [row for row in motion_rows(connection, suite=suite) if not row.is_vertical]
-    recording_of = _recordings(connection)
+    recording_of = recordings_of_motions(connection)
     verticals: dict[int, list[MotionRow]] = defaultdict(list)
     for row in motion_rows(connection):
         if row.is_vertical:
@@ -74,16 +74,6 @@ def vertical_pair(connection: Connection, motion_id: int) -> VerticalPair:
         .order_by(motion.c.id)
     )
     return _pair(row, [motion_row(connection, each) for each in connection.scalars(query)])
-
-
-def load_vertical(connection: Connection, motion_id: int) -> GroundMotion | None:
-    """Return the solver's `vertical` for a stored horizontal motion, or None without one.
-
-    Raises:
-        InputError: there is no motion of that id, or it is a vertical one.
-    """
-    pair = vertical_pair(connection, motion_id)
-    return None if pair.vertical_id is None else load_motion(connection, pair.vertical_id)
 
 
 @dataclass(frozen=True)
@@ -119,12 +109,6 @@ def recordings_of_mixed_dt(connection: Connection) -> list[MixedRecording]:
         )
         for rows in by_recording.values()
     ]
-
-
-def _recordings(connection: Connection) -> dict[int, int]:
-    return {row.id: row.recording_id for row in connection.execute(
-        select(motion.c.id, motion.c.recording_id)
-    )}  # fmt: skip
 
 
 def _pair(row: MotionRow, verticals: Sequence[MotionRow]) -> VerticalPair:

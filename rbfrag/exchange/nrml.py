@@ -145,14 +145,7 @@ def _number(text: str, where: str) -> float:
 _FAR = 8.0
 
 
-def nrml_text(
-    functions: Sequence[FragilityFunction],
-    *,
-    identifier: str = "rbfrag",
-    asset_category: str = "rock_blocks",
-    loss_category: str = "structural",
-    description: str = "",
-) -> str:
+def nrml_text(functions: Sequence[FragilityFunction], *, description: str = "") -> str:
     """Return the document. PGV is in cm/s, PGA and SA in g, as OpenQuake wants them.
 
     A lognormal function is written as ``continuous`` with mean and standard deviation of the
@@ -161,9 +154,6 @@ def nrml_text(
     Args:
         functions: the functions; those of one asset one after the other, the same limit states
             for every asset.
-        identifier: id of the model.
-        asset_category: what the assets are.
-        loss_category: the loss type that OpenQuake files the model under.
         description: a sentence or two.
     """
     if not functions:
@@ -180,8 +170,7 @@ def nrml_text(
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         '<nrml xmlns="http://openquake.org/xmlns/nrml/0.5">',
-        f"<fragilityModel id={quoteattr(identifier)} assetCategory={quoteattr(asset_category)} "
-        f"lossCategory={quoteattr(loss_category)}>",
+        '<fragilityModel id="rbfrag" assetCategory="rock_blocks" lossCategory="structural">',
         f"<description>{escape(description)}</description>",
         f"<limitStates>{escape(' '.join(states))}</limitStates>",
     ]

@@ -38,7 +38,6 @@ def share_functions(
     shares: Sequence[float],
     *,
     levels: int = 80,
-    seed: int = 0,
     model: Model | None = None,
     db: str | PathLike[str] | None = None,
 ) -> tuple[list[FragilityFunction], tuple[str, ...], list[str]]:
@@ -57,7 +56,6 @@ def share_functions(
         measure: as for :func:`~rbfrag.exchange.block_fragility.block_functions`.
         shares: shares of the blocks in percent, rising, above 0 to 100.
         levels: number of levels, common to all limit states.
-        seed: of the draws.
         model: as in :func:`rbfrag.predict`; it must know what its blocks share.
         db: as in :func:`rbfrag.predict`.
 
@@ -80,7 +78,7 @@ def share_functions(
     scores = np.concatenate([_scores(part) for part in parts])
     p = np.sqrt(p2)
     blocks = Placement.of(np.log(p), np.log(kr * STANDARD_GRAVITY_M_S2 / p))
-    sampler, generator = JointSampler(chosen.dependence, blocks), np.random.default_rng(seed)
+    sampler, generator = JointSampler(chosen.dependence, blocks), np.random.default_rng(0)
     counts = [max(1, math.ceil(share / 100.0 * p2.size - 1e-9)) for share in shares]
     reached = np.empty((len(counts), DRAWS))
     at_once = max(1, _VALUES_AT_ONCE // p2.size)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 from rbfrag.fragility.lookup import find_model, suited_models
 from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel, Model
-from rbfrag.fragility.prediction import Prediction, answer_given, is_clear
+from rbfrag.fragility.prediction import Prediction, answer_given, is_clear, single_numbers
 from rbfrag.fragility.words import percent
 
 if TYPE_CHECKING:
@@ -52,25 +52,26 @@ def answer_compared(
 ) -> Prediction | PredictionArray:
     """Return the first model's answer; of single numbers it says which others answer otherwise."""
     first, *others = models
+    singles = single_numbers(given)
+    given = given if singles is None else singles
     answer = answer_given(first, given, level, nan=nan, interval=interval, weights=weights)
     if type(answer) is not Prediction:
         return answer
-    apart = [each for each in others if not _surely_agrees(each, given, answer)]
-    return _with_disagreement(answer, [_one_of(each, given, level, weights) for each in apart])
+    if singles is not None and answer.block_sd is None:
+        others = [each for each in others if not _surely_agrees(each, singles, answer)]
+    return _with_disagreement(answer, [_one_of(each, given, level, weights) for each in others])
 
 
-def _surely_agrees(
-    model: FragilityModel, given: Mapping[str, ArrayLike], first: Prediction
-) -> bool:
-    """Return whether a model's P is within the first one's interval: faster than its answer."""
-    if model.uncertain or any(type(value) is not float for value in given.values()):
-        return False
-    singles = cast("dict[str, float]", given)
+def _surely_agrees(model: FragilityModel, given: dict[str, float], first: Prediction) -> bool:
+    """Return whether a model's P of a certain block is within the first one's interval.
+
+    That is faster than its answer.
+    """
     try:
-        values = model.with_ratios(model.method.block.completed(singles, model.term, SINGLE))
+        values = model.with_ratios(model.method.block.completed(given, model.term, SINGLE))
         if not is_clear(model, values):
             return False
-        probability = model.answer(values, None, SINGLE, singles).probability
+        probability = model.answer(values, None, SINGLE, given).probability
     except (ArithmeticError, ValueError):
         return False
     return bool(first.ci_low <= probability <= first.ci_high)

@@ -93,11 +93,7 @@ class ConditionalShare:
 
 
 def conditional_shares(
-    rows: Sequence[ShockPairRow],
-    measure: Measure,
-    limits: Iterable[float | None],
-    *,
-    level: float = LEVEL,
+    rows: Sequence[ShockPairRow], measure: Measure, limits: Iterable[float | None]
 ) -> tuple[ConditionalShare, ...]:
     """Return what a second shock does to survivors of a first, by limit, state and shaking.
 
@@ -108,18 +104,15 @@ def conditional_shares(
         rows: blocks under two motions.
         measure: what counts.
         limits: displacements [m] or rotations [rad] that count as failure; None for past recovery.
-        level: of the intervals.
 
     Returns:
         The classes that hold a block.
     """
-    return tuple(
-        share for limit in limits for share in _of_limit(rows, measure, limit, level=level)
-    )
+    return tuple(share for limit in limits for share in _of_limit(rows, measure, limit))
 
 
 def _of_limit(
-    rows: Sequence[ShockPairRow], measure: Measure, limit: float | None, *, level: float
+    rows: Sequence[ShockPairRow], measure: Measure, limit: float | None
 ) -> Iterable[ConditionalShare]:
     left = "displacement_m" if measure == "displacement_m" else "rotation_rad"
     classes: dict[tuple[int, int], list[tuple[ShockPairRow, bool, bool]]] = {}
@@ -137,7 +130,7 @@ def _of_limit(
     for (state_class, shaking), blocks in sorted(classes.items()):
         event = np.unique([row.event_id for row, *_ in blocks], return_inverse=True)[1]
         after_share, intact_share = (
-            share_of_events(np.array([block[column] for block in blocks]), event, level)
+            share_of_events(np.array([block[column] for block in blocks]), event)
             for column in (1, 2)
         )
         end = SHAKING[shaking]

@@ -2,7 +2,7 @@
 
 The law is the normal copula of :mod:`rbfrag.fragility.dependence`. Means and variances of counts
 are exact. The beta-binomial distribution of the same mean and variance is a cheap stand-in for that
-of the count, where thousands are wanted; :mod:`rbfrag.fragility.joint_law` has the law itself.
+of the count, where thousands are wanted; ``benchmarks/joint_law.py`` has the law itself.
 Samples are drawn in :mod:`rbfrag.fragility.joint_sampling`.
 """
 
@@ -111,34 +111,9 @@ class Placement:
         """Return some of the blocks."""
         return Placement(*(part[chosen] for part in vars(self).values()))
 
-    def with_azimuth(self, generator: np.random.Generator) -> Placement:
-        """Return the blocks with unknown azimuths drawn at random."""
-        component = generator.integers(COMPONENTS, size=self.size)
-        polarity = generator.choice((-1, 1), size=self.size)
-        return Placement(
-            self.l,
-            self.ln_y,
-            self.earthquake,
-            self.site,
-            np.where(self.drawn, component, self.component),
-            np.where(self.drawn, polarity, self.polarity),
-        )
-
     def correlation(self, dependence: Dependence) -> FloatArray:
         """Return R of every two blocks, shape (n, n); azimuths must be known."""
         return dependence.correlation(*vars(self).values())
-
-
-def bivariate_normal(a: ArrayLike, b: ArrayLike, r: ArrayLike) -> FloatArray:
-    """Return Φ₂(a, b; R), the probability that two standard normals are below a and b.
-
-    Args:
-        a: first bound, any shape.
-        b: second bound.
-        r: correlation, -1 to 1.
-    """
-    first, second = (np.asarray(bound, dtype=np.float64) for bound in (a, b))
-    return np.asarray(joint_excess(first, second, r) + ndtr(first) * ndtr(second))
 
 
 def joint_excess(a: ArrayLike, b: ArrayLike, r: ArrayLike) -> FloatArray:

@@ -217,11 +217,6 @@ class FragilityModel:
         """What counts as failure where there are several criteria; None for the usual one."""
         return self.method.block.criterion_of(self.row.diagnostics)
 
-    @property
-    def has_exponent(self) -> bool:
-        """Whether the exponent M was estimated: P then depends on p beside y."""
-        return self.method.exponent in self.row.coefficients
-
     def with_ratios(
         self, values: dict[str, Any], of: Mapping[str, Any] | None = None
     ) -> dict[str, Any]:

@@ -153,6 +153,17 @@ def answer_given(
         from rbfrag.fragility.uncertain import uncertain_model
 
         model, given = uncertain_model(model, given)
+    singles = single_numbers(given)
+    if singles is not None:
+        return _answer_single(model, singles, quantiles)
+    # Kept apart so that single numbers do not load numpy.
+    from rbfrag.fragility.prediction_array import predict_many
+
+    return predict_many(model, given, quantiles, interval=interval, refuse_nan=nan == "raise")
+
+
+def single_numbers(given: Mapping[str, ArrayLike]) -> dict[str, float] | None:
+    """Return the values of a question as floats; None where one of them is an array."""
     singles: dict[str, float] = {}
     for name, value in given.items():
         if type(value) is float:  # for speed
@@ -160,13 +171,8 @@ def answer_given(
         elif is_single(value):
             singles[name] = single(name, value)
         else:
-            break
-    else:
-        return _answer_single(model, singles, quantiles)
-    # Kept apart so that single numbers do not load numpy.
-    from rbfrag.fragility.prediction_array import predict_many
-
-    return predict_many(model, given, quantiles, interval=interval, refuse_nan=nan == "raise")
+            return None
+    return singles
 
 
 def is_single(value: object) -> bool:

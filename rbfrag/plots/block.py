@@ -109,9 +109,7 @@ _INK, _RESULTANT = "#222222", "#b2182b"
 
 
 @in_own_style
-def plot_block(
-    block: Block, stability: Stability, path: str | PathLike[str], *, title: str = ""
-) -> Path:
+def plot_block(block: Block, stability: Stability, path: str | PathLike[str]) -> Path:
     """Draw a block to scale on its base and back planes, out of the slope to the right.
 
     The contacts are 1 heel, 2 back and 3 toe, C is the centroid. The arrow is the direction of
@@ -122,14 +120,13 @@ def plot_block(
         block: the block.
         stability: its stability.
         path: file to write: .png, .pdf or .svg.
-        title: title of the figure; mode and yield if empty.
     """
     plot_path(path)
     figure = new_figure(7.4, 4.8)
     axes, panel = figure.subplots(1, 2, width_ratios=[2.6, 1.0])
     draw_block(axes, block, stability)
     _write_panel(panel, block, stability)
-    figure.suptitle(title or _title(stability), fontsize=11)
+    figure.suptitle(_title(stability), fontsize=11)
     return save_figure(figure, path)
 
 

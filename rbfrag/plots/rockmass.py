@@ -46,9 +46,7 @@ TITLE_WIDTH = 90
 
 
 @in_own_style
-def plot_rockmass(
-    realisations: Realisations, path: str | PathLike[str], *, title: str = ""
-) -> Path:
+def plot_rockmass(realisations: Realisations, path: str | PathLike[str]) -> Path:
     """Draw the cumulative counts of blocks against PGA by mode, and the shares of the modes.
 
     The counts are not divided by the number of blocks in the mode, so that curves may be
@@ -57,7 +55,6 @@ def plot_rockmass(
     Args:
         realisations: the realisations.
         path: file to write: .png, .pdf or .svg.
-        title: title of the figure; a count of the blocks if empty.
     """
     plot_path(path)
     counts = mode_counts(realisations)
@@ -100,7 +97,7 @@ def plot_rockmass(
     _name_bars(bars, present)
     bars.set_ylim(0.0, 1.12 * max(shares))
     bars.set_ylabel("share of the blocks [%]")
-    figure.suptitle(title or _title(realisations), fontsize=10)
+    figure.suptitle(_title(realisations), fontsize=10)
     return save_figure(figure, path)
 
 
@@ -133,9 +130,7 @@ PARTS = (
 
 
 @in_own_style
-def plot_failures(
-    shaken: ShakenMass, path: str | PathLike[str], *, level: float = 0.95, title: str = ""
-) -> Path:
+def plot_failures(shaken: ShakenMass, path: str | PathLike[str], *, level: float = 0.95) -> Path:
     """Draw the share of the blocks that fail against the scale of the motion, by mode.
 
     Beside it, what becomes of the blocks of every mode under the motion as it was recorded, or at
@@ -145,7 +140,6 @@ def plot_failures(
         shaken: the outcomes of the blocks.
         path: file to write: .png, .pdf or .svg.
         level: confidence level of the bands.
-        title: title of the figure; the motion and the number of blocks if empty.
     """
     plot_path(path)
     by_scale = failures(shaken, level)
@@ -159,7 +153,7 @@ def plot_failures(
         figure = new_figure(width_in + 1.2, 4.6)
         bars = figure.subplots()
     _draw_bars(bars, bars_of)
-    figure.suptitle(title or _shaken_title(shaken), fontsize=10)
+    figure.suptitle(_shaken_title(shaken), fontsize=10)
     return save_figure(figure, path)
 
 

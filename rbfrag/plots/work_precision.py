@@ -56,9 +56,7 @@ class Point(Protocol):
 
 
 @in_own_style
-def plot_work_precision(
-    points: Sequence[Point], path: str | os.PathLike[str], *, title: str = ""
-) -> None:
+def plot_work_precision(points: Sequence[Point], path: str | os.PathLike[str]) -> None:
     """Draw time against error, a marker per method and setting, and write it to `path`.
 
     The marker is at the median error, a thin bar reaches to the worst. Open markers had
@@ -67,7 +65,6 @@ def plot_work_precision(
     Args:
         points: measured methods; those of a family in the order of their settings.
         path: .png, .pdf or .svg.
-        title: written above.
     """
     figure = new_figure(width_in=8.0, height_in=5.4)
     axes = figure.subplots()
@@ -103,6 +100,4 @@ def plot_work_precision(
     axes.set_ylabel("median time of one run [s]")
     light_grid(axes)
     axes.legend(fontsize=7.5, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-    if title:
-        axes.set_title(title, fontsize=10)
     save_figure(figure, path)

@@ -13,7 +13,7 @@ from rbfrag.campaign.add_motions import AddReport, add_motions
 from rbfrag.db.engine import opened_database
 from rbfrag.db.motions import load_motion, motion_row, motion_rows
 from rbfrag.db.rows import MotionRow
-from rbfrag.db.vertical_pairs import VerticalPair, load_vertical, vertical_pairs
+from rbfrag.db.vertical_pairs import VerticalPair, vertical_pair, vertical_pairs
 from rbfrag.motions.processing import HighPass, processed
 from rbfrag.motions.recognise import read_motion, read_motions
 from tests.motions import written_by_networks as written
@@ -272,12 +272,10 @@ def test_horizontals_find_their_vertical(tmp_path: Path, db: Path) -> None:
     vertical = rows(db)[1]
     assert {p.vertical_sha256 for p in found.values() if p.vertical_id} == {vertical.sha256}
     with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        for i, pair in found.items():
-            loaded = load_vertical(connection, i)
-            assert (loaded and loaded.sha256) == pair.vertical_sha256
+        assert all(vertical_pair(connection, i) == pair for i, pair in found.items())
         assert "no vertical" in next(p.reason for p in found.values() if p.reason)
         with pytest.raises(ValueError, match="motion 2 is a vertical component"):
-            load_vertical(connection, 2)
+            vertical_pair(connection, 2)
 
 
 def at2_recording(folder: Path, **changes: object) -> Path:

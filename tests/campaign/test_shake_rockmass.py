@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rbfrag.campaign.shake_rockmass import ShakingProgress, shake
+from rbfrag.campaign.shake_rockmass import shake
+from rbfrag.campaign.summary import CampaignProgress
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.rockmasses.file import read_rock_mass
@@ -24,7 +25,7 @@ def record() -> GroundMotion:
 
 def test_two_workers_find_what_one_finds() -> None:
     made = read_rock_mass(EXAMPLE).realise(3 * CHUNK, 1)
-    told: list[ShakingProgress] = []
+    told: list[CampaignProgress] = []
     alone = shake(made, record(), scales=[0.7, 1.3], jobs=1)
     both = shake(made, record(), scales=[0.7, 1.3], jobs=2, on_progress=told.append)
     assert np.array_equal(alone.code, both.code)

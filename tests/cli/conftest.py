@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from rbfrag.cli.main import app
+from tests.synthetic import shaking, write_at2
 
 
 class Shell:
@@ -34,6 +35,11 @@ def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Shell:
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("RBFRAG_DB", raising=False)
     return Shell()
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Path:
+    return write_at2(tmp_path / "record.AT2", shaking(3))
 
 
 Refuses = Callable[..., str]

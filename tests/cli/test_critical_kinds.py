@@ -11,14 +11,8 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.critical import critical
 from rbfrag.solver.models.sliding import KY_OVER_PGA, sliding_displacements
 from tests.cli.conftest import Refuses, Shell
-from tests.synthetic import shaking, write_at2
 
 SLUMP = "alpha1_deg = 56\nalpha3_deg = 76\nr3_m = 0.7\nbeta_deg = 22\nphi_deg = 30\n"
-
-
-@pytest.fixture
-def record(tmp_path: Path) -> Path:
-    return write_at2(tmp_path / "record.AT2", shaking(3))
 
 
 @pytest.fixture

@@ -42,11 +42,6 @@ MOTION_KEYS = {
 }  # fmt: skip
 
 
-@pytest.fixture
-def record(tmp_path: Path) -> Path:
-    return write_at2(tmp_path / "record.AT2", shaking(3))
-
-
 def test_respond_json_has_the_contract_keys(shell: Shell, record: Path) -> None:
     stays = shell.json("respond", record, "--p2", "3", "--kr", "0.25")
     assert set(stays) == RESPOND_KEYS

@@ -11,14 +11,8 @@ import pytest
 import rbfrag
 from rbfrag.db.location import REFERENCE
 from tests.cli.conftest import Refuses, Shell
-from tests.synthetic import shaking, write_at2
 
 BLOCK = ("--p2", "3", "--kr", "0.05")
-
-
-@pytest.fixture
-def record(tmp_path: Path) -> Path:
-    return write_at2(tmp_path / "record.AT2", shaking(3))
 
 
 def test_unknown_polarity_gives_both_and_their_mean(shell: Shell, record: Path) -> None:

@@ -8,17 +8,11 @@ from pathlib import Path
 import pytest
 
 from tests.cli.conftest import Refuses, Shell
-from tests.synthetic import shaking, write_at2
 
 SLIDE = ("--s1", "1", "--s2", "2", "--gamma", "60", "--beta", "20", "--phi", "30")
 SLUMP = ("--alpha1", "45", "--alpha3", "65", "--r3", "1", "--beta", "0", "--phi", "35")
 CONFINED = ("--alpha1", "-40", "--alpha3", "20", "--r3", "1", "--beta", "5", "--phi", "30")
 TOPPLE = ("--alpha1", "-10", "--alpha3", "25", "--r3", "1.5", "--beta", "5", "--phi", "35")
-
-
-@pytest.fixture
-def record(tmp_path: Path) -> Path:
-    return write_at2(tmp_path / "record.AT2", shaking(3))
 
 
 @pytest.mark.parametrize(

@@ -38,9 +38,7 @@ def _rows(engine: Engine, table: str) -> int:
 
 
 @given(samples_g, st.floats(1e-4, 1.0))
-@settings(
-    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_samples_come_back_bit_for_bit(engine: Engine, samples: np.ndarray, dt_s: float) -> None:
     motion = GroundMotion(samples, dt_s)
     with engine.begin() as connection:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
@@ -31,7 +31,6 @@ KINDS = (".csv", ".xlsx", ".parquet")
 
 @pytest.mark.parametrize("kind", KINDS)
 # The first call loads pyarrow, which takes as long as it takes.
-@settings(deadline=None)
 @given(values=st.lists(st.floats(width=64), min_size=1, max_size=30))
 def test_numbers_come_back_to_the_bit(
     kind: str, values: list[float], tmp_path_factory: pytest.TempPathFactory

@@ -349,7 +349,7 @@ WHOLE = {
 
 
 @pytest.mark.parametrize("suffix", list(WHOLE))
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_damaged_files_are_refused_or_answered(
     suffix: str, data: st.DataObject, tmp_path_factory: pytest.TempPathFactory

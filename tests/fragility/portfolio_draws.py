@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import ndtr
 
 from rbfrag.fragility.dependence import Dependence
-from rbfrag.fragility.joint import Placement
+from rbfrag.fragility.joint import Placement, joint_excess
 
 LAW = Dependence(0.055, 0.162, 0.270, 0.513, 1.7, 2.5, 5.1, 0.67)
 
@@ -22,3 +23,8 @@ def anywhere(n: int, seed: int) -> Placement:
         random.uniform(-1.2, 1.7, n), random.normal(size=n), random.integers(2, size=n),
         random.integers(3, size=n), random.integers(2, size=n), random.choice((-1, 1), size=n),
     )  # fmt: skip
+
+
+def bivariate_normal(a, b, r):
+    """Return Φ₂(a, b; R), the probability that two standard normals are below a and b."""
+    return joint_excess(a, b, r) + ndtr(a) * ndtr(b)

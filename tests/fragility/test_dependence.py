@@ -50,7 +50,7 @@ def test_labels_may_be_text() -> None:
     st.lists(st.floats(0.05, 20.0), min_size=4, max_size=4),
     st.integers(0, 1000),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_correlations_are_positive_semidefinite(
     share: list[float], length: list[float], seed: int
 ) -> None:

@@ -13,8 +13,9 @@ from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.fit import pair_tables
 from rbfrag.fragility.fit.dependence import PairTables, estimate_dependence
-from rbfrag.fragility.joint import Placement, bivariate_normal
+from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
+from tests.fragility.portfolio_draws import bivariate_normal
 
 TRUE = Dependence(0.15, 0.20, 0.25, 0.40, 1.5, 1.5, 3.0, 0.5)
 

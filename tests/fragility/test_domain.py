@@ -135,7 +135,7 @@ def test_measures_that_the_model_does_not_read_are_judged_too(model: FragilityMo
     )
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(i=st.integers(0, 10**6), factor=st.floats(8.0, 100.0))
 def test_scaling_pgv_alone_leaves_the_domain(
     fitted: FragilityModel, data: FitData, i: int, factor: float

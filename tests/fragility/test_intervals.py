@@ -107,7 +107,7 @@ def expected_ends(
 COLUMNS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(
     number=st.integers(0, 10_000),
     seed=st.integers(0, 10_000),

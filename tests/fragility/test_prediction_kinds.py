@@ -55,7 +55,7 @@ def one(**asked: Any) -> Prediction:
     return answer
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     ky=st.floats(0.01, 0.5),
     d=st.floats(0.001, 1.0),
@@ -236,7 +236,7 @@ def test_an_unknown_model_or_kind_is_named(tmp_path: Any, monkeypatch: pytest.Mo
         predict(**SLUMP, pgv_m_s=0.5, rotation_deg=7.0)
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(
     ks=st.floats(0.02, 0.6),
     ps2=st.floats(0.5, 30.0),

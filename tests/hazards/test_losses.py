@@ -13,12 +13,12 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import binom, binomtest, chi2
 
+from benchmarks.joint_law import JointFailures
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError
 from rbfrag.exchange.event_losses import losses
 from rbfrag.exchange.openquake_events import JobFiles, read_events
-from rbfrag.fragility.joint_law import JointFailures
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.predict import predict
 from rbfrag.hazards import event_counts

@@ -40,9 +40,7 @@ def labels(motion: GroundMotion) -> dict[str, object]:
     recording=text, vertical=st.none() | st.booleans(), azimuth=st.none() | st.floats(0.0, 360.0),
     start=st.none() | st.datetimes(min_value=datetime(1900, 1, 1)), remarks=st.lists(text),
 )  # fmt: skip
-@settings(
-    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_csv_keeps_every_bit_and_label(
     tmp_path: Path,
     samples: np.ndarray,
@@ -77,9 +75,7 @@ def test_csv_keeps_every_bit_and_label(
 
 
 @given(samples=samples_g, dt_s=st.floats(1e-4, 1.0), station=text, event=text)
-@settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_at2_keeps_every_bit(
     tmp_path: Path, samples: np.ndarray, dt_s: float, station: str, event: str
 ) -> None:

@@ -100,7 +100,7 @@ def test_velocity_that_vanishes_twice_inside_one_interval() -> None:
     assert m.pgd_m == pytest.approx(top * G, rel=1e-13)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(samples, st.data())
 def test_measures_are_the_extremes_of_an_independent_integration(
     a: FloatArray, data: st.DataObject
@@ -124,7 +124,7 @@ def test_measures_are_the_extremes_of_an_independent_integration(
     assert m.final_displacement_m == pytest.approx(d[-1], abs=1e-10)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(samples)
 def test_histories_pass_through_the_independent_integration(a: FloatArray) -> None:
     motion = GroundMotion(a, 0.02)
@@ -133,7 +133,7 @@ def test_histories_pass_through_the_independent_integration(a: FloatArray) -> No
     np.testing.assert_allclose(displacement_m(a, motion.interval_s), d, atol=1e-12)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(samples, st.integers(-300, 300))
 def test_scaling_by_a_power_of_two_scales_every_measure_exactly(a: FloatArray, power: int) -> None:
     motion = GroundMotion(np.where(np.abs(a) < 1e-3, 0.0, a), 0.01)
@@ -147,7 +147,7 @@ def test_scaling_by_a_power_of_two_scales_every_measure_exactly(a: FloatArray, p
         assert scaled.tm_s == pytest.approx(motion.tm_s, rel=1e-12)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(samples)
 def test_reversed_polarity_keeps_peaks_and_turns_final_values(a: FloatArray) -> None:
     m, r = GroundMotion(a, 0.01).measures, GroundMotion(-a, 0.01).measures

@@ -68,7 +68,6 @@ def damaged(content: bytes, data: st.DataObject) -> bytes:
 @pytest.mark.parametrize("name", MADE)
 @settings(
     max_examples=200,
-    deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(data=st.data())

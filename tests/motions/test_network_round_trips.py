@@ -19,7 +19,6 @@ from tests.synthetic import shaking
 
 in_folder = settings(
     max_examples=40,
-    deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 

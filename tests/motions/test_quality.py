@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.motions.pulses import rectangular
 from rbfrag.motions.quality import quality_flags
+from tests.physics.pulses import rectangle
 
 
 def ordinary(npts: int = 2001, dt_s: float = 0.01, pga_g: float = 0.3) -> np.ndarray:
@@ -84,11 +84,11 @@ def test_edges(at: int, code: str) -> None:
 
 
 def test_analytic_pulse_is_not_suspected() -> None:
-    assert quality_flags(rectangular(0.3, 0.5)) == ()
-    assert [flag.code for flag in quality_flags(rectangular(6.0, 0.01))] == ["pga_suspicious"]
+    assert quality_flags(rectangle(0.5, 0.3)) == ()
+    assert [flag.code for flag in quality_flags(rectangle(0.01, 6.0))] == ["pga_suspicious"]
 
 
 def test_sentences_state_value_and_limit() -> None:
-    (flag,) = quality_flags(rectangular(6.0, 0.01))
+    (flag,) = quality_flags(rectangle(0.01, 6.0))
     assert "6 g" in flag.sentence
     assert "5 g" in flag.sentence

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import Polarity
-from rbfrag.motions.pulses import half_sine, rectangular, rectangular_cycle, triangle
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from tests.physics.pulses import rectangle, rectangular_cycle, sine_lobes, triangle
 
 P2 = np.geomspace(1e-4, 1e4, 17)
 
@@ -85,7 +85,7 @@ def half_sine_form(f: float) -> float:
 
 
 PULSES: dict[str, tuple[Callable[[float, float], GroundMotion], Callable[[float], float]]] = {
-    "rectangle": (rectangular, lambda f: -math.expm1(-f)),
+    "rectangle": (rectangle, lambda f: -math.expm1(-f)),
     "triangle": (triangle, lambda f: 1.0 - 2.0 / f * math.log(2.0 - math.exp(-0.5 * f))),
     "rectangular cycle": (rectangular_cycle, lambda f: math.expm1(-f) ** 2),
 }
@@ -97,7 +97,7 @@ def test_pulse_of_straight_lines(name: str, f: float) -> None:
     make, closed_form = PULSES[name]
     amplitude_g, p2 = 0.37, 7.3
     p = math.sqrt(p2)
-    angle = p * toppling_spectrum(make(amplitude_g, f / p), p2) / STANDARD_GRAVITY_M_S2
+    angle = p * toppling_spectrum(make(f / p, amplitude_g), p2) / STANDARD_GRAVITY_M_S2
     assert angle / amplitude_g == pytest.approx(closed_form(f), rel=1e-12)
 
 
@@ -105,7 +105,7 @@ def test_pulse_of_straight_lines(name: str, f: float) -> None:
 def test_half_sine(f: float) -> None:
     p2 = 7.3
     p = math.sqrt(p2)
-    motion = half_sine(1.0, f / p, f / p / 4000)
+    motion = sine_lobes(f / p, (1.0,), 4000)
     angle = p * toppling_spectrum(motion, p2) / STANDARD_GRAVITY_M_S2
     assert angle == pytest.approx(half_sine_form(f), rel=2e-7)
 
@@ -113,7 +113,7 @@ def test_half_sine(f: float) -> None:
 def test_half_sine_to_the_printed_digits() -> None:
     p2 = 1.0
     for f, printed in ((0.1, 0.06062997), (1.0, 0.42299562), (5.0, 0.86223461)):
-        angle = toppling_spectrum(half_sine(1.0, f, f / 4000), p2) / STANDARD_GRAVITY_M_S2
+        angle = toppling_spectrum(sine_lobes(f, (1.0,), 4000), p2) / STANDARD_GRAVITY_M_S2
         assert angle == pytest.approx(printed, abs=1e-7)
 
 
@@ -213,13 +213,13 @@ def test_extreme_sizes_stay_finite() -> None:
 
 
 def test_weights_agree_where_series_and_closed_form_meet() -> None:
-    motion = triangle(0.4, 2.0)  # intervals of 1 s: p h = p
+    motion = triangle(2.0, 0.4)  # intervals of 1 s: p h = p
     below, above = toppling_spectrum(motion, [0.25 * (1.0 - 1e-15), 0.25 * (1.0 + 1e-15)])
     assert above == pytest.approx(below, rel=3e-15)
 
 
 def test_shape_follows_p2() -> None:
-    motion = rectangular(0.3, 0.5)
+    motion = rectangle(0.5, 0.3)
     grid = toppling_spectrum(motion, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
     assert np.shape(grid) == (2, 3)
     assert np.shape(toppling_spectrum(motion, [])) == (0,)
@@ -237,12 +237,12 @@ def test_nothing_drives() -> None:
 @pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf, "three", [1.0, math.nan]])
 def test_bad_p2_is_refused(bad: object) -> None:
     with pytest.raises(InputError, match="p2"):
-        toppling_spectrum(rectangular(0.3, 0.5), bad)  # type: ignore[call-overload]
+        toppling_spectrum(rectangle(0.5, 0.3), bad)  # type: ignore[call-overload]
 
 
 def test_bad_polarity_is_refused() -> None:
     with pytest.raises(InputError, match="polarity"):
-        toppling_spectrum(rectangular(0.3, 0.5), 1.0, "both")  # type: ignore[arg-type]
+        toppling_spectrum(rectangle(0.5, 0.3), 1.0, "both")  # type: ignore[arg-type]
 
 
 def test_too_large_to_compute_is_refused() -> None:

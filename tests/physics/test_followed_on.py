@@ -16,6 +16,7 @@ from rbfrag.solver.integrator.one_freedom.equation import Pose
 from rbfrag.solver.kind import BlockOnPlanes
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome, Response
+from tests.on_planes import on_planes
 from tests.physics.penalty import Simulated, simulate
 from tests.physics.test_against_penalty import CONFINED, DT_S, SLUMPS, Case, half_sines
 
@@ -125,16 +126,7 @@ def test_steps_find_the_motion_that_mechanisms_solve_for() -> None:
 
 
 def site_of(case: Case) -> BlockOnPlanes:
-    return BlockOnPlanes(
-        block=case.block,
-        beta_rad=math.radians(case.beta),
-        phi_rad=math.radians(case.phi),
-        phi_back_rad=math.radians(case.back),
-        back_fracture=True,
-        cohesive=False,
-        yield_g=None,
-        settings={},
-    )
+    return on_planes(case.block, case.beta, case.phi, case.back)
 
 
 def test_a_confined_block_that_is_back_on_its_base_says_what_is_next() -> None:

@@ -114,7 +114,7 @@ def test_impulse_limit(velocity_m_s: float, p2: float) -> None:
     assert result.y_m_s == pytest.approx(velocity_m_s * math.cos(half_angle), rel=2e-4)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.lists(st.floats(-1.0, 1.0, width=32), min_size=2, max_size=25),
     st.sampled_from([0.1, 1.0, 10.0, 100.0]),

@@ -120,7 +120,7 @@ def by_small_steps(samples: list[float], dt_s: float, ky: float) -> float:
     return d
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(
     samples=st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=12),
     ky=st.floats(0.15, 0.9),
@@ -164,7 +164,7 @@ def test_any_record_against_the_cubics_of_its_intervals(seed: int) -> None:
         assert slid(answer) == pytest.approx(by_intervals(samples, 0.05, ky), rel=1e-9, abs=1e-14)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     samples=st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=30),
     ky=st.floats(0.01, 0.9),

@@ -9,9 +9,9 @@ import pytest
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2 as G
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.integrator.one_freedom.equation import Equation
-from rbfrag.solver.kind import BlockOnPlanes
 from rbfrag.solver.models import confined_toppling, slumping
 from rbfrag.solver.stability.single import stability
+from tests.on_planes import on_planes
 
 # r1 = 1 m, g = 9.81 m/s², both friction angles equal: an independent calculation by 3x3 equilibrium
 # (angles, then k, p², q at rest, k in reverse, and k, p², q after a rotation of 0.1 rad)
@@ -29,19 +29,6 @@ CONFINED = [
     (-40, 20, 30, 5, 103.363728, 0.410337, 8.287584, -0.842494, None, 0.372013, 9.066749,
      -0.991544),
 ]  # fmt: skip
-
-
-def on_planes(block: Block, beta_deg: float, phi_deg: float, back_deg: float) -> BlockOnPlanes:
-    return BlockOnPlanes(
-        block=block,
-        beta_rad=math.radians(beta_deg),
-        phi_rad=math.radians(phi_deg),
-        phi_back_rad=math.radians(back_deg),
-        back_fracture=True,
-        cohesive=False,
-        yield_g=None,
-        settings={},
-    )
 
 
 def coefficients(equation: Equation, theta: float) -> tuple[float, float, float]:

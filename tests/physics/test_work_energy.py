@@ -24,6 +24,7 @@ from rbfrag.solver.kind import BlockOnPlanes
 from rbfrag.solver.models import confined_toppling, sliding, slumping
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome
+from tests.on_planes import on_planes
 
 FloatArray = NDArray[np.float64]
 
@@ -32,19 +33,6 @@ Laws = Callable[
     [FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
     tuple[FloatArray, FloatArray, FloatArray, FloatArray],
 ]
-
-
-def planes(block: Block, beta_deg: float, phi_deg: float, back_deg: float) -> BlockOnPlanes:
-    return BlockOnPlanes(
-        block=block,
-        beta_rad=math.radians(beta_deg),
-        phi_rad=math.radians(phi_deg),
-        phi_back_rad=math.radians(back_deg),
-        back_fracture=True,
-        cohesive=False,
-        yield_g=None,
-        settings={"two_way": True},
-    )
 
 
 def shaking(seed: int, amplitude_g: float, vertical_g: float) -> Excitation:
@@ -159,10 +147,10 @@ def quintic(
 
 
 SLUMP_BLOCK = Block.from_angles(45, 70, 1.5)
-SLUMP = planes(SLUMP_BLOCK, 6, 33, 28)
+SLUMP = on_planes(SLUMP_BLOCK, 6, 33, 28, two_way=True)
 WEDGE_BLOCK = Block.from_angles(-60, 20, 1.0)
-WEDGE = planes(WEDGE_BLOCK, 12, 35, 33)
-SLIDE = planes(Block.from_angles(-20, 60, 1.0), 15, 30, 30)
+WEDGE = on_planes(WEDGE_BLOCK, 12, 35, 33, two_way=True)
+SLIDE = on_planes(Block.from_angles(-20, 60, 1.0), 15, 30, 30, two_way=True)
 
 CASES: dict[str, tuple[Mechanism, Laws, Excitation]] = {
     "sliding": (sliding.mechanism(SLIDE), slide_laws(SLIDE), shaking(1, 0.6, 0.3)),

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from rbfrag.motions.pulses import half_sine, rectangular, triangle
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.critical_strength import LOBES, half_sine_lobe, lobe_line, triangular_lobe
+from tests.physics.pulses import rectangle, sine_lobes, triangle
 
 F = (0.1, 0.5, 1.0, 2.0, 5.0)
 
@@ -31,9 +31,9 @@ def test_are_the_spectra_of_the_pulses(name: str, f: float) -> None:
     p2 = 2.0
     duration_s = f / math.sqrt(p2)
     pulse = {
-        "rectangular": lambda: rectangular(0.3, duration_s),
-        "half-sine": lambda: half_sine(0.3, duration_s, duration_s / 4000),
-        "triangular": lambda: triangle(0.3, duration_s),
+        "rectangular": lambda: rectangle(duration_s, 0.3),
+        "half-sine": lambda: sine_lobes(duration_s, (0.3,), 4000),
+        "triangular": lambda: triangle(duration_s, 0.3),
     }[name]()
     angle = math.sqrt(p2) * toppling_spectrum(pulse, p2) / STANDARD_GRAVITY_M_S2
     line = float(lobe_line(name, math.pi / f))

@@ -28,9 +28,7 @@ SCENARIOS = st.fixed_dictionaries(
 )
 
 
-@settings(
-    max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(values=SCENARIOS, level=st.sampled_from([0.5, 0.95, 0.999]))
 def test_one_block_is_answered_as_by_the_command_line(client, database, capsys, values, level):
     answer = client.get("/v1/predict", params={**values, "level": level})
@@ -43,9 +41,7 @@ def test_one_block_is_answered_as_by_the_command_line(client, database, capsys, 
     assert answer.json()["ci_high"] == own.ci_high
 
 
-@settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(rows=st.lists(SCENARIOS.map(lambda s: {**s, "pga": 0.5}), min_size=1, max_size=20))
 def test_lists_are_answered_within_rounding_of_single_blocks(client, rows):
     names = ("p2", "kr", "pgv")

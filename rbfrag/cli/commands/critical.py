@@ -16,7 +16,6 @@ from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import WAYS, ShapeOptions
 from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import option, stacked
-from rbfrag.cli.parameters.values import number_list
 from rbfrag.cli.sentences import critical_in_words, slides_in_words
 from rbfrag.errors import InputError
 from rbfrag.solver.described import TAKEN_TO_TOPPLE
@@ -94,7 +93,9 @@ def critical(
         remarks.append(TAKEN_TO_TOPPLE)
     say_when_compiling()
     if "displacement_m" in model.search_options:
-        distances = None if displacement is None else number_list(displacement, "--displacement")
+        distances = (
+            None if displacement is None else options.number_list(displacement, "--displacement")
+        )
         document = _slides(model.kind, ground, upward, direction.polarity, distances, remarks)
         print_json(document) if printing.json else _show_slides(document, verbose=printing.verbose)
         return

@@ -11,7 +11,6 @@ from rbfrag.cli.output import print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions
 from rbfrag.cli.parameters.stack import command_group, option, stacked
-from rbfrag.cli.parameters.values import number_list
 
 if TYPE_CHECKING:
     from rbfrag.exchange.export import ExportAnswer
@@ -65,7 +64,7 @@ def nrml(
     from rbfrag.exchange.export import nrml as written
 
     keywords, remarks = blocks.keywords()
-    wanted = None if shares is None else number_list(shares, "--shares")
+    wanted = None if shares is None else options.number_list(shares, "--shares")
     _print(written(out, **keywords, shares=wanted), remarks, json=json)
 
 

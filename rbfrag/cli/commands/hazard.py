@@ -17,7 +17,6 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
-from rbfrag.cli.parameters.curve import CurveOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.fragility.words import percent
@@ -83,7 +82,7 @@ def hazard(
     ),
     blocks: BlocksOptions,
     standing: StandingOptions,
-    meaning: CurveOptions,
+    meaning: options.Curve,
     answering: options.Answering,
     wanted: RateOptions,
     out: str | None = option("Write one row a block and site (.csv, .xlsx, .parquet)."),

@@ -143,13 +143,9 @@ def plot_curve(
 @app.command("sensitivity", epilog="Example:  rbfrag plot sensitivity --out sensitivity.png")
 def plot_sensitivity(out: Out, suite: options.Suite = None, db: options.Db = None) -> None:
     """Draw critical k_r/PGA over the frequency ratio omega_m/p, with the lines of single lobes."""
-    from rbfrag.db.engine import opened_database
-    from rbfrag.db.queries import combination_table
-    from rbfrag.plots.critical_strength import plot_sensitivity as draw
+    from rbfrag.plots import plot
 
-    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        table = combination_table(connection, suite=suite)
-    draw(table, out, data="without vertical motion" + (f", suite {suite}" if suite else ""))
+    plot.sensitivity(out, suite=suite, db=db)
     print(out)
 
 
@@ -177,15 +173,9 @@ def plot_calibration(
 @app.command("vertical", epilog="Example:  rbfrag plot vertical --out vertical.png")
 def plot_vertical(out: Out, suite: options.Suite = None, db: options.Db = None) -> None:
     """Draw critical strengths with vertical motion beside those without it."""
-    from rbfrag.db.engine import opened_database
-    from rbfrag.db.queries import combination_table
-    from rbfrag.plots.critical_strength import plot_vertical as draw
-    from rbfrag.plots.critical_strength import vertical_pairs
+    from rbfrag.plots import plot
 
-    with opened_database(db, read_only=True) as engine, engine.connect() as connection:
-        without = combination_table(connection, suite=suite)
-        with_it = combination_table(connection, suite=suite, vertical="with")
-    draw(vertical_pairs(without, with_it), out)
+    plot.vertical(out, suite=suite, db=db)
     print(out)
 
 
@@ -201,11 +191,10 @@ def plot_spectrum(
     db: options.Db = None,
 ) -> None:
     """Draw the toppling spectra of motions over the size of the block, with PGV beside them."""
-    from rbfrag.cli.parameters.values import number_list, polarities
     from rbfrag.plots import plot
     from rbfrag.plots.canvas import plot_path
 
-    sizes, wanted = number_list(p2, "--p2"), polarities(polarity)
+    sizes, wanted = options.number_list(p2, "--p2"), options.polarities(polarity)
     plot_path(out)
     records = [find_motion(text, db=db, reading=reading) for text in motions]
     plot.spectrum(records, out, polarities=wanted, p2=sizes)
@@ -263,20 +252,15 @@ def plot_modes(
 ) -> None:
     """Draw failure modes and yield accelerations over the block angles alpha1 and alpha3."""
     from rbfrag.cli.parameters.block import charted_blocks
+    from rbfrag.plots import plot
     from rbfrag.plots.canvas import plot_path
-    from rbfrag.plots.modes import plot_modes as draw
 
     plot_path(out)
     shown = charted_blocks(blocks, rockmass, phi=phi, phi_back=phi_back, no_back=no_back)
-    draw(
-        out,
-        phi_deg=phi,
-        beta_deg=beta,
-        phi_back_deg=phi_back,
-        back_fracture=not no_back,
-        alpha1_deg=shown.alpha1_deg,
-        alpha3_deg=shown.alpha3_deg,
-    )
+    plot.modes(
+        out, phi_deg=phi, beta_deg=beta, phi_back_deg=phi_back, back_fracture=not no_back,
+        alpha1_deg=shown.alpha1_deg, alpha3_deg=shown.alpha3_deg,
+    )  # fmt: skip
     print(out)
     print_warnings(shown.warnings)
 
@@ -302,7 +286,6 @@ def plot_rotation(
     The rock behind a block may give way with it: its back plane then turns by a share of the
     block's rotation.
     """
-    from rbfrag.cli.parameters.values import number_list
     from rbfrag.plots.rotation import plot_rotation as draw
 
     described = shape.described()
@@ -311,7 +294,9 @@ def plot_rotation(
     block, conditions = described.without_kv().on_planes()
     if not conditions.pop("back_fracture", True):
         raise InputError("--no-back: without a plane behind it no block turns against it")
-    lines = draw(block, out, shares=number_list(back_follows, "--back-follows"), **conditions)
+    lines = draw(
+        block, out, shares=options.number_list(back_follows, "--back-follows"), **conditions
+    )
     if json:
         print_json({"plot": out, "lines": [line._asdict() for line in lines]})
         return

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from rbfrag.cli.output import print_json, print_warnings
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import BlockOptions, StandingOptions
-from rbfrag.cli.parameters.curve import CurveOptions
 from rbfrag.cli.parameters.stack import option, stacked
 
 EXAMPLE = "Example:  rbfrag report --height 2.4 --width 0.5 --pgv 0.6 --out block.pdf"
@@ -40,7 +39,7 @@ def report(
     standing: StandingOptions,
     measures: options.Measures,
     rate: Hazard,
-    meaning: CurveOptions,
+    meaning: options.Curve,
     heading: Heading,
     answering: options.Answering,
     json: options.Json = False,

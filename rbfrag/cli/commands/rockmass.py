@@ -19,7 +19,6 @@ from rbfrag.cli.output import (
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_shaking
 from rbfrag.cli.parameters.stack import argument, option, stacked
-from rbfrag.cli.parameters.values import number_list
 from rbfrag.cli.sentences import rock_mass_in_words
 
 ALWAYS = ("at_rest", "stays", "unstable")
@@ -154,7 +153,7 @@ def rockmass(
         answer = answered(
             file, n=drawn.n, seed=drawn.seed, **stated, sa_g=spectrum or None, motion=ground,
             vertical=upward, polarity=shaken.polarity,
-            scales=[1.0] if shaken.scales is None else number_list(shaken.scales, "--scales"),
+            scales=options.number_list("1" if shaken.scales is None else shaken.scales, "--scales"),
             displacement_m=limits.displacement, rotation_deg=limits.rotation,
             model=answering.model, level=answering.level, db=answering.db, jobs=shaken.jobs,
             on_progress=lambda progress: bar.show(progress.done, progress.total),
@@ -164,12 +163,9 @@ def rockmass(
     if out is not None:
         write_table(answer.table_columns(), out, excel_text=excel_text)
     if plot is not None:
-        from rbfrag.plots.rockmass import plot_failures, plot_rockmass
+        from rbfrag.plots.plot import rockmass as draw
 
-        if answer.outcomes is None:
-            plot_rockmass(answer.blocks, plot)
-        else:
-            plot_failures(answer.outcomes, plot, level=answering.level)
+        draw(answer, plot)
     if printing.json:
         print_json(document)
         return

@@ -90,12 +90,9 @@ def shakemap(
     about = {**answer.about, "warnings": warnings}
     _write(dict(answer.columns), about, target, excel_text=excel_text)
     if plot is not None:
-        from rbfrag.plots.shakemap import plot_shakemap
+        from rbfrag.plots.plot import shakemap as draw
 
-        plot_shakemap(
-            answer.columns["lon"], answer.columns["lat"], answer.columns["probability"], plot,
-            title=answer.title, epicentre=answer.epicentre, shape=answer.shape,
-        )  # fmt: skip
+        draw(answer, plot)
     document = {**answer.as_dict(), "file": str(target), "warnings": warnings}
     if printing.json:
         print_json(document)

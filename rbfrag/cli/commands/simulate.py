@@ -18,7 +18,6 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.stack import option, stacked
-from rbfrag.cli.parameters.values import number_list
 
 if TYPE_CHECKING:
     from rbfrag.campaign.summary import CampaignProgress
@@ -226,18 +225,18 @@ def _conditional_cells(row: ConditionalShare) -> tuple[object, ...]:
 
 
 def _numbers(text: str | None, option: str) -> list[float] | None:
-    return None if text is None else number_list(text, option)
+    return None if text is None else options.number_list(text, option)
 
 
 def _rotations(text: str) -> list[float | None]:
     return [
-        None if part.strip() == RECOVERY else number_list(part, "--rotation")[0]
+        None if part.strip() == RECOVERY else options.number_list(part, "--rotation")[0]
         for part in text.split(",")
     ]
 
 
 def _grid(text: str) -> int | list[float]:
-    return int(text) if text.strip().isdecimal() else number_list(text, "--grid")
+    return int(text) if text.strip().isdecimal() else options.number_list(text, "--grid")
 
 
 def _blocks(text: str) -> list[float | Literal["critical"]]:
@@ -246,5 +245,5 @@ def _blocks(text: str) -> list[float | Literal["critical"]]:
         if part.strip() == "critical":
             blocks.append("critical")
         else:
-            blocks += number_list(part, "--store-responses")
+            blocks += options.number_list(part, "--store-responses")
     return blocks

@@ -14,8 +14,6 @@ from rbfrag.cli.output import (
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.motion import find_motion
 from rbfrag.cli.parameters.stack import option, stacked
-from rbfrag.cli.parameters.values import number_list
-from rbfrag.cli.parameters.values import polarities as polarities_of
 from rbfrag.cli.sentences import rounded, spectrum_in_words, strongest_kr
 
 if TYPE_CHECKING:
@@ -46,7 +44,7 @@ def spectrum(
     """
     from rbfrag.motions.toppling_spectrum import spectrum_as_dict as as_dict
 
-    sizes, polarities = number_list(p2, "--p2"), polarities_of(polarity)
+    sizes, polarities = options.number_list(p2, "--p2"), options.polarities(polarity)
     check_files(table=csv, plot=plot, excel_text=excel_text)
     records = [find_motion(text, db=db, reading=reading) for text in motions]
     answers = [

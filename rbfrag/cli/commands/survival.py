@@ -17,7 +17,6 @@ from rbfrag.cli.output import (
 )
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import StandingOptions, TableOptions
-from rbfrag.cli.parameters.curve import CurveOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.cli.sentences import rounded
 
@@ -70,7 +69,7 @@ def survival(
     blocks: TableOptions,
     standing: StandingOptions,
     known: Uncertainty,
-    meaning: CurveOptions,
+    meaning: options.Curve,
     answering: options.Answering,
     weights: str | None = option(
         "Weights of the branches: 0.5,0.3,0.2 in the order of the curves, or OpenQuake's file of "

@@ -1,14 +1,20 @@
-"""Options that several commands share, with one wording each, and those that travel together."""
+"""Options that several commands share, with one wording each, and what their values mean."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from rbfrag.cli.parameters.completion import model_names, motion_ids
 from rbfrag.cli.parameters.stack import option
+from rbfrag.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rbfrag.motions.polarity import Polarity as PolarityName
 
 EXCEL_TEXT = (
     "In CSV: write texts that begin with = + - or @ with an apostrophe, so that Excel does not "
@@ -159,3 +165,48 @@ class Answering:
     model: Model = None
     level: Level = 0.95
     db: Db = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Curve:
+    """What a hazard curve means."""
+
+    imt: str | None = option("Intensity measure of the curve: PGV, PGA, 'SA(1.0)'.")
+    site: str | None = option("Site of the file: its number from 1 on, or its name.")
+    convert: str | None = option(
+        "Published conversion of a spectral acceleration to PGV: newmark_hall_1982 "
+        "(SA(1)) or bommer_alarcon_2006 (SA(0.5)); its scatter is integrated."
+    )
+    convert_sigma: float | None = option(
+        "Standard deviation of ln PGV about the conversion. Default: that of the reference's "
+        "motions."
+    )
+    component: str | None = option(
+        "What the curve's horizontal component means: single, geometric_mean, rotd50 or larger. "
+        "Left out: single, with a warning."
+    )
+
+
+def number_list(text: str, option: str) -> list[float]:
+    """Return the numbers of a list separated by commas."""
+    values = []
+    for part in text.split(","):
+        try:
+            values.append(float(part))
+        except ValueError:
+            raise InputError(
+                f"{option}: {part.strip()!r} is no number: write a list such as 30,10,3,1"
+            ) from None
+    return values
+
+
+def polarities(text: str) -> Sequence[PolarityName]:
+    """Return the polarities that forward, reverse or both means."""
+    from rbfrag.motions.polarity import POLARITIES
+
+    if text == "both":
+        return POLARITIES
+    chosen = [each for each in POLARITIES if each == text]
+    if not chosen:
+        raise InputError(f"--polarity is {text!r}: write forward, reverse or both")
+    return chosen

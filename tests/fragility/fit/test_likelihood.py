@@ -129,7 +129,7 @@ def test_a_published_logistic_regression():
     assert errors == [4.931, 1.263, 0.142, 1.065]
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(-6, 6))
 def test_slopes_and_inverses_of_the_links(eta):
     for link in ALL:

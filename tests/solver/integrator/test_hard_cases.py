@@ -17,16 +17,7 @@ from rbfrag.solver.excitation import excitation
 from rbfrag.solver.results import Outcome, Response
 from rbfrag.solver.search.critical import critical
 from rbfrag.solver.toppling_run import respond
-
-
-def nodes(times: list[float], values: list[float]) -> GroundMotion:
-    return GroundMotion.from_nodes(times, values)
-
-
-def noise(seed: int, npts: int = 300, dt_s: float = 0.02, pga_g: float = 0.5) -> GroundMotion:
-    rng = np.random.default_rng(seed)
-    samples = np.convolve(rng.standard_normal(npts + 20), np.hanning(12), "same")[10:-10]
-    return GroundMotion(samples * (pga_g / np.abs(samples).max()), dt_s)
+from tests.solver.motions import noise
 
 
 def judged(
@@ -55,7 +46,7 @@ UP_S, DOWN_S = 0.2, 0.35
 
 def grazing(brake: float) -> GroundMotion:
     """Thrown up, pulled down, and braked by a constant acceleration until the base is near."""
-    return nodes(
+    return GroundMotion.from_nodes(
         [0.0, 0.0, UP_S, UP_S, DOWN_S, DOWN_S, 0.9, 0.9],
         [0.0, 0.6, 0.6, -0.5, -0.5, brake, brake, 0.0],
     )
@@ -138,7 +129,7 @@ def test_a_search_over_chatter_ends_with_a_proof() -> None:
 @pytest.mark.parametrize("level", [0.2, 0.3, 1.0 / 3.0])
 def test_plateau_at_the_threshold(level: float) -> None:
     """A block starts where q exceeds k_r: not at equality, and by one ulp it does."""
-    motion = nodes([0.0, 1.0, 3.0, 4.0], [0.0, level, level, 0.0])
+    motion = GroundMotion.from_nodes([0.0, 1.0, 3.0, 4.0], [0.0, level, level, 0.0])
     at_rest = respond(motion, p2=10.0, kr=level)
     assert (at_rest.started_s, at_rest.peak_theta_rad, at_rest.samples_moved) == (None, 0.0, 0)
     weaker = float(np.nextafter(level, 0.0))
@@ -156,7 +147,7 @@ def test_plateau_at_the_threshold(level: float) -> None:
 @pytest.mark.parametrize("kr", [0.05, 0.2, 0.4])
 def test_small_block_on_a_coarse_record(seed: int, kr: float) -> None:
     """p² = 100 at dt = 0.02 s is p·h = 0.2: one step of it would err by 1e-6, so it is split."""
-    run, true = judged(noise(seed), 100.0, kr)
+    run, true = judged(noise(seed, npts=300, dt_s=0.02), 100.0, kr)
     if true.intervals_moved:
         assert run.steps >= 6 * run.samples_moved / 2
 
@@ -164,8 +155,8 @@ def test_small_block_on_a_coarse_record(seed: int, kr: float) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_huge_block(seed: int) -> None:
     """p² = 1e-3 (a centroid at 7 km): gravity hardly acts, the rotation is that of the pull."""
-    judged(noise(seed), 1e-3, 0.05)
-    judged(noise(seed), 1e-3, 0.3)
+    judged(noise(seed, npts=300, dt_s=0.02), 1e-3, 0.05)
+    judged(noise(seed, npts=300, dt_s=0.02), 1e-3, 0.3)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -174,19 +165,21 @@ def test_extreme_strengths(seed: int) -> None:
 
     Where gravity is all but taken away it does lift, and cos(theta_c) is 1e-4 then.
     """
-    run, _ = judged(noise(seed), 3.0, 1e-5)
+    run, _ = judged(noise(seed, npts=300, dt_s=0.02), 3.0, 1e-5)
     assert run.outcome is Outcome.TOPPLED
-    run, _ = judged(noise(seed), 3.0, 1e4)
+    run, _ = judged(noise(seed, npts=300, dt_s=0.02), 3.0, 1e4)
     assert (run.peak_theta_rad, run.samples_moved) == (0.0, 0)
-    pull = nodes([0.0, 0.5, 1.0, 2.0], [0.0, 0.4, 0.0, 0.0])
-    weightless = nodes([0.0, 0.5, 1.0, 2.0], [0.0, 1e-5 - 1.0, 0.0, 0.0])
+    pull = GroundMotion.from_nodes([0.0, 0.5, 1.0, 2.0], [0.0, 0.4, 0.0, 0.0])
+    weightless = GroundMotion.from_nodes([0.0, 0.5, 1.0, 2.0], [0.0, 1e-5 - 1.0, 0.0, 0.0])
     run, _ = judged(pull, 3.0, 1e4, weightless, rel=1e-7)
     assert run.samples_moved > 0
 
 
 def test_past_the_critical_angle_and_back() -> None:
     """Beyond its balance a block falls on by itself, yet a pull the other way can save it."""
-    motion = nodes([0.0, 0.0, 0.25, 0.25, 0.5, 0.5], [0.0, 1.0, 1.0, -1.0, -1.0, 0.0])
+    motion = GroundMotion.from_nodes(
+        [0.0, 0.0, 0.25, 0.25, 0.5, 0.5], [0.0, 1.0, 1.0, -1.0, -1.0, 0.0]
+    )
     kr = critical(motion, p2=2.0).kr
     assert kr is not None
     for off in (1e-2, 1e-4, 1e-6, 1e-8):
@@ -200,7 +193,7 @@ def test_past_the_critical_angle_and_back() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_zero_padding_before_and_after(seed: int) -> None:
     """Rest before changes no bit and costs no step; rest after is what is assumed anyway."""
-    motion = noise(seed, npts=120)
+    motion = noise(seed, npts=120, dt_s=0.02)
     start = int(np.flatnonzero(motion.acceleration_g > 0.2)[0])
     cut = GroundMotion(motion.acceleration_g[start : start + 40], motion.dt_s)
     late = GroundMotion(np.pad(cut.acceleration_g, (100_000, 0)), motion.dt_s)
@@ -240,8 +233,10 @@ def test_last_sample_that_is_not_zero(p2: float) -> None:
     """After the last sample the ground is at rest: a jump, and energy decides at once."""
     for values in ([0.5, 0.5, 0.5], [0.5, -0.2, 0.6], [0.0, 0.2, 0.9], [0.4, 0.4, -0.9]):
         times = [0.0, 0.1, 0.2]
-        run, _ = judged(nodes(times, values), p2, 0.3)
-        written_out = respond(nodes([*times, 0.2, 3.0], [*values, 0.0, 0.0]), p2=p2, kr=0.3)
+        run, _ = judged(GroundMotion.from_nodes(times, values), p2, 0.3)
+        written_out = respond(
+            GroundMotion.from_nodes([*times, 0.2, 3.0], [*values, 0.0, 0.0]), p2=p2, kr=0.3
+        )
         assert written_out.outcome == run.outcome
         if run.peak_theta_rad is not None:
             assert written_out.peak_theta_rad == pytest.approx(run.peak_theta_rad, rel=1e-10)
@@ -250,8 +245,8 @@ def test_last_sample_that_is_not_zero(p2: float) -> None:
 @pytest.mark.parametrize("left", [0.1, 1e-3, 1e-6, 1e-12])
 def test_gravity_nearly_taken_away(left: float) -> None:
     """1 + k_v > 0 is the model, however little is left; q runs up to k_h/(1 + k_v)."""
-    motion = nodes([0.0, 0.5, 1.0, 2.0], [0.0, 0.05, -0.3, 0.0])
-    vertical = nodes([0.0, 0.5, 1.0, 2.0], [0.0, left - 1.0, 0.0, 0.0])
+    motion = GroundMotion.from_nodes([0.0, 0.5, 1.0, 2.0], [0.0, 0.05, -0.3, 0.0])
+    vertical = GroundMotion.from_nodes([0.0, 0.5, 1.0, 2.0], [0.0, left - 1.0, 0.0, 0.0])
     for kr in (0.3, 2.0):
         judged(motion, 2.0, kr, vertical, rel=1e-8)
     result = critical(motion, p2=2.0, vertical=vertical)
@@ -261,8 +256,8 @@ def test_gravity_nearly_taken_away(left: float) -> None:
 @pytest.mark.parametrize("least", [0.0, -1e-12, -0.5])
 def test_gravity_taken_away(least: float) -> None:
     """1 + k_v <= 0 throws the block: outside the model, said with its time, never guessed."""
-    motion = nodes([0.0, 0.5, 1.0, 2.0], [0.0, 0.05, -0.3, 0.0])
-    vertical = nodes([0.0, 0.5, 1.0, 2.0], [0.0, least - 1.0, 0.0, 0.0])
+    motion = GroundMotion.from_nodes([0.0, 0.5, 1.0, 2.0], [0.0, 0.05, -0.3, 0.0])
+    vertical = GroundMotion.from_nodes([0.0, 0.5, 1.0, 2.0], [0.0, least - 1.0, 0.0, 0.0])
     run = respond(motion, p2=2.0, kr=0.3, vertical=vertical)
     assert run.outcome is Outcome.JUMP
     assert run.peak_theta_rad is None

@@ -30,27 +30,14 @@ from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, follow
 from rbfrag.solver.integrator.one_freedom.harmonics import constant, cosine, sine, turning
 from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
 from rbfrag.solver.integrator.one_freedom.step import TURN_MAX
-from rbfrag.solver.kind import BlockOnPlanes
 from rbfrag.solver.models import confined_toppling, sliding, slumping
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome
 from rbfrag.solver.toppling_run import respond as topple
+from tests.on_planes import on_planes
 from tests.synthetic import shaking
 
 DT_S = 0.01
-
-
-def site(block: Block, beta_deg: float, phi_deg: float, back_deg: float) -> BlockOnPlanes:
-    return BlockOnPlanes(
-        block=block,
-        beta_rad=math.radians(beta_deg),
-        phi_rad=math.radians(phi_deg),
-        phi_back_rad=math.radians(back_deg),
-        back_fracture=True,
-        cohesive=False,
-        yield_g=None,
-        settings={},
-    )
 
 
 def record(seed: int, amplitude_g: float) -> GroundMotion:
@@ -58,7 +45,7 @@ def record(seed: int, amplitude_g: float) -> GroundMotion:
     return GroundMotion(amplitude_g * a / np.abs(a).max(), DT_S)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0))
 def test_harmonics_are_the_functions_that_they_stand_for(
     x: float, one: float, two: float, three: float
@@ -117,9 +104,9 @@ def test_the_engine_as_a_toppling_block(seed: int, scale: float) -> None:
 
 
 MECHANISMS = {
-    "slump": slumping.mechanism(site(Block.from_angles(45, 65, 2.0), 12, 35, 30)),
-    "small slump": slumping.mechanism(site(Block.from_angles(40, 75, 0.2), 15, 30, 35)),
-    "confined": confined_toppling.mechanism(site(Block.from_angles(-60, 20, 1.0), 15, 35, 35)),
+    "slump": slumping.mechanism(on_planes(Block.from_angles(45, 65, 2.0), 12, 35, 30)),
+    "small slump": slumping.mechanism(on_planes(Block.from_angles(40, 75, 0.2), 15, 30, 35)),
+    "confined": confined_toppling.mechanism(on_planes(Block.from_angles(-60, 20, 1.0), 15, 35, 35)),
 }
 
 
@@ -151,9 +138,7 @@ def without_history(run: MechanismRun) -> list[object]:
     return [run.phase.name, *(getattr(plain, name) for name in names)]
 
 
-TWO_WAY = sliding.mechanism(
-    replace(site(Block.from_angles(10, 60, 1.0), 12, 30, 30), settings={"two_way": True})
-)
+TWO_WAY = sliding.mechanism(on_planes(Block.from_angles(10, 60, 1.0), 12, 30, 30, two_way=True))
 
 
 @pytest.mark.parametrize("calm", [1, 15, 16, 17, 200])
@@ -246,7 +231,7 @@ def test_thrown_off_by_the_vertical_motion() -> None:
 def test_painleve() -> None:
     # an overhanging toe: the inertia of the rigid problem is negative
     block = Block.from_angles(-70.0, -65.0, 1.0)
-    equation = confined_toppling.equation(site(block, 10.0, 15.0, 15.0))
+    equation = confined_toppling.equation(on_planes(block, 10.0, 15.0, 15.0))
     assert equation.inertia(0.0) < 0.0
     k = equation.threshold(0.0)
     motion = GroundMotion.from_nodes([0.0, 1.0, 2.0], [0.0, 2.0 * k, 0.0])

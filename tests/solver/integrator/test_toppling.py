@@ -16,17 +16,8 @@ from rbfrag.motions.recognise import read_motions
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.results import Outcome
 from rbfrag.solver.toppling_run import OUTCOMES, respond
+from tests.solver.motions import noise
 from tests.solver.reference import integrate
-
-
-def nodes(times: list[float], values: list[float]) -> GroundMotion:
-    return GroundMotion.from_nodes(times, values)
-
-
-def noise(seed: int, npts: int = 600, pga_g: float = 0.5, dt_s: float = 0.01) -> GroundMotion:
-    rng = np.random.default_rng(seed)
-    samples = np.convolve(rng.standard_normal(npts + 20), np.hanning(12), "same")[10:-10]
-    return GroundMotion(samples * (pga_g / np.abs(samples).max()), dt_s)
 
 
 def agree(
@@ -49,7 +40,7 @@ def agree(
 
 def test_energy_is_kept_in_free_rocking() -> None:
     times = [0.0, 0.0, 0.2, 0.2, *np.arange(0.21, 3.0, 0.01)]
-    motion = nodes(times, [0.0, 0.5, 0.5, 0.0] + [0.0] * (len(times) - 4))
+    motion = GroundMotion.from_nodes(times, [0.0, 0.5, 0.5, 0.0] + [0.0] * (len(times) - 4))
     history = respond(motion, p2=4.0, kr=0.3, history=True).history
     assert history is not None
     free = (history.time_s > 0.2) & (history.theta_rad > 0.0)
@@ -80,8 +71,8 @@ def test_only_p_times_time_matters(factor: float) -> None:
 
 def test_constant_vertical_acceleration_is_a_scaled_gravity() -> None:
     # k_h/(1+k_v) and p² (1+k_v) take their places; free motion comes back before the end
-    motion = nodes([0.0, 0.0, 0.1, 0.1, 3.0], [0.0, 0.6, 0.6, 0.0, 0.0])
-    vertical = nodes([0.0, 0.0, 0.1, 0.1, 3.0], [-0.4] * 5)
+    motion = GroundMotion.from_nodes([0.0, 0.0, 0.1, 0.1, 3.0], [0.0, 0.6, 0.6, 0.0, 0.0])
+    vertical = GroundMotion.from_nodes([0.0, 0.0, 0.1, 0.1, 3.0], [-0.4] * 5)
     one = respond(motion, p2=5.0, kr=0.4, vertical=vertical)
     other = respond(motion.scaled(1.0 / 0.6), p2=5.0 * 0.6, kr=0.4)
     assert one.outcome is Outcome.STABLE
@@ -90,8 +81,8 @@ def test_constant_vertical_acceleration_is_a_scaled_gravity() -> None:
 
 
 def test_throw_is_reported_where_effective_gravity_vanishes_inside_an_interval() -> None:
-    motion = nodes([0.0, 1.0, 2.0], [0.0, 0.1, 0.0])
-    vertical = nodes([0.0, 1.0, 2.0], [0.0, -0.5, -1.5])
+    motion = GroundMotion.from_nodes([0.0, 1.0, 2.0], [0.0, 0.1, 0.0])
+    vertical = GroundMotion.from_nodes([0.0, 1.0, 2.0], [0.0, -0.5, -1.5])
     run = respond(motion, p2=1.0, kr=0.5, vertical=vertical)
     assert run.outcome is Outcome.JUMP
     assert run.peak_theta_n is None
@@ -99,8 +90,8 @@ def test_throw_is_reported_where_effective_gravity_vanishes_inside_an_interval()
 
 
 def test_gravity_close_to_zero_is_still_the_model() -> None:
-    motion = nodes([0.0, 0.5, 1.0, 2.0], [0.0, 0.001, -0.3, 0.0])
-    vertical = nodes([0.0, 0.5, 1.0, 2.0], [0.0, -1.0 + 1e-9, 0.0, 0.0])
+    motion = GroundMotion.from_nodes([0.0, 0.5, 1.0, 2.0], [0.0, 0.001, -0.3, 0.0])
+    vertical = GroundMotion.from_nodes([0.0, 0.5, 1.0, 2.0], [0.0, -1.0 + 1e-9, 0.0, 0.0])
     agree(motion, 2.0, 0.3, vertical)
 
 
@@ -120,26 +111,30 @@ def test_history_and_answer_agree(seed: int, kr: float) -> None:
 
 
 def test_a_jump_lifts_a_block_and_a_steep_fall_brings_it_back_at_once() -> None:
-    motion = nodes([0.0, 0.0, 0.01, 0.5, 0.5], [0.0, 0.21, -3.0, 0.1, 0.0])
+    motion = GroundMotion.from_nodes([0.0, 0.0, 0.01, 0.5, 0.5], [0.0, 0.21, -3.0, 0.1, 0.0])
     agree(motion, 1.0, 0.2)
 
 
 def test_a_spike_of_no_duration_moves_nothing() -> None:
-    motion = nodes([0.0, 0.0, 0.3, 1.0], [0.5, -0.1, 0.3, 0.0])
+    motion = GroundMotion.from_nodes([0.0, 0.0, 0.3, 1.0], [0.5, -0.1, 0.3, 0.0])
     agree(motion, 1.0, 0.2)
-    run = respond(nodes([0.0, 1.0, 1.0, 1.0, 2.0], [0, 0, 0.5, 0, 0]), p2=1.0, kr=0.2)
+    run = respond(
+        GroundMotion.from_nodes([0.0, 1.0, 1.0, 1.0, 2.0], [0, 0, 0.5, 0, 0]), p2=1.0, kr=0.2
+    )
     assert (run.started_s, run.peak_theta_n) == (None, 0.0)
 
 
 def test_a_block_swung_round_in_one_long_interval_has_toppled() -> None:
-    motion = nodes([0.0, 0.91, 0.93], [1.079, -0.109, -0.606])
+    motion = GroundMotion.from_nodes([0.0, 0.91, 0.93], [1.079, -0.109, -0.606])
     assert agree(motion, 36.0, 0.129) is Outcome.TOPPLED
 
 
 def test_a_falling_block_is_not_undetermined_at_the_escape_speed() -> None:
     # x > 0 and falling back: it comes back, however fast
     for end in np.linspace(0.5, 0.6, 41):
-        motion = nodes([0.0, 0.0, 0.2, 0.2, float(end), float(end)], [0, 0.5, 0.5, -0.5, -0.5, 0])
+        motion = GroundMotion.from_nodes(
+            [0.0, 0.0, 0.2, 0.2, float(end), float(end)], [0, 0.5, 0.5, -0.5, -0.5, 0]
+        )
         assert respond(motion, p2=5.0, kr=0.3).outcome is not Outcome.UNDETERMINED
 
 
@@ -155,7 +150,9 @@ def test_chatter_about_the_threshold(size: float) -> None:
 
 
 def test_plateau_equal_to_the_threshold_does_not_lift() -> None:
-    run = respond(nodes([0.0, 1.0, 3.0, 4.0], [0.0, 0.25, 0.25, 0.0]), p2=10.0, kr=0.25)
+    run = respond(
+        GroundMotion.from_nodes([0.0, 1.0, 3.0, 4.0], [0.0, 0.25, 0.25, 0.0]), p2=10.0, kr=0.25
+    )
     assert run.started_s is None
     assert run.peak_theta_rad == 0.0
 
@@ -173,7 +170,7 @@ def test_extreme_slenderness(kr: float) -> None:
 
 
 def test_past_the_critical_angle_and_back() -> None:
-    motion = nodes([0.0, 0.0, 0.25, 0.25, 0.5, 0.5], [0, 1.0, 1.0, -1.0, -1.0, 0])
+    motion = GroundMotion.from_nodes([0.0, 0.0, 0.25, 0.25, 0.5, 0.5], [0, 1.0, 1.0, -1.0, -1.0, 0])
     run = respond(motion, p2=2.0, kr=0.1)
     assert run.outcome is Outcome.STABLE
     assert run.peak_theta_n is not None
@@ -216,7 +213,7 @@ def test_bad_numbers_are_named(name: str, value: float) -> None:
 values_g = st.sampled_from([-1.0, -0.4, -0.2, 0.0, 0.1, 0.2, 0.25, 0.5, 1.0])
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(
     st.lists(st.tuples(values_g, st.sampled_from([0.0, 0.003, 0.02, 0.2, 0.9])), max_size=12),
     st.sampled_from([0.05, 0.2, 0.4]),

@@ -146,7 +146,7 @@ def test_what_was_seen_is_told_as_intervals_and_points() -> None:
     assert "not proven" in critical_as_dict(found)["warnings"][-1]
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seed=st.integers(0, 10_000), size=st.floats(0.1, 3.0))
 def test_everything_that_was_looked_at_below_the_critical_scale_is_safe(
     seed: int, size: float

@@ -48,7 +48,7 @@ def test_the_strength_of_a_rectangular_pulse_is_the_closed_form(
     assert found.upper - found.lower <= 1e-9
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000), with_vertical=st.booleans())
 def test_displacement_falls_with_strength_and_is_convex(seed: int, with_vertical: bool) -> None:
     motion, up = pair(seed)

@@ -10,7 +10,7 @@ import pytest
 
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.polarity import POLARITIES
-from rbfrag.motions.pulses import rectangular_cycle, reversal_pulse
+from rbfrag.motions.pulses import reversal_pulse
 from rbfrag.motions.recognise import read_motions
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -18,6 +18,7 @@ from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.single_run import TOPPLED
 from rbfrag.solver.toppling_run import runner
 from tests.physics import linear_block
+from tests.physics.pulses import rectangular_cycle
 from tests.solver.excursions_from_rest import largest_failing
 from tests.synthetic import shaking
 
@@ -27,7 +28,7 @@ MOTIONS = {
     **{f"shaking {seed}": GroundMotion(shaking(seed), 0.02) for seed in range(4)},
     "starts above zero": GroundMotion([0.2, 0.1, -0.3, 0.25, -0.1], 0.11),
     "ends away from zero": GroundMotion([0.0, 0.3, -0.2, 0.15], 0.07),
-    "jumps": rectangular_cycle(0.4, 0.35),
+    "jumps": rectangular_cycle(0.35, 0.4),
     "reversal": reversal_pulse(0.3, 0.6, 0.8, 0.01),
 }
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 
+from benchmarks.joint_orthant import none_fails
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import Placement, checked, count_moments
-from rbfrag.fragility.joint_orthant import none_fails
 from rbfrag.fragility.joint_points import REPLICATES, LatentPoints
 
 FloatArray = NDArray[np.float64]

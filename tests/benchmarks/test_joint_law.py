@@ -11,13 +11,13 @@ from scipy.integrate import quad
 from scipy.special import ndtr, ndtri
 from scipy.stats import multivariate_normal
 
+from benchmarks.joint_law import JointFailures
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence
-from rbfrag.fragility.joint import Placement, bivariate_normal
-from rbfrag.fragility.joint_law import JointFailures
+from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_points import LatentPoints
 from rbfrag.fragility.joint_sampling import JointSampler
-from tests.fragility.portfolio_draws import LAW, anywhere
+from tests.fragility.portfolio_draws import LAW, anywhere, bivariate_normal
 
 ALONE = Dependence(0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1e-9)
 

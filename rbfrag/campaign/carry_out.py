@@ -1,0 +1,93 @@
+"""Carrying out a campaign: work is handed out, answers stored as they come, progress told."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Engine
+
+from rbfrag.campaign.executors.local import CLUSTER, executor
+from rbfrag.campaign.interrupt import Stopped
+from rbfrag.campaign.machine import processor_and_compiler
+from rbfrag.campaign.summary import CampaignProgress
+from rbfrag.db.campaigns import finish_campaign, start_campaign
+from rbfrag.errors import StoppedError, WorkFailedError
+from rbfrag.solver.results import NUMERICS_VERSION
+
+
+@dataclass(frozen=True)
+class Workforce:
+    """Who does the work of a campaign, and who hears of it.
+
+    Args:
+        jobs: worker processes; None for one per processor.
+        scheduler: address of a Dask scheduler whose workers take their place.
+        on_progress: called after each motion, or pair of motions.
+        stopped: asked now and then whether to end.
+    """
+
+    jobs: int | None
+    scheduler: str | None
+    on_progress: Callable[[CampaignProgress], None] | None
+    stopped: Stopped
+
+    def carry_out(
+        self,
+        engine: Engine,
+        settings: Mapping[str, object],
+        do: Callable[[Any], Any],
+        work: Iterator[object],
+        chunks: int,
+        store: Callable[[int, Any], int],
+        *,
+        total: int,
+        resumed: int,
+        started: float,
+    ) -> None:
+        """Have all work done and stored.
+
+        Args:
+            engine: the database.
+            settings: what the campaign was asked for.
+            do: does one chunk of work; a function of a module, which workers can find.
+            work: the chunks.
+            chunks: their number.
+            store: stores the answers to one chunk, which belong to the campaign of this row id, and
+                returns the number of combinations.
+            total: number of combinations.
+            resumed: of these, those that are stored already.
+            started: when the campaign began, by time.perf_counter [s].
+
+        Raises:
+            StoppedError: `stopped` said so; what was finished is stored.
+            WorkFailedError: a worker died, or has other numerics.
+        """
+        done = resumed
+
+        def tell() -> None:
+            if self.on_progress is not None:
+                seconds = time.perf_counter() - started
+                self.on_progress(CampaignProgress(done, total, resumed, seconds))
+
+        where = processor_and_compiler() if self.scheduler is None else CLUSTER
+        scheduler = self.scheduler if chunks else None
+        with executor(do, self.jobs, scheduler, self.stopped) as execute:
+            with engine.begin() as connection:
+                campaign_id = start_campaign(connection, {**settings, "made_on": where})
+            tell()
+            for answers in execute(work, chunks):
+                if answers.numerics_version != NUMERICS_VERSION:
+                    raise WorkFailedError(
+                        f"a worker computes with numerics version {answers.numerics_version}, "
+                        f"this rbfrag with {NUMERICS_VERSION}: install the same version on all "
+                        "machines"
+                    )
+                done += store(campaign_id, answers)
+                tell()
+            if done < total:
+                raise StoppedError(f"stopped: {done} of {total} stored; the same command goes on")
+            with engine.begin() as connection:
+                finish_campaign(connection, campaign_id)

@@ -1,0 +1,18 @@
+"""The schema of the first release, which later migrations follow.
+
+A new database is made from :mod:`rbfrag.db.schema`; one from before the first release is brought
+here by :mod:`rbfrag.migrations.before_release`.
+
+Revision: 0007
+"""
+
+from __future__ import annotations
+
+revision = "0007"
+down_revision = None
+branch_labels = None
+depends_on = None
+
+
+def upgrade() -> None:
+    pass
