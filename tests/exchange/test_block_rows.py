@@ -85,7 +85,7 @@ def table(folder: Path, form: str, rows: Sequence[tuple[Any, ...]]) -> Any:
     return path
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     form=st.sampled_from(FORMS),
     kinds=st.lists(st.sampled_from(["sound", "sound", *BAD]), min_size=1, max_size=12),
