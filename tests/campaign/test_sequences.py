@@ -22,7 +22,7 @@ from rbfrag.db.merge.databases import merge_databases
 from rbfrag.db.motions import add_motion, load_motion, motion_rows
 from rbfrag.db.rows import EarthquakeInfo, MotionRow
 from rbfrag.errors import InputError, MergeConflictError, StoppedError
-from rbfrag.migrations.tables import fill_digests
+from rbfrag.migrations.before_release import fill_digests
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.models.slumping import FAMILY, BlockClass
 from rbfrag.solver.respond import respond
@@ -181,7 +181,7 @@ def test_merged_databases_hold_both(
     ):
         with opened_database(database) as engine, engine.begin() as connection:
             connection.execute(update(schema.shock_pair).values(**values))
-            fill_digests(connection, "shock_pair")
+            fill_digests(connection, schema.shock_pair)
         if accepted:
             notes = merge_databases(database, db=tmp_path / "new.db").notes
             assert any("pairing is 'station' here and 'drawn' there" in note for note in notes)

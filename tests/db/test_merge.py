@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from rbfrag.migrations.tables import fill_digests
 from sqlalchemy import Engine, delete, func, select, true, update
 
 from benchmarks.database_content import CONTENT_TABLES, content_digest, table_rows_by_natural_key
@@ -33,6 +32,7 @@ from rbfrag.errors import (
     InputError,
     MergeConflictError,
 )
+from rbfrag.migrations.before_release import fill_digests
 from rbfrag.motions.ground_motion import GroundMotion
 
 QUAKE = EarthquakeInfo("chi-chi-1999", magnitude=7.62, guessed=False)
@@ -67,7 +67,7 @@ def _change(engine: Engine, *statements: Any) -> None:
     with engine.begin() as connection:
         for statement in statements:
             connection.execute(statement)
-        for table in schema.metadata.tables:
+        for table in schema.metadata.tables.values():
             fill_digests(connection, table)  # of what is said now
 
 
