@@ -41,12 +41,12 @@ def stopped_by_interrupts() -> Iterator[Stopped]:
     tells.setblocking(False)
     listener = threading.Thread(target=_listen, args=(heard, pressed), daemon=True)
     before = signal.signal(signal.SIGINT, lambda *_: None)
-    told_before = signal.set_wakeup_fd(tells.fileno(), warn_on_full_buffer=False)
+    earlier_fd = signal.set_wakeup_fd(tells.fileno(), warn_on_full_buffer=False)
     listener.start()
     try:
         yield pressed.is_set
     finally:
-        signal.set_wakeup_fd(told_before)
+        signal.set_wakeup_fd(earlier_fd)
         tells.close()
         listener.join()
         # a press while the program ends must not change its status

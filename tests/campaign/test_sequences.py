@@ -181,7 +181,7 @@ def test_merged_databases_hold_both(
     ):
         with opened_database(database) as engine, engine.begin() as connection:
             connection.execute(update(schema.shock_pair).values(**values))
-            fill_digests(connection, "shock_pair")
+            fill_digests(connection, schema.shock_pair)
         if accepted:
             notes = merge_databases(database, db=tmp_path / "new.db").notes
             assert any("pairing is 'station' here and 'drawn' there" in note for note in notes)

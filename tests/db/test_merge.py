@@ -67,7 +67,7 @@ def _change(engine: Engine, *statements: Any) -> None:
     with engine.begin() as connection:
         for statement in statements:
             connection.execute(statement)
-        for table in schema.metadata.tables:
+        for table in schema.metadata.tables.values():
             fill_digests(connection, table)  # of what is said now
 
 
