@@ -9,6 +9,7 @@ import os
 import re
 import secrets
 import tomllib
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,6 +19,9 @@ from rbfrag.errors import InputError
 
 MOST_BYTES = 1 << 28
 """Larger texts are refused: no curve, model or description is 256 MB long."""
+
+LONGEST_FILE_NAME = 240
+"""Bytes: file systems take 255, of which the name of the unfinished file needs some more."""
 
 _DOTTED = re.compile(r"(?:^|[\[{,])[^.,=\n\[\]{}#]*(?:\.[^.,=\n\[\]{}#]*){20}", re.MULTILINE)
 """A key of more than 20 parts; the parser's time grows with the square of their number."""
@@ -171,8 +175,8 @@ def unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """
     document = dict(pairs)
     if len(document) < len(pairs):
-        names = [name for name, _ in pairs]
-        double = next(name for name in document if names.count(name) > 1)
+        # in one pass: a hostile object may hold a million names
+        double = Counter(name for name, _ in pairs).most_common(1)[0][0]
         raise InputError(f"the key {double[:40]!r} is there twice in one JSON object: keep one")
     return document
 
@@ -204,6 +208,10 @@ def output_path(path: str | os.PathLike[str], suffixes: tuple[str, ...], what: s
         raise InputError(
             f"{what} {target}: the suffix {target.suffix!r} is none of {', '.join(suffixes)}: "
             "name the file with one of them"
+        )
+    if len(os.fsencode(target.name)) > LONGEST_FILE_NAME:
+        raise InputError(
+            f"{what} {target}: the name is longer than {LONGEST_FILE_NAME} bytes: shorten it"
         )
     if target.is_dir():
         raise InputError(f"{what} {target} is a folder: name a file in it")

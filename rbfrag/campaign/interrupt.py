@@ -5,10 +5,10 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 STOPPING = "stopping after the motion in hand; press again to stop now"
 
@@ -35,22 +35,44 @@ def stopped_by_interrupts() -> Iterator[Stopped]:
         yield never  # only the main thread may handle signals
         return
     pressed = threading.Event()
-
-    def press(_signal: int, _frame: Any) -> None:
-        if pressed.is_set():
-            for worker in multiprocessing.active_children():
-                worker.kill()
-            os._exit(INTERRUPTED)
-        pressed.set()
-        # not print: the signal may have come in the midst of one
-        os.write(2, f"\n{STOPPING}\n".encode())
-
-    before = signal.signal(signal.SIGINT, press)
+    # A handler in Python would wait until the kernel that the main thread is in returns; the byte
+    # that Python writes for each signal is there at once, and a thread reads it meanwhile.
+    heard, tells = socket.socketpair()
+    tells.setblocking(False)
+    listener = threading.Thread(target=_listen, args=(heard, pressed), daemon=True)
+    before = signal.signal(signal.SIGINT, lambda *_: None)
+    earlier_fd = signal.set_wakeup_fd(tells.fileno(), warn_on_full_buffer=False)
+    listener.start()
     try:
         yield pressed.is_set
     finally:
+        signal.set_wakeup_fd(earlier_fd)
+        tells.close()
+        listener.join()
         # a press while the program ends must not change its status
         signal.signal(signal.SIGINT, signal.SIG_IGN if pressed.is_set() else before)
+
+
+def _listen(heard: socket.socket, pressed: threading.Event) -> None:
+    """Answer each press of Ctrl-C until the other end is closed."""
+    with heard:
+        while signals := heard.recv(64):
+            for number in signals:
+                if number == signal.SIGINT:
+                    _answer(pressed)
+
+
+def _answer(pressed: threading.Event) -> None:
+    if not pressed.is_set():
+        pressed.set()
+        # not print: the main thread may be in the midst of one
+        os.write(2, f"\n{STOPPING}\n".encode())
+        return
+    try:
+        for worker in multiprocessing.active_children():
+            worker.kill()
+    finally:
+        os._exit(INTERRUPTED)
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from rbfrag.errors import RbfragError, one_paragraph
+from rbfrag.errors import InputError, RbfragError, one_paragraph
 from rbfrag.version import __version__
 
 COMMANDS = {
@@ -102,6 +102,12 @@ class _Commands(TyperGroup):
         except RbfragError as error:
             print(f"rbfrag: {error}", file=sys.stderr)
             raise typer.Exit(error.exit_status) from None
+        except OSError as error:
+            if error.filename is None:  # a closed pipe, say
+                raise
+            # of a path that was only looked at: a name that is too long, a folder that is closed
+            print(f"rbfrag: {InputError(f'{error.filename}: {error.strerror}')}", file=sys.stderr)
+            raise typer.Exit(InputError.exit_status) from None
         except _UsageError as error:
             error.message = one_paragraph(in_our_words(error) or error.message)
             raise

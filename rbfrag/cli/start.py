@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import re
+import signal
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -60,13 +61,17 @@ shared, and threads that wait for one another on a busy machine spin
 def run() -> None:
     """Entry point of the console script."""
     os.environ.setdefault(ONE_THREAD, "1")
-    if sys.argv[1:2] == ["predict"]:
-        status = quick_predict(sys.argv[2:])
-        if status is not None:
-            raise SystemExit(status)
-    from rbfrag.cli.main import run as full
+    try:
+        if sys.argv[1:2] == ["predict"]:
+            status = quick_predict(sys.argv[2:])
+            if status is not None:
+                raise SystemExit(status)
+        from rbfrag.cli.main import run as full
 
-    full()
+        full()
+    except KeyboardInterrupt:  # while libraries load, or once more while the command ends
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        raise SystemExit(130) from None
 
 
 def quick_predict(arguments: Sequence[str]) -> int | None:
@@ -94,8 +99,6 @@ def quick_predict(arguments: Sequence[str]) -> int | None:
         # the reader has gone; nothing more can be written, not even by Python's own last flush
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except KeyboardInterrupt:
-        return 130
     return 0
 
 

@@ -24,6 +24,7 @@ from sqlalchemy import (
 from sqlalchemy.dialects import postgresql, sqlite
 
 from rbfrag.db.digest import NOT_DIGESTED, ValueType, row_digests
+from rbfrag.errors import DatabaseError
 
 _KEYS_AT_ONCE = 500
 
@@ -88,14 +89,32 @@ def update_rows(
     where: ColumnElement[bool],
     values: Mapping[str, object],
 ) -> None:
-    """Change columns of the rows that meet a condition."""
-    keys = table.primary_key.columns
+    """Change columns of the rows that meet a condition.
+
+    Raises:
+        DatabaseError: such a row was altered; a digest of the changed row would hide that.
+    """
     for row in connection.execute(select(table).where(where).with_for_update()).mappings().all():
+        refuse_altered(table, {**row})
         changed = _digested(table, {**row, **values})
         connection.execute(
             update(table)
-            .where(*(column == row[column.name] for column in keys))
+            .where(*(column == row[column.name] for column in table.primary_key.columns))
             .values(**values, digest=changed["digest"])
+        )
+
+
+def refuse_altered(table: Table, row: Mapping[str, Any]) -> None:
+    """Refuse a whole row whose values are not those that were written."""
+    try:
+        sound = _digested(table, row)["digest"] == row["digest"]
+    except (ValueError, TypeError, ArithmeticError):  # a value of another type than its column's
+        sound = False
+    if not sound:
+        at = ", ".join(str(row[column.name]) for column in table.primary_key.columns)
+        raise DatabaseError(
+            f"row {at} of the table {table.name} is damaged (its digest differs) and is not "
+            "changed: run  rbfrag db check  and restore the database from a copy"
         )
 
 

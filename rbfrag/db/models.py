@@ -46,9 +46,10 @@ def save_model(connection: Connection, row: ModelRow, *, replace: bool = False) 
             "--replace"
         )
     values["is_default"] = row.is_default or chosen.get(row.name, False)
+    # first of all: a damaged model may be replaced, but not changed
+    connection.execute(delete(fragility_model).where(fragility_model.c.name == row.name))
     if values["is_default"]:
         _clear_default(connection, row.kind)
-    connection.execute(delete(fragility_model).where(fragility_model.c.name == row.name))
     insert_row(connection, fragility_model, values)
     return load_model(connection, row.name)
 

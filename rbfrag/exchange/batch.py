@@ -54,6 +54,9 @@ OF_UNCERTAIN = "block_sd"
 DEVIATIONS = tuple(sorted({sigma for method in methods() for sigma in method.block.sigmas}))
 """Columns of standard deviations of blocks of any kind, of which an empty cell is 0."""
 
+_OR_SIDES = dict.fromkeys(("p2_1_s2", "kr"), ", nor height_m and width_m")
+"""What a table of toppling blocks may have instead of a column."""
+
 NUMERIC = (*BLOCK_COLUMNS, *DEVIATIONS, *RECTANGLE, *STATED)
 """Columns that hold numbers."""
 
@@ -174,8 +177,8 @@ def _columns(
     for column, name in columns.items():
         if name in block.names and name not in given and column not in header:
             raise InputError(
-                f"{origin}: there is no column {column}; the columns are "
-                f"{', '.join(header) or 'none'}"
+                f"{origin}: there is no column {column}{_OR_SIDES.get(column, '')}; the columns "
+                f"are {', '.join(header) or 'none'}"
             )
     doubled = [name for name in header if header.count(name) > 1]
     if doubled:

@@ -22,6 +22,9 @@ Text = Callable[[str], None]
 MOST_BYTES = 1 << 31
 """Larger files are refused."""
 
+DEEPEST = 100
+"""Documents that are read whole are refused beyond this depth."""
+
 
 def parse_xml(
     path: str | os.PathLike[str], what: str, *, start: Start, end: End, text: Text
@@ -89,20 +92,21 @@ class Node:
 def read_xml(path: str | os.PathLike[str], what: str) -> Node:
     """Return a whole document as one node above its root."""
     document = Node("", {}, 0)
-    open_nodes = [document]
+    open_nodes, texts = [document], [[""]]
 
     def start(name: str, attributes: Mapping[str, str], line: int) -> None:
+        if len(open_nodes) > DEEPEST:
+            raise InputError(f"{path}, line {line}: elements nested too deeply: not {what}")
         node = Node(name, attributes, line)
         open_nodes[-1].children.append(node)
         open_nodes.append(node)
+        texts.append([])
 
     def end(_name: str, _line: int) -> None:
-        open_nodes.pop()
+        # joined at once: text between a million comments comes in as many parts
+        open_nodes.pop().text = "".join(texts.pop())
 
-    def text(part: str) -> None:
-        open_nodes[-1].text += part
-
-    parse_xml(path, what, start=start, end=end, text=text)
+    parse_xml(path, what, start=start, end=end, text=lambda part: texts[-1].append(part))
     return document
 
 

@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 _BAND, _REACH, _ARROW = 0.09, 0.30, 0.45
 """Thickness of the rock, reach of the planes and length of the arrow, over the block's size."""
 
+_CLOSE = 0.05
+"""Distance of contacts whose numbers would cover each other, over the size of the drawing."""
+
 
 @dataclass(frozen=True)
 class BlockLines:
@@ -139,12 +142,15 @@ def draw_block(axes: Axes, block: Block, stability: Stability) -> None:
     outline, colour = lines.outline, MODE_COLOURS[stability.mode]
     axes.fill(*zip(*outline, strict=True), color=colour, alpha=0.28, lw=0, zorder=2)
     axes.plot(*zip(*[*outline, outline[0]], strict=True), color=colour, lw=1.6, zorder=3)
+    near = _CLOSE * max(math.dist(a, b) for a in lines.rock for b in lines.rock)
     for name, (x, y) in lines.contacts.items():
         axes.plot([0.0, x], [0.0, y], color=_INK, lw=0.6, ls=":", zorder=4)
         axes.plot(x, y, "o", ms=5, mfc="white", mec=_INK, zorder=6)
         outwards = 13.0 / math.hypot(x, y)
+        # contacts of a slab may be closer to each other than their numbers are wide
+        close = any(0.0 < math.dist(at, (x, y)) < near for at in lines.contacts.values())
         write_near(axes, name, (x, y), (outwards * x, outwards * y), ha="center", va="center",
-                   fontsize=9, movable=False)  # fmt: skip
+                   fontsize=9, movable=close)  # fmt: skip
     tip = lines.resultant
     axes.plot([0.0, 1.5 * tip[0]], [0.0, 1.5 * tip[1]], color=_RESULTANT, lw=0.7, ls="--", zorder=4)
     arrow = {"arrowstyle": "-|>", "color": _RESULTANT, "lw": 1.8, "shrinkA": 0, "shrinkB": 0}
@@ -153,6 +159,7 @@ def draw_block(axes: Axes, block: Block, stability: Stability) -> None:
     write_near(axes, "C", (0.0, 0.0), (-5, 5), fontsize=10)
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.04)
+    axes.ticklabel_format(scilimits=(-2, 5), useMathText=True)
     axes.set_xlabel("horizontal distance from the centroid, out of the slope [m]")
     axes.set_ylabel("height above the centroid [m]")
     light_grid(axes)

@@ -7,11 +7,12 @@ extra brings matplotlib where it is missing (MissingExtraError).
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Sequence
 from functools import wraps
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,8 @@ def in_own_style(draw: Callable[_Arguments, _Result]) -> Callable[_Arguments, _R
     """Let a function draw by matplotlib's defaults, not by the settings of whoever runs it.
 
     Places and sizes of labels belong to these defaults; TeX, or a dark sheet under halos of
-    white, would spoil them.
+    white, would spoil them. A letter that the font lacks (Chinese names of stations) is an empty
+    box, without a warning for each.
     """
 
     @wraps(draw)
@@ -47,7 +49,8 @@ def in_own_style(draw: Callable[_Arguments, _Result]) -> Callable[_Arguments, _R
             from matplotlib import style
         except ImportError:
             return draw(*args, **kwargs)  # and let it say what is missing
-        with style.context("default"):
+        with style.context("default"), warnings.catch_warnings():
+            warnings.filterwarnings("ignore", r"Glyph \d+ .* missing", UserWarning)
             return draw(*args, **kwargs)
 
     return drawn
@@ -113,11 +116,23 @@ def freeze_layout(figure: Figure) -> None:
         axes.set_position(np.round(axes.get_position().bounds, _LAYOUT_DIGITS).tolist())
 
 
+_MOST_DECADES = 1e5
+"""Ratio of the ends of an axis that holds more digits than one a decade."""
+
+
 def written_numbers(axis: Axis, *digits: float) -> None:
     """Write numbers of these leading digits beside a logarithmic axis, powers of ten if need be."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    axis.set_major_locator(LogLocator(subs=digits))
+    class Numbers(LogLocator):
+        """Of many decades the powers of ten alone: with other digits matplotlib shows nothing."""
+
+        def tick_values(self, vmin: float, vmax: float) -> Any:
+            low, high = sorted((vmin, vmax))
+            self.set_params(subs=digits if high < _MOST_DECADES * low else (1.0,))
+            return super().tick_values(low, high)
+
+    axis.set_major_locator(Numbers())
     axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value)))
     axis.set_minor_formatter(NullFormatter())
 

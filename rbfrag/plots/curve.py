@@ -57,8 +57,8 @@ EVENT = "#b8b8b8"
 _COLOURS = (RED, "#4d9221", "#e08214", "#762a83", "#636363")
 _STYLES = ("-", "--", "-.", ":")
 MOST_BESIDE = len(_COLOURS) * len(_STYLES)
-_ROW_IN = 0.18
-"""Height of a row of the legend [inch]."""
+_LETTERS, _LINE_IN = 45, 0.18
+"""Of a line of the legend: how many it holds, and its height [inch]."""
 _POINTS = 241
 _START = 1e-6
 
@@ -119,7 +119,8 @@ def plot_curve(
         raise InputError(
             f"{len(beside or {})} fragilities to compare with: a figure shows at most {MOST_BESIDE}"
         )
-    figure = new_figure(7.0, 4.6 + _ROW_IN * math.ceil(len(beside or {}) / 2))
+    lines = max((as_written(name, _LETTERS).count("\n") + 1 for name in beside or {}), default=0)
+    figure = new_figure(7.0, 4.6 + _LINE_IN * lines * math.ceil(len(beside or {}) / 2))
     axes = figure.add_subplot()
     block = {"p2": p2, "kr": kr} | ({} if restitution is None else {"restitution": restitution})
     draw_curve(axes, model, block, varied, held, level=level, beside=beside)
@@ -187,7 +188,7 @@ def draw_curve(
     axes.plot(x, fitted, color=BLUE, lw=2.0, label="P: share over all earthquakes and sites")
     for i, (name, other) in enumerate((beside or {}).items()):
         colour, style = _COLOURS[i % len(_COLOURS)], _STYLES[i // len(_COLOURS)]
-        axes.plot(x, other(x), style, color=colour, lw=1.4, label=as_written(name, 45))
+        axes.plot(x, other(x), style, color=colour, lw=1.4, label=as_written(name, _LETTERS))
     axes.set(xlim=(0.0, end), ylim=(0.0, 1.0))
     axes.set(xlabel=AXIS[varied], ylabel="probability that the block topples")
     light_grid(axes)

@@ -234,7 +234,7 @@ def _draw_trace(axes: Axes, history: ResponseHistory, time_s: FloatArray) -> Any
         axes.plot(history.time_s, history.strength_g, color=STRENGTH, lw=1.1, label="strength")
     axes.legend(loc="upper right", fontsize=7, ncols=2)
     axes.set_xlim(time_s[0], time_s[-1])
-    top = 1.1 * float(np.abs(driving).max())
+    top = 1.1 * float(np.abs(driving).max()) or 1.0  # a motion of zeros has a sheet, too
     axes.set_ylim(-top, 1.35 * top)
     axes.set(xlabel="time [s]", ylabel="[g]")
     light_grid(axes)

@@ -71,6 +71,7 @@ def draw_contribution(top: Axes, bottom: Axes, curve: HazardCurve, answer: Hazar
         color="#2b6cac", edgecolor="white", linewidth=0.3,
     )  # fmt: skip
     bottom.set_ylabel("share of the rate\n[% per decade of shaking]")
+    bottom.set_ylim(0.0, None if percent.any() else 1.0)
     bottom.set_xlabel(measure_title(curve))
     seen = percent > _SHOWN * max(float(percent.max()), np.finfo(float).tiny)
     if seen.any():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -44,6 +45,9 @@ _HATCHED = (
 _LEVELS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0)
 _NARROW_G = 0.4
 _PLACES = 80
+_LINE_DEG, _LETTER_DEG = 6.6, 3.1
+_LEAST_AREA_DEG2 = 60.0
+"""Of a line and a letter of a name on the chart, and of the least region with one."""
 _VALUE_APART_PX = 2.0
 # An image keeps vector files small.
 _WHOLE_CHART: dict[str, Any] = {
@@ -206,17 +210,18 @@ def _name_regions(chart: _Chart, back_fracture: bool, covered: NDArray[np.bool_]
     for code, mode in enumerate(MODES):
         region = chart.of_mode(code)
         stable = region & chart.in_state(STABLE)
-        # Where no block is drawn, or at least where blocks are stable.
-        places = (_widest_point(here) for here in (stable & ~covered, stable, region))
-        place = next((place for place in places if place is not None), None)
-        if place is None:
-            continue
         text = mode_title(mode)
         if mode == "slump" and not back_fracture:
             text = "turns\nback"
         values = chart.stability.yield_acceleration[stable]
         if values.size and np.ptp(values) < 1e-9:
             text += f"\n{values[0]:.3f} g"
+        # Where no block is drawn, or at least where blocks are stable.
+        areas = (stable & ~covered, stable, region)
+        tried = (_widest_point(here, letters) for letters in (text, "") for here in areas)
+        place = next((place for place in tried if place is not None), None)
+        if place is None:
+            continue
         name = chart.axes.text(
             chart.nodes[place[1]], chart.nodes[place[0]], text, ha="center", va="center",
             fontsize=10, zorder=6, **halo(3.5),
@@ -276,15 +281,24 @@ def _explain_hatches(chart: _Chart) -> None:
         ).set_zorder(8)  # fmt: skip
 
 
-def _widest_point(here: NDArray[np.bool_]) -> tuple[int, int] | None:
-    """Return the place of a region that is furthest from its rim; None if it is too small."""
-    if np.count_nonzero(here) * _STEP_DEG**2 < 60.0:
-        return None
-    from scipy.ndimage import distance_transform_edt
+def _widest_point(here: NDArray[np.bool_], text: str = "") -> tuple[int, int] | None:
+    """Return the place of a region furthest from its rim, of those where a text lies inside.
 
-    distance: Any = distance_transform_edt(np.pad(here, 1))
-    row, column = np.unravel_index(int(np.argmax(distance)), distance.shape)
-    return int(row) - 1, int(column) - 1
+    None where it does not fit, or the region is too small for any.
+    """
+    from scipy.ndimage import distance_transform_edt, minimum_filter
+
+    lines = text.splitlines()
+    size = [_LINE_DEG * len(lines), _LETTER_DEG * max(map(len, lines), default=0)]
+    steps = [max(1, round(length / _STEP_DEG)) for length in size]
+    fits = minimum_filter(here, size=steps, mode="constant")
+    if np.count_nonzero(here) * _STEP_DEG**2 < _LEAST_AREA_DEG2 or not fits.any():
+        return None
+    distance: Any = distance_transform_edt(np.pad(here, 1))[1:-1, 1:-1] * fits
+    widest = np.argwhere(distance > distance.max() - 0.5)
+    # the middle of a band
+    row, column = min(widest.tolist(), key=lambda place: math.dist(place, widest.mean(axis=0)))
+    return row, column
 
 
 def _draw_blocks(

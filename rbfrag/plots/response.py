@@ -111,7 +111,7 @@ def _panels(
     driving = history.k_h / (1.0 + history.k_v)
     upper.plot(history.time_s, driving, color=MOTION, lw=0.7, label="ground: $k_h/(1+k_v)$")
     upper.plot(history.time_s, strength, color=STRENGTH, lw=1.3, label=label)
-    top = 1.15 * max(float(np.abs(driving).max()), least_top)
+    top = 1.15 * max(float(np.abs(driving).max()), least_top) or 1.0
     upper.set_ylim(-top, 1.25 * top)
     upper.axhline(0.0, color="black", lw=0.5)
     upper.set_ylabel("acceleration [g]")
@@ -213,7 +213,7 @@ def _motion_window(history: ResponseHistory, response: Response) -> tuple[float,
 
 def _around(largest: float, least: float) -> tuple[float, float]:
     """Return limits that leave some air, and put zero at one height on both axes."""
-    span = max(largest, 1e-9)
+    span = largest if largest > 0.0 else 1.0
     return min(-0.06 * span, 1.1 * least), 1.12 * span
 
 

@@ -41,6 +41,8 @@ _POINTS = 600
 _SHOWN = 0.997
 _HIGHEST_PGA_G = 2.0
 
+_LETTERS_AN_INCH = 11.0
+
 TITLE_WIDTH = 90
 """Letters of a line of the title, so that the label of a record is not cut at the edges."""
 
@@ -153,7 +155,8 @@ def plot_failures(shaken: ShakenMass, path: str | PathLike[str], *, level: float
         figure = new_figure(width_in + 1.2, 4.6)
         bars = figure.subplots()
     _draw_bars(bars, bars_of)
-    figure.suptitle(_shaken_title(shaken), fontsize=10)
+    letters = min(TITLE_WIDTH, int(_LETTERS_AN_INCH * figure.get_figwidth()))
+    figure.suptitle(_shaken_title(shaken, letters), fontsize=10)
     return save_figure(figure, path)
 
 
@@ -226,12 +229,12 @@ def _part(each: ModeFailures, part: str) -> int:
     return each.outcomes[part]
 
 
-def _shaken_title(shaken: ShakenMass) -> str:
+def _shaken_title(shaken: ShakenMass, letters: int) -> str:
     limits = shaken.limits
     turned = "" if limits.rotation_deg is None else f"by more than {limits.rotation_deg:g}° or "
     about = f"{shaken.shaking.motion.label}: {shaken.realisations.n_blocks:,} blocks of a rock mass"
-    return (
-        f"{as_written(about, TITLE_WIDTH)}\n"
+    rule = (
         f"a slide fails beyond {limits.displacement_m:g} m, "
         f"a block that turns {turned}past recovery"
     )
+    return f"{as_written(about, letters)}\n{as_written(rule, letters)}"

@@ -6,6 +6,7 @@ import math
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
+from pydantic import ValidationError
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.comparison import prediction_document
@@ -21,13 +22,16 @@ from rbfrag.service.parameters import (
     PredictQuery,
     PredictRows,
 )
-from rbfrag.service.problem import READ, SENT
-from rbfrag.service.reading import QueryRoute
+from rbfrag.service.problem import READ, SENT, refusal
+from rbfrag.service.reading import QueryRoute, check_json, json_of, sent_as
 from rbfrag.service.settings import Settings
 from rbfrag.service.work import WorkerPool, in_thread, json_answer, json_text
 
-ROWS_BESIDE = 5000
-"""So many rows are answered beside other requests; more than these, by another process."""
+ELEMENTS_BESIDE = 20_000
+"""So many elements are answered beside other requests; more than these, by another process."""
+
+BYTES_BESIDE = 1 << 20
+"""Longer bodies are parsed by another process, whatever they hold."""
 
 
 def answer_one(query: PredictQuery, db: str | None) -> PredictAnswer:
@@ -69,28 +73,28 @@ def columns_of(body: PredictRows, row_limit: int) -> dict[str, Any]:
     return body.given({**RECTANGLE, **NUMBERS, **SLIDING, **UNCERTAIN, **MEASURES})
 
 
-def answer_many(given: dict[str, Any], chosen: dict[str, Any], db: str | None) -> bytes:
+def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
     """Return probabilities of many blocks.
 
     Args:
-        given: numbers and lists of numbers, as :func:`columns_of` gives them.
-        chosen: kind, rotation_deg, model and level.
+        body: JSON of what :class:`PredictRows` describes.
+        row_limit: most elements of a list.
         db: database of the models.
     """
-    values = dict(given)
+    try:
+        rows = PredictRows.model_validate(json_of(body))
+    except ValidationError as error:
+        raise refusal(PredictRows.model_fields, error.errors(), sent=True) from None
+    values = columns_of(rows, row_limit)
     rectangle = {name: values.pop(name) for name in RECTANGLE.values() if name in values}
     if rectangle:
-        kind = chosen.get("kind")
-        values = _numbers_of_rectangles(rectangle, values, kind) | values
+        values = _numbers_of_rectangles(rectangle, values, rows.kind) | values
     if values and not any(isinstance(value, list) for value in values.values()):
         # an array of one element, so that single numbers are answered by lists too
         first = next(iter(values))
         values[first] = [values[first]]
-    model = find_model(
-        chosen.get("model"), values, db,
-        kind=chosen.get("kind"), rotation_deg=chosen.get("rotation_deg"),
-    )  # fmt: skip
-    answers: Any = answer_given(model, values, chosen["level"])
+    model = find_model(rows.model, values, db, kind=rows.kind, rotation_deg=rows.rotation)
+    answers: Any = answer_given(model, values, rows.level)
     return json_text(
         {
             "probability": _with_null(answers.probability),
@@ -171,17 +175,17 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
         summary="Probability that each of many blocks fails",
         response_model=PredictArrays,
         responses=SENT,
+        openapi_extra=sent_as({"application/json": {"schema": PredictRows.model_json_schema()}}),
     )
-    async def predict_many(request: Request, body: PredictRows) -> Response:
+    async def predict_many(request: Request) -> Response:
         """Return probabilities of many blocks.
 
         Each name is a number or a list; numbers stand for every element. Where an element cannot
         be used, its answer is null and `reason` says why.
         """
-        columns = columns_of(body, settings.row_limit)
-        chosen = body.given({"kind": "kind", "rotation": "rotation_deg", "model": "model"})
-        given = columns, {**chosen, "level": body.level}, settings.db
-        longest = max((len(each) for each in columns.values() if isinstance(each, list)), default=1)
-        if longest > ROWS_BESIDE:
+        body = await request.body()
+        check_json(body, settings.row_limit)
+        given = body, settings.row_limit, settings.db
+        if len(body) > BYTES_BESIDE or body.count(b",") > ELEMENTS_BESIDE:
             return json_answer(await pool.run(request, answer_many, *given))
         return json_answer(await in_thread(settings.time_limit, answer_many, *given))

@@ -14,6 +14,7 @@ from typing import Any
 from fastapi import Request, Response
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
@@ -120,7 +121,8 @@ def answer_error(request: Request, error: Exception, settings: Settings) -> Resp
         settings: those of the service; the place of its database is left out of the words.
     """
     if isinstance(error, RequestValidationError):
-        return _unusable(request, error)
+        fields = _fields_of_query(request)
+        error = refusal(fields, [{**each, "loc": each["loc"][1:]} for each in error.errors()])
     if isinstance(error, RequestRefusedError):
         return problem(error.status_code, error.kind, error.detail, error.headers)
     if isinstance(error, HTTPException):
@@ -145,7 +147,7 @@ def answer_error(request: Request, error: Exception, settings: Settings) -> Resp
 def _by_the_framework(request: Request, error: HTTPException) -> Response:
     status = error.status_code
     if status == 400:
-        return problem(400, "malformed", _unreadable(error))
+        return problem(400, "malformed", f"the form cannot be read: {error.detail}")
     words = HTTPStatus(status).phrase.lower()
     headers = {**(error.headers or {}), **({"allow": _allowed(request)} if status == 405 else {})}
     return problem(
@@ -167,65 +169,45 @@ def _allowed(request: Request) -> str:
     return ", ".join(sorted(methods))
 
 
-def _unreadable(error: HTTPException) -> str:
-    """Return why a body is not what its type says."""
-    cause = error.__cause__
-    if isinstance(cause, UnicodeDecodeError):
-        return f"byte {cause.start} of the body is not UTF-8 text"
-    if isinstance(cause, RecursionError):
-        return "the body is nested too deeply"
-    if isinstance(cause, InputError):  # a key that is there twice
-        return str(cause)
-    if isinstance(cause, ValueError):  # a number of thousands of digits
-        return f"the body is not JSON: {cause}"
-    return f"the form cannot be read: {error.detail}"
-
-
 _short = Repr()
 _short.maxstring = _short.maxother = 60
 
 
-def _unusable(request: Request, error: RequestValidationError) -> Response:
-    """Return the answer to values that do not suit the model of a query or a body."""
-    errors = error.errors()
+def refusal(
+    fields: Mapping[str, FieldInfo], errors: Sequence[Mapping[str, Any]], *, sent: bool = False
+) -> InputError:
+    """Return in words why values do not suit a model.
+
+    Args:
+        fields: the fields of the model, by name.
+        errors: what pydantic says, each with its place in the values.
+        sent: the values are the JSON of a body.
+    """
     # a name that is unknown explains one that is missing
     first = next((each for each in errors if each["type"] == "extra_forbidden"), errors[0])
-    if first["type"] == "json_invalid":
-        before = error.body[: first["loc"][1]]
-        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
-        why = f"line {line}, column {column}: {first['ctx']['error']}"
-        return problem(400, "malformed", f"the body is not JSON: {why}")
-    part, *place = first["loc"]
-    if not place:
-        if first["type"] == "missing":
-            return problem(400, "malformed", "the body is empty, and not JSON")
-        return problem(
-            422, "input", 'the body is a JSON object such as {"p2": 3, "kr": [0.1, 0.2]}'
-        )
+    if not first["loc"]:
+        return InputError('the body is a JSON object such as {"p2": 3, "kr": [0.1, 0.2]}')
     # where a field may be a number or a list, the deepest of its errors is that of what was meant
     worst = max(
-        (each for each in errors if each["loc"][1] == place[0]),
+        (each for each in errors if each["loc"][0] == first["loc"][0]),
         key=lambda each: (len(each["loc"]), each["type"] not in ("float_type", "list_type")),
     )
-    fields = _fields(request, part)
-    name = str(place[0])
+    name = str(first["loc"][0])
     if worst["type"] == "extra_forbidden":
         known = ", ".join(fields)
-        return problem(422, "input", f"there is no parameter {name[:60]!r}; known are {known}")
-    if part == "body" and worst["type"] == "finite_number":
+        return InputError(f"there is no parameter {name[:60]!r}; known are {known}")
+    if sent and worst["type"] == "finite_number":
         value = json.dumps(worst["input"])
         words = f"{value} is no JSON number: give a finite one, or null for a missing one"
-        return problem(400, "malformed", words)
-    indices = "".join(f"[{each}]" for each in worst["loc"][2:] if isinstance(each, int))
-    described = fields[name].description or ""
-    return problem(422, "input", _sentence(name + indices, worst, described))
+        return MalformedError(words)
+    indices = "".join(f"[{each}]" for each in worst["loc"][1:] if isinstance(each, int))
+    return InputError(_sentence(name + indices, worst, fields[name].description or ""))
 
 
-def _fields(request: Request, part: str) -> Mapping[str, Any]:
-    """Return the fields of the model of a request's query or body, by name."""
-    dependant = request.scope["route"].dependant
-    parameters = dependant.body_params if part == "body" else dependant.query_params
-    model: type[BaseModel] = parameters[0].field_info.annotation
+def _fields_of_query(request: Request) -> Mapping[str, FieldInfo]:
+    """Return the fields of the model of a request's query, by name."""
+    (parameter,) = request.scope["route"].dependant.query_params
+    model: type[BaseModel] = parameter.field_info.annotation
     return model.model_fields
 
 

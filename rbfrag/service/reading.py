@@ -10,13 +10,18 @@ from typing import Any
 from urllib.parse import parse_qsl
 
 from fastapi import Request, Response
-from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError
 
 from rbfrag.errors import InputError
 from rbfrag.files import unique_keys
-from rbfrag.service.problem import BUSY, GONE, MalformedError, RequestRefusedError
+from rbfrag.service.problem import (
+    BUSY,
+    GONE,
+    MalformedError,
+    RequestRefusedError,
+    refusal,
+)
 from rbfrag.service.settings import Settings
 
 MULTIPART = "multipart/form-data"
@@ -32,7 +37,7 @@ FILE_FORM = {
 """A form of one file, as OpenAPI describes it."""
 
 SMALL_BYTES = 1 << 16
-"""Bodies that state at most this size are read at once, however many others are being read."""
+"""So much of each body is read at once, however many others are being read."""
 
 MOST_BRACKETS = 1000
 """Lists and objects of a request: one list a name, and one object around them."""
@@ -64,55 +69,44 @@ class Bodies:
         stated = request.headers.get("content-length", "")
         if stated.isdigit() and int(stated) > limits.body_limit_bytes:
             raise self._too_long()
-        if stated.isdigit() and int(stated) <= SMALL_BYTES:
-            # it takes no memory to speak of, and so no place: nobody waits behind idle ones
-            yield _with_body(request, await self._in_time(request))
+        parts: list[bytes] = []
+        # so much takes no memory to speak of, and so no place: nobody waits behind idle bodies
+        if not await self._in_time(self._read_on(request, parts, SMALL_BYTES)):
+            yield _with_body(request, b"".join(parts))
             return
         try:
             await asyncio.wait_for(self._places.acquire(), limits.time_limit)
         except TimeoutError:
             raise RequestRefusedError(*BUSY) from None
         try:
-            yield _with_body(request, await self._in_time(request))
+            await self._in_time(self._read_on(request, parts, limits.body_limit_bytes))
+            yield _with_body(request, b"".join(parts))
         finally:
             self._places.release()
 
-    async def _in_time(self, request: Request) -> bytes:
+    async def _in_time(self, reading: Coroutine[Any, Any, bool]) -> bool:
         limit_s = self._settings.body_time
         try:
-            return await asyncio.wait_for(self._whole(request), limit_s)
+            return await asyncio.wait_for(reading, limit_s)
         except TimeoutError:
             words = f"the body took longer than {limit_s:g} s to come"
             raise RequestRefusedError(408, "too-slow", words, _CLOSE) from None
 
-    def check_json(self, body: bytes) -> None:
-        """Refuse JSON whose parsing would take long, before it is parsed.
-
-        Raises:
-            InputError: more brackets or elements than any request needs.
-        """
-        if body.count(b"[") + body.count(b"{") > MOST_BRACKETS:
-            raise MalformedError(
-                "the body is nested too deeply, or holds more than "
-                f"{MOST_BRACKETS} lists and objects"
-            )
-        most = MOST_NAMES * self._settings.row_limit
-        if body.count(b",") > most:
-            raise InputError(f"the body holds more than {most} elements: split the request")
-
-    async def _whole(self, request: Request) -> bytes:
-        parts, size, more = [], 0, True
-        while more:
+    async def _read_on(self, request: Request, parts: list[bytes], most: int) -> bool:
+        """Read until more than `most` bytes are there; return whether there may be more."""
+        size = sum(map(len, parts))
+        while True:
             message = await request.receive()
             if message["type"] == "http.disconnect":
                 raise RequestRefusedError(*GONE)
-            part = message.get("body", b"")
-            size += len(part)
+            parts.append(message.get("body", b""))
+            size += len(parts[-1])
             if size > self._settings.body_limit_bytes:
                 raise self._too_long()
-            parts.append(part)
-            more = message.get("more_body", False)
-        return b"".join(parts)
+            if not message.get("more_body", False):
+                return False
+            if size > most:
+                return True
 
     def _too_long(self) -> RequestRefusedError:
         limit = self._settings.body_limit_bytes
@@ -126,14 +120,46 @@ def _with_body(request: Request, body: bytes) -> Request:
     async def receive() -> Any:
         return unread.pop() if unread else await request.receive()
 
-    return _StrictRequest(request.scope, receive)
+    return Request(request.scope, receive)
 
 
-class _StrictRequest(Request):
-    """A request in whose JSON each key is there once."""
+def check_json(body: bytes, row_limit: int) -> None:
+    """Refuse JSON whose parsing would take long, before it is parsed.
 
-    async def json(self) -> Any:
-        return json.loads(await self.body(), object_pairs_hook=unique_keys)
+    Raises:
+        InputError: more brackets, names or elements than any request needs.
+    """
+    if body.count(b"[") + body.count(b"{") > MOST_BRACKETS or body.count(b":") > MOST_BRACKETS:
+        raise MalformedError(
+            "the body is nested too deeply, or holds more than "
+            f"{MOST_BRACKETS} lists, objects or names"
+        )
+    most = MOST_NAMES * row_limit
+    if body.count(b",") > most:
+        raise InputError(f"the body holds more than {most} elements: split the request")
+
+
+def json_of(body: bytes) -> Any:
+    """Return what a body says, in whose JSON each key is there once.
+
+    Raises:
+        MalformedError: it is not JSON.
+    """
+    if not body:
+        raise MalformedError("the body is empty, and not JSON")
+    try:
+        return json.loads(body, object_pairs_hook=unique_keys)
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        raise MalformedError(f"the body is not JSON: {where}: {error.msg}") from None
+    except UnicodeDecodeError as error:
+        raise MalformedError(f"byte {error.start} of the body is not UTF-8 text") from None
+    except RecursionError:
+        raise MalformedError("the body is nested too deeply") from None
+    except InputError as error:  # a key that is there twice
+        raise MalformedError(str(error)) from None
+    except ValueError as error:  # a number of thousands of digits
+        raise MalformedError(f"the body is not JSON: {error}") from None
 
 
 class BoundedRoute(APIRoute):
@@ -147,14 +173,8 @@ class BoundedRoute(APIRoute):
             query_of(request)
             if request.method != "POST":
                 return await handler(request)
-            if self.body_field is not None:
-                # JSON is all that these routes take, and what curl sends says that it is a form
-                headers = [each for each in request.scope["headers"] if each[0] != b"content-type"]
-                request.scope["headers"] = [*headers, (b"content-type", b"application/json")]
             bodies: Bodies = request.app.state.bodies
             async with bodies.read(request) as read:
-                if self.body_field is not None:
-                    bodies.check_json(await read.body())
                 return await handler(read)
 
         return bounded
@@ -176,8 +196,7 @@ class QueryRoute(APIRoute):
             try:
                 query = model.model_validate(query_of(request))
             except ValidationError as error:
-                errors = [{**each, "loc": ("query", *each["loc"])} for each in error.errors()]
-                raise RequestValidationError(errors) from None
+                raise refusal(model.model_fields, error.errors()) from None
             document: BaseModel = await self.endpoint(query)
             return Response(document.model_dump_json(), media_type="application/json")
 
@@ -201,6 +220,11 @@ def query_of(request: Request) -> dict[str, str]:
 def media_type(request: Request) -> str:
     """Return the type of a body without its parameters."""
     return request.headers.get("content-type", "").partition(";")[0].strip().lower()
+
+
+def sent_as(content: dict[str, Any]) -> dict[str, Any]:
+    """Return what OpenAPI says of a body that is a file as it is: FastAPI has no word for it."""
+    return {"requestBody": {"required": True, "content": content}}
 
 
 async def sent_file(request: Request) -> bytes:

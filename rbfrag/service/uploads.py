@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
@@ -11,7 +11,7 @@ from rbfrag.service import work
 from rbfrag.service.documents import CriticalAnswer, HazardAnswer, RockmassAnswer, SpectrumAnswer
 from rbfrag.service.parameters import CriticalQuery, HazardQuery, RockmassQuery, SpectrumQuery
 from rbfrag.service.problem import SENT, RequestRefusedError
-from rbfrag.service.reading import FILE_FORM, MULTIPART, media_type, sent_file
+from rbfrag.service.reading import FILE_FORM, MULTIPART, media_type, sent_as, sent_file
 from rbfrag.service.settings import Settings
 from rbfrag.service.work import WorkerPool, json_answer
 
@@ -46,12 +46,7 @@ _FORMS = {
 }
 
 
-def _sent(content: dict[str, Any]) -> dict[str, Any]:
-    """Return what OpenAPI says of a body that is a file as it is: FastAPI has no word for it."""
-    return {"requestBody": {"required": True, "content": content}}
-
-
-_ACCELEROGRAM = _sent(
+_ACCELEROGRAM = sent_as(
     {
         "application/octet-stream": {
             "schema": {"type": "string", "format": "binary"},
@@ -100,7 +95,7 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
         summary="Annual rate at which a block topples",
         response_model=HazardAnswer,
         responses=SENT,
-        openapi_extra=_sent(
+        openapi_extra=sent_as(
             {
                 "text/csv": {"schema": _TEXT, "example": CURVE},
                 "application/json": {"schema": {"type": "object"}},
@@ -122,7 +117,7 @@ def add_routes(routes: APIRouter, settings: Settings, pool: WorkerPool) -> None:
         summary="Modes and yield accelerations of the blocks of a rock mass",
         response_model=RockmassAnswer,
         responses=SENT,
-        openapi_extra=_sent(
+        openapi_extra=sent_as(
             {
                 "application/json": {"schema": {"type": "object"}, "example": ROCK_MASS},
                 "application/toml": {"schema": _TEXT, "example": ROCK_MASS_TOML},

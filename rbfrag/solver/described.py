@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.formulas import (
@@ -20,6 +20,10 @@ from rbfrag.solver.block.formulas import (
 )
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.modes import words_of_mode, yield_coefficient
+
+if TYPE_CHECKING:
+    from rbfrag.solver.kind import Kind
+    from rbfrag.solver.stability.single import Stability
 
 
 class Form(NamedTuple):
@@ -251,7 +255,6 @@ def _numbers_and_remarks(
     described: DescribedBlock, kind: str
 ) -> tuple[dict[str, float], tuple[str, ...]]:
     from rbfrag.solver.kinds import model_of_kind, stands_free_of
-    from rbfrag.solver.mechanism import shaken_mechanism
     from rbfrag.solver.stability.single import stability
 
     model = model_of_kind(kind)
@@ -262,6 +265,7 @@ def _numbers_and_remarks(
     topples = "kr" in model.parameters
     backed = described.conditions.get("back_fracture", True)
     unbacked = (NOT_BACKED,) if stands_free_of(model, backed) else ()
+    # without friction a rectangle is taken to be of the model's mode, and the answer says so
     if described.only_topples and model.free_standing:
         beta_rad = math.radians(described.conditions["beta_deg"])
         values, remarks = model.numbers_of(described.block, beta_rad)
@@ -272,39 +276,14 @@ def _numbers_and_remarks(
     if model.free_standing:
         conditions["back_fracture"] = False
     result = stability(block, **conditions)
-    yields = f"(yield {result.yield_acceleration:.4g} g"
-    if result.mode != model.mode:
-        raise InputError(
-            f"{origin}its mode is {words_of_mode(result.mode)} {yields}, {result.state}), and the "
-            f"{kind} model says nothing about it{_instead(described, result.mode)}"
-        )
-    if result.state != "stable" or result.yield_acceleration <= 0.0:
-        raise InputError(
-            f"{origin}the block is {result.state} in {words_of_mode(result.mode)} {yields}): "
-            + (
-                "it fails without an earthquake"
-                if result.state == "unstable"
-                else "no earthquake decides about it"
-            )
-        )
+    _refuse_other_blocks(described, result, model)
     if model.free_standing:
         if conditions.get("cohesion_pa"):
             raise InputError(f"{origin}cohesion_pa does not go with {kind}: leave it out")
         values, remarks = model.numbers_of(block, math.radians(result.beta_deg))
         return values, (*result.warnings, *remarks)
     if "ps2" in model.parameters:
-        for name, nothing in (("cohesion_pa", 0.0), ("back_fracture", True)):
-            if conditions.pop(name, nothing) != nothing:
-                raise InputError(f"{origin}{name} does not go with {kind}: leave it out")
-        conditions.pop("density_kg_m3", None)
-        try:
-            shaken = shaken_mechanism(block, kind=kind, **conditions)
-        except InputError as error:
-            raise InputError(f"{origin}{error}") from None
-        values = {"ks": shaken.yield_g, "ps2": shaken.p2}
-        if math.isfinite(shaken.leaves_g):
-            values["leaves_g"] = shaken.leaves_g
-        return values, shaken.remarks
+        return _numbers_of_mechanism(block, kind, conditions, origin)
     values = {"p2": block.p2, "kr": result.yield_acceleration, "ky": result.yield_acceleration}
     values = {name: value for name, value in values.items() if name in model.parameters}
     if "ky" in values:
@@ -314,6 +293,47 @@ def _numbers_and_remarks(
             )
         values["beta_deg"] = result.beta_deg
     return values, (*result.warnings, *unbacked)
+
+
+def _refuse_other_blocks(described: DescribedBlock, result: Stability, model: Kind) -> None:
+    """Refuse a block of another mode than the model's, and one that no earthquake decides about."""
+    origin, mode = described.origin, words_of_mode(result.mode)
+    yields = f"(yield {result.yield_acceleration:.4g} g"
+    if result.mode != model.mode:
+        raise InputError(
+            f"{origin}its mode is {mode} {yields}, {result.state}), and the {model.kind} model "
+            f"says nothing about it{_instead(described, result.mode)}"
+        )
+    if result.state != "stable" or result.yield_acceleration <= 0.0:
+        raise InputError(
+            f"{origin}the block is {result.state} in {mode} {yields}): "
+            + (
+                "it fails without an earthquake"
+                if result.state == "unstable"
+                else "no earthquake decides about it"
+            )
+        )
+
+
+def _numbers_of_mechanism(
+    block: Block, kind: str, conditions: dict[str, Any], origin: str
+) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Return the numbers of a block whose frequency depends on friction and dip, and warnings."""
+    from rbfrag.solver.mechanism import shaken_mechanism
+
+    for name, nothing in (("cohesion_pa", 0.0), ("back_fracture", True)):
+        if conditions.pop(name, nothing) != nothing:
+            raise InputError(f"{origin}{name} does not go with {kind}: leave it out")
+    conditions.pop("density_kg_m3", None)
+    try:
+        shaken = shaken_mechanism(block, kind=kind, **conditions)
+    except InputError as error:
+        raise InputError(f"{origin}{error}") from None
+    values = {"ks": shaken.yield_g, "ps2": shaken.p2}
+    # a contact may open at some k_h, from where on the model does not hold
+    if math.isfinite(shaken.leaves_g):
+        values["leaves_g"] = shaken.leaves_g
+    return values, shaken.remarks
 
 
 def toppling_rectangle(described: DescribedBlock) -> dict[str, float]:

@@ -121,6 +121,12 @@ SPOILT = {
         b'{"Peak Ground Acceleration": {"xs": [1' + b"0" * 400 + b', 1], "ys": [1, 0.1]}}',
     ),
     "JSON with a key twice": ("blocks GeoJSON", b'{"type": 1, "type": "FeatureCollection"}'),
+    "JSON of a million keys, one twice": (
+        "blocks GeoJSON",
+        b"{" + b",".join(b'"%d":1' % i for i in range(1_000_000)) + b',"999999":1}',
+    ),
+    "deep XML": ("NRML", b"<a>" * OFTEN + b"</a>" * OFTEN),
+    "text in many pieces": ("NRML", b"<nrml>" + b"a<!---->" * 400_000 + b"</nrml>"),
     "cell without end": ("block CSV", b'x_m,y_m,contact\n0,0,"' + b"h" * 200_000 + b"\n"),
     "long cell": ("pelicun", b"ID,Demand-Type," + b"x" * 200_000 + b"\n"),
     "no header": ("realizations", b"# rlz_id,weight\n"),

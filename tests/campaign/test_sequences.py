@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sqlalchemy import Engine, select, true, update
+from sqlalchemy import Engine, select, update
 
 from rbfrag.campaign.motion_pairs import MotionPair, drawn_pairs, shocks_of_stations
 from rbfrag.campaign.resimulate import resimulate
@@ -18,11 +18,11 @@ from rbfrag.campaign.simulate import CampaignProgress, CampaignSummary, simulate
 from rbfrag.db import schema
 from rbfrag.db.check.database import check_database
 from rbfrag.db.engine import open_database, opened_database
-from rbfrag.db.insert import update_rows
 from rbfrag.db.merge.databases import merge_databases
 from rbfrag.db.motions import add_motion, load_motion, motion_rows
 from rbfrag.db.rows import EarthquakeInfo, MotionRow
 from rbfrag.errors import InputError, MergeConflictError, StoppedError
+from rbfrag.migrations.before_release import fill_digests
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.models.slumping import FAMILY, BlockClass
 from rbfrag.solver.respond import respond
@@ -181,7 +181,7 @@ def test_merged_databases_hold_both(
     ):
         with opened_database(database) as engine, engine.begin() as connection:
             connection.execute(update(schema.shock_pair).values(**values))
-            update_rows(connection, schema.shock_pair, true(), {})
+            fill_digests(connection, schema.shock_pair)
         if accepted:
             notes = merge_databases(database, db=tmp_path / "new.db").notes
             assert any("pairing is 'station' here and 'drawn' there" in note for note in notes)

@@ -179,3 +179,35 @@ def test_values_of_another_type_in_our_words(
     message = shell(*command, expect=2).stderr
     assert words in " ".join(message.split())
     assert "Input should be" not in message
+
+
+LONG = "a" * 300
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("motions", "add", LONG),
+        ("motions", "export", "{record}", "--out", f"{LONG}.csv"),
+        ("spectrum", "{record}", "--csv", f"{LONG}.csv"),
+        ("predict", "--batch", f"{LONG}.csv", "--out", "answers.csv"),
+        ("losses", LONG, "--blocks", "blocks.csv"),
+        ("report", "--p2", "3", "--kr", "0.1", "--pgv", "0.5", "--out", f"{LONG}.pdf"),
+        ("report", "--p2", "3", "--kr", "0.1", "--pgv", "0.5", "--out", f"{LONG}/block.pdf"),
+        ("db", "merge", LONG, "--db", "a.db"),
+        ("demo", "--folder", LONG),
+    ],
+)
+def test_a_name_that_no_file_can_have(refuses: Refuses, record: Path, words: list[str]) -> None:
+    refuses(*(word.format(record=record) for word in words))
+
+
+def test_metadata_may_name_what_no_file_can_be_called(
+    shell: Shell, record: Path, tmp_path: Path
+) -> None:
+    table = tmp_path / "metadata.csv"
+    table.write_text(f"file\n{record.name}\n{LONG}\n")
+    place = tmp_path / "a.db"
+    done = shell("motions", "add", record.parent, "--metadata", table, "--db", place, expect=1)
+    assert "it is not there" in done.stderr
+    assert "Traceback" not in done.stderr

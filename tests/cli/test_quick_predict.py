@@ -1,6 +1,7 @@
 """The quick way of `predict` and the full command line say the same."""
 
 import os
+import signal
 import subprocess
 import sys
 
@@ -8,7 +9,7 @@ import pytest
 import typer
 
 from rbfrag.cli.main import app
-from rbfrag.cli.start import NAMES, NUMBERS, ONE_THREAD, numbers_and_names, quick_predict
+from rbfrag.cli.start import NAMES, NUMBERS, ONE_THREAD, numbers_and_names, quick_predict, run
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
 from tests.cli.conftest import Shell
@@ -138,3 +139,22 @@ def test_linear_algebra_has_one_thread_unless_more_are_asked_for(
         [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True
     )
     assert done.stdout.split()[-1] == used
+
+
+@pytest.mark.parametrize("words", [["predict", "--p2", "3", "--kr", "0.1"], ["block"]])
+def test_an_interrupt_at_any_moment_has_its_status(
+    monkeypatch: pytest.MonkeyPatch, words: list[str]
+) -> None:
+    def pressed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("rbfrag.cli.start.quick_predict", pressed)
+    monkeypatch.setattr("rbfrag.cli.main.run", pressed)
+    monkeypatch.setattr("sys.argv", ["rbfrag", *words])
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        with pytest.raises(SystemExit) as ended:
+            run()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert ended.value.code == 130

@@ -255,3 +255,9 @@ def test_blocks_of_sites_without_a_curve_have_their_reason(
     assert [row["block_id"] for row in only["blocks"]] == ["C", "D"]
     Path("b.csv").write_text(head + "B,10,0.2,12\n")
     assert "stands at site '12'" in refuses("hazard", curve, "--blocks", "b.csv")
+
+
+def test_a_chart_shows_the_blocks_that_it_can(shell: Shell) -> None:
+    Path("b.csv").write_text("alpha1_deg,alpha3_deg\n-20,20\nsteep,20\n,20\n-30,10\n")
+    done = shell("plot", "modes", "--phi", "30", "--blocks", "b.csv", "--out", "a.svg")
+    assert "2 of 4 rows are no block and not shown" in done.stderr

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,40 @@ from rbfrag.db.check.database import check_database, coverage
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import reference_file
 from rbfrag.db.model_file import STORED, ModelRow, read_models
-from rbfrag.db.models import model_rows, save_model
+from rbfrag.db.models import model_rows, save_model, set_default
 from rbfrag.db.motions import motion_rows
 from rbfrag.db.queries import combination_table
 from rbfrag.db.stored_combination import keys_with_samples, stored_combination
 from rbfrag.errors import DatabaseError, RbfragError
+
+
+@pytest.mark.parametrize("value", ["2", "0.5", "-1"])
+def test_a_truth_value_is_zero_or_one(sqlite_file: Path, fill: Any, value: str) -> None:
+    with opened_database(sqlite_file) as engine, engine.begin() as connection:
+        fill(connection, [1])
+    _raw(sqlite_file, f"UPDATE motion SET is_vertical = {value} WHERE id = 1")
+    with opened_database(sqlite_file, read_only=True) as engine, engine.connect() as connection:
+        found = check_database(connection)
+    assert any("is_vertical" in each.problem for each in found)
+
+
+def test_a_change_of_a_row_does_not_hide_that_it_was_altered(
+    sqlite_file: Path, model: ModelRow
+) -> None:
+    with opened_database(sqlite_file) as engine, engine.begin() as connection:
+        save_model(connection, replace(model, name="first", is_default=True))
+        save_model(connection, replace(model, name="second", is_default=False))
+    _raw(sqlite_file, "UPDATE fragility_model SET covariance = '[[9]]' WHERE name = 'first'")
+    with opened_database(sqlite_file) as engine:
+        with engine.begin() as connection, pytest.raises(DatabaseError, match="is damaged"):
+            set_default(connection, "second")
+        with engine.connect() as connection:
+            assert {found.row for found in check_database(connection)} >= {"first"}
+        # what the check advises goes on working
+        with engine.begin() as connection:
+            save_model(connection, replace(model, name="first"), replace=True)
+            set_default(connection, "second")
+            assert check_database(connection) == []
 
 
 def test_what_is_not_covered_is_said(filled: Engine) -> None:
@@ -44,7 +74,7 @@ DAMAGE = {
     "motion.pga_g": ("'strong'", "9e999", "x'00'"),
     "motion.npts": ("'many'",),
     "motion.dt_s": ("'short'", "-1"),
-    "motion.is_vertical": ("'up'",),
+    "motion.is_vertical": ("'up'", "2", "-1"),
     "motion.samples": ("'text'", "x'00'"),
     "motion.start_time": ("'noon'",),
     "motion.component": ("cast(x'ff' as text)",),

@@ -126,3 +126,29 @@ def test_twice_ends_at_once(place: Path, jobs: int, group: bool, pause_s: float)
             time.sleep(0.02)
     assert 0 < stored(str(place)) <= WHOLE
     digest(str(place))  # passes the check of the database
+
+
+IN_A_KERNEL = """
+import hashlib
+from rbfrag.campaign.interrupt import stopped_by_interrupts
+with stopped_by_interrupts():
+    print("ready", flush=True)
+    # like a kernel: it gives up the lock of the interpreter, and looks at no signal
+    hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)
+"""
+
+
+def test_presses_are_answered_while_a_kernel_runs() -> None:
+    command = [sys.executable, "-c", IN_A_KERNEL]
+    with subprocess.Popen(
+        command, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == b"ready\n"
+            interrupt(process, group=False)
+            said_until(process, STOPPING)
+            interrupt(process, group=False)
+            assert process.wait(PATIENCE_S) == 130
+        finally:
+            process.kill()

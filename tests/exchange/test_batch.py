@@ -132,7 +132,7 @@ def test_old_answers_are_replaced(answer: Answer, tmp_path: Path) -> None:
     [
         (TABLE.replace("p2_1_s2", "p2"), "there is no column p2_1_s2"),
         (TABLE.replace("block_id", "kr"), "the column kr is there twice"),
-        ("", "there is no column p2_1_s2; the columns are none"),
+        ("", "no column p2_1_s2, nor height_m and width_m; the columns are none"),
     ],
 )
 def test_bad_tables_are_refused(answer: Answer, tmp_path: Path, text: str, words: str) -> None:

@@ -85,7 +85,7 @@ def table(folder: Path, form: str, rows: Sequence[tuple[Any, ...]]) -> Any:
     return path
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     form=st.sampled_from(FORMS),
     kinds=st.lists(st.sampled_from(["sound", "sound", *BAD]), min_size=1, max_size=12),
@@ -259,6 +259,17 @@ def test_cells_of_pandas() -> None:
     rows = read_blocks(frame)
     assert rows.blocks["row"].tolist() == [0]
     assert rows.refused["reason"][0].startswith("p2 is not a number")
+
+
+def test_columns_that_must_be_whole_are_refused_with_all_their_lines(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("kr,p2\n0.1,3\nx,3\n0.1\n?,3\n")
+    with pytest.raises(InputError) as refusal:
+        read_columns(path, ("kr",))
+    assert str(refusal.value) == (
+        f"{path}, line 3: kr = 'x' is not a number; line 4: 1 cells under 2 columns; "
+        "line 5: kr = '?' is not a number"
+    )
 
 
 def test_a_long_list_has_room_in_a_message() -> None:

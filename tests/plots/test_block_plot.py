@@ -23,6 +23,8 @@ OUTLINE = (
     Block.from_polygon([(0, 0), (0.8, 0), (0.95, 0.2), (0.46, 2), (-0.54, 2)], 0, 4, 1, 74.8906),
     {"beta_deg": 12.0, "phi_deg": 35.0},
 )
+SLAB = (Block.rectangle(0.5, 30.0), {"beta_deg": 5.0, "phi_deg": 35.0})
+PEBBLE = (Block.rectangle(1e-3, 4e-4), {"beta_deg": 0.0, "phi_deg": 35.0})
 NO_BACK = (TOPPLE[0], {**TOPPLE[1], "back_fracture": False})
 CASES = {
     "topple": TOPPLE,
@@ -31,6 +33,8 @@ CASES = {
     "confined topple locked": LOCKED,
     "slump unstable": UNSTABLE,
     "topple of an outline": OUTLINE,
+    "topple of a pebble": PEBBLE,
+    "slide of a slab": SLAB,
     "topple without back": (NO_BACK[0], NO_BACK[1]),
 }
 
@@ -67,6 +71,9 @@ def test_the_drawing_is_the_block_turned_into_the_slope(case, tmp_path, caught, 
     assert (
         overlapping(figure, [*axes.texts, *panel.texts, axes.xaxis.label, axes.yaxis.label]) == []
     )
+    left, right = axes.get_xlim()
+    ticks = [t.label1 for t in axes.xaxis.get_major_ticks() if left <= t.get_loc() <= right]
+    assert overlapping(figure, ticks) == []
 
 
 def test_the_resultant_of_a_topple_runs_through_the_toe(tmp_path, caught):

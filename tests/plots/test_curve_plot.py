@@ -66,3 +66,20 @@ def test_a_missing_measure_is_named(tmp_path) -> None:
     with pytest.raises(InputError, match="tm_s"):
         plot_curve(straight_line_model("pga_tm"), 3.0, 0.1, tmp_path / "c.png")
     assert not list(tmp_path.iterdir())
+
+
+def test_as_many_curves_beside_it_as_styles_and_no_more(tmp_path, caught, overlapping) -> None:
+    figures = caught(module)
+    names = [f"fragility {i} of a file with rather long names of $ states" for i in range(21)]
+    beside = {name: lambda x: np.clip(x, 0.0, 1.0) for name in names}
+    with pytest.raises(InputError, match=r"21 fragilities .* at most 20"):
+        plot_curve(straight_line_model(), 3.0, 0.1, tmp_path / "c.png", beside=beside)
+    assert not list(tmp_path.iterdir())
+    del beside[names[-1]]
+    plot_curve(straight_line_model(), 3.0, 0.1, tmp_path / "c.png", beside=beside)
+    (figure,) = figures
+    axes = figure.axes[0]
+    drawn = [line for line in axes.lines if line.get_label().startswith("fragility")]
+    assert len({(line.get_color(), line.get_linestyle()) for line in drawn}) == 20
+    assert axes.get_window_extent().height > 0.3 * figure.bbox.height
+    assert overlapping(figure, [axes.title, *figure.legends[0].get_texts()]) == []

@@ -41,6 +41,13 @@ def test_the_block_moves_in_the_film(slump: Response, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_film_of_no_motion_is_one_of_rest(tmp_path: Path) -> None:
+    still = GroundMotion(np.zeros(30), 0.1)
+    rest = respond(still, block=BLOCK, beta_deg=0.0, phi_deg=35.0, history=True)
+    path = film(rest, BLOCK, tmp_path / "rest.gif", beta_deg=0.0, title="none of $5 and $6")
+    assert path.stat().st_size > 1000
+
+
 def test_a_film_of_two_motions_shows_both(tmp_path: Path) -> None:
     motion = GroundMotion.from_nodes([0.0, 0.0, 0.2, 0.2, 4.0], [0.0, 0.9, 0.9, 0.0, 0.0])
     planes = {"block": BLOCK, "beta_deg": 0.0, "phi_deg": 35.0}

@@ -91,6 +91,15 @@ def test_a_value_stands_on_its_contour_in_its_region(
         assert frame.contains(*box.max)
 
 
+@pytest.mark.parametrize("phi", [2.0, 5.0, 60.0, 85.0])
+def test_names_of_narrow_regions_do_not_cover_each_other(phi, tmp_path, caught, overlapping):
+    figures = caught(module)
+    plot_modes(tmp_path / "a.png", phi_deg=phi)
+    (figure,) = figures
+    assert len(names(figure)) >= 3
+    assert overlapping(figure, [*names(figure), figure._suptitle]) == []
+
+
 def test_a_few_blocks_are_points_and_many_a_histogram(tmp_path, caught):
     figures = caught(module)
     a1 = np.random.default_rng(1).uniform(-30.0, 10.0, MOST_POINTS + 1)

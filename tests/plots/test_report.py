@@ -109,6 +109,16 @@ def test_bad_questions_leave_no_file(refuses: Refuses, asked: tuple[str, ...], w
     assert not list(Path().iterdir())
 
 
+def test_notes_are_sentences_and_symbols_have_their_index(tmp_path: Path) -> None:
+    for suffix in ("pdf", "html"):
+        path = rbfrag.report(tmp_path / f"a.{suffix}", p2=3.0, kr=0.1, pgv_m_s=30.0)
+        words = words_of(path)
+        assert "did you mean cm/s?" in words
+        assert "cm/s?." not in words
+    page = (tmp_path / "a.html").read_text("utf-8")
+    assert "rectangle of this p² and k<sub>r</sub>" in page
+
+
 def test_a_path_of_another_kind_is_refused(refuses: Refuses) -> None:
     assert ".docx" in refuses("report", *SHAPE, "--out", "a.docx")
 
@@ -146,6 +156,27 @@ def test_nothing_on_the_sheet_covers_anything(
         assert figure.bbox.contains(*box.max)
         for other in boxes[i + 1 :]:
             assert not box.padded(-1.0).overlaps(other.padded(-1.0))
+
+
+def test_a_long_title_has_lines_and_its_dollars(tmp_path: Path) -> None:
+    contents = contents_of(
+        DescribedBlock(ROCK, {"beta_deg": 0.0}), {"pgv_m_s": 0.6}, kind=None, model=None,
+        level=0.95, db=None, rate=RateQuestion(None),
+    )  # fmt: skip
+    title = "Blocks above the road, at costs of $5 and $6 a day, " * 4
+    figure = sheet.new_figure(8.27, 11.69)
+    sheet._draw(figure, contents, title, "1 May 2026")
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    texts = [text for text in texts_of(figure) if text.get_text()]
+    heads = [text for text in texts if text.get_fontsize() == 15.0]
+    assert len(heads) == 3
+    assert "$5 and $6" in " ".join(text.get_text() for text in heads)
+    boxes = [text.get_window_extent(canvas.get_renderer()) for text in texts]
+    for i, box in enumerate(boxes):
+        assert figure.bbox.contains(*box.min)
+        assert figure.bbox.contains(*box.max)
+        assert not any(box.padded(-1.0).overlaps(other.padded(-1.0)) for other in boxes[:i])
 
 
 def texts_of(part):

@@ -78,6 +78,11 @@ def test_a_list_says_which_element_cannot_be_used(client):
     assert found["probability"][1:] == [1.0, None]
     assert found["reason"][:2] == ["", "unstable"]
     assert found["reason"][2].startswith("kr is not a number")
+    (said,) = (text for text in found["warnings"] if "could not be used" in text)
+    assert said.startswith(
+        "1 of 3 blocks could not be used; the reasons stand in the column reason"
+    )
+    assert f"it is element 2: {found['reason'][2]}" in said
 
 
 @pytest.mark.parametrize(

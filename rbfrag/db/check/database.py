@@ -154,7 +154,9 @@ def _check_types(connection: Connection) -> Iterator[Finding]:
         ]
         for column in table.c:
             kinds = next(_STORAGE[kind] for kind in _STORAGE if isinstance(column.type, kind))
-            wrong = func.typeof(column).not_in(kinds)
+            wrong: ColumnElement[bool] = func.typeof(column).not_in(kinds)
+            if isinstance(column.type, Boolean):  # read as true, and yet not equal to it
+                wrong = or_(wrong, literal_column(column.name).not_in((0, 1)))
             for row in connection.execute(select(*key).select_from(table).where(wrong)):
                 yield Finding(name, ", ".join(map(str, row)), f"{column.name}: of another type")
 

@@ -120,6 +120,13 @@ class Contents:
     document: dict[str, Any]
     rate: Rate | None
 
+    def notes(self) -> tuple[str, ...]:
+        """Return the warnings as sentences."""
+        return tuple(
+            f"Note: {text[:1].upper()}{text[1:]}{'' if text.endswith('?') else '.'}"
+            for text in self.remarks
+        )
+
     def columns(self) -> tuple[tuple[Table, ...], tuple[Table, ...]]:
         """Return the tables in two columns: the question, and the answer."""
         return self.tables[:2], self.tables[2:]

@@ -90,7 +90,7 @@ def _draw(figure: Figure, contents: Contents, title: str, date: str) -> None:
         _, *cells, _ = part.subfigures(1, len(ratios), width_ratios=ratios, squeeze=False)[0]
         for cell, panel in zip(cells, row, strict=True):
             panel.draw(cell)
-            cell.suptitle(panel.title, fontsize=9)
+            cell.suptitle(_shown(panel.title), fontsize=9, parse_math=False)
     _write_foot(parts[-1], contents, heights[-1])
 
 
@@ -108,18 +108,22 @@ def _wrapped(text: str, letters: int) -> list[str]:
 
 
 def _foot_lines(contents: Contents) -> list[str]:
-    notes = [f"Note: {remark[:1].upper()}{remark[1:]}." for remark in contents.remarks]
-    return [line for text in (*notes, *contents.versions) for line in _wrapped(text, _FINE)]
+    texts = (*contents.notes(), *contents.versions)
+    return [line for text in texts for line in _wrapped(text, _FINE)]
 
 
 def _lines_of(tables: Sequence[Table]) -> float:
     return sum(1.5 + len(rows) for _, rows in tables)
 
 
+def _shown(text: str) -> str:
+    """Return a text with the index of k_r where it belongs."""
+    return text.replace("k_r", "k\N{LATIN SUBSCRIPT SMALL LETTER R}")
+
+
 def _write(part: SubFigure, x: float, y: float, text: str, **style: Any) -> None:
-    """Write letters as they are, the index of k_r where it belongs."""
-    shown = text.replace("k_r", "k\N{LATIN SUBSCRIPT SMALL LETTER R}")
-    part.text(x, y, shown, va="center", parse_math=False, **style)
+    """Write letters as they are, dollars too."""
+    part.text(x, y, _shown(text), va="center", parse_math=False, **style)
 
 
 def _write_head(

@@ -26,7 +26,8 @@ body { font: 15px/1.45 system-ui, sans-serif; color: #222; max-width: 60rem; mar
 h1 { color: #1f4e79; font-size: 1.6rem; margin: 0; }
 h2 { color: #1f4e79; font-size: 1rem; margin: 1rem 0 .2rem; }
 .first { font-size: 1.15rem; font-weight: 600; }
-.parts { display: grid; grid-template-columns: repeat(auto-fit, minmax(22rem, 1fr)); gap: 1rem; }
+.parts { display: grid; grid-template-columns: repeat(auto-fit, minmax(22rem, 1fr)); gap: 1rem;
+  margin-bottom: 1rem; }
 table { border-collapse: collapse; width: 100%; }
 th { width: 50%; }
 th, td { text-align: left; font-weight: normal; padding: .1rem .6rem .1rem 0;
@@ -62,7 +63,7 @@ def write_html(contents: Contents, title: str, date: str, target: Path) -> None:
         f'<p class="first">{_written(first)}</p>', f"<p>{_written(' '.join(others))}</p>",
         '<div class="parts">', *map(_column, contents.columns()), "</div>",
         '<div class="parts">', *map(_figure, panels_of(contents)), "</div>",
-        "<footer>", *(f"<p>Note: {_written(text)}.</p>" for text in contents.remarks),
+        "<footer>", *(f"<p>{_written(text)}</p>" for text in contents.notes()),
         *(f"<p>{escape(text)}</p>" for text in contents.versions), "</footer>",
         "</body></html>",
     ]  # fmt: skip
@@ -88,7 +89,7 @@ def _table(table: Table) -> str:
 
 
 def _figure(panel: Panel) -> str:
-    return f"<figure><figcaption>{escape(panel.title)}</figcaption>\n{_svg(panel)}\n</figure>"
+    return f"<figure><figcaption>{_written(panel.title)}</figcaption>\n{_svg(panel)}\n</figure>"
 
 
 def _svg(panel: Panel) -> str:

@@ -127,9 +127,10 @@ def mechanism(site: BlockOnPlanes) -> Mechanism:
 def _leans(site: BlockOnPlanes) -> bool:
     """Whether the block leans on its back plane at rest."""
     block = site.block
-    return (
-        block is not None and site.back_fracture and math.degrees(site.beta_rad) < block.alpha1_deg
-    )
+    if block is None or not site.back_fracture:
+        return False
+    # in radians, which equal angles are equal in: degrees and back may round to another number
+    return site.beta_rad < math.radians(block.alpha1_deg)
 
 
 def _tips_back(site: BlockOnPlanes) -> Equation:
