@@ -10,8 +10,10 @@ from typing import Any
 
 import pytest
 from sqlalchemy import Engine
+from typer.testing import CliRunner
 
 import rbfrag
+from rbfrag.cli.main import app
 from rbfrag.db.check.database import check_database, coverage
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import reference_file
@@ -50,6 +52,30 @@ def test_a_change_of_a_row_does_not_hide_that_it_was_altered(
             save_model(connection, replace(model, name="first"), replace=True)
             set_default(connection, "second")
             assert check_database(connection) == []
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        ("motion.dt_s", "'short'"),
+        ("motion.samples", "'text'"),
+        ("motion.start_time", "'noon'"),
+        ("simulation.theta_n", "'x'"),
+        ("combination.natural_key", "x'00'"),
+    ],
+)
+def test_the_command_ends_with_findings(
+    sqlite_file: Path, fill: Any, column: str, value: str
+) -> None:
+    with opened_database(sqlite_file) as engine, engine.begin() as connection:
+        fill(connection, [1, 2])
+    table, _, name = column.partition(".")
+    _raw(sqlite_file, f"UPDATE {table} SET {name} = {value} WHERE rowid = 1"
+         if table != "simulation" else f"UPDATE {table} SET {name} = {value}")  # fmt: skip
+    done = CliRunner().invoke(app, ["db", "check", "--db", str(sqlite_file), "--sample", "9"])
+    assert isinstance(done.exception, SystemExit), done.exception
+    assert done.exit_code == 1
+    assert table in done.output
 
 
 def test_what_is_not_covered_is_said(filled: Engine) -> None:
