@@ -38,6 +38,9 @@ from rbfrag.errors import (
 BUSY_TIMEOUT_S = 30.0
 """How long a connection waits for another process's lock [s]."""
 
+CONNECT_TIMEOUT_S = 30.0
+"""How long a server may take to answer [s], unless the URL has another ``connect_timeout``."""
+
 
 def database_label(url: URL) -> str:
     """Return the database as messages name it: the file, or the URL without its password."""
@@ -101,9 +104,12 @@ def _sqlite_engine(
 def _server_engine(url: URL, read_only: bool) -> Engine:
     if importlib.util.find_spec("psycopg") is None:
         raise MissingExtraError("PostgreSQL databases need psycopg", "postgres")
-    # A connection that the server closed between two transactions is replaced without a word.
-    engine = create_engine(url, pool_pre_ping=True)
     longest_s = LONGEST_WAIT_S.get()
+    # A host that accepts and never answers would hold the caller for good.
+    waits_s = CONNECT_TIMEOUT_S if longest_s is None else min(CONNECT_TIMEOUT_S, longest_s)
+    patience = {} if "connect_timeout" in url.query else {"connect_timeout": max(int(waits_s), 2)}
+    # A connection that the server closed between two transactions is replaced without a word.
+    engine = create_engine(url, pool_pre_ping=True, connect_args=patience)
     if longest_s is not None:
         event.listen(engine, "connect", partial(_wait_at_most, longest_s))
     if read_only:
@@ -155,7 +161,7 @@ def _explained_server_error(
     if type(error).__module__.partition(".")[0] != "psycopg":
         return None
     reason = " ".join(str(error).split())
-    unnamed = state is None and type(error).__name__ == "OperationalError"
+    unnamed = state is None and type(error).__name__ in ("OperationalError", "ConnectionTimeout")
     if unnamed and not connected:
         return DatabaseNotFoundError(
             f"cannot reach {label}: {reason}; check host, port, user and database name"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+from itertools import islice
+from typing import Any, ClassVar
 
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
@@ -22,6 +23,9 @@ LINGER_S = 5.0
 LINGER_BYTES = 1 << 26
 """How much it may send; a 64th of it where it does not say how much it will."""
 
+CONNECTIONS = 500
+"""With more open connections than these, those that have been idle longest are closed."""
+
 _END = b"connection: close\r\ncontent-length: 0\r\n\r\n"
 _TOO_LARGE = b"HTTP/1.1 431 Request Header Fields Too Large\r\n" + _END
 _TOO_SLOW = b"HTTP/1.1 408 Request Timeout\r\n" + _END
@@ -30,6 +34,8 @@ _TOO_SLOW = b"HTTP/1.1 408 Request Timeout\r\n" + _END
 class BoundedProtocol(HttpToolsProtocol):
     """A connection whose headers have limits, and that ends with an answer."""
 
+    _open: ClassVar[dict[BoundedProtocol, None]] = {}
+    """The connections of this process, the one that was last used last."""
     _late: asyncio.TimerHandle | None = None
     _read = 0
     _ending = False
@@ -38,11 +44,14 @@ class BoundedProtocol(HttpToolsProtocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin to wait for the first headers."""
         super().connection_made(transport)
+        self._make_room()
+        self._used()
         self._wait_for_headers()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Wait for nothing more."""
         self._stop_waiting()
+        self._open.pop(self, None)
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
@@ -67,6 +76,7 @@ class BoundedProtocol(HttpToolsProtocol):
     def on_headers_complete(self) -> None:
         """Begin to answer."""
         self._stop_waiting()
+        self._used()
         super().on_headers_complete()
         self.cycle.transport = _Lingering(self, self.cycle)  # type: ignore[assignment]
         if self._ending:
@@ -92,6 +102,19 @@ class BoundedProtocol(HttpToolsProtocol):
             self.loop.call_later(LAST_WORDS_S, self._end_if_idle)
         else:
             super().shutdown()
+
+    def _used(self) -> None:
+        self._open.pop(self, None)
+        self._open[self] = None
+
+    def _make_room(self) -> None:
+        """Close what has been idle longest, so that idle connections keep nobody out."""
+        too_many = 1 + len(self._open) - CONNECTIONS
+        if too_many > 0:
+            idle = (each for each in self._open if each._idle())
+            for each in list(islice(idle, too_many)):
+                each._refuse(_TOO_SLOW)
+                self._open.pop(each, None)
 
     def _idle(self) -> bool:
         return self.cycle is None or self.cycle.response_complete

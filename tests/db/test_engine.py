@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import signal
+import socket
 import sqlite3
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from rbfrag.db.engine import open_database, opened_database
 from rbfrag.db.insert import insert_row
 from rbfrag.db.location import locate
 from rbfrag.db.schema import suite
+from rbfrag.db.sqlite_file import LONGEST_WAIT_S
 from rbfrag.db.upgrade import upgrade_database
 from rbfrag.errors import (
     DatabaseBusyError,
@@ -280,6 +282,20 @@ class TestRefusals:
                 with pytest.raises(DatabaseError, match="disk is full"):
                     insert_row(connection, suite, {"name": "x" * 100_000})
             assert _count(engine) == 0
+
+    @pytest.mark.parametrize(("stated", "limit_s"), [("?connect_timeout=2", None), ("", 2.0)])
+    def test_server_that_accepts_and_never_answers(
+        self, stated: str, limit_s: float | None
+    ) -> None:
+        pytest.importorskip("psycopg")
+        token = LONGEST_WAIT_S.set(limit_s)
+        try:
+            with socket.create_server(("127.0.0.1", 0)) as silent:
+                url = f"postgresql://nobody@127.0.0.1:{silent.getsockname()[1]}/none{stated}"
+                with pytest.raises(DatabaseNotFoundError, match=r"cannot reach .*timeout"):
+                    open_database(url)
+        finally:
+            LONGEST_WAIT_S.reset(token)
 
     def test_postgres_without_psycopg(self, monkeypatch: pytest.MonkeyPatch) -> None:
         real = importlib.util.find_spec

@@ -60,6 +60,22 @@ def test_headers_that_come_in_time_are_answered():
                 assert answer.read() == b"hello"
 
 
+def test_idle_connections_keep_nobody_out(monkeypatch):
+    monkeypatch.setattr(protocol, "CONNECTIONS", 20)
+    with serving() as port:
+        wires = [socket.create_connection(("127.0.0.1", port), 20) for _ in range(50)]
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/") as answer:
+                assert answer.read() == b"hello"
+            # the first ones are told that they waited too long, the last ones may still ask
+            assert wires[0].recv(1000).startswith(b"HTTP/1.1 408 ")
+            wires[-1].sendall(b"GET / HTTP/1.1\r\nhost: x\r\n\r\n")
+            assert wires[-1].recv(1000).startswith(b"HTTP/1.1 200 ")
+        finally:
+            for wire in wires:
+                wire.close()
+
+
 def test_processes_are_counted_together(tmp_path):
     with running_service(tmp_path, workers=2, jobs=1) as running:
         for _ in range(30):
