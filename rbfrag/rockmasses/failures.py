@@ -225,7 +225,7 @@ def outcome_columns(shaken: ShakenMass) -> dict[str, NDArray[Any]]:
         **{name: np.tile(values, m) for name, values in columns.items()},
         "scale": np.repeat(scales, n),
         "pga_g": np.repeat(shaken.pga_g, n),
-        "fate": names[shaken.code.reshape(-1)],
+        "outcome": names[shaken.code.reshape(-1)],
         "displacement_m": shaken.displacement_m.reshape(-1),
         "rotation_deg": np.degrees(shaken.rotation_rad.reshape(-1)),
         "reason": np.tile(reason, m),

@@ -76,14 +76,14 @@ def test_sliding_blocks_by_hand() -> None:
     ky = math.tan(math.radians(10.0))
     factor = math.cos(math.radians(10.0)) / math.cos(math.radians(30.0))
     slid = factor * 0.5 * 0.4 * G * 0.2**2 * (0.4 / ky - 1.0)
-    for limit, fate in ((slid * 1.001, "stays"), (slid * 0.999, "fails")):
+    for limit, outcome in ((slid * 1.001, "stays"), (slid * 0.999, "fails")):
         found = shake(made, pulse(0.4, 0.2), limits=FailureLimits(limit))
-        assert [OUTCOMES[code] for code in found.code[0]] == [fate] * 3
+        assert [OUTCOMES[code] for code in found.code[0]] == [outcome] * 3
         assert found.displacement_m[0] == pytest.approx([slid] * 3, rel=1e-10)
         assert np.isnan(found.rotation_rad).all()
         (each,) = failures(found)
-        assert each.total.fails == (3 if fate == "fails" else 0)
-        assert each.total.of_all.value == (1.0 if fate == "fails" else 0.0)
+        assert each.total.fails == (3 if outcome == "fails" else 0)
+        assert each.total.of_all.value == (1.0 if outcome == "fails" else 0.0)
         assert each.modes["slide"].displacement_m is not None
         assert each.modes["slide"].displacement_m["max"] == pytest.approx(slid, rel=1e-10)
     # on the limit itself rounding decides, and that is said
@@ -133,15 +133,15 @@ def test_every_block_is_what_it_would_be_alone(four: ShakenMass) -> None:
             beta_deg=float(made.beta_deg[j]),
             phi_deg=float(made.phi_deg[j]),
         )
-        fate = OUTCOMES[four.code[1, j]]
-        outcomes.add((alone.kind, fate))
+        outcome = OUTCOMES[four.code[1, j]]
+        outcomes.add((alone.kind, outcome))
         if alone.kind == "sliding":
             assert alone.peak_displacement_m == pytest.approx(four.displacement_m[1, j], rel=1e-9)
             if alone.outcome is Outcome.STABLE:
-                assert (fate == "fails") == (alone.peak_displacement_m > 0.05)
+                assert (outcome == "fails") == (alone.peak_displacement_m > 0.05)
         else:
             told = {"stable": "stays", "toppled": "fails"}.get(alone.outcome, alone.outcome.value)
-            assert fate == told
+            assert outcome == told
             if alone.peak_theta_rad is not None:
                 assert alone.peak_theta_rad == pytest.approx(
                     four.rotation_rad[1, j], rel=1e-6, abs=1e-9
@@ -149,7 +149,7 @@ def test_every_block_is_what_it_would_be_alone(four: ShakenMass) -> None:
     assert {kind for kind, _ in outcomes} == {
         "sliding", "toppling", "slumping", "confined_toppling",
     }  # fmt: skip
-    assert {"stays", "fails"} <= {fate for _, fate in outcomes}
+    assert {"stays", "fails"} <= {outcome for _, outcome in outcomes}
 
 
 def test_the_fates_are_a_partition(four: ShakenMass) -> None:
@@ -215,7 +215,7 @@ def test_the_table_has_a_row_for_each_block_and_scale(four: ShakenMass) -> None:
     assert {values.shape for values in columns.values()} == {(2 * n,)}
     assert columns["block_id"].tolist() == [*range(1, n + 1)] * 2
     assert set(columns["scale"][:n]) == {0.5}
-    named = columns["fate"].reshape(2, n)
+    named = columns["outcome"].reshape(2, n)
     assert all(
         named[1, j] == OUTCOMES[four.code[1, j]] for j in np.flatnonzero(four.realisations.is_block)
     )
