@@ -17,6 +17,7 @@ from rbfrag.fragility.model import Model
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.measure_type import IntensityType
+from rbfrag.hazards.site_probability import described
 
 FloatArray = NDArray[np.float64]
 
@@ -44,6 +45,8 @@ def block_functions(
     kr: FloatArray,
     measure: str,
     *,
+    kind: str | None = None,
+    restitution: FloatArray | None = None,
     one_class: bool = False,
     levels: int = 80,
     model: Model | None = None,
@@ -61,6 +64,9 @@ def block_functions(
         kr: toppling yield acceleration coefficients, shape (m,).
         measure: ``pgv_m_s``, ``pga_g``, ``sa03_g``, ``sa10_g``, ``sa20_g`` or ``sa30_g``, which
             a model reads alone.
+        kind: how they stand; None for backed by a slope.
+        restitution: of blocks that rock, shape (m,); None or NaN for what angular momentum
+            leaves.
         one_class: the blocks stand for one class: one function, their mean, of one name.
         levels: number of levels of a discrete function.
         model: as in :func:`rbfrag.predict`.
@@ -75,15 +81,17 @@ def block_functions(
         DatabaseError: the database cannot be read.
     """
     x = scanned_levels()
-    kind, about, parts = probabilities_over(x, p2, kr, measure, levels, model, db)
+    measured, about, parts = probabilities_over(
+        x, p2, kr, measure, levels, model, db, kind=kind, restitution=restitution
+    )
     if one_class:
         total = np.zeros_like(x)
         for part in parts:
             total += part.sum(axis=0)
-        return [_function(names[0], kind, x, total / p2.size, levels)], about
+        return [_function(names[0], measured, x, total / p2.size, levels)], about
     rows = (row for part in parts for row in part)
     functions = [
-        _function(name, kind, x, row, levels) for name, row in zip(names, rows, strict=True)
+        _function(name, measured, x, row, levels) for name, row in zip(names, rows, strict=True)
     ]
     return functions, about
 
@@ -101,18 +109,23 @@ def probabilities_over(
     levels: int,
     model: Model | None,
     db: str | PathLike[str] | None,
+    *,
+    kind: str | None = None,
+    restitution: FloatArray | None = None,
 ) -> tuple[IntensityType, tuple[str, ...], Iterator[FloatArray]]:
     """Return the meaning of the levels, the model, and probabilities, some blocks at a time."""
     if levels < 10:
         raise InputError(f"levels = {levels}: a discrete fragility needs at least 10")
     if measure not in _TYPES:
         raise InputError(f"measure = {measure!r}: use one of {', '.join(_TYPES)}")
-    chosen = find_model(model, ("p2", "kr", measure), db)
+    chosen = find_model(model, ("p2", "kr", measure), db, kind=kind)
+    columns = described(chosen, p2, kr, restitution)
 
     def rows() -> Iterator[FloatArray]:
         for start in range(0, p2.size, _CHUNK):
             some = slice(start, start + _CHUNK)
-            given = {"p2": p2[some, None], "kr": kr[some, None], measure: x[None, :]}
+            of_blocks = {name: column[some, None] for name, column in columns.items()}
+            given = {**of_blocks, measure: x[None, :]}
             prediction = answer_given(chosen, given, 0.95, interval=False)
             assert isinstance(prediction, PredictionArray)
             yield prediction.probability

@@ -23,6 +23,7 @@ from rbfrag.fragility.model import Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.curve import ANSWERED
 from rbfrag.hazards.measure_type import openquake_type
+from rbfrag.solver.kinds import model_of_kind
 
 EACH_NEEDED = "an exposure model needs a function of each"
 """Why a table with a row that cannot be used is refused."""
@@ -66,6 +67,8 @@ def nrml(
     kr: ArrayLike | None = None,
     *,
     blocks: Blocks | None = None,
+    kind: str | None = None,
+    restitution: ArrayLike | None = None,
     imt: str = "PGV",
     shares: Sequence[float] | None = None,
     one_class: bool = False,
@@ -81,6 +84,9 @@ def nrml(
         p2: frequency parameters p² [1/s²], scalar or shape (m,), with `kr`.
         kr: toppling yield acceleration coefficients.
         blocks: instead of these a table of blocks: a file, or columns by name.
+        kind: how they stand: ``toppling`` (backed by a slope, the default) or ``rocking``.
+        restitution: of blocks that rock: speed after an impact over that before it; None for what
+            angular momentum leaves.
         imt: measure of the functions: PGV, PGA, or SA(T) at 0.3, 1, 2 or 3 s.
         shares: shares of the blocks [%]: a limit state each, that at least so many fail; None for
             a function of each block.
@@ -96,20 +102,28 @@ def nrml(
         DatabaseError: the database cannot be read.
     """
     target = output_path(out, (".xml",), "NRML file")
-    table, measure = given_blocks(p2, kr, blocks).whole(EACH_NEEDED), _measure(imt)
+    rows = given_blocks(p2, kr, blocks, restitution=restitution, kind=kind)
+    table, measure = rows.whole(EACH_NEEDED), _measure(imt)
     single = one_class or (blocks is None and len(table["kr"]) == 1)
     notes: Sequence[str] = ()
     if shares is not None:
+        if _stands_free(kind):
+            raise InputError(
+                "shares are of a rock mass, whose blocks are backed by the rock behind them: leave "
+                "shares or the kind out"
+            )
         functions, about, notes = share_functions(
             name, table["p2_1_s2"], table["kr"], measure, list(shares), levels=levels, model=model,
             db=db,
         )  # fmt: skip
     else:
         functions, about = block_functions(
-            _names(table, name, single), table["p2_1_s2"], table["kr"], measure,
-            one_class=one_class, levels=levels, model=model, db=db,
+            _names(table, name, single), table["p2_1_s2"], table["kr"], measure, kind=kind,
+            restitution=table.get("restitution"), one_class=one_class, levels=levels, model=model,
+            db=db,
         )  # fmt: skip
-    what = f"Toppling of rock blocks, model {about[0]} ({about[2]} on {about[1]})"
+    what = f"{'Overturning of free-standing' if _stands_free(kind) else 'Toppling of'} rock blocks"
+    what += f", model {about[0]} ({about[2]} on {about[1]})"
     write_text(nrml_text(functions, description=what), target)
     return _answer(str(target), None, functions, about, notes)
 
@@ -120,6 +134,8 @@ def pelicun(
     kr: ArrayLike | None = None,
     *,
     blocks: Blocks | None = None,
+    kind: str | None = None,
+    restitution: ArrayLike | None = None,
     imt: str = "PGV",
     one_class: bool = False,
     name: str = "block",
@@ -136,6 +152,8 @@ def pelicun(
         p2: as for :func:`nrml`, like all that follow.
         kr: see there.
         blocks: see there.
+        kind: see there.
+        restitution: see there.
         imt: see there.
         one_class: see there.
         name: see there.
@@ -150,17 +168,22 @@ def pelicun(
     """
     target = output_path(out, (".csv",), "fragility table")
     beside = output_path(str(target.with_suffix(".json")), (".json",), "description")
-    table, measure = given_blocks(p2, kr, blocks).whole(EACH_NEEDED), _measure(imt)
+    rows = given_blocks(p2, kr, blocks, restitution=restitution, kind=kind)
+    table, measure = rows.whole(EACH_NEEDED), _measure(imt)
     single = one_class or (blocks is None and len(table["kr"]) == 1)
     functions, about = block_functions(
-        _names(table, name, single), table["p2_1_s2"], table["kr"], measure,
-        one_class=one_class, levels=levels, model=model, db=db,
+        _names(table, name, single), table["p2_1_s2"], table["kr"], measure, kind=kind,
+        restitution=table.get("restitution"), one_class=one_class, levels=levels, model=model,
+        db=db,
     )  # fmt: skip
+    count, free = len(table["kr"]), _stands_free(kind)
+    mean = "free-standing blocks" if free else "toppling blocks of a rock mass, backed by a slope"
+    stands = "that stands free" if free else "backed by a slope"
     descriptions = (
-        [f"Mean over {len(table['kr'])} stable toppling blocks of a rock mass, backed by a slope."]
+        [f"Mean over {count} stable {mean}."]
         if one_class
         else [
-            f"Rock block backed by a slope, p² = {a:.6g} 1/s², k_r = {b:.6g}."
+            f"Rock block {stands}, p² = {a:.6g} 1/s², k_r = {b:.6g}."
             for a, b in zip(table["p2_1_s2"].tolist(), table["kr"].tolist(), strict=True)
         ]
     )
@@ -169,6 +192,10 @@ def pelicun(
     write_text(metadata_text(functions, descriptions, about), beside)
     write_text(content, target)
     return _answer(str(target), str(beside), functions, about, renamed)
+
+
+def _stands_free(kind: str | None) -> bool:
+    return kind is not None and model_of_kind(kind).free_standing
 
 
 def _measure(imt: str) -> str:

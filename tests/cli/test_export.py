@@ -12,6 +12,7 @@ import pytest
 import rbfrag
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
+from rbfrag.errors import InputError
 from rbfrag.exchange.nrml import read_nrml
 from rbfrag.exchange.pelicun_table import read_pelicun
 from tests.cli.conftest import Shell
@@ -52,6 +53,31 @@ def test_pelicun_of_one_block_in_pga(shell: Shell) -> None:
     x = np.linspace(0.4, 1.8, 50)
     expected = rbfrag.predict(3.0, 0.1, pga_g=x).probability
     assert np.abs(found.at(x) - expected).max() < 1.2 * told["largest_grid_error"] + 1e-5
+
+
+def test_functions_of_free_standing_blocks(shell: Shell, refuses: Callable[..., str]) -> None:
+    Path("blocks.csv").write_text("p2_1_s2,kr,restitution\n3,0.1,0.8\n10,0.3,\n")
+    rocking = ("--kind", "rocking", "--levels", "300")
+    told = shell.json("export", "nrml", "--blocks", "blocks.csv", *rocking, "--out", "a.xml")
+    shell.json(
+        "export", "pelicun", "--p2", "3", "--kr", "0.1", "--restitution", "0.8", *rocking,
+        "--out", "a.csv",
+    )  # fmt: skip
+    bouncing, own = read_nrml("a.xml")
+    (alone,) = read_pelicun("a.csv").functions
+    x = np.geomspace(0.1, 3.0, 50)
+    for found, block in ((bouncing, (3.0, 0.1, 0.8)), (alone, (3.0, 0.1, 0.8)), (own, (10, 0.3))):
+        p2, kr, *restitution = block
+        expected = rbfrag.predict(
+            p2, kr, kind="rocking", restitution=restitution[0] if restitution else None, pgv_m_s=x
+        ).probability
+        assert np.abs(found.at(x) - expected).max() < 1.2 * told["largest_grid_error"] + 1e-5
+    assert "Overturning of free-standing rock blocks" in Path("a.xml").read_text()
+    assert "that stands free" in json.loads(Path("a.json").read_text())["block"]["Description"]
+    backed = ("export", "nrml", "--p2", "3", "--kr", "0.1", "--out", "b.xml")
+    assert "--kind rocking" in refuses(*backed, "--restitution", "0.8")
+    with pytest.raises(InputError, match="shares are of a rock mass"):
+        rbfrag.export.nrml("b.xml", 3.0, 0.1, kind="rocking", shares=[50.0])
 
 
 @pytest.mark.usefixtures("database")

@@ -9,7 +9,7 @@ import typer
 
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlocksOptions
+from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions
 from rbfrag.cli.parameters.stack import command_group, option, stacked
 
 if TYPE_CHECKING:
@@ -33,17 +33,19 @@ class FunctionOptions(BlocksOptions):
     model: options.Model = None
     db: options.Db = None
 
-    def keywords(self) -> tuple[dict[str, Any], tuple[str, ...]]:
+    def keywords(self, standing: StandingOptions) -> tuple[dict[str, Any], tuple[str, ...]]:
         """Return the keywords of `rbfrag.export`, and what is to be said of the blocks."""
-        given = self.toppling_blocks()
+        given = self.toppling_blocks(standing)
         keywords = {
             "one_class": given.is_class, "imt": self.imt, "name": self.name, "levels": self.levels,
-            "model": self.model, "db": self.db,
+            "model": self.model, "db": self.db, "kind": standing.kind,
         }  # fmt: skip
         if given.rows is None and not given.is_class:
-            return {**keywords, "p2": given.columns["p2_1_s2"], "kr": given.columns["kr"]}, (
-                given.remarks
-            )
+            named = {"p2": "p2_1_s2", "kr": "kr", "restitution": "restitution"}
+            columns = {
+                key: given.columns[name] for key, name in named.items() if name in given.columns
+            }
+            return keywords | columns, given.remarks
         keywords["blocks"] = given.question
         return keywords, given.remarks
 
@@ -53,6 +55,7 @@ class FunctionOptions(BlocksOptions):
 def nrml(
     out: Out,
     blocks: FunctionOptions,
+    standing: StandingOptions,
     shares: str | None = option(
         "Shares of the blocks of a rock mass [%]: a limit state each, that at least so many fail. "
         "Example: 1,10,50.",
@@ -63,7 +66,7 @@ def nrml(
     """Write an OpenQuake fragility model, NRML 0.5 (.xml); PGV is in cm/s there."""
     from rbfrag.exchange.export import nrml as written
 
-    keywords, remarks = blocks.keywords()
+    keywords, remarks = blocks.keywords(standing)
     wanted = None if shares is None else options.number_list(shares, "--shares")
     _print(written(out, **keywords, shares=wanted), remarks, json=json)
 
@@ -72,7 +75,9 @@ def nrml(
     "pelicun", epilog="Example:  rbfrag export pelicun --height 2.4 --width 0.5 --out fragility.csv"
 )
 @stacked
-def pelicun(out: Out, blocks: FunctionOptions, json: options.Json = False) -> None:
+def pelicun(
+    out: Out, blocks: FunctionOptions, standing: StandingOptions, json: options.Json = False
+) -> None:
     """Write a fragility table of pelicun and SimCenter (.csv), and its description (.json).
 
     PGV is in m/s (mps) there. The description has the table's name: fragility.json stands beside
@@ -80,7 +85,7 @@ def pelicun(out: Out, blocks: FunctionOptions, json: options.Json = False) -> No
     """
     from rbfrag.exchange.export import pelicun as written
 
-    keywords, remarks = blocks.keywords()
+    keywords, remarks = blocks.keywords(standing)
     _print(written(out, **keywords), remarks, json=json)
 
 
