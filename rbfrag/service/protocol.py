@@ -44,7 +44,7 @@ class BoundedProtocol(HttpToolsProtocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin to wait for the first headers."""
         super().connection_made(transport)
-        self._make_room()
+        self._close_longest_idle()
         self._used()
         self._wait_for_headers()
 
@@ -107,7 +107,7 @@ class BoundedProtocol(HttpToolsProtocol):
         self._open.pop(self, None)
         self._open[self] = None
 
-    def _make_room(self) -> None:
+    def _close_longest_idle(self) -> None:
         """Close what has been idle longest, so that idle connections keep nobody out."""
         too_many = 1 + len(self._open) - CONNECTIONS
         if too_many > 0:
