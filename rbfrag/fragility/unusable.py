@@ -128,7 +128,7 @@ def elements(reasons: NDArray[np.object_]) -> list[str]:
 
 
 def in_list(places: Iterable[str], reasons: Iterable[str]) -> str:
-    """Return blocks with their reasons as one phrase: alike ones together, as many as have room.
+    """Return blocks with their reasons as one phrase: alike ones together, as many as fit.
 
     Args:
         places: where each stands, as "line 3 (block A7)".
