@@ -20,6 +20,7 @@ LEVELS = (
     {"solver"},
     {"db"},
     {"fragility"},
+    {"question"},
     {"hazards", "rockmasses"},
     {"plots", "exchange", "campaign"},
     {"bench"},

@@ -13,14 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_rows import foreign_reasons
+from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, foreign_reasons
 from rbfrag.exchange.block_table import (
     BLOCK_COLUMNS,
+    FRICTION,
     NUMBERS,
     RECTANGLE,
     is_of_rectangles,
     rectangle_columns,
     rectangle_reasons,
+    sliding_reasons,
 )
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
 from rbfrag.exchange.tables.files import (
@@ -30,7 +32,7 @@ from rbfrag.exchange.tables.files import (
     table_source,
     table_writer,
 )
-from rbfrag.exchange.tables.parts import Part
+from rbfrag.exchange.tables.parts import Part, cells_of
 from rbfrag.files import reading, written_whole
 from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.measures import STATED
@@ -39,6 +41,7 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
+from rbfrag.question.table import Header, Numeric, columns_in
 from rbfrag.solver.kinds import model_of_kind
 
 FloatArray = NDArray[np.float64]
@@ -47,6 +50,10 @@ NUMBERS_OF_ANSWERS = ("probability", "ci_low", "ci_high", "event_low", "event_hi
 
 ANSWERS = (*NUMBERS_OF_ANSWERS, "in_domain", "reason")
 """The columns that are appended; a table that has them gets new ones."""
+
+NAMES = ("block_id", "site_id")
+KEPT = (*NAMES, *PLACE, *PORTFOLIO)
+"""Columns that say which block a row is, and what other answers read of it."""
 
 OF_UNCERTAIN = "block_sd"
 """The column that is appended too where blocks are uncertain."""
@@ -57,8 +64,14 @@ DEVIATIONS = tuple(sorted({sigma for method in methods() for sigma in method.blo
 _OR_SIDES = dict.fromkeys(("p2_1_s2", "kr"), ", nor height_m and width_m")
 """What a table of toppling blocks may have instead of a column."""
 
-NUMERIC = (*BLOCK_COLUMNS, *DEVIATIONS, *RECTANGLE, *STATED)
-"""Columns that hold numbers."""
+READ = (*BLOCK_COLUMNS, *DEVIATIONS, *RECTANGLE, FRICTION, *STATED)
+"""Columns of numbers that may be read, by what written tables call them."""
+
+NUMERIC = Numeric(READ)
+"""The same, whatever a table calls them."""
+
+TEXTS = ("kind", "mode")
+"""Columns of texts that are read."""
 
 
 def predict_table(
@@ -104,8 +117,13 @@ def predict_table(
     try:
         with reading(origin, "a block table"), ExitStack() as stack:
             header, parts, dialect = table_parts(origin, NUMERIC, stack, fast=True)
-            names = _columns(origin, header, given, kind)
+            stated = columns_in(header, origin, (*READ, *TEXTS, *NAMES))
+            names = _columns(origin, header, stated, given, kind)
             known = [*_known_names(names), *given]
+            remarks = (
+                *stated.remarks,
+                *stated.unread(header, (*names, *TEXTS, *KEPT, *ANSWERS, OF_UNCERTAIN)),
+            )
             chosen = find_model(model, known, db, kind=kind, rotation_deg=rotation_deg)
             partial = stack.enter_context(written_whole(goal))
             uncertain = not set(known).isdisjoint(DEVIATIONS)
@@ -118,7 +136,7 @@ def predict_table(
             formulas: list[str] = []
             refused: dict[str, str] = {}
             for part in parts:
-                answer = _answer(part, names, given, chosen, level)
+                answer = _answer(part, stated, names, given, chosen, level)
                 cells = {
                     name: cells
                     for name, cells in part.cells.items()
@@ -151,22 +169,29 @@ def predict_table(
         "model": chosen.name,
         "term": chosen.term.name,
         "method": chosen.row.method,
-        "warnings": [*chosen.notes, *unusable, *formulas],
+        "warnings": [*remarks, *chosen.notes, *unusable, *formulas],
     }
 
 
 def _columns(
-    origin: PathLike[str], header: list[str], given: Mapping[str, float], kind: str | None
+    origin: PathLike[str],
+    header: list[str],
+    stated: Header,
+    given: Mapping[str, float],
+    kind: str | None,
 ) -> dict[str, str]:
     """Return what each column of numbers is called in `predict`."""
-    block = block_of([*(BLOCK_COLUMNS.get(name, "") for name in header), *given], kind)
+    have = stated.columns
+    # a dip says what else is said, not how the block fails
+    numbers = [BLOCK_COLUMNS.get(name, "") for name in have if name not in RECTANGLE]
+    block = block_of([*numbers, *given], kind)
     rectangles = (
         block.names == TOPPLING_BLOCK.names
-        and is_of_rectangles(header)
+        and is_of_rectangles(have)
         and not {*block.names}.intersection(given)
     )
     columns = (
-        {name: name for name in (*RECTANGLE, *block.options)}
+        {name: name for name in (*RECTANGLE, FRICTION, *block.options)}
         if rectangles
         else {
             column: name
@@ -175,16 +200,16 @@ def _columns(
         }
     )
     for column, name in columns.items():
-        if name in block.names and name not in given and column not in header:
+        if name in block.names and name not in given and column not in have:
             raise InputError(
                 f"{origin}: there is no column {column}{_OR_SIDES.get(column, '')}; the columns "
                 f"are {', '.join(header) or 'none'}"
             )
-    doubled = [name for name in header if header.count(name) > 1]
+    doubled = [name for name in header if name and header.count(name) > 1]
     if doubled:
         raise InputError(f"{origin}: the column {doubled[0]} is there twice")
     columns |= {name: name for name in (*block.sigmas, *STATED)}
-    present = {column: name for column, name in columns.items() if column in header}
+    present = {column: name for column, name in columns.items() if column in have}
     for column, name in present.items():
         if name in given:
             raise InputError(f"{column} is an option and a column of {origin}: give it once")
@@ -195,12 +220,13 @@ def _known_names(names: Mapping[str, str]) -> list[str]:
     """Return what is known of blocks and motions, rectangles by their numbers."""
     if "height_m" not in names:
         return list(names.values())
-    measures = (name for name in names.values() if name not in RECTANGLE)
+    measures = (name for name in names.values() if name not in (*RECTANGLE, FRICTION))
     return [*(BLOCK_COLUMNS[name] for name in NUMBERS), *measures]
 
 
 def _answer(
     part: Part,
+    stated: Header,
     names: Mapping[str, str],
     given: Mapping[str, float],
     model: FragilityModel,
@@ -209,17 +235,20 @@ def _answer(
     values: dict[str, NDArray[Any]] = {}
     faults = dict(part.faults)
     for column, name in names.items():
-        values[name], others = part.numbers(column)
+        header, factor = stated.columns[column]
+        cells, others = part.numbers(header)
+        values[name] = cells * factor
         faults = others | faults
     if "height_m" in values:
         free_standing = model_of_kind(model.kind).free_standing
-        faults = rectangle_reasons(values) | faults
+        faults = rectangle_reasons(values) | sliding_reasons(values, model.kind) | faults
         numbers_of = rectangle_columns(values, free_standing=free_standing)
-        values = {name: value for name, value in values.items() if name not in RECTANGLE}
+        others_of = (*RECTANGLE, FRICTION)
+        values = {name: value for name, value in values.items() if name not in others_of}
         for column, value in numbers_of.items():
             name = BLOCK_COLUMNS[column]
-            stated = values.get(name, np.nan)
-            values[name] = np.where(np.isnan(stated), value, stated)
+            own = values.get(name, np.nan)
+            values[name] = np.where(np.isnan(own), value, own)
     values = model.method.block.filled(values)
     for name in set(DEVIATIONS).intersection(values):
         values[name] = np.nan_to_num(values[name], nan=0.0, posinf=np.inf)
@@ -229,7 +258,12 @@ def _answer(
     answer[OF_UNCERTAIN] = np.zeros(predicted.probability.shape)
     if predicted.block_sd is not None:
         answer[OF_UNCERTAIN] = predicted.block_sd
-    faults |= foreign_reasons(part.cells, model.kind)
+    texts = {
+        name: cells_of(part.cells[stated.columns[name].header])
+        for name in TEXTS
+        if name in stated.columns
+    }
+    faults |= foreign_reasons(texts, model.kind)
     bad = [*faults]
     for name in (*NUMBERS_OF_ANSWERS, OF_UNCERTAIN):
         answer[name][bad] = np.nan

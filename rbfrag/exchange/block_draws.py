@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_table import (
     BLOCK_COLUMNS,
+    FRICTION,
     RECTANGLE,
     is_of_rectangles,
     read_columns,
     rectangle_columns,
+    sliding_reasons,
 )
+from rbfrag.fragility.methods import TOPPLING_BLOCK
 
 FloatArray = NDArray[np.float64]
 
@@ -32,11 +35,14 @@ def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], Flo
         MissingExtraError: a Parquet file without pyarrow.
     """
     columns: dict[str, Any] = read_columns(
-        path, (), optional=(*BLOCK_COLUMNS, *RECTANGLE, "weight")
+        path, (), optional=(*BLOCK_COLUMNS, *RECTANGLE, FRICTION, "weight")
     )
     weight = columns.pop("weight", None)
     if is_of_rectangles(columns):
+        for i, reason in sliding_reasons(columns, TOPPLING_BLOCK.kind).items():
+            raise InputError(f"{path}: draw {i + 1}: {reason}")
         columns |= rectangle_columns(columns)
+        columns.pop("dip_deg", None)
     drawn = {
         name: columns[column]
         for column, name in BLOCK_COLUMNS.items()

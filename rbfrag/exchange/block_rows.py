@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_table import (
     BLOCK_COLUMNS,
+    FRICTION,
     NUMBERS,
     RECTANGLE,
     SIGMAS,
@@ -21,6 +22,7 @@ from rbfrag.exchange.block_table import (
     read_cells,
     rectangle_columns,
     rectangle_reasons,
+    sliding_reasons,
 )
 from rbfrag.files import as_path
 from rbfrag.fragility.lookup import block_of
@@ -32,6 +34,9 @@ Columns = Mapping[str, NDArray[Any]]
 
 PLACE = ("lon", "lat")
 """Columns of where blocks stand [deg]."""
+
+TEXTS = ("block_id", "site_id", "kind", "mode")
+"""Columns of texts."""
 
 PORTFOLIO = ("count", "weight", "loss", "loss_sigma")
 """Columns of how many like blocks a row is, what a failure counts and costs, and its scatter."""
@@ -51,6 +56,7 @@ class BlockRows:
         source: what messages call the table.
         word: what ``line`` counts: lines, rows or features.
         named: whether the table names its blocks.
+        remarks: which columns are converted, and which are not read.
     """
 
     blocks: Columns
@@ -58,6 +64,7 @@ class BlockRows:
     source: str
     word: str
     named: bool
+    remarks: tuple[str, ...] = ()
 
     @property
     def places(self) -> list[str]:
@@ -125,13 +132,14 @@ class BlockRows:
         return self.blocks
 
     def unusable_in_words(self, effect: str = "") -> tuple[str, ...]:
-        """Return what is to be said of the rows that cannot be used.
+        """Return what is to be said of the columns, and of the rows that cannot be used.
 
         Args:
-            effect: what becomes of them in numbers of several blocks.
+            effect: what becomes of these rows in numbers of several blocks.
         """
         reasons = self.refused["reason"].tolist()
-        return unusable_in_words(self.refused_count, self.size, self.places, reasons, effect)
+        unusable = unusable_in_words(self.refused_count, self.size, self.places, reasons, effect)
+        return (*self.remarks, *unusable)
 
     def with_refused(
         self, answers: Columns, row: NDArray[np.int_] | None = None
@@ -207,18 +215,27 @@ def read_blocks(
         name = str(source)
     cells = read_cells(
         source,
-        (*NUMBERS, *SIGMAS, *RECTANGLE, "restitution", *reads),
-        ("block_id", "site_id", "kind", "mode"),
+        (*NUMBERS, *SIGMAS, *RECTANGLE, FRICTION, "restitution", *reads),
+        TEXTS,
     )
     columns, size = cells.columns, len(cells.lines)
+    rectangles = is_of_rectangles(columns)
+    read = {*columns} if rectangles else {*columns} - {*RECTANGLE, FRICTION}
+    remarks = (
+        *cells.stated.remarks,
+        *cells.stated.unread(cells.header, (*read, *TEXTS, *PLACE, *PORTFOLIO, "reason")),
+    )
     named = "block_id" in columns
     if not named:
         columns["block_id"] = np.array([str(i + 1) for i in range(size)], dtype=object)
     default = kind or TOPPLING_BLOCK.kind
     faults = foreign_reasons(columns, default, one_kind=one_kind) | cells.faults
     kinds = np.array([each or default for each in columns.get("kind", [""] * size)], dtype=object)
-    if is_of_rectangles(columns):
+    if rectangles:
         faults = rectangle_reasons(columns) | faults
+        for own in dict.fromkeys(kinds.tolist()):
+            slide = sliding_reasons(columns, own)
+            faults = {i: text for i, text in slide.items() if kinds[i] == own} | faults
         columns |= _rectangles(columns, kinds)
     for needed in NUMBERS:
         if needed not in columns:
@@ -241,7 +258,7 @@ def read_blocks(
     refused = {column: values[~sound] for column, values in columns.items()}
     blocks = {column: values[sound] for column, values in columns.items()}
     refused["reason"] = reasons[~sound]
-    return BlockRows(blocks, refused, name, cells.word, named).checked()
+    return BlockRows(blocks, refused, name, cells.word, named, remarks).checked()
 
 
 def foreign_reasons(

@@ -27,8 +27,10 @@ from rbfrag.exchange.tables.files import (
 from rbfrag.exchange.tables.parts import Part, Parts, cells_of
 from rbfrag.files import reading, written_whole
 from rbfrag.fragility.unusable import in_list
-from rbfrag.solver.block.formulas import array_elementwise
+from rbfrag.question.table import Column, Header, Numeric, columns_in
+from rbfrag.solver.block.formulas import array_elementwise, tan_deg
 from rbfrag.solver.described import rectangle_numbers
+from rbfrag.solver.stability.modes import yield_coefficient
 
 NUMBERS = ("p2_1_s2", "kr")
 """Columns of a block that topples."""
@@ -38,7 +40,7 @@ BLOCK_COLUMNS = {
     "kr": "kr",
     "ky": "ky",
     "displacement_m": "displacement_m",
-    "beta_deg": "beta_deg",
+    "dip_deg": "beta_deg",
     "ks": "ks",
     "ps2_1_s2": "ps2",
     "leaves_g": "leaves_g",
@@ -51,6 +53,9 @@ SIGMAS = ("p2_sigma", "kr_sigma")
 
 RECTANGLE = ("height_m", "width_m", "dip_deg")
 """Columns of a rectangle, which are read where those are not all there; the dip may be missing."""
+
+FRICTION = "phi_deg"
+"""Column of the friction angle of a rectangle, which is taken to topple where the cell is empty."""
 
 TABLE = "a block table"
 """What messages say that a file should hold."""
@@ -121,12 +126,16 @@ class Cells(NamedTuple):
         faults: what is wrong with rows, by their index.
         lines: number of each row in its file.
         word: what that is the number of: line, row or feature.
+        header: all columns of the table, as it calls them.
+        stated: which of them state which fields.
     """
 
     columns: dict[str, NDArray[Any]]
     faults: dict[int, str]
     lines: Sequence[int]
     word: str
+    header: Sequence[str]
+    stated: Header
 
     def place(self, i: int) -> str:
         """Return where a row stands, as its file shows it."""
@@ -150,14 +159,18 @@ def read_cells(
     """
     with ExitStack() as stack:
         name, word, header, parts = _opened(source, numbers, stack)
+        stated = columns_in(header, name, (*numbers, *texts))
+        known = {
+            each: stated.columns.get(each, Column(each, 1.0))
+            for each in (*numbers, *texts)
+            if each in header or each in stated.columns
+        }
         for each in needed:
-            if each not in header:
+            if each not in known:
                 have = ", ".join(header) or "none"
                 raise InputError(f"{name}: there is no column {each}; the columns are {have}")
         collected: dict[str, list[NDArray[Any]]] = {
-            each: [np.empty(0, dtype=object if each in texts else np.float64)]
-            for each in (*numbers, *texts)
-            if each in header
+            each: [np.empty(0, dtype=object if each in texts else np.float64)] for each in known
         }
         faults: dict[int, str] = {}
         lines: list[int] = []
@@ -167,17 +180,17 @@ def read_cells(
                 if each in texts:
                     cells = [
                         checked_name(as_written(str(cell).strip()), f"{name}: a cell of {each}")
-                        for cell in cells_of(part.cells[each])
+                        for cell in cells_of(part.cells[known[each].header])
                     ]
                     arrays.append(np.array(cells, dtype=object))
                 else:
-                    values, others = part.numbers(each)
+                    values, others = part.numbers(known[each].header)
                     wrong = others | wrong
-                    arrays.append(values)
+                    arrays.append(values * known[each].factor)
             faults |= {len(lines) + i: fault for i, fault in wrong.items()}
             lines.extend(part.lines)
         columns = {each: np.concatenate(arrays) for each, arrays in collected.items()}
-        return Cells(columns, faults, lines, word)
+        return Cells(columns, faults, lines, word, header, stated)
 
 
 def _opened(
@@ -191,7 +204,7 @@ def _opened(
             return str(path), "feature", [*part.cells], iter([part])
         path = table_source(path)
         stack.enter_context(_reading(path))
-        header, parts, _ = table_parts(path, numbers, stack)
+        header, parts, _ = table_parts(path, Numeric(numbers), stack)
         return str(path), place_word(path), header, parts
     part = given_part(source)
     return "blocks", "row", [*part.cells], iter([part])
@@ -241,7 +254,8 @@ def rectangle_columns(
     """Return ``p2_1_s2`` and ``kr`` of rectangles, NaN where there is none.
 
     Args:
-        columns: ``height_m``, ``width_m`` and, unless the bases are level, ``dip_deg``.
+        columns: ``height_m``, ``width_m`` and, unless the bases are level, ``dip_deg``; with
+            ``phi_deg`` one that slides at rest has a k_r below zero.
         free_standing: whether nothing backs them: k_r is then that of the weaker sense, and
             ``restitution`` is returned too, 1 - 1.5 sin² α (Housner 1963), 0 where that is less.
     """
@@ -255,6 +269,9 @@ def rectangle_columns(
         if free_standing:
             sine2 = width * width / (width * width + height * height)
             columns_of_kind["restitution"] = np.maximum(1.0 - 1.5 * sine2, 0.0)
+        slides, ky = sliding_rectangles(columns)
+        falls = slides & (ky <= 0.0)  # slides at rest: as unstable as one that topples at rest
+        columns_of_kind["kr"] = np.where(falls, np.minimum(ky, 0.0), columns_of_kind["kr"])
         is_block = (height > 0.0) & (width > 0.0) & (np.abs(dip) < 90.0)
         return {
             name: np.where(is_block & np.isfinite(values), values, np.nan)
@@ -262,9 +279,47 @@ def rectangle_columns(
         }
 
 
+def sliding_rectangles(columns: Mapping[str, Any]) -> tuple[NDArray[np.bool_], NDArray[Any]]:
+    """Return where rectangles slide before they topple, and k_y = tan(phi - dip) of all.
+
+    A rectangle slides where tan(phi) <= width/height (mode boundaries belong to sliding); where no
+    friction angle is stated it is taken not to.
+
+    Args:
+        columns: ``height_m``, ``width_m`` and, if there are, ``dip_deg`` and ``phi_deg``.
+    """
+    functions = array_elementwise()
+    height, width, dip = (
+        np.asarray(columns.get(name, 0.0), dtype=np.float64) for name in RECTANGLE
+    )
+    phi = np.asarray(columns.get(FRICTION, np.nan), dtype=np.float64)
+    with np.errstate(all="ignore"):
+        tan_phi = tan_deg(phi, functions)
+        tan_dip = tan_deg(np.nan_to_num(dip, nan=0.0), functions)
+        ky = yield_coefficient(tan_phi, 1.0, tan_dip, 1.0, functions)
+        return np.asarray(width / height >= tan_phi), np.asarray(ky)
+
+
+def sliding_reasons(columns: Mapping[str, Any], kind: str) -> dict[int, str]:
+    """Return by index which rectangles slide, of which the kind says nothing, in words.
+
+    One that slides at rest is none of them: whatever is asked, it fails (:func:`rectangle_columns`
+    gives it a strength below zero).
+    """
+    slides, ky = sliding_rectangles(columns)
+    return {
+        i: f"slides (yield {ky[i]:.2g} g), and the {kind} model says nothing about it: answer it "
+        "by kind sliding, with ky and displacement_m"
+        for i in np.flatnonzero(slides & (ky > 0.0)).tolist()
+    }
+
+
 def rectangle_reasons(columns: Mapping[str, Any]) -> dict[int, str]:
-    """Return by index which lengths and dips are those of no rectangle, in words."""
+    """Return by index which lengths and angles are those of no rectangle, in words."""
     reasons: dict[int, str] = {}
+    friction = np.asarray(columns.get(FRICTION, ()), dtype=np.float64)
+    for i in np.flatnonzero((friction < 0.0) | (friction >= 90.0)).tolist():
+        reasons[i] = f"{FRICTION} = {friction[i]:g} is not from 0 to below 90"
     for name in RECTANGLE:
         values = np.asarray(columns.get(name, ()), dtype=np.float64)
         low, high, wanted = (

@@ -130,7 +130,7 @@ def test_old_answers_are_replaced(answer: Answer, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (TABLE.replace("p2_1_s2", "p2"), "there is no column p2_1_s2"),
+        (TABLE.replace("p2_1_s2", "size"), "there is no column p2_1_s2"),
         (TABLE.replace("block_id", "kr"), "the column kr is there twice"),
         ("", "no column p2_1_s2, nor height_m and width_m; the columns are none"),
     ],

@@ -236,6 +236,11 @@ class TableOptions(BlockOptions):
         from rbfrag.solver.quantity import positive
 
         values, remarks = self.toppling(standing.kind)
+        if missing := [each for each in ("p2", "kr") if each not in values]:
+            raise InputError(
+                f"a block of kind {standing.kind} has no {missing[0]}: this command answers for "
+                "blocks that topple or rock; predict answers for others"
+            )
         columns: dict[str, Any] = {
             "block_id": [name],
             "p2_1_s2": np.array([positive(values["p2"], "p2", "1/s²")]),

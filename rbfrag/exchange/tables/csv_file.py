@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,7 +68,7 @@ def dialect_of(origin: Path) -> Dialect:
 
 
 def csv_parts(
-    origin: Path, numeric: Sequence[str], stack: ExitStack, *, fast: bool
+    origin: Path, numeric: Container[str], stack: ExitStack, *, fast: bool
 ) -> tuple[list[str], Parts, Dialect]:
     """Return the names of the columns, the parts, and how the file is written.
 
@@ -90,7 +90,7 @@ def csv_parts(
 
 
 def _by_arrow(
-    origin: Path, header: list[str], numeric: Sequence[str], reader: Any, arrow: Any
+    origin: Path, header: list[str], numeric: Container[str], reader: Any, arrow: Any
 ) -> Parts:
     from pyarrow import csv as arrow_csv
 
@@ -178,7 +178,7 @@ def csv_writer(
     partial: Path,
     header: Sequence[str],
     answers: Sequence[str],
-    numeric: Sequence[str],
+    numeric: Container[str],
     stack: ExitStack,
     dialect: Dialect,
     *,

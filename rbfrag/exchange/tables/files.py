@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -44,7 +44,7 @@ def table_path(path: str | os.PathLike[str]) -> Path:
 
 
 def table_parts(
-    source: Path, numeric: Sequence[str], stack: ExitStack, *, fast: bool = False
+    source: Path, numeric: Container[str], stack: ExitStack, *, fast: bool = False
 ) -> tuple[list[str], Parts, Dialect]:
     """Return the columns of a table, its parts, and how to write CSV that is like it.
 
@@ -66,7 +66,7 @@ def table_writer(
     header: Sequence[str],
     answers: Sequence[str] = (),
     *,
-    numeric: Sequence[str] = (),
+    numeric: Container[str] = (),
     stack: ExitStack,
     dialect: Dialect | None = None,
     fast: bool = False,

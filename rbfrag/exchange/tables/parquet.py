@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from rbfrag.exchange.tables.parts import TEXTS, Part, Parts, Write, pyarrow
 
 
 def parquet_parts(
-    origin: Path, numeric: Sequence[str], stack: ExitStack
+    origin: Path, numeric: Container[str], stack: ExitStack
 ) -> tuple[list[str], Parts]:
     """Return the names of the columns of a Parquet file, and its parts."""
     arrow, parquet = pyarrow()
@@ -62,7 +62,7 @@ def parquet_writer(
     partial: Path,
     header: Sequence[str],
     answers: Sequence[str],
-    numeric: Sequence[str],
+    numeric: Container[str],
     stack: ExitStack,
 ) -> Write:
     """Return a function that writes parts as Parquet, where NaN is null."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -125,7 +125,7 @@ def cells_of(column: Any) -> list[Any]:
 
 
 def columns_to_write(
-    part: Part, header: Sequence[str], numeric: Sequence[str]
+    part: Part, header: Sequence[str], numeric: Container[str]
 ) -> Iterator[tuple[str, Any]]:
     """Yield the columns of a part: numbers as arrays, but for those with a cell that is none."""
     for name in header:

@@ -8,7 +8,7 @@ import struct
 import warnings
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -49,7 +49,7 @@ def openpyxl() -> Any:
 
 
 def workbook_parts(
-    origin: Path, numeric: Sequence[str], stack: ExitStack
+    origin: Path, numeric: Container[str], stack: ExitStack
 ) -> tuple[list[str], Parts]:
     """Return the names of the columns of the first sheet, and its parts.
 
@@ -109,7 +109,7 @@ def _check(origin: Path) -> None:
                     before = more[-4096:]
 
 
-def _parts(origin: Path, header: list[str], rows: Any, numeric: Sequence[str]) -> Parts:
+def _parts(origin: Path, header: list[str], rows: Any, numeric: Container[str]) -> Parts:
     width = len(header)
     texts = [i for i, name in enumerate(header) if name not in numeric]
     with _damage(origin):
@@ -166,7 +166,7 @@ def workbook_writer(
     partial: Path,
     header: Sequence[str],
     answers: Sequence[str],
-    numeric: Sequence[str],
+    numeric: Container[str],
     stack: ExitStack,
 ) -> Write:
     """Return a function that writes parts into the one sheet of a workbook.

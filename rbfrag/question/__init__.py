@@ -1,0 +1,1 @@
+"""What may be said of blocks and shaking, declared once."""

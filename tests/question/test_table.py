@@ -1,0 +1,131 @@
+"""Headers of tables: the field and the unit that a column states, what is refused, what is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rbfrag.errors import InputError
+from rbfrag.exchange.batch import READ, predict_table
+from rbfrag.exchange.block_rows import read_blocks
+from rbfrag.fragility.predict import predict
+from rbfrag.question.fields import column_of, declared
+from rbfrag.question.table import columns_in, field_of
+from rbfrag.solver.block.geometry import Block
+from rbfrag.solver.stability.single import stability
+
+
+@pytest.mark.parametrize(
+    ("header", "field", "unit"),
+    [
+        ("height_m", "height_m", None),
+        ("H (m)", "height_m", "m"),
+        ("Height [m]", "height_m", "m"),
+        ("dip", "beta_deg", None),
+        ("Beta", "beta_deg", None),
+        ("Friction angle (°)", "phi_deg", "°"),
+        ("PGV [cm/s]", "pgv_m_s", "cm/s"),
+        ("pga", "pga_g", None),
+        ("SA(1.0) [g]", "sa10_g", "g"),
+        ("sa03", "sa03_g", None),
+        ("Block", "block_id", None),
+        ("p2_1_s2", "p2", None),
+    ],
+)
+def test_a_column_states_a_field_under_any_of_its_names(
+    header: str, field: str, unit: str | None
+) -> None:
+    assert field_of(header) == (field, unit)
+
+
+def test_no_name_stands_for_two_fields() -> None:
+    owners: dict[str, str] = {}
+    for name, field in declared().items():
+        for each in {name, column_of(name), *field.others}:
+            assert owners.setdefault(each, name) == name, each
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        (["hieght_m", "width_m"], "did you mean height_m"),
+        (["height_m", "restitutoin"], "did you mean restitution"),
+        (["dip", "beta"], "both state dip of the base"),
+        (["kr", "kr"], "kr is there twice"),
+        (["Height [ft]"], "'ft'"),
+        (["PGA (gal)"], "'gal'"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(header: list[str], words: str) -> None:
+    with pytest.raises(InputError, match=words.replace("(", r"\(")):
+        columns_in(header, "blocks.csv", READ)
+
+
+def test_other_columns_are_named_loudly_where_they_sound_like_input() -> None:
+    header = ["p2_1_s2", "kr", "dip direction", "note"]
+    stated = columns_in(header, "blocks.csv", READ)
+    loud, quiet = stated.unread(header, ("p2_1_s2", "kr"))
+    assert loud.startswith("NOT READ: dip direction")
+    assert quiet == "not read: note"
+
+
+def answered(tmp_path: Path, text: str, **given: float) -> tuple[list[list[str]], tuple[str, ...]]:
+    source, target = tmp_path / "blocks.csv", tmp_path / "answers.csv"
+    source.write_text(text)
+    told = predict_table(source, target, given=given, model=None, level=0.95, db=None)
+    warnings = told["warnings"]
+    assert isinstance(warnings, list)
+    rows = [line.split(",") for line in target.read_text().splitlines()]
+    return rows, tuple(warnings)
+
+
+@pytest.mark.parametrize("dip", ["dip", "dip_deg", "beta", "Dip (deg)", "beta_deg"])
+def test_a_dip_weakens_a_rectangle_whatever_its_column_is_called(tmp_path: Path, dip: str) -> None:
+    rows, _ = answered(tmp_path, f"height_m,width_m,{dip},pgv_m_s\n2,0.4,10,0.8\n")
+    block = Block.rectangle(2.0, 0.4)
+    kr = stability(block, beta_deg=10.0, phi_deg=45.0).kr
+    alone = predict(block.p2, kr, pgv_m_s=0.8)
+    assert float(rows[1][4]) == pytest.approx(alone.probability, rel=1e-12)
+
+
+def test_units_in_headers_are_converted_and_said(tmp_path: Path) -> None:
+    plain, _ = answered(tmp_path, "height_m,width_m,pgv_m_s\n2,0.4,0.8\n")
+    rows, warnings = answered(tmp_path, "H (cm),W [mm],PGV [cm/s]\n200,400,80\n")
+    assert float(rows[1][3]) == pytest.approx(float(plain[1][3]), rel=1e-12)
+    assert sum("is converted" in text for text in warnings) == 3
+
+
+def test_a_rectangle_that_slides_is_never_answered_as_one_that_topples(tmp_path: Path) -> None:
+    rows, _ = answered(
+        tmp_path,
+        "height_m,width_m,dip,phi,pgv_m_s\n2.5,2.5,20,32,0.5\n2,0.4,0,40,0.8\n1,1,40,30,0.5\n",
+    )
+    assert rows[1][5] == ""
+    assert "slides (yield 0.21 g)" in ",".join(rows[1])
+    assert stability(Block.rectangle(2.5, 2.5), beta_deg=20.0, phi_deg=32.0).mode == "slide"
+    assert float(rows[2][5]) > 0.0
+    # it slides at rest
+    assert rows[3][5] == "1"
+    assert rows[3][-1] == '"unstable"'
+
+
+@pytest.mark.parametrize("width", [0.2, 0.8, 1.678, 1.679, 1.9])
+@pytest.mark.parametrize("beta", [-10.0, 0.0, 15.0, 35.0])
+def test_rows_slide_where_stability_says_so(width: float, beta: float) -> None:
+    phi = 40.0
+    judged = stability(Block.rectangle(2.0, width), beta_deg=beta, phi_deg=phi)
+    columns = {
+        "height_m": [2.0, 3.0],
+        "width_m": [width, 0.3],
+        "beta": [beta, 0.0],
+        "phi": [phi, phi],
+    }
+    rows = read_blocks(columns)
+    if judged.mode == "slide" and judged.yield_acceleration > 0.0:
+        assert "slides" in rows.refused["reason"][0]
+    elif judged.yield_acceleration <= 0.0:
+        assert "unstable" in rows.refused["reason"][0]
+    else:
+        assert rows.refused_count == 0
+        assert rows.blocks["kr"][0] == pytest.approx(judged.kr, rel=1e-12)
