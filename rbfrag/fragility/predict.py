@@ -10,8 +10,9 @@ from os import PathLike
 from typing import TYPE_CHECKING, Literal, overload
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.comparison import answer_compared, candidate_models
+from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import spectral
+from rbfrag.fragility.prediction import answer_given
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -176,8 +177,7 @@ def predict(
             ``both`` gives the mean of the two, which stand beside it (motion only).
         model: a model, the name of a stored one, or None for the one of the best score that what
             is given suffices for, or the database's default where no other reads more of the
-            motion. Of single numbers the others answer, too, and a warning tells where their
-            interval does not overlap.
+            motion.
         level: confidence level of the interval and of the range of one earthquake, between 0
             and 1.
         db: database of the model: a path or SQLAlchemy URL; None for ``RBFRAG_DB``, or else
@@ -252,5 +252,5 @@ def predict(
             given, motion, kind=kind, rotation_deg=rotation_deg, polarity=polarity, model=model,
             level=level, db=db, weights=weights,
         )  # fmt: skip
-    models = candidate_models(given, model, db, kind=kind, rotation_deg=rotation_deg)
-    return answer_compared(models, given, level, nan=nan, interval=interval, weights=weights)
+    chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
+    return answer_given(chosen, given, level, nan=nan, interval=interval, weights=weights)

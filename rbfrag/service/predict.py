@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import ValidationError
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.comparison import prediction_document
+from rbfrag.fragility.document import prediction_document
 from rbfrag.fragility.lookup import find_model, models_in_memory
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.service.documents import PredictAnswer, PredictArrays

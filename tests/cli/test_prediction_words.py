@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import pytest
@@ -90,32 +89,9 @@ def test_percent_has_the_digits_of_an_engineer(share: float, said: str) -> None:
     assert percent(share) == said
 
 
-def test_answers_whose_intervals_do_not_overlap_are_told_of(shell: Shell) -> None:
-    asked = ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--pga", "0.5"]
-    document = shell.json("predict", *asked, "--tm", "0.5")
-    first, *others = document["answers"]
-    apart = {
-        each["model"]
-        for each in others
-        if each["ci_low"] > first["ci_high"] or each["ci_high"] < first["ci_low"]
-    }
-    (told,) = [text for text in document["warnings"] if text.startswith("the answers do not agree")]
-    assert re.findall(r" by ([\w-]+),", told) == [first["model"], *apart]
-    assert apart == {"bounded-pgv"}
-    assert document["data"] == "the reference that is shipped with rbfrag"
-    agreed = shell.json("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
-    assert not any("do not agree" in text for text in agreed["warnings"])
-
-
-def test_of_many_answers_that_do_not_agree_two_are_told_of(shell: Shell) -> None:
-    motion = "--pgv 0.1 --pga 0.9 --tm 0.9 --pgd 1 --sa03 2 --sa10 2 --sa20 2 --sa30 2"
-    document = shell.json("predict", "--p2", "3", "--kr", "0.1", *motion.split())
-    first, *others = sorted(document["answers"], key=lambda each: each["probability"])
-    apart = [each for each in others if each["ci_low"] > first["ci_high"]]
-    assert len(apart) > 3
-    (told,) = [text for text in document["warnings"] if text.startswith("the answers do not agree")]
-    least, most = (f"{percent(each['probability'])} (" for each in (apart[0], apart[-1]))
-    assert f"but {len(apart)} others from {least}" in told
-    assert f" by {apart[0]['model']} to {most}" in told
-    assert len(told) < 400
-    assert "e+" not in told
+def test_other_suited_models_are_listed_and_none_is_said_to_be_wrong(shell: Shell) -> None:
+    asked = ["--p2", "3", "--kr", "0.1", "--pgv", "0.6", "--pga", "0.5", "--tm", "0.5"]
+    document = shell.json("predict", *asked)
+    assert len(document["answers"]) > 3
+    assert document["answers"][0]["recommended"]
+    assert not any("agree" in text for text in document["warnings"])

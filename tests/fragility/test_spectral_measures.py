@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.comparison import prediction_document
 from rbfrag.fragility.dependence import EventSpread
+from rbfrag.fragility.document import prediction_document
 from rbfrag.fragility.intervals import ParameterErrors
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.methods import LOGIT, OF_OUTCOME, TOPPLING_BLOCK, Eta, Form, Method

@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal, norm, truncnorm
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
-from rbfrag.fragility.comparison import prediction_document
+from rbfrag.fragility.document import prediction_document
 from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.fragility.methods import SINGLE, arrays, method_named, methods
 from rbfrag.fragility.model import FragilityModel
@@ -242,12 +242,15 @@ def test_links_know_their_density_and_quantile() -> None:
 
 
 def test_other_models_are_asked_of_the_uncertain_block_too():
-    # within the first model's interval lies P of the median block, but not P over what it may be
     question = {
         **{"p2": 0.677, "kr": 0.081, "kr_sigma": 0.575},
         **{"pgv_m_s": 0.194, "pga_g": 0.212, "tm_s": 0.984},
     }
     document = prediction_document(question, db=REFERENCE)
-    assert any("4 others from 0.1 %" in text for text in document["warnings"])
-    answer = predict(**question, db=REFERENCE)
-    assert list(answer.warnings) == document["warnings"]
+    assert len(document["answers"]) > 3
+    for each in document["answers"]:
+        alone = predict(**question, db=REFERENCE, model=each["model"])
+        assert each["probability"] == alone.probability
+        certain = predict(**{**question, "kr_sigma": 0.0}, db=REFERENCE, model=each["model"])
+        assert each["probability"] != certain.probability
+    assert list(predict(**question, db=REFERENCE).warnings) == document["warnings"]

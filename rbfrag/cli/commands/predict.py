@@ -138,7 +138,7 @@ def predict(
             "nothing about the shaking is given: state what is known of it, --pgv [m/s], --pga "
             "[g], --tm [s], --sa10 [g] …, or  --motion FILE"
         )
-    from rbfrag.fragility.comparison import prediction_document
+    from rbfrag.fragility.document import prediction_document
 
     remarks: tuple[str, ...] = ()
     kind = failure.kind

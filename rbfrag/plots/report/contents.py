@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.comparison import prediction_document
+from rbfrag.fragility.document import prediction_document
 from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.measures import SPECTRAL, STATED
 from rbfrag.fragility.methods import TOPPLING_BLOCK

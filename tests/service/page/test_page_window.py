@@ -98,17 +98,6 @@ def test_on_a_phone_the_answer_stays_in_sight_and_fields_can_be_hit(open_page):
     assert FIRST_ANSWER not in opened.text("#strip")
 
 
-def test_answers_that_do_not_agree_are_told_of_where_the_answer_stays_in_sight(open_page):
-    opened = open_page("?p2=3&kr=0.1&pgv=0.1&sa10_g=2", **NARROW)
-    assert "; other models do not agree" in opened.text("#strip")
-    expect(opened.page.locator("#warnings")).to_contain_text("the answers do not agree: 0 %")
-    expect(opened.page.locator("#live")).to_contain_text("other models do not agree")
-    check_that_nothing_sticks_out(opened.page, 390)
-    opened.page.fill("#sa10_g", "")
-    opened.settled()
-    assert "agree" not in opened.text("#strip")
-
-
 @pytest.mark.parametrize("query", QUERIES)
 def test_text_stands_out_from_what_is_behind_it(open_page, query):
     page = open_page(query).page

@@ -29,9 +29,6 @@ const KNOWS = {
 /** How the sentence of the service begins that the page says in its own place. */
 const SAID = /^no friction angle is given/;
 
-/** How the sentence begins that other models answer otherwise. */
-const DISAGREE = /^the answers do not agree/;
-
 /** An equals sign that does not part from what stands beside it. */
 const IS = "\u00a0=\u00a0";
 
@@ -69,11 +66,7 @@ export function showAnswer(answer) {
     answer.warnings.filter((/** @type {string} */ each) => !SAID.test(each)),
   );
   showOthers(answer.answers);
-  const doubt = answer.warnings.some((/** @type {string} */ each) => DISAGREE.test(each))
-    ? "; other models do not agree"
-    : "";
-  byId("strip").textContent =
-    `${percent(answer.probability)} ${verbOf(answer)} (${interval})${doubt}`;
+  byId("strip").textContent = `${percent(answer.probability)} ${verbOf(answer)} (${interval})`;
   mark("known");
   const event =
     answer.event_low === null
@@ -81,7 +74,7 @@ export function showAnswer(answer) {
       : ` In one single earthquake ${percent(answer.event_low)} to ${percent(answer.event_high)}.`;
   const failure = `Probability of ${answer.failure.replace("permanent displacement above", "sliding more than")}`;
   byId("answer-title").textContent = failure;
-  speak(`${failure} ${percent(answer.probability)}, ${interval}, ${range}${doubt}.${event}`);
+  speak(`${failure} ${percent(answer.probability)}, ${interval}, ${range}.${event}`);
 }
 
 /**

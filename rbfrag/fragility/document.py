@@ -1,0 +1,85 @@
+"""The answer to a question under the keys of the JSON contract, with that of every suited model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from rbfrag.fragility.lookup import find_model, suited_models
+from rbfrag.fragility.prediction import Prediction, answer_given
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from rbfrag.fragility.prediction_motion import Polarity
+    from rbfrag.motions.recognise import MotionLike
+
+
+def prediction_document(
+    given: Mapping[str, ArrayLike],
+    *,
+    kind: str | None = None,
+    rotation_deg: float | None = None,
+    motion: MotionLike | None = None,
+    polarity: Polarity = "both",
+    model: str | None = None,
+    level: float = 0.95,
+    db: str | PathLike[str] | None = None,
+    remarks: Sequence[str] = (),
+    weights: ArrayLike | None = None,
+) -> dict[str, Any]:
+    """Return the answer under the keys of the JSON contract, and that of every suited model.
+
+    Args:
+        given: block and what is known of the motion, by the names of :func:`predict`.
+        kind: how the block fails; None for what it is given by.
+        rotation_deg: rotation that counts as failure, where models of several are fitted [deg].
+        motion: the accelerogram itself.
+        polarity: forward, reverse or both; with `motion` only.
+        model: name of a stored model; None for the best for each term that the measures
+            suffice for.
+        level: confidence level of the interval.
+        db: database of the models, as for :func:`predict`.
+        remarks: warnings about the block, which go before those of the answer.
+        weights: of draws of the block, which the arrays are then.
+
+    Raises:
+        InputError: a value that cannot be used, or measures no model can work with.
+        UnknownModelError: no model of that name.
+        DatabaseError: the database cannot be read.
+    """
+    others: list[Prediction] = []
+    if motion is not None:
+        # Kept apart: a motion needs numpy.
+        from rbfrag.fragility.prediction_motion import predict_motion
+
+        others = [
+            predict_motion(
+                given, motion, kind=kind, rotation_deg=rotation_deg, polarity=polarity,
+                model=model, level=level, db=db,
+            )
+        ]  # fmt: skip
+    else:
+        options: dict[str, Any] = {"kind": kind, "rotation_deg": rotation_deg}
+        models = (
+            suited_models(given, db, **options)
+            if model is None
+            else [find_model(model, given, db, **options)]
+        )
+        for each in models:
+            answer = answer_given(each, given, level, weights=weights)
+            assert isinstance(answer, Prediction)
+            others.append(answer)
+    recommended = others[0]
+    document = recommended.as_dict()
+    document["warnings"] = [*remarks, *recommended.warnings]
+    columns = (
+        "model", "term", "method", "probability", "ci_low", "ci_high", "event_low", "event_high",
+        "in_domain",
+    )  # fmt: skip
+    document["answers"] = [
+        {**{name: getattr(each, name) for name in columns}, "recommended": each is recommended}
+        for each in others
+    ]
+    return document
