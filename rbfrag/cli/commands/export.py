@@ -47,7 +47,8 @@ class FunctionOptions(BlocksOptions):
             }
             return keywords | columns, given.remarks
         keywords["blocks"] = given.question
-        return keywords, given.remarks
+        of_columns = () if given.rows is None else given.rows.remarks
+        return keywords, (*given.remarks, *of_columns)
 
 
 @app.command("nrml", epilog="Example:  rbfrag export nrml --height 2.4 --width 0.5 --out block.xml")

@@ -94,6 +94,7 @@ def survival(
     table, _, remarks, rows = blocks.toppling_blocks(standing)
     if rows is not None:
         rows.whole(ALL_STAND)
+        remarks += rows.remarks
     read = as_curves(curves, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
     answer = answered(
         read, table["p2_1_s2"], table["kr"], age_years=known.age, age_sd_years=known.age_sd,

@@ -206,7 +206,7 @@ class TableOptions(BlockOptions):
 
     blocks: str | None = option(
         "Table of blocks (.csv, .xlsx, .parquet, .geojson) with p2_1_s2 [1/s²] and kr, or "
-        "height_m and width_m [m] (and dip_deg); one answer a row.",
+        "height_m and width_m [m] (and dip_deg, phi_deg); one answer a row.",
         metavar="FILE",
     )
 
