@@ -29,6 +29,10 @@ LOUD = ("phi", "frict", "dip", "beta", "incl", "pg", "sa", "shak", "slope")
 """Beginnings of words that sound like friction, dip or shaking."""
 
 
+WRITTEN = ("block_sd",)
+"""Columns of answers that miss a field's name by a letter and are none; they may be read again."""
+
+
 class Column(NamedTuple):
     """A column that states a field.
 
@@ -189,7 +193,7 @@ def _factor(unit: str, stated: str) -> float | None:
 def _refuse_near_miss(text: str, source: object, read: Collection[str]) -> None:
     """Refuse a header of six letters or more that misses a name by an edit, or by a swap."""
     bare = _IN_BRACKETS.sub("", text.strip()).lower().replace(" ", "_")
-    if sum(map(str.isalpha, bare)) < _FEWEST_LETTERS:
+    if bare in WRITTEN or sum(map(str.isalpha, bare)) < _FEWEST_LETTERS:
         return
     for name, field in _names().items():
         if column_of(field) in read and _is_near(bare, name):
