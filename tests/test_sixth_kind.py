@@ -1,11 +1,10 @@
-"""A kind is one file: a throw-away one answers everywhere, without another line of the package.
+"""A kind is a line of facts and a file: a throw-away one answers everywhere, without another line.
 
 Its blocks fail when the peak acceleration exceeds k_r.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -20,7 +19,7 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.service.app import make_app
 from rbfrag.service.settings import Settings
-from rbfrag.solver import kinds
+from rbfrag.solver.kinds import KINDS, KindFacts
 from tests.synthetic import shaking
 
 FALLS = '''
@@ -37,10 +36,6 @@ from rbfrag.solver.results import Outcome, Response, SearchPoints
 
 
 class Falls(Kind):
-    kind = "falls"
-    parameters = ("p2", "kr")
-    campaign = True
-
     def respond(self, site, shaking):
         fails = shaking.motion.pga_g > site.yield_g
         return Response(
@@ -74,20 +69,19 @@ class Falls(Kind):
         return results
 
 
-MODEL = Falls()
+MODEL = Falls.named("falls")
 '''
 
 
 @pytest.fixture
-def falls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def falls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "kinds"
     folder.mkdir()
-    (folder / "zz_falls.py").write_text(FALLS)
+    (folder / "falls.py").write_text(FALLS)
     path = [*rbfrag.solver.models.__path__, str(folder)]
     monkeypatch.setattr(rbfrag.solver.models, "__path__", path)
-    kinds.models.cache_clear()
-    yield
-    kinds.models.cache_clear()
+    facts = KindFacts("falls", parameters=("p2", "kr"), campaign=True)
+    monkeypatch.setitem(KINDS, "falls", facts)
 
 
 @pytest.fixture

@@ -19,8 +19,7 @@ from rbfrag.db.rows import MotionRow
 from rbfrag.db.spectra import SpectrumKey, spectrum_values
 from rbfrag.db.vertical_pairs import VerticalPair, vertical_pairs
 from rbfrag.errors import InputError
-from rbfrag.solver.kind import Case
-from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.kind import Case, model_of_kind
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import NUMERICS_VERSION, POLARITIES, SEARCH_LIMIT, Polarity
 

@@ -29,8 +29,7 @@ from rbfrag.db.stored_combination import (
     stored_combination,
 )
 from rbfrag.errors import RbfragError
-from rbfrag.solver.kind import Case, CaseRequest, Shaking
-from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.kind import Case, CaseRequest, Shaking, model_of_kind
 from rbfrag.solver.results import (
     MAP_DEPTH,
     NUMERICS_VERSION,

@@ -28,8 +28,7 @@ from rbfrag.db.shock_pairs import (
 from rbfrag.errors import InputError
 from rbfrag.fragility.conditional import conditional_shares
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver.kind import BlockOnPlanes, Case, Kind, Shaking
-from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.kind import BlockOnPlanes, Case, Kind, Shaking, model_of_kind
 from rbfrag.solver.results import NUMERICS_VERSION, BlockState, Polarity, Response
 from rbfrag.solver.sequence import STARTS_ANEW
 

@@ -41,8 +41,8 @@ from rbfrag.db.queries import Vertical
 from rbfrag.db.responses import insert_responses
 from rbfrag.db.spectra import store_spectrum
 from rbfrag.errors import InputError, WorkFailedError
-from rbfrag.solver.kind import Case
-from rbfrag.solver.kinds import models
+from rbfrag.solver.kind import Case, model_of_kind
+from rbfrag.solver.kinds import KINDS
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.results import MAP_DEPTH, CriticalResult
 
@@ -146,7 +146,13 @@ def simulate(
             one = "--map" if full_map else "--vertical"
             raise InputError(f"{one} does not go with --sequence: leave one of them out")
         return simulate_sequences(
-            models()[kind], cases, db=db, suite=suite, seed=seed, draws=draws, workforce=workforce
+            model_of_kind(kind),
+            cases,
+            db=db,
+            suite=suite,
+            seed=seed,
+            draws=draws,
+            workforce=workforce,
         )
     started = time.perf_counter()
     with opened_database(db) as engine:
@@ -172,9 +178,9 @@ def simulate(
 
 def _cases(kind: str, described: dict[str, Any], extras: Sequence[str]) -> tuple[Case, ...]:
     """Ask the kind for its combinations; it refuses the options of others."""
-    known = {name: model for name, model in models().items() if model.campaign}
+    known = {name: model for name, model in KINDS.items() if model.campaign}
     if kind not in known:
-        why = models()[kind].no_search if kind in models() else ""
+        why = KINDS[kind].no_search if kind in KINDS else ""
         raise InputError(
             f"--kind {kind}: campaigns are of {', '.join(sorted(known))}{': ' if why else ''}{why}"
         )
@@ -184,7 +190,7 @@ def _cases(kind: str, described: dict[str, Any], extras: Sequence[str]) -> tuple
             raise InputError(
                 f"{OPTIONS[name]} goes with --kind {' or '.join(owners)}, not with {kind}"
             )
-    return known[kind].cases(**described)
+    return model_of_kind(kind).cases(**described)
 
 
 class _Run:

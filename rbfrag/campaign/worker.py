@@ -11,8 +11,7 @@ from rbfrag.db.responses import ResponseRecord
 from rbfrag.db.rows import MotionRow
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
-from rbfrag.solver.kind import Case, CaseRequest, Shaking
-from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.kind import Case, CaseRequest, Shaking, model_of_kind
 from rbfrag.solver.results import (
     MAP_DEPTH,
     NUMERICS_VERSION,

@@ -42,7 +42,7 @@ from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
 from rbfrag.question.table import Header, Numeric, columns_in
-from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.kinds import facts_of
 
 FloatArray = NDArray[np.float64]
 
@@ -240,7 +240,7 @@ def _answer(
         values[name] = cells * factor
         faults = others | faults
     if "height_m" in values:
-        free_standing = model_of_kind(model.kind).free_standing
+        free_standing = facts_of(model.kind).free_standing
         faults = rectangle_reasons(values) | sliding_reasons(values, model.kind) | faults
         numbers_of = rectangle_columns(values, free_standing=free_standing)
         others_of = (*RECTANGLE, FRICTION)

@@ -28,7 +28,7 @@ from rbfrag.files import as_path
 from rbfrag.fragility.lookup import block_of
 from rbfrag.fragility.methods import TOPPLING_BLOCK
 from rbfrag.fragility.unusable import block_reasons, refuse, unusable_in_words
-from rbfrag.solver.kinds import model_of_kind, models
+from rbfrag.solver.kinds import KINDS, facts_of
 
 Columns = Mapping[str, NDArray[Any]]
 
@@ -271,7 +271,7 @@ def foreign_reasons(
         default: kind that answers for rows that state none.
         one_kind: it answers alone; otherwise each row's own does.
     """
-    model_of_kind(default)  # refuses a kind that there is not
+    facts_of(default)  # refuses a kind that there is not
     stated = [columns[name] for name in ("kind", "mode") if name in columns]
     if not stated:
         return {}
@@ -281,13 +281,13 @@ def foreign_reasons(
     @cache
     def why(kind: str, mode: str) -> str:
         own = kind or default
-        if own not in models():
-            return f"kind = {own[:40]!r} is none of {', '.join(sorted(models()))}"
+        if own not in KINDS:
+            return f"kind = {own[:40]!r} is none of {', '.join(sorted(KINDS))}"
         if one_kind and own != default:
             return f"the block's kind is {own}, and the answer is for kind {default}"
         if not one_kind and block_of(_NAMES, own).kind != own:
             return f"a block of kind {own} is not described by {' and '.join(NUMBERS)}"
-        if mode and mode != model_of_kind(own).mode:
+        if mode and mode != facts_of(own).mode:
             shown = mode[:40].replace("_", " ")
             return f"the block's mode is {shown}: the {own} model says nothing about it"
         return ""
@@ -346,7 +346,7 @@ def _not_negative(name: str, numbers: NDArray[np.float64], i: int) -> str:
 def _rectangles(columns: Columns, kinds: NDArray[np.object_]) -> dict[str, NDArray[Any]]:
     """Return the numbers of rectangles, each by its kind: those of free-standing ones differ."""
     backed = rectangle_columns(columns)
-    is_free = {name for name, model in models().items() if model.free_standing}
+    is_free = {name for name, model in KINDS.items() if model.free_standing}
     free = np.array([kind in is_free for kind in kinds.tolist()], dtype=bool)
     if not free.any():
         return backed

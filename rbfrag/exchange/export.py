@@ -23,7 +23,7 @@ from rbfrag.fragility.model import Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.curve import ANSWERED
 from rbfrag.hazards.measure_type import openquake_type
-from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.kinds import facts_of
 
 EACH_NEEDED = "an exposure model needs a function of each"
 """Why a table with a row that cannot be used is refused."""
@@ -195,7 +195,7 @@ def pelicun(
 
 
 def _stands_free(kind: str | None) -> bool:
-    return kind is not None and model_of_kind(kind).free_standing
+    return kind is not None and facts_of(kind).free_standing
 
 
 def _measure(imt: str) -> str:

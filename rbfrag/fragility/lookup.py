@@ -224,9 +224,9 @@ def _suited_in(
 
 
 def _how_to_make(kind: str) -> str:
-    from rbfrag.solver.kinds import models
+    from rbfrag.solver.kinds import KINDS
 
-    stored = [name for name, model in sorted(models().items()) if model.campaign]
+    stored = [name for name, model in sorted(KINDS.items()) if model.campaign]
     if kind in stored:
         return f"make one with  rbfrag simulate --kind {kind}  and  rbfrag fit --kind {kind}"
     return f"there are models of {', '.join(stored)}"

@@ -26,7 +26,8 @@ from rbfrag.service.reading import Bodies, BoundedRoute
 from rbfrag.service.request_records import CONTENT_TYPE, Metrics
 from rbfrag.service.settings import Settings
 from rbfrag.service.work import WorkerPool
-from rbfrag.solver.kinds import models as models_of_blocks
+from rbfrag.solver.kind import model_of_kind
+from rbfrag.solver.kinds import KINDS
 from rbfrag.version import __version__
 
 FOLDER = Path(__file__).parent / "page"
@@ -74,7 +75,7 @@ def make_app(settings: Settings) -> FastAPI:
         if settings.early:
             pool.open().schedule(work.warm_up)
             # so that the first block of a page does not wait for its libraries
-            loading = asyncio.ensure_future(asyncio.to_thread(models_of_blocks))
+            loading = asyncio.ensure_future(asyncio.to_thread(_load_models))
         yield
         if settings.early:
             await loading
@@ -141,3 +142,8 @@ def make_app(settings: Settings) -> FastAPI:
             allow_headers=["Authorization", "Content-Type"],
         )
     return app
+
+
+def _load_models() -> None:
+    for kind in KINDS:
+        model_of_kind(kind)

@@ -67,11 +67,11 @@ def add_routes(routes: APIRouter) -> None:
 def _drawn(query: DrawingQuery) -> tuple[Block, Stability, str, dict[str, float] | None]:
     """Return a block, how it stands, the kind of its failure and what a prediction reads of it."""
     from rbfrag.solver.described import numbers_of_kind
-    from rbfrag.solver.kinds import model_of_mode
+    from rbfrag.solver.kinds import kind_of_mode
     from rbfrag.solver.stability.single import level_rectangle, rough_deg, stability
 
     def kind_of(result: Stability) -> str:
-        return model_of_mode(result.mode, back_fracture=not query.no_back).kind
+        return kind_of_mode(result.mode, back_fracture=not query.no_back).kind
 
     others = query.model_dump(exclude_defaults=True).keys() - {"p2", "kr", "no_back"}
     if query.p2 is not None or query.kr is not None or not others:

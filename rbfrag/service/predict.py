@@ -120,7 +120,7 @@ def _numbers_of_rectangles(
     columns: dict[str, Any], others: dict[str, Any], kind: str | None
 ) -> dict[str, Any]:
     from rbfrag.exchange.block_table import BLOCK_COLUMNS, rectangle_columns
-    from rbfrag.solver.kinds import model_of_kind
+    from rbfrag.solver.kinds import facts_of
 
     for name, keyword in RECTANGLE.items():
         if keyword not in columns and name != "dip":
@@ -128,7 +128,7 @@ def _numbers_of_rectangles(
     for name in NUMBERS:
         if name in others:
             raise InputError(f"{name} does not go with height and width: give one of them")
-    free_standing = kind is not None and model_of_kind(kind).free_standing
+    free_standing = kind is not None and facts_of(kind).free_standing
     numbers = rectangle_columns(columns, free_standing=free_standing)
     return {BLOCK_COLUMNS[name]: values.tolist() for name, values in numbers.items()}
 

@@ -22,7 +22,7 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.modes import words_of_mode, yield_coefficient
 
 if TYPE_CHECKING:
-    from rbfrag.solver.kind import Kind
+    from rbfrag.solver.kinds import KindFacts
     from rbfrag.solver.stability.single import Stability
 
 
@@ -213,13 +213,13 @@ def kind_of(described: DescribedBlock, kind: str) -> str:
         described: the block.
         kind: how it fails where a plane backs it.
     """
-    from rbfrag.solver.kinds import model_of_kind, model_of_mode, stands_free_of
+    from rbfrag.solver.kinds import facts_of, kind_of_mode, stands_free_of
 
-    model = model_of_kind(kind)
+    model = facts_of(kind)
     backed = described.conditions.get("back_fracture", True)
     if model.mode is None or not stands_free_of(model, backed):
         return kind
-    return model_of_mode(model.mode, back_fracture=False).kind
+    return kind_of_mode(model.mode, back_fracture=False).kind
 
 
 def _instead(described: DescribedBlock, mode: str) -> str:
@@ -254,10 +254,11 @@ def numbers_of_kind(
 def _numbers_and_remarks(
     described: DescribedBlock, kind: str
 ) -> tuple[dict[str, float], tuple[str, ...]]:
-    from rbfrag.solver.kinds import model_of_kind, stands_free_of
+    from rbfrag.solver.kind import model_of_kind
+    from rbfrag.solver.kinds import facts_of, stands_free_of
     from rbfrag.solver.stability.single import stability
 
-    model = model_of_kind(kind)
+    model = facts_of(kind)
     if not model.parameters:
         raise InputError(f"there is no fragility model of kind {kind}")
     described = described.without_kv()
@@ -268,7 +269,7 @@ def _numbers_and_remarks(
     # without friction a rectangle is taken to be of the model's mode, and the answer says so
     if described.only_topples and model.free_standing:
         beta_rad = math.radians(described.conditions["beta_deg"])
-        values, remarks = model.numbers_of(described.block, beta_rad)
+        values, remarks = model_of_kind(kind).numbers_of(described.block, beta_rad)
         return values, (TAKEN_NOT_TO_SLIP, *remarks)
     if described.only_topples and topples:
         return toppling_rectangle(described), (TAKEN_TO_TOPPLE, *unbacked)
@@ -280,7 +281,7 @@ def _numbers_and_remarks(
     if model.free_standing:
         if conditions.get("cohesion_pa"):
             raise InputError(f"{origin}cohesion_pa does not go with {kind}: leave it out")
-        values, remarks = model.numbers_of(block, math.radians(result.beta_deg))
+        values, remarks = model_of_kind(kind).numbers_of(block, math.radians(result.beta_deg))
         return values, (*result.warnings, *remarks)
     if "ps2" in model.parameters:
         return _numbers_of_mechanism(block, kind, conditions, origin)
@@ -295,7 +296,7 @@ def _numbers_and_remarks(
     return values, (*result.warnings, *unbacked)
 
 
-def _refuse_other_blocks(described: DescribedBlock, result: Stability, model: Kind) -> None:
+def _refuse_other_blocks(described: DescribedBlock, result: Stability, model: KindFacts) -> None:
     """Refuse a block of another mode than the model's, and one that no earthquake decides about."""
     origin, mode = described.origin, words_of_mode(result.mode)
     yields = f"(yield {result.yield_acceleration:.4g} g"

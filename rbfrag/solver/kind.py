@@ -1,7 +1,7 @@
 """What a kind of failure is: how a block of it answers, what describes it, what is stored of it.
 
-A kind is one object, ``MODEL``, in one file of `rbfrag/solver/models`; `rbfrag.solver.kinds` finds
-it there. Campaigns, the database, fits and predictions ask that object, never for its name.
+A kind is a line of facts in `rbfrag.solver.kinds` and one object, ``MODEL``, in the file of its
+name in `rbfrag/solver/models`. Campaigns, the database and fits ask these, never for the name.
 """
 
 from __future__ import annotations
@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any, Literal, Protocol
+from functools import cache, cached_property
+from importlib import import_module
+from typing import Any, ClassVar, Literal, Protocol, Self
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import Excitation, excitation, motion_remarks
+from rbfrag.solver.kinds import KindFacts, facts_of, kind_of_mode
 from rbfrag.solver.results import (
     MAP_DEPTH,
     POLARITIES,
@@ -31,9 +33,6 @@ from rbfrag.solver.results import (
     SearchPoints,
 )
 from rbfrag.solver.stability.modes import ModeName
-
-PLANES = ("beta_deg", "phi_deg", "phi_back_deg")
-"""Options that describe the planes of a block."""
 
 SHAKING = ("vertical", "polarity", "search_limit")
 """Options of every search."""
@@ -191,42 +190,24 @@ class Measures(Protocol):
         """PGV [m/s]."""
 
 
-class Kind:
-    """Base of the kinds: what one without a search and without a campaign answers.
+class Kind(KindFacts):
+    """Base of the kinds: the facts of one, and what it answers without search and campaign.
 
     Attributes:
-        kind: its name.
-        mode: failure mode of its blocks; None where no geometry chooses it.
-        free_standing: whether its blocks have no plane behind them.
         carries_state: whether a motion leaves a block somewhere else than it found it.
-        settings: options of `rbfrag.respond` that it understands.
-        parameters: what describes its block in predictions, and in `rbfrag.respond` without a
-            shape; () where no fragility is fitted.
-        searchable: whether it has a critical value.
-        search_needs: the option without which there is no search.
-        search_options: options of `rbfrag.critical` that it understands.
-        no_search: why it has no critical value; empty where there is none yet.
-        campaign: whether campaigns store it.
-        campaign_options: what :meth:`cases` may be asked.
         polarities: those that campaigns run; one alone where the other is its mirror image.
         sequence_measure: what counts as failure in campaigns of sequences: where the block is left
             [m], or its greatest rotation [rad]; empty of kinds that have none.
     """
 
-    kind: str
-    mode: ModeName | None = None
-    free_standing: bool = False
-    carries_state: bool = False
-    settings: tuple[str, ...] = ()
-    parameters: tuple[str, ...] = ()
-    searchable: bool = False
-    search_needs: str = ""
-    search_options: tuple[str, ...] = ()
-    no_search: str = ""
-    campaign: bool = False
-    campaign_options: tuple[str, ...] = ()
-    polarities: tuple[Polarity, ...] = POLARITIES
-    sequence_measure: Literal["", "displacement_m", "peak_rad"] = ""
+    carries_state = False
+    polarities: ClassVar[tuple[Polarity, ...]] = POLARITIES
+    sequence_measure: ClassVar[Literal["", "displacement_m", "peak_rad"]] = ""
+
+    @classmethod
+    def named(cls, kind: str) -> Self:
+        """Return the model of a kind with the facts of it."""
+        return cls(**vars(facts_of(kind)))
 
     def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
         """Return what the block does."""
@@ -317,6 +298,18 @@ class Kind:
                 f"{foreign[0]} does not go with {self.kind}, which knows "
                 f"{' and '.join(own) or 'no such option'}"
             )
+
+
+@cache
+def model_of_kind(kind: str) -> Kind:
+    """Return the model of the kind of that name, which is loaded with all that it needs."""
+    model: Kind = import_module(f"rbfrag.solver.models.{facts_of(kind).kind}").MODEL
+    return model
+
+
+def model_of_mode(mode: ModeName, *, back_fracture: bool = True) -> Kind:
+    """Return the model of blocks that fail in this mode; arguments as of `kind_of_mode`."""
+    return model_of_kind(kind_of_mode(mode, back_fracture=back_fracture).kind)
 
 
 def strengths_at(p2: float, measures: Measures, y_over_pgv: FloatArray) -> FloatArray:

@@ -1,59 +1,120 @@
-"""The kinds that there are: every file of `rbfrag/solver/models` with a ``MODEL``."""
+"""The kinds that there are: a line of facts each, for which no model is loaded.
+
+What a kind does is in its model, `rbfrag/solver/models/<kind>.py`; see
+:func:`rbfrag.solver.kind.model_of_kind`.
+"""
 
 from __future__ import annotations
 
-import pkgutil
-from functools import cache
-from importlib import import_module
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import rbfrag.solver.models
 from rbfrag.errors import InputError
-from rbfrag.solver.kind import Kind
-from rbfrag.solver.stability.modes import ModeName
+
+if TYPE_CHECKING:
+    from rbfrag.solver.stability.modes import ModeName
+
+PLANES = ("beta_deg", "phi_deg", "phi_back_deg")
+"""Options that describe the planes of a block."""
 
 
-@cache
-def models() -> dict[str, Kind]:
-    """Return all models by kind."""
-    by_name: dict[str, Kind] = {}
-    for module in pkgutil.iter_modules(rbfrag.solver.models.__path__):
-        model = getattr(import_module(f"rbfrag.solver.models.{module.name}"), "MODEL", None)
-        if model is not None:
-            by_name[model.kind] = model
-    return by_name
+@dataclass(frozen=True)
+class KindFacts:
+    """What is known of a kind of failure before anything is computed.
+
+    Args:
+        kind: its name.
+        mode: failure mode of its blocks; None where no geometry chooses it.
+        parameters: what describes its block in predictions, and in `rbfrag.respond` without a
+            shape; () where no fragility is fitted.
+        free_standing: whether its blocks have no plane behind them.
+        settings: options of `rbfrag.respond` that it understands.
+        search_needs: the option without which there is no search for a critical value; empty of
+            kinds that have none.
+        search_options: options of `rbfrag.critical` that it understands.
+        no_search: why it has no critical value; empty where there is none yet.
+        campaign_options: what campaigns of it may be asked.
+        campaign: whether campaigns store it.
+    """
+
+    kind: str
+    mode: ModeName | None = None
+    parameters: tuple[str, ...] = ()
+    free_standing: bool = False
+    settings: tuple[str, ...] = ()
+    search_needs: str = ""
+    search_options: tuple[str, ...] = ()
+    no_search: str = ""
+    campaign_options: tuple[str, ...] = ()
+    campaign: bool = False
+
+    @property
+    def searchable(self) -> bool:
+        """Whether it has a critical value."""
+        return bool(self.search_needs)
 
 
-def model_of_kind(kind: str) -> Kind:
-    """Return the model of that name."""
-    known = models()
-    if kind not in known:
+_SCALED = ("block", *PLANES, "rotation_deg", "scan_ratio", "bracket")
+
+KINDS = {
+    facts.kind: facts
+    for facts in (
+        KindFacts("confined_toppling", "confined_topple", (), False, (), "block", _SCALED),
+        KindFacts(
+            "rocking", "topple", ("p2", "kr"), True, ("restitution",),
+            no_search="what overturns a free-standing block is no interval of k_r (up to 122 "
+            "islands for one record), so that no value is certain to be the last",
+            campaign_options=("p2", "restitution_factors"), campaign=True,
+        ),
+        KindFacts(
+            "sliding", "slide", ("ky", "displacement_m"), False, ("two_way", "horizontal"),
+            "displacement_m", ("displacement_m", "tolerance", "block", *PLANES), "",
+            ("displacements_m",), campaign=True,
+        ),
+        KindFacts(
+            "slumping", "slump", ("ks", "ps2"), False, (), "block", _SCALED, "",
+            ("rotations_deg", "family", "full_map"), campaign=True,
+        ),
+        KindFacts(
+            "toppling", "topple", ("p2", "kr"), False, (),
+            "p2", ("p2", "full_map", "map_depth", "block", *PLANES), "",
+            ("p2", "grid", "store_responses", "full_map"), campaign=True,
+        ),
+    )
+}  # fmt: skip
+"""All kinds by name, in alphabetical order."""
+
+
+def facts_of(kind: str) -> KindFacts:
+    """Return the facts of the kind of that name."""
+    if kind not in KINDS:
         raise InputError(
-            f"unknown kind {kind!r}: use one of {', '.join(sorted(known))} "
+            f"unknown kind {kind!r}: use one of {', '.join(sorted(KINDS))} "
             "(rocking is free-standing, toppling backed by a slope)"
         )
-    return known[kind]
+    return KINDS[kind]
 
 
-def model_of_mode(mode: ModeName, *, back_fracture: bool = True) -> Kind:
-    """Return the model of blocks that fail in this mode.
+def kind_of_mode(mode: ModeName, *, back_fracture: bool = True) -> KindFacts:
+    """Return the kind of blocks that fail in this mode.
 
     Args:
         mode: the failure mode.
         back_fracture: whether there is a plane behind the block, which decides where the mode has
-            a model of each kind.
+            a kind of each sort.
     """
-    of_mode = [model for model in models().values() if model.mode == mode]
-    # False comes first: the model that fits, or the only one there is
-    return min(of_mode, key=lambda model: model.free_standing == back_fracture)
+    of_mode = [facts for facts in KINDS.values() if facts.mode == mode]
+    # False comes first: the kind that fits, or the only one there is
+    return min(of_mode, key=lambda facts: facts.free_standing == back_fracture)
 
 
-def stands_free_of(model: Kind, back_fracture: bool) -> bool:
-    """Return whether a block is asked of a model of backed blocks though nothing backs it.
+def stands_free_of(facts: KindFacts, back_fracture: bool) -> bool:
+    """Return whether a block is asked of a kind of backed blocks though nothing backs it.
 
     Args:
-        model: the model that is asked.
+        facts: the kind that is asked.
         back_fracture: whether there is a plane behind the block.
     """
-    if back_fracture or model.free_standing or model.mode is None:
+    if back_fracture or facts.free_standing or facts.mode is None:
         return False
-    return model_of_mode(model.mode, back_fracture=False).free_standing
+    return kind_of_mode(facts.mode, back_fracture=False).free_standing

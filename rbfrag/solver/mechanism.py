@@ -23,8 +23,7 @@ from rbfrag.solver.free_motion import (
 )
 from rbfrag.solver.integrator.one_freedom.equation import Mechanism, Pose
 from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, MotionHistory, follow
-from rbfrag.solver.kind import BlockOnPlanes, Kind, RunEnd, Runner, Shaking
-from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.kind import BlockOnPlanes, Kind, RunEnd, Runner, Shaking, model_of_kind
 from rbfrag.solver.results import (
     BlockState,
     FloatArray,

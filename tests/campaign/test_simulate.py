@@ -23,8 +23,7 @@ from rbfrag.db.queries import combination_table, database_info, outcome_grid
 from rbfrag.db.schema import combination, outcome_interval, simulation
 from rbfrag.db.spectra import spectrum_values
 from rbfrag.errors import InputError, WorkFailedError
-from rbfrag.solver.kind import Case
-from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.kind import Case, model_of_kind
 from rbfrag.solver.toppling_run import respond
 from tests.synthetic import write_suite
 

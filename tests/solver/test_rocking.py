@@ -20,6 +20,7 @@ from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.described import DescribedBlock, numbers_of_kind
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.free_batch import simulate_free
+from rbfrag.solver.kind import model_of_kind
 from rbfrag.solver.models.rocking import SENSITIVITY, changes_with_the_motion, free_block
 from rbfrag.solver.respond import block_of_numbers
 from rbfrag.solver.results import Outcome, Response, ResponseHistory
@@ -98,7 +99,7 @@ def test_reference_values(records_dir: Path, row: tuple) -> None:
     assert not run.sensitive
     site = rbfrag.solver.respond._site(
         block, rbfrag.stability(block, beta_deg=beta, phi_deg=45.0, back_fracture=False),
-        rbfrag.solver.kinds.model_of_kind("rocking"), {"restitution": restitution},
+        model_of_kind("rocking"), {"restitution": restitution},
     )  # fmt: skip
     made = free_block(site)
     found = (made.toe.p**2, made.heel.p**2, made.toe.passed_on, made.heel.passed_on)
@@ -351,7 +352,7 @@ def test_the_force_on_the_corner_is_that_of_the_motion_of_the_centroid() -> None
     needed = (np.abs(along) / across)[moves].max()
     site = rbfrag.solver.respond._site(
         block, rbfrag.stability(block, beta_deg=beta, phi_deg=45.0, back_fracture=False),
-        rbfrag.solver.kinds.model_of_kind("rocking"), {},
+        model_of_kind("rocking"), {},
     )  # fmt: skip
     made = free_block(site)
     excited = excitation(motion, vertical)

@@ -99,9 +99,9 @@ def block(
 
 def _rocks(mode: ModeName) -> bool:
     """Return whether a block of this mode rocks where nothing backs it."""
-    from rbfrag.solver.kinds import model_of_mode
+    from rbfrag.solver.kinds import kind_of_mode
 
-    return model_of_mode(mode, back_fracture=False).free_standing
+    return kind_of_mode(mode, back_fracture=False).free_standing
 
 
 def _mesh(

@@ -22,7 +22,7 @@ from rbfrag.solver.described import TAKEN_TO_TOPPLE
 
 if TYPE_CHECKING:
     from rbfrag.motions.ground_motion import GroundMotion
-    from rbfrag.solver.kind import Kind
+    from rbfrag.solver.kinds import KindFacts
     from rbfrag.solver.results import Polarity
 
 EXAMPLE = "Example:  rbfrag critical record.AT2 --height 2.4 --width 0.5"
@@ -141,12 +141,12 @@ SEARCH_OPTION = {
 """What an option is called by the kinds that understand it."""
 
 
-def _chosen_kind(kind: str | None, of_shape: dict[str, Any], displacement: str | None) -> Kind:
+def _chosen_kind(kind: str | None, of_shape: dict[str, Any], displacement: str | None) -> KindFacts:
     from rbfrag.solver.critical import kind_of
-    from rbfrag.solver.kinds import model_of_kind, model_of_mode
+    from rbfrag.solver.kinds import facts_of, kind_of_mode
 
     if kind is not None:
-        model = model_of_kind(kind)
+        model = facts_of(kind)
         if model.search_needs == "block" and "block" not in of_shape:
             raise InputError(
                 f"--block is missing: shape, friction and dip of a block decide about {kind}; "
@@ -155,18 +155,18 @@ def _chosen_kind(kind: str | None, of_shape: dict[str, Any], displacement: str |
         return model
     if of_shape:
         return kind_of(None, of_shape)
-    return model_of_mode("topple" if displacement is None else "slide")
+    return kind_of_mode("topple" if displacement is None else "slide")
 
 
-def _refuse_options_of_other_kinds(model: Kind, given: dict[str, bool]) -> None:
-    from rbfrag.solver.kinds import models
+def _refuse_options_of_other_kinds(model: KindFacts, given: dict[str, bool]) -> None:
+    from rbfrag.solver.kinds import KINDS
 
     if model.no_search:
         raise InputError(f"--kind {model.kind} has no critical value: {model.no_search}")
     for word, is_given in given.items():
         if is_given and SEARCH_OPTION[word] not in model.search_options:
             name = SEARCH_OPTION[word]
-            owners = [kind for kind, its in models().items() if name in its.search_options]
+            owners = [kind for kind, its in KINDS.items() if name in its.search_options]
             raise InputError(
                 f"{word} goes with --kind {' and '.join(owners)}, not with {model.kind}"
             )
@@ -176,12 +176,12 @@ def _refuse_options_of_other_kinds(model: Kind, given: dict[str, bool]) -> None:
 
 def _searched_block(shape: ShapeOptions, kind: str | None) -> dict[str, Any]:
     """Return the keywords of a search that a shape gives."""
-    from rbfrag.solver.kinds import model_of_kind
+    from rbfrag.solver.kinds import facts_of
 
     described = shape.described()
     if described is None:
         return {}
-    if described.only_topples and (kind is None or model_of_kind(kind).search_needs == "p2"):
+    if described.only_topples and (kind is None or facts_of(kind).search_needs == "p2"):
         return {"p2": described.block.p2}
     block, conditions = described.on_planes()
     for name, nothing in (("kv", 0.0), ("cohesion_pa", 0.0), ("back_fracture", True)):

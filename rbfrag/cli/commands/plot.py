@@ -113,7 +113,7 @@ def plot_curve(
     from rbfrag.fragility.methods import TOPPLING_BLOCK
     from rbfrag.plots import plot
     from rbfrag.solver.described import kind_of
-    from rbfrag.solver.kinds import model_of_kind
+    from rbfrag.solver.kinds import facts_of
 
     def others(measure: str) -> Any:
         if beside is None:
@@ -127,7 +127,7 @@ def plot_curve(
         kind = kind_of(shape, TOPPLING_BLOCK.kind)
     numbers, remarks = block.toppling(kind)
     if standing.restitution is not None:
-        if kind is None or not model_of_kind(kind).free_standing:
+        if kind is None or not facts_of(kind).free_standing:
             raise InputError("--restitution goes with blocks that stand free: --kind rocking")
         numbers |= {"restitution": standing.restitution}
     fixed: dict[str, Any] = held.given()

@@ -227,9 +227,9 @@ def respond(
         _draw(response, files.plot, p2, what.get("kr"), title, direction.reverse)
     if files.film is not None and body is not None:
         from rbfrag.plots.film import film
-        from rbfrag.solver.kinds import model_of_kind
+        from rbfrag.solver.kinds import facts_of
 
-        backed = not model_of_kind(response.kind).free_standing
+        backed = not facts_of(response.kind).free_standing
         film(
             response, body, files.film, beta_deg=what["beta_deg"],
             exaggerate=files.exaggerate, back_fracture=backed and what.get("back_fracture", True),
@@ -272,9 +272,9 @@ def _possible(
 
 def _numbers_of(body: Block, what: dict[str, Any]) -> dict[str, float]:
     """Return the numbers of a block that stands free, evenly and level, or refuse its shape."""
-    from rbfrag.solver.kinds import model_of_kind
+    from rbfrag.solver.kinds import facts_of
 
-    free = what["kind"] is not None and model_of_kind(what["kind"]).free_standing
+    free = what["kind"] is not None and facts_of(what["kind"]).free_standing
     if free and what["beta_deg"] == 0.0 and math.isclose(body.alpha1_deg, -body.alpha3_deg):
         return {"p2": body.p2, "kr": body.tan_alpha3}
     raise InputError(
@@ -312,15 +312,13 @@ def _body(
     block: BlockOptions, ky: float | None, kind: str | None
 ) -> tuple[Block | None, dict[str, Any], tuple[str, ...]]:
     """Return the block where its shape decides, the keywords that say it, and warnings."""
-    from rbfrag.solver.kinds import model_of_kind, model_of_mode
+    from rbfrag.solver.kinds import facts_of, kind_of_mode
 
     described = block.described()
     if described is not None and described.only_topples:
         conditions = described.without_kv().conditions
         backed = conditions.get("back_fracture", True)
-        model = (
-            model_of_mode("topple", back_fracture=backed) if kind is None else model_of_kind(kind)
-        )
+        model = kind_of_mode("topple", back_fracture=backed) if kind is None else facts_of(kind)
         if not model.free_standing:
             return None, {"kind": kind, **toppling_rectangle(described)}, (TAKEN_TO_TOPPLE,)
         free = {"kind": model.kind, "block": described.block, **conditions}

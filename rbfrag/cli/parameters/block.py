@@ -178,9 +178,9 @@ class StandingOptions:
         """Whether they stand free."""
         if self.kind is None:
             return False
-        from rbfrag.solver.kinds import model_of_kind
+        from rbfrag.solver.kinds import facts_of
 
-        return model_of_kind(self.kind).free_standing
+        return facts_of(self.kind).free_standing
 
     def completed(self, columns: dict[str, Any]) -> dict[str, Any]:
         """Return a table of blocks with what is stated for all; backed ones have no restitution.

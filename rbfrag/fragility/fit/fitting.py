@@ -130,9 +130,9 @@ def methods_of_kind(kind: str) -> tuple[Method, ...]:
     Raises:
         InputError: an unknown kind, or one that no method goes with.
     """
-    from rbfrag.solver.kinds import model_of_kind
+    from rbfrag.solver.kinds import facts_of
 
-    names = model_of_kind(kind).parameters
+    names = facts_of(kind).parameters
     reading = [method for method in methods() if names and method.block.names == names]
     # of a kind without methods of its own, all that read what describes its block
     suited = tuple(each for each in reading if each.block.kind == kind) or tuple(reading)

@@ -25,7 +25,7 @@ from rbfrag.plots.model_lines import MORE_TERMS, ONE_NUMBER_TERMS, HeldMeasures,
 from rbfrag.plots.spectrum import block_size_m
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.described import DescribedBlock, kind_of, numbers_of_kind
-from rbfrag.solver.kinds import model_of_kind
+from rbfrag.solver.kinds import facts_of
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.stability.single import Stability, stability
 from rbfrag.version import __version__
@@ -162,7 +162,7 @@ def contents_of(
         values, remarks = numbers_of_kind(described, kind)
         given = {**values, **given}
     kind = block_of(given, kind).kind if kind is None else kind
-    if set(TOPPLING_BLOCK.names) - set(model_of_kind(kind).parameters):
+    if set(TOPPLING_BLOCK.names) - set(facts_of(kind).parameters):
         raise InputError(
             f"no report is made of kind {kind}: its curves are not drawn; ask  rbfrag predict"
         )
@@ -178,7 +178,7 @@ def contents_of(
     numbers = {name: given[name] for name in given if name not in STATED}
     measures = {name: given[name] for name in STATED if name in given}
     answered = _rate(numbers, kind, rate, level, db)
-    block, stands, drawn = _drawn(described, numbers, free=model_of_kind(kind).free_standing)
+    block, stands, drawn = _drawn(described, numbers, free=facts_of(kind).free_standing)
     warnings = [*document["warnings"], *(answered.document["warnings"] if answered else ())]
     return Contents(
         sentences=(
@@ -271,7 +271,7 @@ def _tables(
     rate: Rate | None,
 ) -> Sequence[Table]:
     level = f"{100.0 * document['level']:g} %"
-    stands = "stands free" if model_of_kind(kind).free_standing else "backed by a slope"
+    stands = "stands free" if facts_of(kind).free_standing else "backed by a slope"
     block = [("fails by", f"{mode_title(kind)} ({stands})")]
     if described is not None:
         shape, known = described.block, described.conditions

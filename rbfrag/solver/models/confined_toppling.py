@@ -212,8 +212,6 @@ def _positive(angle_rad: float) -> float | None:
 class ConfinedToppling(ScaledKind):
     """Toppling between a back plane and the base; no fragility of it is fitted."""
 
-    kind = "confined_toppling"
-    mode = "confined_topple"
     yield_name = "kct"
 
     def mechanism(self, site: BlockOnPlanes) -> Mechanism:
@@ -221,4 +219,4 @@ class ConfinedToppling(ScaledKind):
         return mechanism(site)
 
 
-MODEL = ConfinedToppling()
+MODEL = ConfinedToppling.named("confined_toppling")

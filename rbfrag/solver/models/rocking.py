@@ -159,17 +159,6 @@ def _corner(
 class Rocking(Kind):
     """The model of free-standing blocks; campaigns run symmetric ones on level ground."""
 
-    kind = "rocking"
-    mode = "topple"
-    free_standing = True
-    settings = ("restitution",)
-    parameters = ("p2", "kr")
-    no_search = (
-        "what overturns a free-standing block is no interval of k_r (up to 122 islands for one "
-        "record), so that no value is certain to be the last"
-    )
-    campaign = True
-    campaign_options = ("p2", "restitution_factors")
     polarities = ("forward",)
 
     def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
@@ -416,4 +405,4 @@ def _posed(block: FreeBlock, traced: RockingHistory) -> ResponseHistory:
     return replace(traced.motion, centroid_m=centroid, turned_rad=-theta, impact_s=traced.impact_s)
 
 
-MODEL = Rocking()
+MODEL = Rocking.named("rocking")

@@ -42,7 +42,6 @@ from rbfrag.solver.integrator.one_freedom.equation import (
 from rbfrag.solver.integrator.one_freedom.follow import follow
 from rbfrag.solver.integrator.one_freedom.harmonics import constant
 from rbfrag.solver.kind import (
-    PLANES,
     BlockOnPlanes,
     Case,
     CaseRequest,
@@ -237,16 +236,7 @@ def level_plane(ky: float) -> BlockOnPlanes:
 class Sliding(MechanismKind):
     """The sliding model; its critical strength slides a stated distance."""
 
-    kind = "sliding"
-    mode = "slide"
     yield_name = "ky"
-    settings = ("two_way", "horizontal")
-    parameters = ("ky", "displacement_m")
-    searchable = True
-    search_needs = "displacement_m"
-    search_options = ("displacement_m", "tolerance", "block", *PLANES)
-    campaign = True
-    campaign_options = ("displacements_m",)
     sequence_measure = "displacement_m"
 
     def mechanism(self, site: BlockOnPlanes) -> Mechanism:
@@ -337,4 +327,4 @@ class Sliding(MechanismKind):
         return level_plane(block["ky"])
 
 
-MODEL = Sliding()
+MODEL = Sliding.named("sliding")

@@ -227,12 +227,7 @@ RULES = ("search_limit", "scan_ratio", "bracket")
 class Slumping(ScaledKind):
     """The slumping model; campaigns shake the blocks of the family."""
 
-    kind = "slumping"
-    mode = "slump"
     yield_name = "ks"
-    parameters = ("ks", "ps2")
-    campaign = True
-    campaign_options = ("rotations_deg", "family", "full_map")
     sequence_measure = "peak_rad"
     one_phase = True
 
@@ -338,4 +333,4 @@ def _class_of(case: Case) -> BlockClass:
         raise InputError(f"its block {case.block} is not described as slumping ones are") from None
 
 
-MODEL = Slumping()
+MODEL = Slumping.named("slumping")

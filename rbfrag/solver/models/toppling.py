@@ -19,7 +19,6 @@ from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.solver.excitation import Excitation, kept_excitation
 from rbfrag.solver.kind import (
-    PLANES,
     SHAKING,
     BlockOnPlanes,
     Case,
@@ -33,6 +32,7 @@ from rbfrag.solver.kind import (
     each_once,
     strengths_at,
 )
+from rbfrag.solver.kinds import PLANES
 from rbfrag.solver.quantity import finite_or_none, positive
 from rbfrag.solver.results import (
     DEFAULT_P2,
@@ -50,16 +50,6 @@ Y_OVER_PGV = np.concatenate([0.1 * 40.0 ** (np.arange(-10, 0) / 24.0), np.geomsp
 
 class Toppling(Kind):
     """The toppling model."""
-
-    kind = "toppling"
-    mode = "topple"
-    settings = ()
-    parameters = ("p2", "kr")
-    searchable = True
-    search_needs = "p2"
-    search_options = ("p2", "full_map", "map_depth", "block", *PLANES)
-    campaign = True
-    campaign_options = ("p2", "grid", "store_responses", "full_map")
 
     def respond(self, site: BlockOnPlanes, shaking: Shaking) -> Response:
         """Return what the block does."""
@@ -202,4 +192,4 @@ def _strength(site: BlockOnPlanes) -> float:
     return math.tan(math.radians(balance_deg))
 
 
-MODEL = Toppling()
+MODEL = Toppling.named("toppling")

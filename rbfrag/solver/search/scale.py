@@ -23,7 +23,7 @@ from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.solver.excitation import Excitation
 from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, follow
-from rbfrag.solver.kind import PLANES, Shaking
+from rbfrag.solver.kind import Shaking
 from rbfrag.solver.mechanism import MechanismKind, ShakenMechanism, shaken_mechanism
 from rbfrag.solver.quantity import number, positive
 from rbfrag.solver.results import (
@@ -153,10 +153,6 @@ class ScaleSearch:
 
 class ScaledKind(MechanismKind):
     """A kind whose critical value is the smallest factor on the record that brings a block down."""
-
-    searchable = True
-    search_needs = "block"
-    search_options = ("block", *PLANES, "rotation_deg", "scan_ratio", "bracket")
 
     def critical(
         self,

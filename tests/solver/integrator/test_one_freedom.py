@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 import rbfrag.solver.models
 from rbfrag.motions.ground_motion import GroundMotion
-from rbfrag.solver import kinds as response_models
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.one_freedom.equation import (
@@ -30,6 +29,7 @@ from rbfrag.solver.integrator.one_freedom.follow import MechanismRun, follow
 from rbfrag.solver.integrator.one_freedom.harmonics import constant, cosine, sine, turning
 from rbfrag.solver.integrator.one_freedom.rocking import rocking_equation
 from rbfrag.solver.integrator.one_freedom.step import TURN_MAX
+from rbfrag.solver.kinds import KINDS, KindFacts
 from rbfrag.solver.models import confined_toppling, sliding, slumping
 from rbfrag.solver.respond import respond
 from rbfrag.solver.results import Outcome
@@ -286,34 +286,27 @@ def mechanism(site):
 
 
 class Belt(MechanismKind):
-    kind = "belt"
-    mode = "slide"
-
     def mechanism(self, site):
         return mechanism(site)
 
 
-MODEL = Belt()
+MODEL = Belt.named("belt")
 '''
 
 
-def test_a_fifth_model_is_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "zz_belt.py").write_text(FIFTH)
+def test_a_fifth_model_is_a_line_of_facts_and_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "belt.py").write_text(FIFTH)
+    monkeypatch.setitem(KINDS, "belt", KindFacts("belt", "slide"))
     path = [*rbfrag.solver.models.__path__, str(tmp_path)]
     monkeypatch.setattr(rbfrag.solver.models, "__path__", path)
-    response_models.models.cache_clear()
-    try:
-        assert set(response_models.models()) == {
-            "belt", "confined_toppling", "rocking", "sliding", "slumping", "toppling",
-        }  # fmt: skip
-        motion = GroundMotion.from_nodes([0.0, 1.0, 3.0], [0.0, 0.5, 0.0])
-        block = Block.from_fractures(1.0, 2.0, 60.0)
-        answer = respond(motion, block=block, beta_deg=20.0, phi_deg=30.0, kind="belt")
-        assert answer.kind == "belt"
-        assert answer.outcome is Outcome.TOPPLED
-        assert answer.warnings[-1] == "it has left the belt"
-    finally:
-        response_models.models.cache_clear()
+    motion = GroundMotion.from_nodes([0.0, 1.0, 3.0], [0.0, 0.5, 0.0])
+    block = Block.from_fractures(1.0, 2.0, 60.0)
+    answer = respond(motion, block=block, beta_deg=20.0, phi_deg=30.0, kind="belt")
+    assert answer.kind == "belt"
+    assert answer.outcome is Outcome.TOPPLED
+    assert answer.warnings[-1] == "it has left the belt"
 
 
 def test_equations_that_are_the_same_everywhere_are_solved_exactly() -> None:
