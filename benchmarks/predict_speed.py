@@ -18,7 +18,7 @@ from scipy.special import ndtr
 from benchmarks.page import parser, report
 from rbfrag.bench.tables import markdown
 from rbfrag.fragility.lookup import suited_models
-from rbfrag.fragility.predict import predict
+from rbfrag.question.question import predict
 
 BLOCK = {"p2": 3.0, "kr": 0.1}
 REPEATS = 11

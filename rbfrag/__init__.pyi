@@ -17,7 +17,6 @@ from rbfrag.exchange.map_answer import ShakeMapAnswer as ShakeMapAnswer
 from rbfrag.exchange.map_answer import shakemap as shakemap
 from rbfrag.exchange.mesh_file import block_from_mesh as block_from_mesh
 from rbfrag.fragility.fit.stored import fit as fit
-from rbfrag.fragility.predict import predict as predict
 from rbfrag.hazards.answer import BranchRate as BranchRate
 from rbfrag.hazards.answer import HazardAnswer as HazardAnswer
 from rbfrag.hazards.answer import hazard as hazard
@@ -34,6 +33,7 @@ from rbfrag.motions.recognise import read_motions as read_motions
 from rbfrag.motions.toppling_spectrum import toppling_spectrum as toppling_spectrum
 from rbfrag.plots import plot as plot
 from rbfrag.plots.report.write import report as report
+from rbfrag.question.question import predict as predict
 from rbfrag.solver.block.arrays import BlockArray as BlockArray
 from rbfrag.solver.block.geometry import Block as Block
 from rbfrag.solver.block.mesh_block import MeshBlock as MeshBlock

@@ -2,6 +2,7 @@
 
     RbfragError
     ├── InputError                  a value, option or file that cannot be used   (exit 2)
+    │   ├── UnknownFieldError       a keyword that is none
     │   ├── MotionFileError         an accelerogram that cannot be read
     │   │   ├── UnknownFormatError  no reader recognises the content
     │   │   └── UnitNotStatedError  neither the file nor the caller says the unit
@@ -29,6 +30,7 @@ Python escapes them, so that no input can steer a terminal.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Collection
 from os import PathLike, fspath
 from typing import ClassVar
 
@@ -66,7 +68,27 @@ class RbfragError(Exception):
 
 
 class InputError(RbfragError, ValueError):
-    """A value, option or file that cannot be used."""
+    """A value, option or file that cannot be used.
+
+    Args:
+        message: what is wrong; fields stand in it under their keywords.
+        fields: those of them that a door may spell in its own way.
+    """
+
+    def __init__(self, message: str = "", *, fields: Collection[str] = ()) -> None:
+        super().__init__(message)
+        self.fields = tuple(fields)
+
+    def spelled(self, spell: Callable[[str], str]) -> str:
+        """Return the message with its fields as a door spells them."""
+        if not self.fields:
+            return str(self)
+        names = "|".join(sorted(map(re.escape, self.fields), key=len, reverse=True))
+        return re.sub(rf"(?<![\w-])(?:{names})\b", lambda match: spell(match[0]), str(self))
+
+
+class UnknownFieldError(InputError, TypeError):
+    """A keyword that is none."""
 
 
 class MotionFileError(InputError):

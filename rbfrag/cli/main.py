@@ -14,6 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 from rbfrag.errors import InputError, RbfragError, one_paragraph
+from rbfrag.question.fields import option_of
 from rbfrag.version import __version__
 
 COMMANDS = {
@@ -100,7 +101,8 @@ class _Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except RbfragError as error:
-            print(f"rbfrag: {error}", file=sys.stderr)
+            text = error.spelled(option_of) if isinstance(error, InputError) else str(error)
+            print(f"rbfrag: {text}", file=sys.stderr)
             raise typer.Exit(error.exit_status) from None
         except OSError as error:
             if error.filename is None:  # a closed pipe, say

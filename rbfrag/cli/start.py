@@ -89,7 +89,7 @@ def quick_predict(arguments: Sequence[str]) -> int | None:
         if name in given:
             stated[name] = given.pop(name)
     try:
-        from rbfrag.fragility.document import prediction_document
+        from rbfrag.question.document import prediction_document
 
         show_prediction(prediction_document(given, **stated), given, **flags)
         sys.stdout.flush()

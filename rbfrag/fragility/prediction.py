@@ -15,6 +15,7 @@ from rbfrag.fragility.intervals import Quantiles, checked_level, quantiles_of
 from rbfrag.fragility.methods import SINGLE
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.unknown_outcomes import NOTABLE_SHARE, in_words
+from rbfrag.solver.kinds import mode_of_kind
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,9 +82,14 @@ class Prediction:
     block_sd: float | None = None
     data: str | None = field(default=None, compare=False)
 
+    @property
+    def mode(self) -> str:
+        """Failure mode of the block."""
+        return mode_of_kind(self.kind)
+
     def as_dict(self) -> dict[str, Any]:
         """Return the answer under the keys of the JSON contract."""
-        return {**vars(self), "warnings": list(self.warnings)}
+        return {"kind": self.kind, "mode": self.mode, **vars(self), "warnings": list(self.warnings)}
 
     # not Tabular: `rbfrag predict` starts without its module
     def __iter__(self) -> Iterator[dict[str, Any]]:
@@ -94,7 +100,7 @@ class Prediction:
         """Return the answer as a pandas table of one row."""
         from rbfrag.frames import columns_of, frame_of
 
-        return frame_of(columns_of(self))
+        return frame_of({"kind": self.kind, "mode": self.mode, **columns_of(self)})
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows."""

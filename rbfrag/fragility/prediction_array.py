@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,13 +18,19 @@ from rbfrag.fragility.intervals import Quantiles
 from rbfrag.fragility.methods import Numbers, arrays
 from rbfrag.fragility.model import Answer, FragilityModel
 from rbfrag.fragility.unknown_outcomes import IN_GENERAL, NOTABLE_SHARE
+from rbfrag.fragility.unusable import unusable_in_words
 from rbfrag.frames import Tabular
+from rbfrag.solver.kinds import KINDS, mode_of_kind
+from rbfrag.solver.stability.modes import MODES
 
 if TYPE_CHECKING:
     import pandas as pd
 
 FloatArray = NDArray[np.float64]
 T = TypeVar("T")
+
+Texts = NDArray[np.object_]
+ReasonPart = tuple[NDArray[np.intp], Texts | Callable[[], Texts]]
 
 CHUNK = 1 << 14
 """Rows that are worked on at a time: what they need stays near the processor."""
@@ -33,17 +39,15 @@ CHUNK = 1 << 14
 class Reasons:
     """Sentences by element, kept as flat places and their texts until somebody reads them."""
 
-    def __init__(
-        self, shape: tuple[int, ...], parts: list[tuple[NDArray[np.intp], NDArray[np.object_]]]
-    ) -> None:
-        """Keep the sentences of some elements."""
-        self.shape, self._parts = shape, parts
+    def __init__(self, shape: tuple[int, ...], parts: Sequence[ReasonPart]) -> None:
+        """Keep the sentences of some elements, as texts or as what writes them when it is asked."""
+        self.shape, self.parts = shape, parts
 
     def array(self) -> NDArray[np.object_]:
         """Return the text of every element, empty where there is none."""
         result = np.full(self.shape, "", dtype=object)
-        for places, texts in self._parts:
-            result.flat[places] = texts
+        for places, texts in self.parts:
+            result.flat[places] = texts() if callable(texts) else texts
         return result
 
 
@@ -74,6 +78,9 @@ class PredictionArray(Tabular):
             certain.
         data: the database that the model is of; None of a model that was given itself.
         index: labels of the rows, of the pandas Series that were given; None without one.
+        kind_codes: kind of each element, a place among all kinds, -1 for none; None where all are
+            of one kind.
+        mode_codes: failure mode of each, a place among all modes, -1 where it is not known.
     """
 
     kind: str
@@ -95,6 +102,34 @@ class PredictionArray(Tabular):
     block_sd: FloatArray | None = None
     data: str | None = None
     index: pd.Index | None = None
+    kind_codes: NDArray[np.int8] | None = None
+    mode_codes: NDArray[np.int8] | None = None
+
+    @property
+    def kinds(self) -> NDArray[np.object_]:
+        """How each block fails; empty where that is not known."""
+        if self.kind_codes is None:
+            return np.full(self.probability.shape, self.kind, dtype=object)
+        return np.array([*KINDS, ""], dtype=object)[self.kind_codes]
+
+    @property
+    def modes(self) -> NDArray[np.object_]:
+        """Failure mode of each block; empty where that is not known."""
+        if self.mode_codes is None:
+            return np.full(self.probability.shape, mode_of_kind(self.kind), dtype=object)
+        return np.array([*MODES, ""], dtype=object)[self.mode_codes]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be said of the whole answer: its notes, and how many have no answer."""
+        missing = np.isnan(self.probability)
+        count = int(np.count_nonzero(missing))
+        if not count:
+            return self.notes
+        first = int(np.argmax(missing.ravel()))
+        reason = self.reason.ravel()[first]
+        places = [f"element {first}"]
+        return (*self.notes, *unusable_in_words(count, missing.size, places, [reason]))
 
     @cached_property
     def reason(self) -> NDArray[np.object_]:
@@ -103,7 +138,10 @@ class PredictionArray(Tabular):
 
     def table_columns(self) -> dict[str, Any]:
         """Return the columns by name; arrays are flat."""
-        return {**super().table_columns(), "reason": self.reason.ravel()}
+        columns = super().table_columns()
+        kinds = {"kind": self.kinds.ravel(), "mode": self.modes.ravel()}
+        others = {name: each for name, each in columns.items() if not name.endswith("_codes")}
+        return {**others, **kinds, "reason": self.reason.ravel()}
 
     def to_frame(self) -> pd.DataFrame:
         """Return the answers as a pandas table, with the index of the Series that were given."""
@@ -135,7 +173,7 @@ def predict_many(
     interval: bool,
     refuse_nan: bool,
 ) -> PredictionArray:
-    """Return the answers for broadcast arrays; see :func:`rbfrag.fragility.predict.predict`.
+    """Return the answers for broadcast arrays; see :func:`rbfrag.question.question.predict`.
 
     Args:
         model: the model that answers.
@@ -148,8 +186,8 @@ def predict_many(
         InputError: arrays that are not numeric or do not broadcast, or, if asked, an
             element that cannot be used.
     """
-    index = _index_of(given)
-    values, shape = _flat(given)
+    index = index_of(given)
+    values, shape = flat(given)
     size = int(np.prod(shape))
     ns = arrays()
     p, low, high, event_low, event_high, y, x = np.empty((7, size))
@@ -205,7 +243,7 @@ def predict_many(
     )
 
 
-def _index_of(given: Mapping[str, Any]) -> pd.Index | None:
+def index_of(given: Mapping[str, Any]) -> pd.Index | None:
     """Return the index of pandas Series; None where none is given.
 
     Raises:
@@ -351,7 +389,7 @@ class _Sentences:
         return np.asarray(lines[which], dtype=object)
 
 
-def _flat(given: Mapping[str, object]) -> tuple[dict[str, FloatArray], tuple[int, ...]]:
+def flat(given: Mapping[str, object]) -> tuple[dict[str, FloatArray], tuple[int, ...]]:
     """Return flat arrays of the broadcast size, or of size 1, and the broadcast shape."""
     arrays: dict[str, FloatArray] = {}
     for name, value in given.items():

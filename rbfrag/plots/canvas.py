@@ -92,6 +92,9 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
 _LAYOUT_DIGITS = 6
 """Of places on the sheet, of its width and height."""
 
+_LIMIT_DIGITS = 9
+"""Of the limits of axes [m]."""
+
 
 def freeze_layout(figure: Figure) -> None:
     """Arrange the parts of a figure once and for all, the same each time.
@@ -114,6 +117,9 @@ def freeze_layout(figure: Figure) -> None:
                 text.set_position((x, y))
     for axes in figure.axes:
         axes.set_position(np.round(axes.get_position().bounds, _LAYOUT_DIGITS).tolist())
+        if axes.get_adjustable() == "datalim":  # an equal scale has taken its limits from there
+            axes.set_xlim(*np.round(axes.get_xlim(), _LIMIT_DIGITS), auto=None)
+            axes.set_ylim(*np.round(axes.get_ylim(), _LIMIT_DIGITS), auto=None)
 
 
 _MOST_DECADES = 1e5

@@ -6,6 +6,7 @@ and no library is loaded.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, Generic, TypedDict, TypeVar, get_type_hints
@@ -33,6 +34,9 @@ class Field:
     is_text: bool = False
 
 
+SPECTRAL = ("sa03_g", "sa10_g", "sa20_g", "sa30_g")
+
+
 def _scatter(of: str) -> Field:
     return Field(f"standard deviation of {of}")
 
@@ -49,12 +53,19 @@ class BlockFields(TypedDict, Generic[V], total=False):
     kr: Annotated[V, Field("yield acceleration of toppling, tan(critical angle)", "", ("k_r",))]
     height_m: Annotated[V, Field("height of a rectangle", "m", ("height", "h"))]
     width_m: Annotated[V, Field("width of a rectangle along its base", "m", ("width", "w", "b"))]
+    alpha1_deg: Annotated[V, Field("angle of the heel", "deg", ("alpha1", "α1"))]
+    alpha3_deg: Annotated[V, Field("angle of the toe", "deg", ("alpha3", "α3"))]
+    r3_m: Annotated[V, Field("distance from centroid to toe", "m", ("r3",))]
+    s1_m: Annotated[V, Field("spacing of the base fractures", "m", ("s1",))]
+    s2_m: Annotated[V, Field("spacing of the back fractures", "m", ("s2",))]
+    gamma_deg: Annotated[V, Field("dip of the back plane less that of the base", "deg", ("gamma",))]
     beta_deg: Annotated[
         V, Field("dip of the base", "deg", ("beta", "dip", "dip_deg", "β", "base_dip"), "dip_deg")
     ]
     phi_deg: Annotated[
         V, Field("friction angle of the base", "deg", ("phi", "φ", "friction", "friction_angle"))
     ]
+    phi_back_deg: Annotated[V, Field("friction angle of the back plane", "deg", ("phi_back",))]
     ky: Annotated[V, Field("yield acceleration of sliding", "", ("k_y",))]
     displacement_m: Annotated[V, Field("displacement that is too far", "m", ("displacement",))]
     ks: Annotated[V, Field("yield acceleration of slumping", "", ("k_s",))]
@@ -112,3 +123,21 @@ def declared() -> dict[str, Field]:
 def column_of(name: str) -> str:
     """Return what the column of a field is called in tables that are written."""
     return declared()[name].column or name
+
+
+_UNIT = re.compile("_(deg|m_s|m|g|s)$")
+
+
+def word_of(name: str) -> str:
+    """Return what people call a field that has its unit in its name: ``beta`` of ``beta_deg``."""
+    return "no_back" if name == "back_fracture" else _UNIT.sub("", name)
+
+
+def option_of(name: str) -> str:
+    """Return what a field is called on the command line."""
+    return "--" + word_of(name).replace("_", "-")
+
+
+def parameter_of(name: str) -> str:
+    """Return what a field is called in requests: spectral accelerations as in tables."""
+    return name if name in SPECTRAL or name == "leaves_g" else word_of(name)

@@ -16,12 +16,13 @@ from rbfrag.fragility.checks import refusals
 from rbfrag.fragility.intervals import checked_level
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import Model
-from rbfrag.fragility.predict import predict
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.question.question import predict
 from rbfrag.rockmasses.joint_sets import Realisations
+from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.quantity import positive
-from rbfrag.solver.stability.arrays import slumping_p2
+from rbfrag.solver.stability.at_rest import slump_at_rest
 from rbfrag.solver.stability.modes import MODES, UNSTABLE, ModeName
 
 FloatArray = NDArray[np.float64]
@@ -146,7 +147,7 @@ def scenario(
         realisations: blocks of a rock mass.
         measures: what is known of the motion, by name: pgv_m_s [m/s], pga_g [g], tm_s [s], pgd_m
             [m], sa03_g, sa10_g, sa20_g, sa30_g [g].
-        model: as in :func:`rbfrag.fragility.predict.predict`.
+        model: as in :func:`rbfrag.question.question.predict`.
         level: confidence level of the intervals.
         db: database of the models.
         displacement_m: how far is too far for a block that slides [m]; None for an answer of
@@ -268,16 +269,19 @@ def _other_modes(
         name: measures[name] for name in ("pgv_m_s", "pga_g") if name in measures
     }
     blocks, k = realisations.blocks, realisations.stability.yield_acceleration
-    p2 = slumping_p2(
-        alpha1_deg=blocks.alpha1_deg,
-        alpha3_deg=blocks.alpha3_deg,
-        gamma_deg=realisations.gamma_deg,
-        r1_m=blocks.r1_m,
-        r3_m=blocks.r3_m,
-        beta_deg=realisations.beta_deg,
-        phi_deg=realisations.phi_deg,
-        phi_back_deg=realisations.phi_back_deg,
-    )
+    with np.errstate(all="ignore"):
+        p2, _ = slump_at_rest(
+            alpha1_deg=blocks.alpha1_deg,
+            alpha3_deg=blocks.alpha3_deg,
+            gamma_deg=realisations.gamma_deg,
+            r1_m=blocks.r1_m,
+            r3_m=blocks.r3_m,
+            beta_deg=realisations.beta_deg,
+            phi_deg=realisations.phi_deg,
+            phi_back_deg=realisations.phi_back_deg,
+            functions=array_elementwise(),
+            trigonometry=np,
+        )
     described = (k > 0.0) & ~realisations.bonded
     slides = realisations.of_mode("slide", "stable") & described
     slumps = realisations.of_mode("slump", "stable") & described & np.isfinite(p2)

@@ -66,8 +66,8 @@ def add_routes(routes: APIRouter) -> None:
 
 def _drawn(query: DrawingQuery) -> tuple[Block, Stability, str, dict[str, float] | None]:
     """Return a block, how it stands, the kind of its failure and what a prediction reads of it."""
-    from rbfrag.solver.described import numbers_of_kind
-    from rbfrag.solver.kinds import kind_of_mode
+    from rbfrag.question.blocks import described_block
+    from rbfrag.solver.kinds import facts_of, kind_of_mode
     from rbfrag.solver.stability.single import level_rectangle, rough_deg, stability
 
     def kind_of(result: Stability) -> str:
@@ -80,7 +80,7 @@ def _drawn(query: DrawingQuery) -> tuple[Block, Stability, str, dict[str, float]
                 f"{min(others)} does not go with p2 and kr: a block is these two numbers, or a "
                 "shape with its beta and phi"
             )
-        numbers, _ = query.model_copy(update={"no_back": False}).toppling("p2", "kr")
+        _, numbers, _ = query.model_copy(update={"no_back": False}).toppling("p2", "kr")
         body, result = level_rectangle(numbers["p2"], numbers["kr"])
         return body, result, kind_of(result), numbers
     described = query.described()
@@ -92,7 +92,10 @@ def _drawn(query: DrawingQuery) -> tuple[Block, Stability, str, dict[str, float]
     result = stability(body, **conditions)
     kind = kind_of(result)
     try:
-        return body, result, kind, numbers_of_kind(described, kind)[0]
+        slides = {"displacement_m": 1.0} if "ky" in facts_of(kind).parameters else {}
+        (group,) = described_block(described, slides, kind).groups
+        numbers = {n: value for n, value in group.numbers.items() if n != "displacement_m"}
+        return body, result, kind, numbers
     except InputError:  # no earthquake decides about it, or no model answers
         return body, result, kind, None
 

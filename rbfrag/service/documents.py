@@ -54,6 +54,7 @@ class PredictAnswer(_Document):
     """
 
     kind: str
+    mode: str
     probability: float
     ci_low: float
     ci_high: float
@@ -88,6 +89,8 @@ class PredictArrays(_Fitted):
     in_domain: list[bool]
     reason: list[str]
     kind: str
+    kinds: list[str]
+    modes: list[str]
     level: float
     data: str | None
     warnings: list[str]

@@ -13,7 +13,6 @@ from pydantic import BaseModel, ConfigDict, Field, StrictFloat
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import SPECTRAL
-from rbfrag.fragility.methods import TOPPLING_BLOCK
 
 if TYPE_CHECKING:
     from rbfrag.solver.described import DescribedBlock
@@ -39,11 +38,15 @@ KR = _words("Rocking acceleration coefficient k_r = tan(critical angle) [g].")
 HEIGHT = _words("Height of a rectangle, perpendicular to its base [m], with width.")
 WIDTH = _words("Width of a rectangle along its base [m], with height.")
 DIP = _words("Dip of the base of a rectangle, out of the slope positive [deg]. Default: 0.")
+ALPHA1 = _words("Angle of the heel [deg], with alpha3 and r3.")
+ALPHA3 = _words("Angle of the toe [deg].")
+R3 = _words("Distance from centroid to toe [m].")
 S1 = _words("Spacing of the base fractures [m], with s2 and gamma.")
 S2 = _words("Spacing of the back fractures [m].")
 GAMMA = _words("Dip of the back plane less dip of the base [deg].")
 BETA = _words("Dip of the base, out of the slope positive [deg].")
 PHI = _words("Friction angle of the base [deg]; only a rectangle is taken to topple without.")
+PHI_BACK = _words("Friction angle of the back plane [deg]. Default: phi.")
 KIND = _words("How the block fails. Default: what it is given by.")
 KY = _words("Sliding: yield acceleration coefficient tan(phi - beta).")
 DISPLACEMENT = _words("Sliding: the displacement that is too far [m].")
@@ -90,10 +93,15 @@ UNCERTAIN = {
         "restitution_sigma",
     )
 }  # fmt: skip
-RECTANGLE = {"height": "height_m", "width": "width_m", "dip": "dip_deg"}
 PLANES = {
     "beta": "beta_deg", "phi": "phi_deg", "phi_back": "phi_back_deg", "cohesion": "cohesion_pa",
     "density": "density_kg_m3", "kv": "kv",
+}  # fmt: skip
+
+OF_ROWS = {
+    "height": "height_m", "width": "width_m", "alpha1": "alpha1_deg", "alpha3": "alpha3_deg",
+    "r3": "r3_m", "s1": "s1_m", "s2": "s2_m", "gamma": "gamma_deg", "phi": "phi_deg",
+    "phi_back": "phi_back_deg",
 }  # fmt: skip
 
 _SHAPES = ("height", "width", "dip", "alpha1", "alpha3", "r3", "s1", "s2", "gamma")
@@ -125,19 +133,15 @@ class Shape(Parameters):
     height: Annotated[Positive | None, HEIGHT] = None
     width: Annotated[Positive | None, WIDTH] = None
     dip: Annotated[float | None, DIP] = None
-    alpha1: float | None = None
-    """Angle of the heel [deg], with alpha3 and r3."""
-    alpha3: float | None = None
-    """Angle of the toe [deg]."""
-    r3: Positive | None = None
-    """Distance from centroid to toe [m]."""
+    alpha1: Annotated[float | None, ALPHA1] = None
+    alpha3: Annotated[float | None, ALPHA3] = None
+    r3: Annotated[Positive | None, R3] = None
     s1: Annotated[Positive | None, S1] = None
     s2: Annotated[Positive | None, S2] = None
     gamma: Annotated[float | None, GAMMA] = None
     beta: Annotated[float | None, BETA] = None
     phi: Annotated[float | None, PHI] = None
-    phi_back: float | None = None
-    """Friction angle of the back plane [deg]. Default: phi."""
+    phi_back: Annotated[float | None, PHI_BACK] = None
     no_back: bool = False
     """There is no fracture behind the block."""
 
@@ -153,49 +157,48 @@ class Shape(Parameters):
             conditions["back_fracture"] = False
         return describe(shape, conditions)
 
-    def numbers(self, kind: str | None = None) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Return what predictions read of the block, by keyword, and warnings.
-
-        Args:
-            kind: how a block that is given by its shape is asked to fail; None for toppling.
+    def block_fields(self) -> dict[str, Any]:
+        """Return what is stated of the block, by keyword, numbers or a shape.
 
         Raises:
-            InputError: numbers and a shape, or a shape that does not fail so.
+            InputError: a shape that is stated in part, or planes without one.
         """
         described, values = self.described(), self.given(NUMBERS)
-        if described is None:
-            # the dip of the base is also that of a block that slides
-            base = self.given({"beta": "beta_deg"})
-            for name in ("phi", "phi_back", "no_back") if "ky" in values else OF_A_SHAPE:
-                if (value := getattr(self, name)) is not None and value is not False:
-                    raise InputError(f"{name} goes with the shape of a block, by {WAYS}")
-            return values | base, ()
-        if values:
-            raise InputError(f"{next(iter(values))} does not go with a shape: give one of them")
-        from rbfrag.solver.described import numbers_of_kind
-
-        return numbers_of_kind(described, kind or TOPPLING_BLOCK.kind)
-
-    def kind_of_question(self, kind: str | None) -> str | None:
-        """Return how the block is asked to fail; None for what its numbers say."""
-        described = None if kind is not None else self.described()
-        if described is None:
-            return kind
-        from rbfrag.solver.described import kind_of
-
-        return kind_of(described, TOPPLING_BLOCK.kind)
+        if described is not None:
+            return {"block": described.block, **described.conditions, **values}
+        # the dip of the base is also that of a block that slides
+        base = self.given({"beta": "beta_deg"})
+        for name in ("phi", "phi_back", "no_back") if "ky" in values else OF_A_SHAPE:
+            if (value := getattr(self, name)) is not None and value is not False:
+                raise InputError(f"{name} goes with the shape of a block, by {WAYS}")
+        return values | base
 
     def toppling(
         self, *names: str, kind: str | None = None
-    ) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Return p2 [1/s²] and k_r, of which some must be given, and warnings."""
-        values, remarks = self.numbers(kind)
+    ) -> tuple[str | None, dict[str, Any], tuple[str, ...]]:
+        """Return the kind, what answers about blocks that topple or rock read of one, and warnings.
+
+        Args:
+            names: what must be given.
+            kind: how it fails; None for toppling, or rocking where nothing backs its shape.
+        """
+        described, values = self.described(), self.block_fields()
+        if described is not None:
+            if numbers := self.given(NUMBERS):
+                raise InputError(
+                    f"{next(iter(numbers))} does not go with a shape: give one of them"
+                )
+            from rbfrag.question.blocks import toppling_block
+
+            blocks = toppling_block(described, {}, kind)
+            (group,) = blocks.groups
+            return group.kind, {**group.numbers}, blocks.remarks
         for name in names:
             if name not in values:
                 raise InputError(
                     f"{name} is missing: a block is given by {' and '.join(names)}, or by {WAYS}"
                 )
-        return values, remarks
+        return kind, values, ()
 
 
 class _Weight(Parameters):
@@ -271,6 +274,16 @@ class PredictRows(Parameters):
     height: Annotated[Column | None, HEIGHT] = None
     width: Annotated[Column | None, WIDTH] = None
     dip: Annotated[Column | None, DIP] = None
+    alpha1: Annotated[Column | None, ALPHA1] = None
+    alpha3: Annotated[Column | None, ALPHA3] = None
+    r3: Annotated[Column | None, R3] = None
+    s1: Annotated[Column | None, S1] = None
+    s2: Annotated[Column | None, S2] = None
+    gamma: Annotated[Column | None, GAMMA] = None
+    phi: Annotated[Column | None, PHI] = None
+    phi_back: Annotated[Column | None, PHI_BACK] = None
+    no_back: bool = False
+    """There is no fracture behind the blocks."""
     ky: Annotated[Column | None, KY] = None
     displacement: Annotated[Column | None, DISPLACEMENT] = None
     beta: Annotated[Column | None, BETA] = None

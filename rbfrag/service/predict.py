@@ -9,14 +9,14 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import ValidationError
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.document import prediction_document
-from rbfrag.fragility.lookup import find_model, models_in_memory
-from rbfrag.fragility.prediction import answer_given
+from rbfrag.fragility.lookup import models_in_memory
+from rbfrag.question.document import prediction_document
+from rbfrag.question.question import ask, described
 from rbfrag.service.documents import PredictAnswer, PredictArrays
 from rbfrag.service.parameters import (
     MEASURES,
     NUMBERS,
-    RECTANGLE,
+    OF_ROWS,
     SLIDING,
     UNCERTAIN,
     PredictQuery,
@@ -36,19 +36,21 @@ BYTES_BESIDE = 1 << 20
 
 def answer_one(query: PredictQuery, db: str | None) -> PredictAnswer:
     """Return what `rbfrag predict --json` prints."""
-    kind = query.kind_of_question(query.kind)
-    block, remarks = query.numbers(kind)
-    document = prediction_document(
-        block
-        | query.given(MEASURES)
+    stated = (
+        query.block_fields()
         | query.given({"displacement": "displacement_m"})
-        | query.given(UNCERTAIN),
-        kind=kind,
+        | query.given(UNCERTAIN)
+    )
+    blocks = described(stated, query.kind)
+    (group,) = blocks.groups
+    document = prediction_document(
+        {**group.numbers, **query.given(MEASURES)},
+        kind=group.kind,
+        remarks=blocks.remarks,
         rotation_deg=query.rotation,
         model=query.model,
         level=query.level,
         db=db,
-        remarks=remarks,
     )
     return PredictAnswer.model_validate(document)
 
@@ -70,7 +72,14 @@ def columns_of(body: PredictRows, row_limit: int) -> dict[str, Any]:
     if len({length for length in lengths.values() if length > 1}) > 1:
         sizes = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise InputError(f"the lists differ in length: {sizes}; give one length, or one number")
-    return body.given({**RECTANGLE, **NUMBERS, **SLIDING, **UNCERTAIN, **MEASURES})
+    values = body.given({**OF_ROWS, **NUMBERS, **SLIDING, **UNCERTAIN, **MEASURES})
+    if body.dip is not None:
+        if body.beta is not None:
+            raise InputError("dip does not go with beta: both are the dip of the base")
+        if not (body.height and body.width):
+            raise InputError("dip goes with height and width: of other blocks it is beta")
+        values["beta_deg"] = body.dip
+    return values | ({"back_fracture": False} if body.no_back else {})
 
 
 def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
@@ -86,15 +95,14 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
     except ValidationError as error:
         raise refusal(PredictRows.model_fields, error.errors(), sent=True) from None
     values = columns_of(rows, row_limit)
-    rectangle = {name: values.pop(name) for name in RECTANGLE.values() if name in values}
-    if rectangle:
-        values = _numbers_of_rectangles(rectangle, values, rows.kind) | values
     if values and not any(isinstance(value, list) for value in values.values()):
         # an array of one element, so that single numbers are answered by lists too
-        first = next(iter(values))
+        first = next(name for name in values if name != "back_fracture")
         values[first] = [values[first]]
-    model = find_model(rows.model, values, db, kind=rows.kind, rotation_deg=rows.rotation)
-    answers: Any = answer_given(model, values, rows.level)
+    answers: Any = ask(
+        {name: _array(value) for name, value in values.items()},
+        kind=rows.kind, rotation_deg=rows.rotation, model=rows.model, level=rows.level, db=db,
+    )  # fmt: skip
     return json_text(
         {
             "probability": _with_null(answers.probability),
@@ -106,45 +114,23 @@ def answer_many(body: bytes, row_limit: int, db: str | None) -> bytes:
             "in_domain": answers.in_domain.tolist(),
             "reason": answers.reason.tolist(),
             "kind": answers.kind,
+            "kinds": answers.kinds.tolist(),
+            "modes": answers.modes.tolist(),
             "level": answers.level,
             "model": answers.model,
             "term": answers.term,
             "method": answers.method,
             "data": answers.data,
-            "warnings": [*answers.notes, *_unusable(answers)],
+            "warnings": list(answers.warnings),
         }
     )
 
 
-def _numbers_of_rectangles(
-    columns: dict[str, Any], others: dict[str, Any], kind: str | None
-) -> dict[str, Any]:
-    from rbfrag.exchange.block_table import BLOCK_COLUMNS, rectangle_columns
-    from rbfrag.solver.kinds import facts_of
-
-    for name, keyword in RECTANGLE.items():
-        if keyword not in columns and name != "dip":
-            raise InputError(f"{name} is missing: a rectangle has height, width and dip")
-    for name in NUMBERS:
-        if name in others:
-            raise InputError(f"{name} does not go with height and width: give one of them")
-    free_standing = kind is not None and facts_of(kind).free_standing
-    numbers = rectangle_columns(columns, free_standing=free_standing)
-    return {BLOCK_COLUMNS[name]: values.tolist() for name, values in numbers.items()}
-
-
-def _unusable(answers: Any) -> tuple[str, ...]:
-    """Return how many elements have no answer, as of tables, and the first of them."""
+def _array(value: Any) -> Any:
+    """Return a list as an array, in which null is NaN."""
     import numpy as np
 
-    from rbfrag.fragility.unusable import unusable_in_words
-
-    missing = np.flatnonzero(np.isnan(answers.probability)).tolist()
-    first = missing[:1]
-    return unusable_in_words(
-        len(missing), answers.probability.size, [f"element {i}" for i in first],
-        [answers.reason[i] for i in first],
-    )  # fmt: skip
+    return np.array(value, dtype=np.float64) if isinstance(value, list) else value
 
 
 def _with_null(values: Any) -> list[float | None]:

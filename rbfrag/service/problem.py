@@ -20,6 +20,7 @@ from starlette.routing import Match
 
 from rbfrag.db.location import locate, reference_file
 from rbfrag.errors import DatabaseError, InputError, RbfragError, UnknownModelError
+from rbfrag.question.fields import parameter_of
 from rbfrag.service.documents import Problem
 from rbfrag.service.settings import Settings
 
@@ -133,7 +134,8 @@ def answer_error(request: Request, error: Exception, settings: Settings) -> Resp
         words = "the database cannot be read; the log of the service says why"
         return problem(503, "database", words)
     if isinstance(error, RbfragError):
-        detail = in_parameters(str(error), settings)
+        text = error.spelled(parameter_of) if isinstance(error, InputError) else str(error)
+        detail = in_parameters(text, settings)
         if isinstance(error, MalformedError):
             return problem(400, "malformed", detail)
         if isinstance(error, SeveralTracesError):

@@ -128,10 +128,11 @@ def spectrum(body: bytes, query: SpectrumQuery) -> bytes:
 
 def critical(body: bytes, query: CriticalQuery) -> bytes:
     """Return what `rbfrag critical --json` prints."""
+    from rbfrag.fragility.methods import TOPPLING_BLOCK
     from rbfrag.solver.reports import critical_as_dict
     from rbfrag.solver.search.critical import critical as search
 
-    p2 = query.toppling("p2")[0]["p2"]
+    p2 = query.toppling("p2", kind=TOPPLING_BLOCK.kind)[1]["p2"]
     result = search(
         _motion(body, query),
         p2=p2,
@@ -148,7 +149,7 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     from rbfrag.hazards.curve_file import hazard_curves_in, suited_curves
     from rbfrag.hazards.report import as_dict
 
-    block, remarks = query.toppling("p2", "kr", kind=query.kind)
+    kind, block, remarks = query.toppling("p2", "kr", kind=query.kind)
     known: dict[str, Any] = {**block, **query.given({"restitution": "restitution"})}
     try:
         curves = hazard_curves_in(_text(body), FILE, imt=query.imt, site=query.site)
@@ -160,9 +161,9 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
         converted_period_s=None if convert is None else convert.period_s,
     )
     chosen = query.model_dump(
-        include={"years", "kind", "level", "convert", "convert_sigma", "component", "model"}
+        include={"years", "level", "convert", "convert_sigma", "component", "model"}
     )
-    rates = [answer(curve, **known, **chosen, db=db) for curve in curves]
+    rates = [answer(curve, **known, **chosen, kind=kind, db=db) for curve in curves]
     return json_text(as_dict(curves, [[None]] * len(curves), rates, remarks))
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.formulas import (
@@ -19,11 +19,7 @@ from rbfrag.solver.block.formulas import (
     tan_deg,
 )
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.stability.modes import words_of_mode, yield_coefficient
-
-if TYPE_CHECKING:
-    from rbfrag.solver.kinds import KindFacts
-    from rbfrag.solver.stability.single import Stability
+from rbfrag.solver.stability.modes import yield_coefficient
 
 
 class Form(NamedTuple):
@@ -57,10 +53,6 @@ NOT_BACKED = (
 TAKEN_NOT_TO_SLIP = (
     "no friction angle is given: the corners of the free-standing rectangle are taken not to slip"
 )
-
-
-LEAST_M, MOST_M = 0.05, 60.0
-"""Blocks smaller or larger than this are seldom meant: another unit may have been typed."""
 
 
 @dataclass(frozen=True)
@@ -204,137 +196,6 @@ def rectangle_numbers(
     tan_dip = tan_deg(dip_deg, functions)
     # in units of the height: sin δ* and cos δ* up to a positive factor
     return p2, yield_coefficient(width_m, height_m, tan_dip, 1.0, functions)
-
-
-def kind_of(described: DescribedBlock, kind: str) -> str:
-    """Return how a block fails that is asked to fail in one way, backed or standing free.
-
-    Args:
-        described: the block.
-        kind: how it fails where a plane backs it.
-    """
-    from rbfrag.solver.kinds import facts_of, kind_of_mode, stands_free_of
-
-    model = facts_of(kind)
-    backed = described.conditions.get("back_fracture", True)
-    if model.mode is None or not stands_free_of(model, backed):
-        return kind
-    return kind_of_mode(model.mode, back_fracture=False).kind
-
-
-def _instead(described: DescribedBlock, mode: str) -> str:
-    """Return what to ask instead about a block of another mode."""
-    spell = described.spell
-    if mode == "slide":
-        return f"; predict with {spell('displacement_m')} tells how likely it slides so many metres"
-    if mode == "slump":
-        return f"; predict with {spell('kind')} slumping tells how likely it slumps"
-    return "; see  rbfrag block"
-
-
-def numbers_of_kind(
-    described: DescribedBlock, kind: str
-) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return what predictions read of a block, by name, and warnings.
-
-    Args:
-        described: the block.
-        kind: how it is asked to fail.
-
-    Raises:
-        InputError: the block is of another mode, or no earthquake decides about it.
-    """
-    values, remarks = _numbers_and_remarks(described, kind)
-    across_m = 2.0 * described.block.r3_m
-    if not LEAST_M <= across_m <= MOST_M:
-        remarks += (f"the block measures some {across_m:.2g} m: lengths are in m",)
-    return values, remarks
-
-
-def _numbers_and_remarks(
-    described: DescribedBlock, kind: str
-) -> tuple[dict[str, float], tuple[str, ...]]:
-    from rbfrag.solver.kind import model_of_kind
-    from rbfrag.solver.kinds import facts_of, stands_free_of
-    from rbfrag.solver.stability.single import stability
-
-    model = facts_of(kind)
-    if not model.parameters:
-        raise InputError(f"there is no fragility model of kind {kind}")
-    described = described.without_kv()
-    origin = described.origin
-    topples = "kr" in model.parameters
-    backed = described.conditions.get("back_fracture", True)
-    unbacked = (NOT_BACKED,) if stands_free_of(model, backed) else ()
-    # without friction a rectangle is taken to be of the model's mode, and the answer says so
-    if described.only_topples and model.free_standing:
-        beta_rad = math.radians(described.conditions["beta_deg"])
-        values, remarks = model_of_kind(kind).numbers_of(described.block, beta_rad)
-        return values, (TAKEN_NOT_TO_SLIP, *remarks)
-    if described.only_topples and topples:
-        return toppling_rectangle(described), (TAKEN_TO_TOPPLE, *unbacked)
-    block, conditions = described.on_planes()
-    if model.free_standing:
-        conditions["back_fracture"] = False
-    result = stability(block, **conditions)
-    _refuse_other_blocks(described, result, model)
-    if model.free_standing:
-        if conditions.get("cohesion_pa"):
-            raise InputError(f"{origin}cohesion_pa does not go with {kind}: leave it out")
-        values, remarks = model_of_kind(kind).numbers_of(block, math.radians(result.beta_deg))
-        return values, (*result.warnings, *remarks)
-    if "ps2" in model.parameters:
-        return _numbers_of_mechanism(block, kind, conditions, origin)
-    values = {"p2": block.p2, "kr": result.yield_acceleration, "ky": result.yield_acceleration}
-    values = {name: value for name, value in values.items() if name in model.parameters}
-    if "ky" in values:
-        if conditions.get("cohesion_pa"):
-            raise InputError(
-                f"{origin}cohesion_pa does not go with {kind}: the first slip breaks it"
-            )
-        values["beta_deg"] = result.beta_deg
-    return values, (*result.warnings, *unbacked)
-
-
-def _refuse_other_blocks(described: DescribedBlock, result: Stability, model: KindFacts) -> None:
-    """Refuse a block of another mode than the model's, and one that no earthquake decides about."""
-    origin, mode = described.origin, words_of_mode(result.mode)
-    yields = f"(yield {result.yield_acceleration:.4g} g"
-    if result.mode != model.mode:
-        raise InputError(
-            f"{origin}its mode is {mode} {yields}, {result.state}), and the {model.kind} model "
-            f"says nothing about it{_instead(described, result.mode)}"
-        )
-    if result.state != "stable" or result.yield_acceleration <= 0.0:
-        raise InputError(
-            f"{origin}the block is {result.state} in {mode} {yields}): "
-            + (
-                "it fails without an earthquake"
-                if result.state == "unstable"
-                else "no earthquake decides about it"
-            )
-        )
-
-
-def _numbers_of_mechanism(
-    block: Block, kind: str, conditions: dict[str, Any], origin: str
-) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the numbers of a block whose frequency depends on friction and dip, and warnings."""
-    from rbfrag.solver.mechanism import shaken_mechanism
-
-    for name, nothing in (("cohesion_pa", 0.0), ("back_fracture", True)):
-        if conditions.pop(name, nothing) != nothing:
-            raise InputError(f"{origin}{name} does not go with {kind}: leave it out")
-    conditions.pop("density_kg_m3", None)
-    try:
-        shaken = shaken_mechanism(block, kind=kind, **conditions)
-    except InputError as error:
-        raise InputError(f"{origin}{error}") from None
-    values = {"ks": shaken.yield_g, "ps2": shaken.p2}
-    # a contact may open at some k_h, from where on the model does not hold
-    if math.isfinite(shaken.leaves_g):
-        values["leaves_g"] = shaken.leaves_g
-    return values, shaken.remarks
 
 
 def toppling_rectangle(described: DescribedBlock) -> dict[str, float]:

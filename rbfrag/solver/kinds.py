@@ -95,6 +95,12 @@ def facts_of(kind: str) -> KindFacts:
     return KINDS[kind]
 
 
+def mode_of_kind(kind: str) -> str:
+    """Return the failure mode of the blocks of a kind; empty for no kind, or one without."""
+    facts = KINDS.get(kind)
+    return "" if facts is None else facts.mode or ""
+
+
 def kind_of_mode(mode: ModeName, *, back_fracture: bool = True) -> KindFacts:
     """Return the kind of blocks that fail in this mode.
 

@@ -27,8 +27,8 @@ from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.exchange.database_tables import export_database
 from rbfrag.fragility.fit.check import check_models
 from rbfrag.fragility.fit.fitting import fit
-from rbfrag.fragility.predict import predict
 from rbfrag.motions.ground_motion import GroundMotion
+from rbfrag.question.question import predict
 from rbfrag.solver.critical import critical
 from rbfrag.solver.mechanism import shaken_mechanism
 from rbfrag.solver.models.sliding import KY_OVER_PGA, sliding_displacements

@@ -10,7 +10,7 @@ import pytest
 
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
-from rbfrag.fragility.predict import predict
+from rbfrag.question.question import predict
 from rbfrag.solver.block.geometry import Block
 from tests.cli.conftest import Refuses, Shell
 from tests.fragility.test_overturning import T2, stored

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rbfrag.fragility.predict import predict
+from rbfrag.question.question import predict
 from tests.cli.conftest import Refuses, Shell
 
 ASKED = ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")

@@ -16,7 +16,7 @@ from rbfrag.errors import InputError, MissingExtraError
 from rbfrag.exchange.batch import ANSWERS, predict_table
 from rbfrag.exchange.block_table import read_columns, write_block_table
 from rbfrag.exchange.tables import csv_file, parts
-from rbfrag.fragility.predict import predict
+from rbfrag.question.question import predict
 from tests.fragility.conftest import model_row
 
 HEAD = "block_id,p2_1_s2,kr,pgv_m_s"

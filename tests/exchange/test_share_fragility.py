@@ -13,7 +13,7 @@ from rbfrag.exchange.fragility_function import FragilityFunction
 from rbfrag.exchange.nrml import nrml_text, read_nrml
 from rbfrag.exchange.share_fragility import DRAWS, share_functions
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
+from rbfrag.question.question import predict
 from tests.fragility.conftest import model as model
 from tests.fragility.conftest import model_row
 from tests.fragility.conftest import row as row

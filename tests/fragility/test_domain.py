@@ -21,9 +21,9 @@ from rbfrag.fragility.fit.fitting import fit_source
 from rbfrag.fragility.measures import TERMS
 from rbfrag.fragility.methods import SINGLE, method_named
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.question.question import predict
 from tests.fragility.outcome_draws import drawn_outcomes
 
 METHOD, TERM = method_named("bounded"), TERMS["pgv_pga_tm"]

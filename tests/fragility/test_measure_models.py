@@ -15,8 +15,8 @@ from rbfrag.fragility.fit.data import Y0_OVER_PGV, FitSource, fit_data
 from rbfrag.fragility.measures import SPECTRAL, TERMS
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
 from rbfrag.fragility.prediction import Prediction
+from rbfrag.question.question import predict
 from rbfrag.solver.models.toppling import Y_OVER_PGV
 from tests.fragility.conftest import model_row
 from tests.fragility.outcome_draws import G, drawn_outcomes

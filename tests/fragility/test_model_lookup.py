@@ -11,7 +11,7 @@ from rbfrag.db.models import load_model, save_model, set_default
 from rbfrag.errors import DatabaseNotFoundError, InputError, ModelError, UnknownModelError
 from rbfrag.fragility.lookup import SHIPPED, find_model, stored_rows
 from rbfrag.fragility.model_list import model_list
-from rbfrag.fragility.predict import predict
+from rbfrag.question.question import predict
 
 
 @pytest.fixture
@@ -91,7 +91,7 @@ def test_the_database_of_the_environment_and_folder_without_heavy_libraries(data
     program = """
 import sys
 from dataclasses import replace
-from rbfrag.fragility.predict import predict
+from rbfrag.question.question import predict
 print(predict(3.0, 0.1, pgv_m_s=0.6).model)
 heavy = {"numpy", "scipy", "pandas", "statsmodels", "numba", "matplotlib", "sqlalchemy"}
 print(sorted(heavy & set(sys.modules)))

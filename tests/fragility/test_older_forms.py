@@ -17,7 +17,7 @@ from rbfrag.db.model_file import MODEL_FORM, ModelRow
 from rbfrag.db.models import save_model
 from rbfrag.errors import ModelError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
+from rbfrag.question.question import predict
 
 
 def app_command(name: str) -> Any:

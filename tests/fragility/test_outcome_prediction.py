@@ -12,10 +12,10 @@ from rbfrag.errors import InputError
 from rbfrag.fragility import prediction_array
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
 from rbfrag.fragility.prediction import MotionPrediction, answer_given
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.toppling_spectrum import toppling_spectrum
+from rbfrag.question.question import predict
 from tests.fragility.outcome_draws import TRUTH
 from tests.fragility.portfolio_draws import SHARED
 

@@ -11,9 +11,9 @@ from scipy.stats import norm
 
 from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.question.question import predict
 
 G = 9.80665
 
@@ -57,8 +57,8 @@ def test_probability_and_interval_against_scipy(row, term, level):
 def test_keys_of_the_json_contract(row):
     answer = predict(3.0, 0.1, pgv_m_s=0.6, model=row())
     assert list(answer.as_dict()) == [
-        "kind", "probability", "ci_low", "ci_high", "event_low", "event_high", "level", "model",
-        "term", "method", "failure", "y_m_s", "intensity_m_s", "in_domain", "warnings",
+        "kind", "mode", "probability", "ci_low", "ci_high", "event_low", "event_high", "level",
+        "model", "term", "method", "failure", "y_m_s", "intensity_m_s", "in_domain", "warnings",
         "pgv_over_pga_s", "median_displacement_m", "unknown_share", "block_sd", "data",
     ]  # fmt: skip
     assert (answer.kind, answer.failure, answer.median_displacement_m) == (
@@ -320,7 +320,7 @@ def test_single_numbers_load_no_heavy_library():
     program = """
 import sys
 from rbfrag.db.model_file import ModelRow
-from rbfrag.fragility.predict import predict
+from rbfrag.question.question import predict
 row = ModelRow("m", "pgv", "wls", {"c0": 0.0, "c1": 0.7, "v0": 1e-4, "v1": 2e-3},
                ((1e-6, 0, 0, 0), (0, 1e-4, 0, 0), (0, 0, 1e-10, 0), (0, 0, 0, 1e-8)),
                {"p2": (0.1, 30.0)}, "")

@@ -16,10 +16,10 @@ from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError, ModelError, UnknownModelError
 from rbfrag.fragility.methods import method_named
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
 from rbfrag.fragility.prediction import MotionPrediction, Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.question.question import predict
 from tests.fragility.portfolio_draws import SHARED
 from tests.fragility.test_outcome_prediction import shaking
 

@@ -9,14 +9,14 @@ import pytest
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import EventSpread
-from rbfrag.fragility.document import prediction_document
 from rbfrag.fragility.intervals import ParameterErrors
 from rbfrag.fragility.measures import Term
 from rbfrag.fragility.methods import LOGIT, OF_OUTCOME, TOPPLING_BLOCK, Eta, Form, Method
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.question.document import prediction_document
+from rbfrag.question.question import predict
 from tests.fragility.conftest import model_row
 
 G = 9.80665

@@ -12,13 +12,13 @@ from scipy.stats import multivariate_normal, norm, truncnorm
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
-from rbfrag.fragility.document import prediction_document
 from rbfrag.fragility.intervals import quantiles_of
 from rbfrag.fragility.methods import SINGLE, arrays, method_named, methods
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
 from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.question.document import prediction_document
+from rbfrag.question.question import predict
 from rbfrag.solver.scatter import fraction
 from tests.fragility.test_overturning import T2, one, stored
 

@@ -13,13 +13,13 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.fragility.predict import predict
 from rbfrag.hazards import answer as module
 from rbfrag.hazards.annual_rate import failure_rate
 from rbfrag.hazards.answer import HazardAnswer, hazard
 from rbfrag.hazards.curve import HazardCurve, hazard_curve
 from rbfrag.hazards.report import as_dict
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.question.question import predict
 from tests.fragility.conftest import SHARED, model_row
 
 SHARES = ("rho_e", "rho_s", "rho_v", "rho_o")

@@ -20,13 +20,13 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.event_losses import losses
 from rbfrag.exchange.openquake_events import JobFiles, read_events
 from rbfrag.fragility.methods import method_named
-from rbfrag.fragility.predict import predict
 from rbfrag.hazards import event_counts
 from rbfrag.hazards.answer import hazard
 from rbfrag.hazards.curve_file import read_hazard_curves
 from rbfrag.hazards.event_counts import Part, count_part
 from rbfrag.hazards.losses import LossAnswer, rate_interval, share_interval
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.question.question import predict
 from tests.exchange.openquake_job import write_job
 from tests.fragility.conftest import SHARED, model_row
 

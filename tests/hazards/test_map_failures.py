@@ -12,7 +12,6 @@ from scipy.stats import norm
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
 from rbfrag.hazards.conversions import component
 from rbfrag.hazards.map_failures import (
     COPULA,
@@ -23,6 +22,7 @@ from rbfrag.hazards.map_failures import (
     map_failures,
 )
 from rbfrag.hazards.site_probability import SiteProbability, site_probability
+from rbfrag.question.question import predict
 from tests.hazards.conftest import measure_row
 
 FloatArray = NDArray[np.float64]

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from rbfrag.fragility.dependence import EventSpread, event_range
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.hazards import site_probability as site_module
 from rbfrag.hazards.conversions import component
 from rbfrag.hazards.correlations import correlation, correlations
 from rbfrag.hazards.site_probability import site_probability
+from rbfrag.question.question import predict
 from tests.hazards.conftest import measure_row
 
 FloatArray = NDArray[np.float64]

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.predict import predict
 from rbfrag.plots import chart as module
 from rbfrag.plots.chart import CONTOURS, plot_chart
+from rbfrag.question.question import predict
 from tests.plots.critical_values import straight_line_model
 
 

@@ -9,9 +9,9 @@ import pytest
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import EventSpread
-from rbfrag.fragility.predict import predict
 from rbfrag.plots import curve as module
 from rbfrag.plots.curve import plot_curve
+from rbfrag.question.question import predict
 from tests.plots.critical_values import straight_line_model
 
 

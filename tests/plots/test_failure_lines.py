@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
 from rbfrag.plots.model_lines import failure_line, held_measures
+from rbfrag.question.question import predict
 from tests.plots.critical_values import straight_line_model
 
 X = np.array([0.05, 0.3, 1.0])

@@ -131,7 +131,7 @@ def test_the_equation_is_in_the_title(table, model, tmp_path, drawn):
 
 
 def test_the_failure_lines_have_their_probabilities(table, model, tmp_path, drawn):
-    from rbfrag.fragility.predict import predict
+    from rbfrag.question.question import predict
 
     plot_fit(table, model, tmp_path / "fit.png")
     lines = {line.get_label(): line for line in drawn[0].axes[0].lines}

@@ -10,10 +10,10 @@ import pytest
 from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
 from rbfrag.plots import chart
 from rbfrag.plots.chart import plot_chart
 from rbfrag.plots.model_lines import failure_line, held_measures
+from rbfrag.question.question import predict
 
 G = 9.80665
 DOMAIN = {

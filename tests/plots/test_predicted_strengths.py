@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rbfrag.fragility.predict import predict
 from rbfrag.plots.fit import plot_fit
 from rbfrag.plots.model_lines import predicted_strengths, smooth_line
+from rbfrag.question.question import predict
 from tests.fragility.outcome_draws import drawn_outcomes
 from tests.plots.test_held_measures import WITH_TM, model_of
 

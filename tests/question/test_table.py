@@ -9,8 +9,8 @@ import pytest
 from rbfrag.errors import InputError
 from rbfrag.exchange.batch import READ, predict_table
 from rbfrag.exchange.block_rows import read_blocks
-from rbfrag.fragility.predict import predict
 from rbfrag.question.fields import column_of, declared
+from rbfrag.question.question import predict
 from rbfrag.question.table import columns_in, field_of
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.predict import predict
+from rbfrag.question.question import predict
 from rbfrag.rockmasses.joint_sets import RockMass
 from rbfrag.rockmasses.scenario import Scenario, scenario
 from rbfrag.solver.block.geometry import Block

@@ -11,7 +11,7 @@ import pytest
 
 from rbfrag.errors import DatabaseNotFoundError, InputError
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
+from rbfrag.question.question import predict
 from rbfrag.rockmasses.counts import Crossing, crossings, mode_counts
 from rbfrag.rockmasses.joint_sets import Realisations, RockMass
 from rbfrag.rockmasses.report import as_dict, block_columns

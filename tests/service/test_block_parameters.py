@@ -60,7 +60,7 @@ def test_a_shape_that_slides_is_answered_where_sliding_is_asked_for(client):
     shape = {**ANGLES, "phi": 22, "pgv": 0.6}
     refused = client.get("/v1/predict", params=shape)
     assert refused.status_code == 422
-    assert "its mode is slide" in refused.json()["detail"]
+    assert "the block slides (yield 0.07 g): state displacement" in refused.json()["detail"]
     query = {**shape, "kind": "sliding", "displacement": 0.05}
     assert client.get("/v1/predict", params=query).json()["kind"] == "sliding"
 

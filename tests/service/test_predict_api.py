@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import rbfrag
 from rbfrag.cli.output import show_prediction
-from rbfrag.fragility.document import prediction_document
+from rbfrag.question.document import prediction_document
 
 KEYWORD = {"pgv": "pgv_m_s", "pga": "pga_g", "tm": "tm_s", "pgd": "pgd_m"}
 

@@ -38,7 +38,7 @@ class FunctionOptions(BlocksOptions):
         given = self.toppling_blocks(standing)
         keywords = {
             "one_class": given.is_class, "imt": self.imt, "name": self.name, "levels": self.levels,
-            "model": self.model, "db": self.db, "kind": standing.kind,
+            "model": self.model, "db": self.db, "kind": given.kind,
         }  # fmt: skip
         if given.rows is None and not given.is_class:
             named = {"p2": "p2_1_s2", "kr": "kr", "restitution": "restitution"}

@@ -111,7 +111,7 @@ def hazard(
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot, excel_text=excel_text)
-    table, is_class, remarks, rows = blocks.toppling_blocks(standing)
+    table, is_class, remarks, rows, kind = blocks.toppling_blocks(standing)
     files = [
         suited_in(path, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
         for path in curve
@@ -132,7 +132,7 @@ def hazard(
             weights=wanted.weights, at_least=wanted.counts(len(one.names), most),
             convert=meaning.convert, convert_sigma=meaning.convert_sigma,
             component=meaning.component, years=wanted.years, model=answering.model,
-            level=answering.level, db=answering.db, one_class=is_class, kind=standing.kind,
+            level=answering.level, db=answering.db, one_class=is_class, kind=kind,
             restitution=one.columns.get("restitution"),
         )
         for one in sites

@@ -110,9 +110,7 @@ def plot_curve(
     that may fail in one single earthquake. The other measures are held at the values given.
     """
     from rbfrag.fragility.measures import SPECTRAL
-    from rbfrag.fragility.methods import TOPPLING_BLOCK
     from rbfrag.plots import plot
-    from rbfrag.solver.described import kind_of
     from rbfrag.solver.kinds import facts_of
 
     def others(measure: str) -> Any:
@@ -122,10 +120,7 @@ def plot_curve(
 
         return of_measure(beside, measure)
 
-    kind, shape = standing.kind, block.described()
-    if kind is None and shape is not None:
-        kind = kind_of(shape, TOPPLING_BLOCK.kind)
-    numbers, remarks = block.toppling(kind)
+    kind, numbers, remarks = block.toppling(standing.kind)
     if standing.restitution is not None:
         if kind is None or not facts_of(kind).free_standing:
             raise InputError("--restitution goes with blocks that stand free: --kind rocking")
@@ -214,9 +209,10 @@ def plot_response(
     db: options.Db = None,
 ) -> None:
     """Draw acceleration against k_r(theta), and theta over the critical angle, in time."""
+    from rbfrag.fragility.methods import TOPPLING_BLOCK
     from rbfrag.plots import plot
 
-    numbers, about = block.toppling()
+    _, numbers, about = block.toppling(TOPPLING_BLOCK.kind)
     ground, upward, remarks = find_shaking(motion, direction, db=db, reading=reading)
     say_when_compiling()
     plot.response(

@@ -7,11 +7,11 @@ from typing import Any
 
 from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings, show_prediction
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import WAYS, BlockOptions, UncertaintyOptions, option_of
+from rbfrag.cli.parameters.block import WAYS, BlockOptions, UncertaintyOptions
 from rbfrag.cli.parameters.stack import option, stacked
 from rbfrag.cli.sentences import table_in_words
 from rbfrag.errors import InputError
-from rbfrag.solver.described import kind_of, numbers_of_kind
+from rbfrag.question.fields import option_of
 
 EXAMPLE = "Example:  rbfrag predict --height 2.4 --width 0.5 --dip 3 --pgv 0.6"
 
@@ -138,17 +138,17 @@ def predict(
             "nothing about the shaking is given: state what is known of it, --pgv [m/s], --pga "
             "[g], --tm [s], --sa10 [g] …, or  --motion FILE"
         )
-    from rbfrag.fragility.document import prediction_document
+    from rbfrag.question.document import prediction_document
 
-    remarks: tuple[str, ...] = ()
     kind = failure.kind
+    remarks: tuple[str, ...] = ()
     if known.block_draws is not None:
         from rbfrag.exchange.block_draws import read_draws
 
         draws, question["weights"] = read_draws(known.block_draws)
         given = {**draws, **given}
     else:
-        kind, remarks = _complete(given, block, kind)
+        kind, given, remarks = _completed(given, block, kind)
     if record.motion is not None:
         from rbfrag.cli.parameters.motion import find_motion
 
@@ -158,38 +158,32 @@ def predict(
     show_prediction(document, given, json=printing.json, verbose=printing.verbose)
 
 
-def _complete(
+def _completed(
     given: dict[str, Any], block: BlockOptions, kind: str | None
-) -> tuple[str | None, tuple[str, ...]]:
-    """Add what the shape of a block says of it, and refuse a block of which something is missing.
-
-    Returns:
-        How it fails, and warnings about it.
-    """
+) -> tuple[str | None, dict[str, Any], tuple[str, ...]]:
+    """Return the kind, block and measures as answers read them, and warnings about the block."""
     from rbfrag.fragility.lookup import block_of
+    from rbfrag.fragility.measures import MEASURES
 
-    remarks: tuple[str, ...] = ()
-    known_by = block_of(given, kind)
     shape = block.described()
     if shape is not None:
-        kind = kind_of(shape, known_by.kind) if kind is None else kind
-        values, remarks = numbers_of_kind(shape, kind)
-        known_by = block_of(values, kind)
-        if doubled := [name for name in known_by.names if name in given and name in values]:
-            raise InputError(
-                f"{option_of(doubled[0])} does not go with a shape, which describes the block"
-            )
-        given |= {name: value for name, value in values.items() if name not in given}
-    elif block.beta is not None:
+        from rbfrag.question.blocks import described_block
+
+        others = {name: value for name, value in given.items() if name not in MEASURES}
+        measures = {name: value for name, value in given.items() if name in MEASURES}
+        blocks = described_block(shape, others, kind)
+        (group,) = blocks.groups
+        return group.kind, {**group.numbers, **measures}, blocks.remarks
+    if block.beta is not None:
         given["beta_deg"] = block.beta
-        known_by = block_of(given, kind)
+    known_by = block_of(given, kind)
     missing = [name for name in known_by.names if name not in given]
     if missing and kind in (None, known_by.kind):
         raise InputError(
             f"{option_of(missing[0])} is missing: a block of kind {known_by.kind} is given by "
             f"{' and '.join(map(option_of, known_by.names))}, or by {WAYS}"
         )
-    return kind, remarks
+    return kind, given, ()
 
 
 def _show_summary(summary: dict[str, Any], *, json: bool) -> None:

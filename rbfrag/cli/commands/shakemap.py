@@ -82,7 +82,7 @@ def shakemap(
     check_files(table=out if excel_text else None, plot=plot, excel_text=excel_text)
     given = blocks.toppling_blocks(standing, n=n, reads=(*PLACE, "weight"))
     answer = answered(
-        grid, blocks=given.question, kind=standing.kind, uncertainty=meaning.uncertainty,
+        grid, blocks=given.question, kind=given.kind, uncertainty=meaning.uncertainty,
         component=meaning.component, allow_partial=meaning.allow_partial, draws=drawing.draws,
         seed=drawing.seed, model=answering.model, level=answering.level, db=answering.db,
     )  # fmt: skip

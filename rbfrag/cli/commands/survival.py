@@ -91,7 +91,7 @@ def survival(
     from rbfrag.hazards.survival import survival as answered
 
     check_files(plot=plot)
-    table, _, remarks, rows = blocks.toppling_blocks(standing)
+    table, _, remarks, rows, kind = blocks.toppling_blocks(standing)
     if rows is not None:
         rows.whole(ALL_STAND)
         remarks += rows.remarks
@@ -100,7 +100,7 @@ def survival(
         read, table["p2_1_s2"], table["kr"], age_years=known.age, age_sd_years=known.age_sd,
         weights=weights, p2_sigma=table.get("p2_sigma", known.p2_sigma),
         kr_sigma=table.get("kr_sigma", known.kr_sigma), restitution=table.get("restitution"),
-        restitution_sigma=known.restitution_sigma, kind=standing.kind, convert=meaning.convert,
+        restitution_sigma=known.restitution_sigma, kind=kind, convert=meaning.convert,
         convert_sigma=meaning.convert_sigma, component=meaning.component, model=answering.model,
         level=answering.level, draws=known.draws, seed=known.seed, db=answering.db,
     )  # fmt: skip

@@ -11,7 +11,8 @@ import typer
 from rbfrag.cli.parameters.options import EXCEL_TEXT
 from rbfrag.cli.parameters.stack import option
 from rbfrag.errors import InputError
-from rbfrag.solver.described import DescribedBlock, describe, numbers_of_kind
+from rbfrag.question.fields import option_of
+from rbfrag.solver.described import DescribedBlock, describe
 
 if TYPE_CHECKING:
     import numpy as np
@@ -137,18 +138,17 @@ class UncertaintyOptions:
 class BlockOptions(ShapeOptions, NumberOptions):
     """A block by numbers or by its shape."""
 
-    def toppling(self, kind: str | None = None) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Return ``p2`` [1/s²] and ``kr``, what else predictions read of the block, and warnings.
+    def toppling(
+        self, kind: str | None = None
+    ) -> tuple[str | None, dict[str, float], tuple[str, ...]]:
+        """Return the kind, what predictions read of the block, and warnings.
 
         Args:
-            kind: how the block fails; None for toppling.
+            kind: how the block fails; None for toppling, or rocking where nothing backs its shape.
 
         Raises:
-            InputError: an option is missing, or the block does not topple; the message names the
-                mode that governs instead.
+            InputError: an option is missing, or the block is of another mode.
         """
-        from rbfrag.fragility.methods import TOPPLING_BLOCK
-
         described = self.described()
         if described is None:
             if self.p2 is None or self.kr is None:
@@ -156,8 +156,12 @@ class BlockOptions(ShapeOptions, NumberOptions):
                 raise InputError(
                     f"{missing} is missing: a block is given by --p2 and --kr, or by {WAYS}"
                 )
-            return {"p2": self.p2, "kr": self.kr}, ()
-        return numbers_of_kind(described, kind or TOPPLING_BLOCK.kind)
+            return kind, {"p2": self.p2, "kr": self.kr}, ()
+        from rbfrag.question.blocks import toppling_block
+
+        blocks = toppling_block(described, {}, kind)
+        (group,) = blocks.groups
+        return group.kind, {**group.numbers}, blocks.remarks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,24 +177,28 @@ class StandingOptions:
         "restitution goes before. Default: what angular momentum leaves."
     )
 
-    @property
-    def is_free(self) -> bool:
-        """Whether they stand free."""
-        if self.kind is None:
+    def is_free(self, kind: str | None) -> bool:
+        """Return whether blocks of a kind stand free; None for what is stated here."""
+        kind = kind or self.kind
+        if kind is None:
             return False
         from rbfrag.solver.kinds import facts_of
 
-        return facts_of(self.kind).free_standing
+        return facts_of(kind).free_standing
 
-    def completed(self, columns: dict[str, Any]) -> dict[str, Any]:
+    def completed(self, columns: dict[str, Any], kind: str | None = None) -> dict[str, Any]:
         """Return a table of blocks with what is stated for all; backed ones have no restitution.
+
+        Args:
+            columns: the table.
+            kind: how they fail; None for what is stated here.
 
         Raises:
             InputError: a restitution of blocks that do not stand free.
         """
         import numpy as np
 
-        if not self.is_free:
+        if not self.is_free(kind):
             if self.restitution is not None:
                 raise InputError("--restitution goes with blocks that stand free: --kind rocking")
             return {name: column for name, column in columns.items() if name != "restitution"}
@@ -232,13 +240,13 @@ class TableOptions(BlockOptions):
 
             rows = read_blocks(self.blocks, standing.kind, reads=reads, one_kind=True)
             rows = replace(rows, blocks=standing.completed({**rows.blocks}))
-            return TopplingBlocks(rows.blocks, False, (), rows)
+            return TopplingBlocks(rows.blocks, False, (), rows, standing.kind)
         from rbfrag.solver.quantity import positive
 
-        values, remarks = self.toppling(standing.kind)
+        kind, values, remarks = self.toppling(standing.kind)
         if missing := [each for each in ("p2", "kr") if each not in values]:
             raise InputError(
-                f"a block of kind {standing.kind} has no {missing[0]}: this command answers for "
+                f"a block of kind {kind} has no {missing[0]}: this command answers for "
                 "blocks that topple or rock; predict answers for others"
             )
         columns: dict[str, Any] = {
@@ -248,7 +256,7 @@ class TableOptions(BlockOptions):
         }
         if standing.restitution is None and "restitution" in values:
             columns["restitution"] = np.array([values["restitution"]])
-        return TopplingBlocks(standing.completed(columns), False, remarks)
+        return TopplingBlocks(standing.completed(columns, kind), False, remarks, None, kind)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -277,7 +285,7 @@ class BlocksOptions(TableOptions):
         """
         if self.rockmass is None:
             return super().toppling_blocks(standing, name=name, reads=reads)
-        if standing is not None and standing.is_free:
+        if standing is not None and standing.is_free(None):
             raise InputError(
                 f"--rockmass does not go with --kind {standing.kind}: its blocks are backed by the "
                 "rock behind them"
@@ -294,12 +302,14 @@ class TopplingBlocks(NamedTuple):
         is_class: they stand for one class, the stable toppling blocks of a rock mass.
         remarks: warnings.
         rows: the table that they are of, with what cannot be used of it; None without one.
+        kind: how they fail; None for toppling.
     """
 
     columns: Mapping[str, Any]
     is_class: bool
     remarks: tuple[str, ...]
     rows: BlockRows | None = None
+    kind: str | None = None
 
     @property
     def question(self) -> BlockRows | dict[str, Any]:
@@ -320,11 +330,6 @@ def taken_as_medians(columns: Mapping[str, Any]) -> tuple[str, ...]:
         f"{' and '.join(stated)} of the blocks are not integrated here: each block is taken as its "
         "median (predict, survival and losses integrate)",
     )
-
-
-def option_of(name: str) -> str:
-    """Return what a name is called on the command line."""
-    return "--" + name.removesuffix("_deg").removesuffix("_m").replace("_", "-")
 
 
 def _of_rock_mass(path: str, n: int | None) -> TopplingBlocks:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.document import prediction_document
 from rbfrag.fragility.lookup import block_of, find_model
 from rbfrag.fragility.measures import SPECTRAL, STATED
 from rbfrag.fragility.methods import TOPPLING_BLOCK
@@ -23,8 +22,10 @@ from rbfrag.hazards.report import as_dict, beyond_in_words, once_in, rate_in_wor
 from rbfrag.plots.canvas import mode_title
 from rbfrag.plots.model_lines import MORE_TERMS, ONE_NUMBER_TERMS, HeldMeasures, held_measures
 from rbfrag.plots.spectrum import block_size_m
+from rbfrag.question.blocks import toppling_block
+from rbfrag.question.document import prediction_document
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.described import DescribedBlock, kind_of, numbers_of_kind
+from rbfrag.solver.described import DescribedBlock
 from rbfrag.solver.kinds import facts_of
 from rbfrag.solver.quantity import positive
 from rbfrag.solver.stability.single import Stability, stability
@@ -158,9 +159,11 @@ def contents_of(
     """
     remarks: tuple[str, ...] = ()
     if described is not None:
-        kind = kind_of(described, TOPPLING_BLOCK.kind) if kind is None else kind
-        values, remarks = numbers_of_kind(described, kind)
-        given = {**values, **given}
+        others = {name: value for name, value in given.items() if name not in STATED}
+        blocks = toppling_block(described, others, kind)
+        (group,) = blocks.groups
+        measures = {name: value for name, value in given.items() if name in STATED}
+        kind, remarks, given = group.kind, blocks.remarks, {**group.numbers, **measures}
     kind = block_of(given, kind).kind if kind is None else kind
     if set(TOPPLING_BLOCK.names) - set(facts_of(kind).parameters):
         raise InputError(

@@ -109,6 +109,26 @@ class BlockArray(Tabular):
     reason_code: CodeArray
 
     @classmethod
+    def rectangle(cls, height_m: ArrayLike, width_m: ArrayLike) -> BlockArray:
+        """Return rectangles; the arguments broadcast.
+
+        Args:
+            height_m: heights, perpendicular to the base planes [m].
+            width_m: widths along the base planes [m].
+
+        Raises:
+            InputError: an argument holds no numbers, or the shapes do not go together.
+        """
+
+        def formula(height: FloatArray, width: FloatArray) -> _Columns:
+            reason = _reasons((height, width), (height, width))
+            height, width = _only_usable(reason, height, width)
+            t3 = width / height
+            return -t3, t3, height * 0.5, reason
+
+        return _blocks(formula, {"height_m": height_m, "width_m": width_m})
+
+    @classmethod
     def from_angles(
         cls, alpha1_deg: ArrayLike, alpha3_deg: ArrayLike, r3_m: ArrayLike
     ) -> BlockArray:

@@ -222,27 +222,6 @@ class Rocking(Kind):
 
         return run
 
-    def numbers_of(self, block: Block, beta_rad: float) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Return p² and k_r of the corner that fails first and the restitution of both.
-
-        Predictions are about symmetric blocks on level ground: of another block, about the one
-        that is as weak as its weaker sense and loses as much speed in two impacts, √(e31 e13).
-
-        Raises:
-            InputError: the block does not stand of itself.
-        """
-        free = _of_shape(block, beta_rad, None)
-        weaker = min(free.toe, free.heel, key=lambda corner: corner.theta_c)
-        kept = math.sqrt(max(free.toe.passed_on, 0.0) * max(free.heel.passed_on, 0.0))
-        values = {"p2": weaker.p**2, "kr": weaker.kr, "restitution": kept}
-        if math.isclose(free.toe.theta_c, free.heel.theta_c, rel_tol=1e-6):
-            return values, ()
-        sense = "forward" if weaker is free.toe else "backward"
-        return values, (
-            "the block does not stand alike on both corners: the answer is that of the symmetric "
-            f"block of its weaker sense, {sense}; respond runs it as it stands",
-        )
-
     def cases(self, **request: Any) -> tuple[Case, ...]:
         """Return every size with every factor on the restitution of the rectangle.
 

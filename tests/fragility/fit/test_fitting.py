@@ -11,7 +11,7 @@ from rbfrag.errors import FitError, InputError
 from rbfrag.fragility.fit.fitting import fit
 from rbfrag.fragility.fit.report import FitReport, log_correlations, power_law
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.predict import predict
+from rbfrag.question.question import predict
 
 
 def rows_of(table, chosen):

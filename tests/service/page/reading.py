@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from playwright.sync_api import Page
 
 from rbfrag.db.location import REFERENCE
-from rbfrag.fragility.predict import predict
+from rbfrag.question.question import predict
 
 PERCENT = re.compile(r"([<>]?)\s*([\d.]+)\s*%")
 

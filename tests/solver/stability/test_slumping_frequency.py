@@ -5,15 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from rbfrag.solver.block.formulas import array_elementwise
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.mechanism import shaken_mechanism
 from rbfrag.solver.models.slumping import FAMILY
-from rbfrag.solver.stability.arrays import slumping_p2
+from rbfrag.solver.stability.at_rest import slump_at_rest
 
 
 def test_it_is_that_of_the_mechanism() -> None:
     blocks = [each.block for each in FAMILY]
-    found = slumping_p2(
+    p2, leaves_g = slump_at_rest(
         alpha1_deg=np.array([b.alpha1_deg for b in blocks]),
         alpha3_deg=np.array([b.alpha3_deg for b in blocks]),
         gamma_deg=np.array([b.gamma_deg for b in blocks]),
@@ -22,8 +23,10 @@ def test_it_is_that_of_the_mechanism() -> None:
         beta_deg=np.array([each.beta_deg for each in FAMILY]),
         phi_deg=np.array([each.phi_deg for each in FAMILY]),
         phi_back_deg=np.array([each.phi_deg - 4.0 for each in FAMILY]),
+        functions=array_elementwise(),
+        trigonometry=np,
     )
-    for value, each in zip(found, FAMILY, strict=True):
+    for value, leaves, each in zip(p2, leaves_g, FAMILY, strict=True):
         one = shaken_mechanism(
             each.block,
             kind="slumping",
@@ -32,6 +35,7 @@ def test_it_is_that_of_the_mechanism() -> None:
             phi_back_deg=each.phi_deg - 4.0,
         )
         assert value == pytest.approx(one.p2, rel=1e-12)
+        assert leaves == pytest.approx(one.leaves_g, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -47,4 +51,5 @@ def test_printed_values(angles: tuple[float, float, float, float], p2: float) ->
         ("r1_m", block.r1_m), ("r3_m", block.r3_m), ("beta_deg", beta), ("phi_deg", phi),
         ("phi_back_deg", phi),
     )}  # fmt: skip
-    assert slumping_p2(**one)[0] * 9.81 / 9.80665 == pytest.approx(p2, abs=1e-6)
+    rest = slump_at_rest(**one, functions=array_elementwise(), trigonometry=np)
+    assert rest[0][0] * 9.81 / 9.80665 == pytest.approx(p2, abs=1e-6)

@@ -1,0 +1,185 @@
+"""The answers for many blocks, of which each kind has its own model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rbfrag.errors import InputError, ModelError
+from rbfrag.fragility.measures import MEASURES
+from rbfrag.fragility.model import FragilityModel
+from rbfrag.fragility.prediction import Prediction, answer_given
+from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reasons, flat, index_of
+from rbfrag.question.blocks import Blocks, Refused, many_blocks
+
+_COLUMNS = (
+    "probability", "ci_low", "ci_high", "event_low", "event_high", "y_m_s", "intensity_m_s",
+    "unknown_share", "block_sd",
+)  # fmt: skip
+
+
+def ask_many(
+    given: Mapping[str, Any],
+    kind: str | Sequence[str | None] | None,
+    mode: Sequence[str | None] | None,
+    *,
+    rows: bool,
+    level: float,
+    nan: Literal["propagate", "raise"],
+    interval: bool,
+    weights: ArrayLike | None,
+    find: Callable[[Mapping[str, Any], str | None], FragilityModel],
+) -> Prediction | PredictionArray:
+    """Return the answers for blocks that are described by shapes, or are of several kinds.
+
+    Args:
+        given: fields of block and shaking: numbers or arrays.
+        kind: how they fail, for all or one each.
+        mode: failure modes that are stated, one each.
+        rows: the arrays are columns of a table.
+        level: confidence level.
+        nan: what becomes of elements that cannot be used.
+        interval: whether an interval is asked for.
+        weights: of draws of one block.
+        find: returns the model that answers for what is given, of a kind.
+
+    Raises:
+        InputError: nothing of it can be answered for, or, if asked, an element.
+    """
+    backed = {name: given[name] for name in ("back_fracture",) if name in given}
+    numbers = {name: value for name, value in given.items() if name not in backed}
+    each = {"kind": kind, "mode": mode}
+    texts = {
+        n: np.zeros(len(v)) for n, v in each.items() if v is not None and not isinstance(v, str)
+    }
+    values, shape = flat({**numbers, **texts})
+    size = int(np.prod(shape))
+    measures = {name: value for name, value in values.items() if name in MEASURES}
+    block: dict[str, Any] = {n: v for n, v in values.items() if n not in {*measures, *texts}}
+    blocks = many_blocks({**block, **backed}, size, kinds=kind, modes=mode, rows=rows)
+    if weights is not None:
+        return _of_draws(blocks, given, level, weights, size, find)
+    refused, parts = list(blocks.refused), []
+    for group in blocks.groups:
+        places = group.places
+        assert places is not None
+        own = {**group.numbers, **{n: v if v.size == 1 else v[places] for n, v in measures.items()}}
+        try:
+            chosen = find(own, group.kind)
+            own = chosen.method.block.filled(own) if rows else own
+            own = {n: np.broadcast_to(v, places.shape) for n, v in own.items()}
+            answer = answer_given(chosen, own, level, interval=interval)
+        except (InputError, ModelError) as error:
+            if len(blocks.groups) == 1:
+                raise
+            refused.append(Refused(places, str(error), {}))
+            continue
+        assert isinstance(answer, PredictionArray)
+        parts.append((places, answer))
+    if nan == "raise":
+        _refuse(refused, parts, blocks, shape)
+    return _together(parts, refused, blocks, shape, level, index_of(numbers))
+
+
+def _refuse(
+    refused: Sequence[Refused],
+    parts: Sequence[tuple[NDArray[np.intp], PredictionArray]],
+    blocks: Blocks,
+    shape: tuple[int, ...],
+) -> None:
+    """Refuse the first element that has no answer, and one that falls at rest."""
+    reasons: dict[int, str] = {}
+    for each in refused:
+        reasons |= dict(zip(each.places.tolist(), each.texts().tolist(), strict=True))
+    for places, answer in parts:
+        missing = np.flatnonzero(np.isnan(answer.probability) | (answer.reason == "unstable"))
+        texts = answer.reason[missing].tolist()
+        reasons |= dict(zip(places[missing].tolist(), texts, strict=True))
+    if blocks.unstable is not None:
+        reasons |= dict.fromkeys(blocks.unstable.tolist(), "unstable")
+    if reasons:
+        first = min(reasons)
+        where = tuple(int(i) for i in np.unravel_index(first, shape))
+        raise InputError(f"element {where}: {reasons[first]}")
+
+
+def _of_draws(
+    blocks: Blocks,
+    given: Mapping[str, Any],
+    level: float,
+    weights: ArrayLike,
+    size: int,
+    find: Callable[[Mapping[str, Any], str | None], FragilityModel],
+) -> Prediction | PredictionArray:
+    """Return the one answer over draws of a block, all of which fail in one way."""
+    whole = [group for group in blocks.groups if group.places is not None]
+    if len(whole) != 1 or whole[0].places is None or whole[0].places.size != size:
+        at_rest = 0 if blocks.unstable is None else int(blocks.unstable.size)
+        first = next((f": {each.texts()[0]}" for each in blocks.refused), "")
+        kinds = " and ".join(str(group.kind) for group in whole) or "none"
+        raise InputError(
+            f"the draws of one block are of one kind, and these are of {kinds}"
+            + (f", {at_rest} fall at rest" if at_rest else "")
+            + first
+        )
+    (group,) = whole
+    own = {**group.numbers, **{name: given[name] for name in given if name in MEASURES}}
+    return answer_given(find(own, group.kind), own, level, weights=weights)
+
+
+def _together(
+    parts: Sequence[tuple[NDArray[np.intp], PredictionArray]],
+    refused: Sequence[Refused],
+    blocks: Blocks,
+    shape: tuple[int, ...],
+    level: float,
+    index: Any,
+) -> PredictionArray:
+    """Return the answers of several models as one, in the order of the blocks."""
+    size = int(np.prod(shape))
+    columns: dict[str, Any] = {}
+    for name in _COLUMNS:
+        known = [(at, value) for at, part in parts if (value := getattr(part, name)) is not None]
+        if known or name not in ("unknown_share", "block_sd"):
+            columns[name] = column = np.full(size, np.nan)
+            for at, value in known:
+                column[at] = value
+    in_domain = np.zeros(size, dtype=np.bool_)
+    reasons: list[ReasonPart] = []
+    for at, part in parts:
+        in_domain[at] = part.in_domain
+        reasons += [(at[places], texts) for places, texts in part.reasons.parts]
+    reasons += [(each.places, each.texts) for each in refused]
+    unstable = blocks.unstable
+    if unstable is not None and unstable.size:
+        for name in ("probability", "ci_low", "ci_high", "event_low", "event_high"):
+            columns[name][unstable] = 1.0
+        if "block_sd" in columns:
+            columns["block_sd"][unstable] = 0.0
+        in_domain[unstable] = True
+        reasons.append((unstable, np.full(unstable.size, "unstable", dtype=object)))
+    answers = [part for _, part in parts]
+
+    def named(name: str) -> str:
+        return ", ".join(dict.fromkeys(getattr(part, name) for part in answers))
+
+    notes = dict.fromkeys(note for part in answers for note in part.notes)
+    codes = {"kind_codes": blocks.kinds, "mode_codes": blocks.modes}
+    grid: dict[str, Any] = {n: each.reshape(shape) for n, each in codes.items() if each is not None}
+    return PredictionArray(
+        kind=named("kind"),
+        in_domain=in_domain.reshape(shape),
+        reasons=Reasons(shape, reasons),
+        level=level,
+        model=named("model"),
+        term=named("term"),
+        method=named("method"),
+        notes=(*blocks.remarks, *notes),
+        data=next((part.data for part in answers if part.data), None),
+        index=index if index is not None and shape == (len(index),) else None,
+        **{name: column.reshape(shape) for name, column in columns.items()},
+        **grid,
+    )

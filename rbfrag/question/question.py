@@ -1,0 +1,278 @@
+"""A question about blocks and their shaking, and its answer: `predict`, for every kind of failure.
+
+For a single block neither numpy nor any other library is loaded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
+
+from rbfrag.errors import InputError, UnknownFieldError
+from rbfrag.fragility.lookup import find_model
+from rbfrag.fragility.measures import MEASURES, spectral
+from rbfrag.fragility.prediction import Prediction, answer_given, is_single
+from rbfrag.question.blocks import Blocks, Group, has_shape, one_block
+from rbfrag.question.fields import BlockFields, ShakingFields, V
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from rbfrag.fragility.model import Model
+    from rbfrag.fragility.prediction_array import PredictionArray
+    from rbfrag.fragility.prediction_motion import Polarity
+    from rbfrag.motions.recognise import MotionLike
+    from rbfrag.solver.block.geometry import Block
+
+
+class QuestionOptions(TypedDict, total=False):
+    """What is asked of blocks and their shaking."""
+
+    rotation_deg: float | None
+    model: Model | None
+    level: float
+    db: str | PathLike[str] | None
+    nan: Literal["propagate", "raise"]
+    interval: bool
+    weights: ArrayLike | None
+
+
+class QuestionFields(BlockFields[V], ShakingFields[V], QuestionOptions, total=False):
+    """What :func:`predict` may be asked."""
+
+    block: Block | None
+    back_fracture: bool | None
+    kind: str | None
+    sa_g: Mapping[float, V] | None
+    motion: MotionLike | None
+    polarity: Polarity
+
+
+_NAMES = QuestionFields.__optional_keys__
+_OPTIONS = QuestionOptions.__optional_keys__
+_SINGLE = frozenset({"block", "back_fracture"})
+"""Fields that hold one thing for all blocks."""
+
+
+@overload
+def predict(
+    p2: float | None = ...,
+    kr: float | None = ...,
+    /,
+    **question: Unpack[QuestionFields[float | None]],
+) -> Prediction: ...
+
+
+@overload
+def predict(
+    p2: ArrayLike | None = ...,
+    kr: ArrayLike | None = ...,
+    /,
+    **question: Unpack[QuestionFields[ArrayLike | None]],
+) -> Prediction | PredictionArray: ...
+
+
+def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | PredictionArray:
+    """Return the probability that a block fails, with its confidence interval.
+
+    P = F(eta), with eta and F of the model's method (docs/theory/fragility.md), is the share of
+    such blocks that fail over all earthquakes and sites with these measures. The interval
+    F(eta ± t s) says how well that is known, s being the standard error of eta from the fits that
+    each leave an earthquake out and t Student's quantile for as many earthquakes as tell of this
+    block. The range of one earthquake says what share of such blocks at many sites fails in one
+    single earthquake. Without shaking, and where mechanics forbids failure (k >= PGA, say), P is 0
+    whatever the model says.
+
+    A block is given by p2 and kr (it topples, or rocks if `kind` says so), by ky and displacement_m
+    (it slides further than that), by ks and ps2 (it slumps), or by its shape, dip and friction,
+    which tell how it fails; each is a number or an array. What is given with a standard deviation
+    is the median of what the block may be: P is then the mean over all that, with its interval,
+    and ``block_sd`` how much P differs among them. Strength and size are lognormal, a restitution
+    is normal, cut off at 0 and 1, and all are independent.
+
+    Args:
+        p2: frequency parameter p² of the block [1/s²].
+        kr: its yield acceleration coefficient for toppling at rest [-].
+        question: the fields of block and shaking, and what is asked of them:
+
+            kind: how it fails; None for what shape, dip and friction, or the numbers say.
+            height_m, width_m: sides of a rectangle [m]; or alpha1_deg, alpha3_deg, r3_m; or s1_m,
+                s2_m, gamma_deg; or block, a :class:`rbfrag.Block`.
+            beta_deg: dip of the base, out of the slope positive [deg]; level if not given.
+            phi_deg, phi_back_deg: friction angles of base and back plane [deg]. A rectangle without
+                is taken to topple.
+            back_fracture: False for a block that no plane backs.
+            ky: yield acceleration coefficient of sliding, tan(phi - beta) [-].
+            displacement_m: the displacement down the base that is too far [m].
+            ks: yield acceleration coefficient of slumping [-].
+            ps2: frequency parameter p_s² of slumping at rest [1/s²].
+            rotation_deg: with ks: rotation that counts as failure [deg], of which there must be a
+                model; None for failure past recovery.
+            leaves_g: with ks: acceleration at which the block leaves its back plane [g]: above it
+                the answer warns.
+            restitution: of a block that rocks: speed after an impact over that before it, above 0
+                and up to 1; None for what angular momentum leaves.
+            p2_sigma, kr_sigma, ky_sigma, ks_sigma, ps2_sigma: standard deviations of logarithms.
+            restitution_sigma: standard deviation of the restitution.
+            pgv_m_s: peak ground velocity of the horizontal component [m/s].
+            pga_g: peak ground acceleration [g].
+            tm_s: mean period [s].
+            pgd_m: peak ground displacement [m].
+            sa03_g, sa10_g, sa20_g, sa30_g: spectral accelerations of the horizontal component at
+                5 % damping [g]; or all of them as sa_g, by their period: ``{1.0: 0.4}``.
+            motion: the accelerogram itself or its file, instead of its measures.
+            polarity: ``forward`` or ``reverse`` where it is known how the motion points at the
+                slope; ``both`` gives the mean of the two, which stand beside it (motion only).
+            model: a model, the name of a stored one, or None for the one of the best score that
+                what is given suffices for, or the database's default where no other reads more of
+                the motion.
+            level: confidence level of the interval and of the range of one earthquake, between 0
+                and 1.
+            db: database of the model: a path or SQLAlchemy URL; None for ``RBFRAG_DB``, or else
+                ``rbfrag.db`` in the current folder, or else the reference that is shipped.
+            nan: in arrays, ``propagate`` answers NaN with its reason where the input cannot be
+                used, ``raise`` refuses such arrays.
+            interval: in arrays, False leaves interval and range out (their ends are then NaN),
+                which takes less time.
+            weights: makes the arrays that describe the block draws of one block, of these weights
+                (1: all the same): one answer, over all of them.
+
+    Returns:
+        :class:`Prediction` when every argument is a single number (with `motion` and both
+        polarities :class:`MotionPrediction`), otherwise
+        :class:`~rbfrag.fragility.prediction_array.PredictionArray` of the broadcast shape. In
+        arrays a block that fails at rest has P = 1 and the reason ``unstable``.
+
+    Raises:
+        InputError: a value that cannot be used, measures the model cannot work with, or a shape
+            that is described in part, slides without a displacement or is of another kind.
+        UnknownFieldError: a keyword that is none.
+        UnknownModelError: no model of that name.
+        DatabaseError: the database cannot be read.
+    """
+    if not question.keys() <= _NAMES:
+        raise _unknown(question)
+    given: dict[str, Any] = {} if p2 is None else {"p2": p2}
+    if kr is not None:
+        given["kr"] = kr
+    if not question.keys().isdisjoint(given):
+        raise InputError("p2 and kr come first, or by their names: give each once")
+    options: dict[str, Any] = {}
+    kind, polarity, motion = None, "both", None
+    for name, value in question.items():
+        if name in _OPTIONS:
+            options[name] = value
+        elif value is None:
+            continue
+        elif name == "kind":
+            kind = value
+        elif name == "sa_g":
+            given |= spectral(value)
+        elif name == "motion":
+            motion = value
+        elif name == "polarity":
+            polarity = value
+        else:
+            given[name] = value
+    if motion is not None:
+        return _answer_motion(given, motion, kind, polarity, options)
+    return ask(given, kind=kind, **options)
+
+
+def _unknown(question: Mapping[str, object]) -> UnknownFieldError:
+    from difflib import get_close_matches
+
+    from rbfrag.question.table import field_of
+
+    name = next(name for name in question if name not in _NAMES)
+    stated = field_of(name)
+    near = [stated[0]] if stated else get_close_matches(name, _NAMES, 1)
+    hint = f": did you mean {near[0]}?" if near else "; help(rbfrag.predict) lists them"
+    return UnknownFieldError(f"{name[:60]} is no field of a question{hint}")
+
+
+def described(given: Mapping[str, Any], kind: str | None) -> Blocks:
+    """Return the single block of a question as answers read it; its measures are left aside."""
+    if not has_shape(given):
+        block = {name: value for name, value in given.items() if name not in MEASURES}
+        return Blocks((Group(kind, block),))
+    return one_block({n: value for n, value in given.items() if n not in MEASURES}, kind)
+
+
+def _answer_motion(
+    given: Mapping[str, Any], motion: Any, kind: str | None, polarity: Any, options: dict[str, Any]
+) -> Prediction:
+    from rbfrag.fragility.prediction_motion import predict_motion
+
+    defaults: dict[str, Any] = {"rotation_deg": None, "model": None, "level": 0.95, "db": None}
+    of_arrays = ("nan", "interval")
+    options = defaults | {name: each for name, each in options.items() if name not in of_arrays}
+    measures = {name: value for name, value in given.items() if name in MEASURES}
+    blocks = described(given, kind)
+    group = blocks.groups[0]
+    answer = predict_motion(
+        {**group.numbers, **measures}, motion, kind=group.kind, polarity=polarity, **options
+    )
+    return with_remarks(answer, blocks.remarks)
+
+
+def with_remarks(answer: Prediction, remarks: tuple[str, ...]) -> Prediction:
+    """Return an answer with what is to be said of its block, first."""
+    return replace(answer, warnings=(*remarks, *answer.warnings)) if remarks else answer
+
+
+def ask(
+    given: Mapping[str, Any],
+    *,
+    kind: Any = None,
+    mode: Any = None,
+    rotation_deg: float | None = None,
+    model: Model | None = None,
+    level: float = 0.95,
+    db: str | PathLike[str] | None = None,
+    nan: Literal["propagate", "raise"] = "propagate",
+    interval: bool = True,
+    weights: ArrayLike | None = None,
+    rows: bool = False,
+) -> Prediction | PredictionArray:
+    """Return the answer for blocks and measures by field; see :func:`predict`.
+
+    Args:
+        given: fields of block and shaking: numbers, or arrays that numpy can broadcast.
+        kind: how they fail, for all or one each; None or an empty text for what they say.
+        mode: failure modes that are stated, one each and empty for none; None for none at all.
+        rotation_deg: rotation that counts as failure [deg].
+        model: a model, the name of a stored one, or None.
+        level: confidence level.
+        db: database of the model.
+        nan: what becomes of elements that cannot be used.
+        interval: whether an interval is asked for.
+        weights: of draws of one block.
+        rows: the arrays are columns of a table, which may state more than is needed.
+    """
+    if nan not in ("propagate", "raise"):
+        raise InputError(f"nan = {nan!r}: use 'propagate' or 'raise'")
+    how: dict[str, Any] = {"nan": nan, "interval": interval, "weights": weights}
+    if (kind is None or isinstance(kind, str)) and mode is None and not rows:
+        if not has_shape(given):
+            chosen = find_model(model, given, db, kind=kind, rotation_deg=rotation_deg)
+            return answer_given(chosen, given, level, **how)
+        if all(name in _SINGLE or is_single(value) for name, value in given.items()):
+            blocks = described(given, kind)
+            (group,) = blocks.groups
+            own = {**group.numbers, **{n: given[n] for n in given if n in MEASURES}}
+            chosen = find_model(model, own, db, kind=group.kind, rotation_deg=rotation_deg)
+            answer = answer_given(chosen, own, level, **how)
+            assert isinstance(answer, Prediction)
+            return with_remarks(answer, blocks.remarks)
+    if "block" in given:
+        raise InputError("block is one block: give the fields of many as arrays")
+    # Kept apart so that a single block does not load numpy.
+    from rbfrag.question.answers import ask_many
+
+    return ask_many(
+        given, kind, mode, rows=rows, level=level, **how,
+        find=lambda own, of: find_model(model, own, db, kind=of, rotation_deg=rotation_deg),
+    )  # fmt: skip

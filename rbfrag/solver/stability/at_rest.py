@@ -1,0 +1,121 @@
+"""What predictions read of blocks that slump, and of blocks that stand free, as they rest.
+
+Formulas for single numbers and for arrays; no numpy is loaded for a single number.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.solver.block.formulas import Elementwise, N
+
+
+def slump_at_rest(
+    *,
+    alpha1_deg: N,
+    alpha3_deg: N,
+    gamma_deg: N,
+    r1_m: N,
+    r3_m: N,
+    beta_deg: N,
+    phi_deg: N,
+    phi_back_deg: N,
+    functions: Elementwise[N],
+    trigonometry: Any,
+) -> tuple[N, N]:
+    """Return p_s² of parallelograms at rest [1/s²], and k_h at which a contact opens [g].
+
+    p_s² = g (F_y cos β - F_x sin β)/D with the contact forces of a slump that starts
+    (docs/theory/slumping.md); NaN where there is none. The acceleration is infinite where k_h opens
+    no contact.
+
+    Args:
+        alpha1_deg: angle of the heel [deg].
+        alpha3_deg: angle of the toe [deg].
+        gamma_deg: dip of the back plane less dip of the base [deg].
+        r1_m: distance from centroid to heel [m].
+        r3_m: distance from centroid to toe [m].
+        beta_deg: dip of the base [deg].
+        phi_deg: friction angle of the base [deg].
+        phi_back_deg: friction angle of the back plane [deg].
+        functions: the functions for this kind of number.
+        trigonometry: what has its ``sin``, ``cos`` and ``radians``: math, or numpy.
+    """
+    where, sin, cos = functions.where, trigonometry.sin, trigonometry.cos
+    a1, a3, gamma, beta, phi1, phi2 = (
+        trigonometry.radians(angle)
+        for angle in (alpha1_deg, alpha3_deg, gamma_deg, beta_deg, phi_deg, phi_back_deg)
+    )
+    # L_h, A, B, F, C' and D of docs/theory/slumping.md at rest, in this order
+    back_edge = 2.0 * r1_m * cos(a1) / sin(gamma)
+    on_base = r3_m * sin(a3 + gamma - phi2)
+    on_back = r1_m * sin(a1 - phi1)
+    force_x = -on_base * sin(phi1) + on_back * sin(gamma - phi2)
+    force_y = on_base * cos(phi1) + on_back * cos(gamma - phi2)
+    path_x = back_edge / sin(gamma) - r1_m * cos(a1)
+    path_y = -r1_m * sin(a1)
+    inertia_m2 = (r1_m * r1_m + r3_m * r3_m) / 6.0
+    inertia = force_y * path_x - force_x * path_y + inertia_m2 * sin(gamma + phi1 - phi2)
+    pull = STANDARD_GRAVITY_M_S2 * (force_y * cos(beta) - force_x * sin(beta))
+    turns = (inertia > 0.0) & (pull > 0.0)
+    p2: Any = where(turns, pull / where(turns, inertia, 1.0), math.nan)
+    # each contact force times D is its lever across the acceleration (`two_contacts`)
+    levers = (
+        (sin(gamma - phi2) * inertia_m2 + path_x * on_base,
+         cos(gamma - phi2) * inertia_m2 + path_y * on_base),
+        (path_x * on_back + sin(phi1) * inertia_m2, path_y * on_back - cos(phi1) * inertia_m2),
+    )  # fmt: skip
+    opens: Any = math.inf
+    for x, y in levers:
+        # a force that k_h only strengthens opens no contact
+        falls = x * sin(beta) - y * cos(beta)
+        own = (x * cos(beta) + y * sin(beta)) / where(falls > 0.0, falls, 1.0)
+        opens = where((falls > 0.0) & (own < opens), own, opens)
+    return p2, opens
+
+
+def rocking_at_rest(
+    *,
+    tan_alpha1: N,
+    tan_alpha3: N,
+    half_s1_m: N,
+    inertia_m2: N,
+    tan_beta: N,
+    functions: Elementwise[N],
+) -> tuple[N, N, N, N, N]:
+    """Return k_r of both senses, forward and backward; p² and restitution; 90° less what is left.
+
+    Predictions are about symmetric blocks on level ground: of another block, about the one that is
+    as weak as its weaker sense, whose p² [1/s²] is returned, and loses as much speed in two
+    impacts, √(e31 e13) (Housner 1963).
+
+    Args:
+        tan_alpha1: tangent of the angle of the heel.
+        tan_alpha3: tangent of the angle of the toe.
+        half_s1_m: height of the centroid above the base, normal to it [m].
+        inertia_m2: moment of inertia about the centroid per mass [m²].
+        tan_beta: tangent of the dip of the base.
+        functions: the functions for this kind of number.
+
+    Returns:
+        k_r about the toe and about the heel, at most 0 for a block that falls over it; p² of the
+        weaker of the two; the restitution; and the least cosine of both critical angles up to a
+        positive factor, at most 0 where one is 90° or more.
+    """
+    where, sqrt = functions.where, functions.sqrt
+    steep = 1.0 + tan_alpha3 * tan_beta, 1.0 + tan_alpha1 * tan_beta
+    least = where(steep[0] < steep[1], steep[0], steep[1])
+    forward = (tan_alpha3 - tan_beta) / where(steep[0] > 0.0, steep[0], 1.0)
+    backward = (tan_beta - tan_alpha1) / where(steep[1] > 0.0, steep[1], 1.0)
+    square = half_s1_m * half_s1_m
+    toe2, heel2 = (square * (1.0 + t * t) for t in (tan_alpha3, tan_alpha1))
+    # moments of inertia about the corners, per mass: I_i = I_C + r_i²
+    about_toe, about_heel = inertia_m2 + toe2, inertia_m2 + heel2
+    per_moment = where(forward <= backward, sqrt(toe2) / about_toe, sqrt(heel2) / about_heel)
+    # I_C + r1·r3, the angular momentum about the corner that takes over, over the speed before:
+    # it is the same after the impact, whose force passes through that corner
+    kept = inertia_m2 + square * (1.0 + tan_alpha1 * tan_alpha3)
+    restitution = where(kept > 0.0, kept, 0.0) / sqrt(about_toe * about_heel)
+    return forward, backward, STANDARD_GRAVITY_M_S2 * per_moment, restitution, least
