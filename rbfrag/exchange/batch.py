@@ -13,17 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, foreign_reasons
-from rbfrag.exchange.block_table import (
-    BLOCK_COLUMNS,
-    FRICTION,
-    NUMBERS,
-    RECTANGLE,
-    is_of_rectangles,
-    rectangle_columns,
-    rectangle_reasons,
-    sliding_reasons,
-)
+from rbfrag.exchange.block_rows import PLACE, PORTFOLIO
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
 from rbfrag.exchange.tables.files import (
     place_word,
@@ -34,21 +24,18 @@ from rbfrag.exchange.tables.files import (
 )
 from rbfrag.exchange.tables.parts import Part, cells_of
 from rbfrag.files import reading, written_whole
-from rbfrag.fragility.lookup import block_of, find_model
+from rbfrag.fragility.lookup import block_of
 from rbfrag.fragility.measures import STATED
-from rbfrag.fragility.methods import TOPPLING_BLOCK, methods
-from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
+from rbfrag.question.blocks import SHAPES, kinds_by_numbers
+from rbfrag.question.fields import BlockFields, column_of
+from rbfrag.question.question import ask
 from rbfrag.question.table import Header, Numeric, columns_in
-from rbfrag.solver.kinds import facts_of
-
-FloatArray = NDArray[np.float64]
 
 NUMBERS_OF_ANSWERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
 
-ANSWERS = (*NUMBERS_OF_ANSWERS, "in_domain", "reason")
+ANSWERS = ("kind", "mode", *NUMBERS_OF_ANSWERS, "in_domain", "reason")
 """The columns that are appended; a table that has them gets new ones."""
 
 NAMES = ("block_id", "site_id")
@@ -58,14 +45,10 @@ KEPT = (*NAMES, *PLACE, *PORTFOLIO)
 OF_UNCERTAIN = "block_sd"
 """The column that is appended too where blocks are uncertain."""
 
-DEVIATIONS = tuple(sorted({sigma for method in methods() for sigma in method.block.sigmas}))
-"""Columns of standard deviations of blocks of any kind, of which an empty cell is 0."""
+FIELDS = {column_of(name): name for name in (*BlockFields.__optional_keys__, *STATED)}
+"""The fields of numbers that may be read, by what written tables call them."""
 
-_OR_SIDES = dict.fromkeys(("p2_1_s2", "kr"), ", nor height_m and width_m")
-"""What a table of toppling blocks may have instead of a column."""
-
-READ = (*BLOCK_COLUMNS, *DEVIATIONS, *RECTANGLE, FRICTION, *STATED)
-"""Columns of numbers that may be read, by what written tables call them."""
+READ = (*FIELDS,)
 
 NUMERIC = Numeric(READ)
 """The same, whatever a table calls them."""
@@ -112,21 +95,16 @@ def predict_table(
             answered.
     """
     origin, goal = table_source(source), table_path(target)
+    question = {"rotation_deg": rotation_deg, "model": model, "level": level, "db": db}
     if origin.exists() and goal.exists() and origin.samefile(goal):
         raise InputError(f"--out {goal} is the table itself: name another file")
     try:
         with reading(origin, "a block table"), ExitStack() as stack:
             header, parts, dialect = table_parts(origin, NUMERIC, stack, fast=True)
             stated = columns_in(header, origin, (*READ, *TEXTS, *NAMES))
-            names = _columns(origin, header, stated, given, kind)
-            known = [*_known_names(names), *given]
-            remarks = (
-                *stated.remarks,
-                *stated.unread(header, (*names, *TEXTS, *KEPT, *ANSWERS, OF_UNCERTAIN)),
-            )
-            chosen = find_model(model, known, db, kind=kind, rotation_deg=rotation_deg)
+            names = _fields(origin, header, stated, given, kind)
             partial = stack.enter_context(written_whole(goal))
-            uncertain = not set(known).isdisjoint(DEVIATIONS)
+            uncertain = any(name.endswith("_sigma") for name in (*names.values(), *given))
             answers = (*ANSWERS, OF_UNCERTAIN) if uncertain else ANSWERS
             kept = [name for name in header if name not in (*ANSWERS, OF_UNCERTAIN)]
             write = table_writer(
@@ -135,8 +113,9 @@ def predict_table(
             counts = np.zeros(3, dtype=np.int64)
             formulas: list[str] = []
             refused: dict[str, str] = {}
+            chosen = _Chosen()
             for part in parts:
-                answer = _answer(part, stated, names, given, chosen, level)
+                answer = _answer(part, stated, names, given, kind, question, chosen)
                 cells = {
                     name: cells
                     for name, cells in part.cells.items()
@@ -157,6 +136,8 @@ def predict_table(
                 raise InputError(f"{origin}: there is no block in the file")
             if not answered:
                 refuse(str(origin), [*refused], [*refused.values()], rows)
+            read = {column for column, name in names.items() if name in {*chosen.read, *STATED}}
+            unread = stated.unread(header, (*read, *TEXTS, *KEPT, *ANSWERS, OF_UNCERTAIN))
     except csv.Error as error:
         raise InputError(f"{origin}: not a CSV file: {error}") from None
     unusable = unusable_in_words(rows - answered, rows, [*refused], [*refused.values()])
@@ -165,63 +146,59 @@ def predict_table(
         "answered": answered,
         "without_answer": rows - answered,
         "in_domain": inside,
-        "kind": chosen.kind,
-        "model": chosen.name,
-        "term": chosen.term.name,
-        "method": chosen.row.method,
-        "warnings": [*remarks, *chosen.notes, *unusable, *formulas],
+        **{name: ", ".join(each) for name, each in chosen.words.items()},
+        "warnings": [*stated.remarks, *unread, *chosen.notes, *unusable, *formulas],
     }
 
 
-def _columns(
+class _Chosen:
+    """What answered, over all parts of a table.
+
+    Attributes:
+        words: kinds, models, terms and methods.
+        notes: what is to be said of the whole answer.
+        read: fields of the blocks that it depends on.
+    """
+
+    def __init__(self) -> None:
+        self.words: dict[str, dict[str, None]] = {
+            name: {} for name in ("kind", "model", "term", "method")
+        }
+        self.notes: dict[str, None] = {}
+        self.read: set[str] = set()
+
+    def add(self, answer: PredictionArray) -> None:
+        for name, known in self.words.items():
+            known.update(dict.fromkeys(filter(None, getattr(answer, name).split(", "))))
+        self.notes.update(dict.fromkeys(answer.notes))
+        self.read |= answer.read
+
+
+def _fields(
     origin: PathLike[str],
     header: list[str],
     stated: Header,
     given: Mapping[str, float],
     kind: str | None,
 ) -> dict[str, str]:
-    """Return what each column of numbers is called in `predict`."""
-    have = stated.columns
-    # a dip says what else is said, not how the block fails
-    numbers = [BLOCK_COLUMNS.get(name, "") for name in have if name not in RECTANGLE]
-    block = block_of([*numbers, *given], kind)
-    rectangles = (
-        block.names == TOPPLING_BLOCK.names
-        and is_of_rectangles(have)
-        and not {*block.names}.intersection(given)
-    )
-    columns = (
-        {name: name for name in (*RECTANGLE, FRICTION, *block.options)}
-        if rectangles
-        else {
-            column: name
-            for column, name in BLOCK_COLUMNS.items()
-            if name in (*block.names, *block.options)
-        }
-    )
-    for column, name in columns.items():
-        if name in block.names and name not in given and column not in have:
-            raise InputError(
-                f"{origin}: there is no column {column}{_OR_SIDES.get(column, '')}; the columns "
-                f"are {', '.join(header) or 'none'}"
-            )
+    """Return the fields that columns of numbers state, by what written tables call them."""
     doubled = [name for name in header if name and header.count(name) > 1]
     if doubled:
         raise InputError(f"{origin}: the column {doubled[0]} is there twice")
-    columns |= {name: name for name in (*block.sigmas, *STATED)}
-    present = {column: name for column, name in columns.items() if column in have}
-    for column, name in present.items():
+    names = {column: name for column, name in FIELDS.items() if column in stated.columns}
+    for column, name in names.items():
         if name in given:
             raise InputError(f"{column} is an option and a column of {origin}: give it once")
-    return present
-
-
-def _known_names(names: Mapping[str, str]) -> list[str]:
-    """Return what is known of blocks and motions, rectangles by their numbers."""
-    if "height_m" not in names:
-        return list(names.values())
-    measures = (name for name in names.values() if name not in (*RECTANGLE, FRICTION))
-    return [*(BLOCK_COLUMNS[name] for name in NUMBERS), *measures]
+    known = {*names.values(), *given}
+    if not kinds_by_numbers(known) and not any(known.issuperset(shape) for shape in SHAPES):
+        block = block_of(known, kind)
+        missing = next(name for name in block.names if name not in known)
+        sides = ", nor height_m and width_m" if "kr" in block.names else ""
+        raise InputError(
+            f"{origin}: there is no column {column_of(missing)}{sides}; the columns are "
+            f"{', '.join(header) or 'none'}"
+        )
+    return names
 
 
 def _answer(
@@ -229,8 +206,9 @@ def _answer(
     stated: Header,
     names: Mapping[str, str],
     given: Mapping[str, float],
-    model: FragilityModel,
-    level: float,
+    kind: str | None,
+    question: Mapping[str, Any],
+    chosen: _Chosen,
 ) -> dict[str, NDArray[Any]]:
     values: dict[str, NDArray[Any]] = {}
     faults = dict(part.faults)
@@ -238,32 +216,29 @@ def _answer(
         header, factor = stated.columns[column]
         cells, others = part.numbers(header)
         values[name] = cells * factor
+        if name.endswith("_sigma"):
+            values[name] = np.nan_to_num(values[name], nan=0.0, posinf=np.inf)
         faults = others | faults
-    if "height_m" in values:
-        free_standing = facts_of(model.kind).free_standing
-        faults = rectangle_reasons(values) | sliding_reasons(values, model.kind) | faults
-        numbers_of = rectangle_columns(values, free_standing=free_standing)
-        others_of = (*RECTANGLE, FRICTION)
-        values = {name: value for name, value in values.items() if name not in others_of}
-        for column, value in numbers_of.items():
-            name = BLOCK_COLUMNS[column]
-            own = values.get(name, np.nan)
-            values[name] = np.where(np.isnan(own), value, own)
-    values = model.method.block.filled(values)
-    for name in set(DEVIATIONS).intersection(values):
-        values[name] = np.nan_to_num(values[name], nan=0.0, posinf=np.inf)
-    predicted = answer_given(model, {**values, **given}, level)
-    assert isinstance(predicted, PredictionArray)
-    answer: dict[str, NDArray[Any]] = {name: getattr(predicted, name) for name in ANSWERS}
-    answer[OF_UNCERTAIN] = np.zeros(predicted.probability.shape)
-    if predicted.block_sd is not None:
-        answer[OF_UNCERTAIN] = predicted.block_sd
     texts = {
-        name: cells_of(part.cells[stated.columns[name].header])
+        name: [str(cell).strip() for cell in cells_of(part.cells[stated.columns[name].header])]
         for name in TEXTS
         if name in stated.columns
     }
-    faults |= foreign_reasons(texts, model.kind)
+    kinds: Any = texts.get("kind", kind)
+    if kind is not None and "kind" in texts:
+        kinds = [each or kind for each in texts["kind"]]
+    predicted = ask({**values, **given}, kind=kinds, mode=texts.get("mode"), rows=True, **question)
+    assert isinstance(predicted, PredictionArray)
+    chosen.add(predicted)
+    answer: dict[str, NDArray[Any]] = {
+        name: getattr(predicted, name) for name in ANSWERS if name not in TEXTS
+    }
+    for name, each in (("kind", predicted.kinds), ("mode", predicted.modes)):
+        own = np.array(texts.get(name, [""] * each.size), dtype=object)
+        answer[name] = np.where(each == "", own, each)
+    answer[OF_UNCERTAIN] = np.zeros(predicted.probability.shape)
+    if predicted.block_sd is not None:
+        answer[OF_UNCERTAIN] = predicted.block_sd
     bad = [*faults]
     for name in (*NUMBERS_OF_ANSWERS, OF_UNCERTAIN):
         answer[name][bad] = np.nan

@@ -81,6 +81,7 @@ class PredictionArray(Tabular):
         kind_codes: kind of each element, a place among all kinds, -1 for none; None where all are
             of one kind.
         mode_codes: failure mode of each, a place among all modes, -1 where it is not known.
+        read: fields of the blocks that the answer depends on, where some stated more.
     """
 
     kind: str
@@ -104,6 +105,7 @@ class PredictionArray(Tabular):
     index: pd.Index | None = None
     kind_codes: NDArray[np.int8] | None = None
     mode_codes: NDArray[np.int8] | None = None
+    read: frozenset[str] = frozenset()
 
     @property
     def kinds(self) -> NDArray[np.object_]:
@@ -140,7 +142,7 @@ class PredictionArray(Tabular):
         """Return the columns by name; arrays are flat."""
         columns = super().table_columns()
         kinds = {"kind": self.kinds.ravel(), "mode": self.modes.ravel()}
-        others = {name: each for name, each in columns.items() if not name.endswith("_codes")}
+        others = {n: each for n, each in columns.items() if not n.endswith("_codes")}
         return {**others, **kinds, "reason": self.reason.ravel()}
 
     def to_frame(self) -> pd.DataFrame:

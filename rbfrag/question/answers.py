@@ -181,5 +181,6 @@ def _together(
         data=next((part.data for part in answers if part.data), None),
         index=index if index is not None and shape == (len(index),) else None,
         **{name: column.reshape(shape) for name, column in columns.items()},
+        read=blocks.read,
         **grid,
     )

@@ -139,6 +139,15 @@ def has_shape(given: Collection[str]) -> bool:
     return any(name in given for name in OF_A_SHAPE)
 
 
+def kinds_by_numbers(given: Collection[str]) -> list[KindFacts]:
+    """Return the kinds of which names of fields have all numbers."""
+    return [
+        facts
+        for facts in KINDS.values()
+        if facts.parameters and all(name in given for name in facts.parameters)
+    ]
+
+
 def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
     """Return the fields of the shape that is stated; None where none is.
 
@@ -546,7 +555,7 @@ class _Sorted:
             if whole:
                 return whole[0]
             begun = any(name in self.given for names in SHAPES for name in names)
-            return shape_among(self.given) if begun and not self._kinds_stated() else None
+            return shape_among(self.given) if begun and not kinds_by_numbers(self.given) else None
         shape = shape_among({*self.given, *(() if self.backed else ("back_fracture",))})
         if shape is not None and numbers:
             raise InputError(
@@ -555,17 +564,10 @@ class _Sorted:
             )
         return shape
 
-    def _kinds_stated(self) -> list[KindFacts]:
-        """Return the kinds of which all numbers are stated, those of most numbers first."""
-        return [
-            facts for facts in KINDS.values()
-            if facts.parameters and all(name in self.given for name in facts.parameters)
-        ]  # fmt: skip
-
     def _complete(self) -> Any:
         """Return which blocks have all numbers of a kind."""
         complete = self.np.zeros(self.size, dtype=self.np.bool_)
-        for facts in self._kinds_stated():
+        for facts in kinds_by_numbers(self.given):
             complete |= self._known(facts.parameters)
         return complete
 
@@ -581,7 +583,7 @@ class _Sorted:
         first = block_of(list(self.given)).kind
         unsaid = self.kinds < 0
         if unsaid.any():
-            for facts in self._kinds_stated():
+            for facts in kinds_by_numbers(self.given):
                 kind = block_of([name for name in self.given if name in _numbers_of(facts)]).kind
                 here = unsaid & self._known(facts.parameters)
                 self.kinds[here & (self.kinds < 0)] = _codes()[kind]
@@ -593,14 +595,16 @@ class _Sorted:
             if not facts.parameters:
                 self.refuse(here, NO_MODEL, kind=facts.kind)
                 continue
+            self.modes[here] = MODES.index(facts.mode) if facts.mode else -1
             missing = [name for name in facts.parameters if name not in self.given]
             if missing:
+                whole = " and ".join(facts.parameters)
                 self.refuse(
-                    here, f"{missing[0]} is missing: a block of kind {facts.kind} is given by "
-                    f"{' and '.join(facts.parameters)}",
-                )  # fmt: skip
+                    here,
+                    f"the block's mode is {words_of_mode(facts.mode or '')}, and {missing[0]} is "
+                    f"missing: a block of kind {facts.kind} is given by {whole}",
+                )
                 continue
-            self.modes[here] = MODES.index(facts.mode) if facts.mode else -1
             numbers = {name: self.given[name] for name in _numbers_of(facts) if name in self.given}
             self.read |= numbers.keys()
             self.group(facts, here, {name: _at(value, here) for name, value in numbers.items()})

@@ -61,7 +61,7 @@ def test_rows_are_answered_or_say_why_not(answer: Answer, tmp_path: Path) -> Non
     expected = predict(3.0, 0.1, pgv_m_s=0.6, db=str(tmp_path / "model.db"))
     assert float(first["probability"]) == pytest.approx(expected.probability, rel=1e-12)
     assert float(first["ci_low"]) == pytest.approx(expected.ci_low, rel=1e-12)
-    assert [*first][-7:] == [*ANSWERS]
+    assert [*first][-9:] == [*ANSWERS]
     for name in ("event_low", "event_high"):
         assert float(first[name]) == pytest.approx(getattr(expected, name), rel=1e-12)
     assert second["event_low"] == ""
@@ -203,11 +203,12 @@ def test_tables_of_blocks_that_slide_or_slump(tmp_path: Path) -> None:
     given = {"displacement_m": 0.05, "pgv_m_s": 0.4, "pga_g": 0.5}
     told = predict_table(source, target, given=given, model=None, level=0.95, db=str(REFERENCE))
     assert (told["kind"], told["rows"], told["answered"]) == ("sliding", 3, 2)
+    assert [row["kind"] for row in rows_of(target)] == ["sliding", "sliding", "toppling"]
     first, second, third = rows_of(target)
     expected = predict(ky=0.1, beta_deg=10.0, **given, db=str(REFERENCE))
     assert float(first["probability"]) == pytest.approx(expected.probability, rel=1e-12)
     assert (second["probability"], second["reason"]) == ("1", "unstable")
-    assert "mode is topple: the sliding model" in third["reason"]
+    assert "mode is topple, and p2 is missing" in third["reason"]
     source.write_text("ks,ps2_1_s2,pgv_m_s\n0.1,3,0.5\n")
     told = predict_table(
         source, target, given={}, model=None, level=0.95, db=str(REFERENCE), rotation_deg=2.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import pytest
@@ -70,14 +71,16 @@ def test_other_columns_are_named_loudly_where_they_sound_like_input() -> None:
     assert quiet == "not read: note"
 
 
-def answered(tmp_path: Path, text: str, **given: float) -> tuple[list[list[str]], tuple[str, ...]]:
+def answered(
+    tmp_path: Path, text: str, **given: float
+) -> tuple[list[dict[str, str]], tuple[str, ...]]:
     source, target = tmp_path / "blocks.csv", tmp_path / "answers.csv"
     source.write_text(text)
     told = predict_table(source, target, given=given, model=None, level=0.95, db=None)
     warnings = told["warnings"]
     assert isinstance(warnings, list)
-    rows = [line.split(",") for line in target.read_text().splitlines()]
-    return rows, tuple(warnings)
+    with target.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file)), tuple(warnings)
 
 
 @pytest.mark.parametrize("dip", ["dip", "dip_deg", "beta", "Dip (deg)", "beta_deg"])
@@ -86,13 +89,13 @@ def test_a_dip_weakens_a_rectangle_whatever_its_column_is_called(tmp_path: Path,
     block = Block.rectangle(2.0, 0.4)
     kr = stability(block, beta_deg=10.0, phi_deg=45.0).kr
     alone = predict(block.p2, kr, pgv_m_s=0.8)
-    assert float(rows[1][4]) == pytest.approx(alone.probability, rel=1e-12)
+    assert float(rows[0]["probability"]) == pytest.approx(alone.probability, rel=1e-12)
 
 
 def test_units_in_headers_are_converted_and_said(tmp_path: Path) -> None:
     plain, _ = answered(tmp_path, "height_m,width_m,pgv_m_s\n2,0.4,0.8\n")
     rows, warnings = answered(tmp_path, "H (cm),W [mm],PGV [cm/s]\n200,400,80\n")
-    assert float(rows[1][3]) == pytest.approx(float(plain[1][3]), rel=1e-12)
+    assert float(rows[0]["probability"]) == pytest.approx(float(plain[0]["probability"]), rel=1e-12)
     assert sum("is converted" in text for text in warnings) == 3
 
 
@@ -101,13 +104,14 @@ def test_a_rectangle_that_slides_is_never_answered_as_one_that_topples(tmp_path:
         tmp_path,
         "height_m,width_m,dip,phi,pgv_m_s\n2.5,2.5,20,32,0.5\n2,0.4,0,40,0.8\n1,1,40,30,0.5\n",
     )
-    assert rows[1][5] == ""
-    assert "slides (yield 0.21 g)" in ",".join(rows[1])
+    first, second, third = rows
+    assert first["probability"] == ""
+    assert "slides (yield 0.21 g): state displacement_m" in first["reason"]
+    assert [row["mode"] for row in rows] == ["slide", "topple", "slide"]
     assert stability(Block.rectangle(2.5, 2.5), beta_deg=20.0, phi_deg=32.0).mode == "slide"
-    assert float(rows[2][5]) > 0.0
+    assert float(second["probability"]) > 0.0
     # it slides at rest
-    assert rows[3][5] == "1"
-    assert rows[3][-1] == '"unstable"'
+    assert (third["probability"], third["reason"]) == ("1", "unstable")
 
 
 @pytest.mark.parametrize("width", [0.2, 0.8, 1.678, 1.679, 1.9])
