@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import PLACE, PORTFOLIO
+from rbfrag.exchange.block_table import BLOCK_FIELDS
 from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
 from rbfrag.exchange.tables.files import (
     place_word,
@@ -29,7 +30,7 @@ from rbfrag.fragility.measures import STATED
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
 from rbfrag.question.blocks import SHAPES, kinds_by_numbers
-from rbfrag.question.fields import BlockFields, column_of
+from rbfrag.question.fields import column_of
 from rbfrag.question.question import ask
 from rbfrag.question.table import Header, Numeric, columns_in
 
@@ -45,7 +46,7 @@ KEPT = (*NAMES, *PLACE, *PORTFOLIO)
 OF_UNCERTAIN = "block_sd"
 """The column that is appended too where blocks are uncertain."""
 
-FIELDS = {column_of(name): name for name in (*BlockFields.__optional_keys__, *STATED)}
+FIELDS = {**BLOCK_FIELDS, **{column_of(name): name for name in STATED}}
 """The fields of numbers that may be read, by what written tables call them."""
 
 READ = (*FIELDS,)

@@ -9,18 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_table import (
-    BLOCK_COLUMNS,
-    FRICTION,
-    RECTANGLE,
-    is_of_rectangles,
-    read_columns,
-    rectangle_columns,
-    sliding_reasons,
-)
-from rbfrag.fragility.methods import TOPPLING_BLOCK
+from rbfrag.exchange.block_table import BLOCK_FIELDS, read_columns
+from rbfrag.question.blocks import has_shape, many_blocks
 
 FloatArray = NDArray[np.float64]
+
+_COLUMNS = tuple(column for column in BLOCK_FIELDS if not column.endswith("_sigma"))
 
 
 def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], FloatArray]:
@@ -34,19 +28,12 @@ def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], Flo
         InputError: the file cannot be read, describes no block, or weights that are none.
         MissingExtraError: a Parquet file without pyarrow.
     """
-    columns: dict[str, Any] = read_columns(
-        path, (), optional=(*BLOCK_COLUMNS, *RECTANGLE, FRICTION, "weight")
-    )
+    columns: dict[str, Any] = read_columns(path, (), optional=(*_COLUMNS, "weight"))
     weight = columns.pop("weight", None)
-    if is_of_rectangles(columns):
-        for i, reason in sliding_reasons(columns, TOPPLING_BLOCK.kind).items():
-            raise InputError(f"{path}: draw {i + 1}: {reason}")
-        columns |= rectangle_columns(columns)
-        columns.pop("dip_deg", None)
     drawn = {
-        name: columns[column]
-        for column, name in BLOCK_COLUMNS.items()
-        if column in columns and not np.isnan(columns[column]).all()
+        BLOCK_FIELDS[column]: values
+        for column, values in columns.items()
+        if not np.isnan(values).all()
     }
     if not drawn:
         raise InputError(
@@ -54,4 +41,12 @@ def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], Flo
             "columns of another kind"
         )
     size = next(iter(drawn.values())).size
+    if has_shape(drawn):
+        blocks = many_blocks(drawn, size, rows=True)
+        for each in (*blocks.refused, *blocks.unstable):
+            raise InputError(f"{path}: draw {each.places[0] + 1}: {each.texts()[0]}")
+        if len(blocks.groups) > 1:
+            kinds = " and ".join(str(group.kind) for group in blocks.groups)
+            raise InputError(f"{path}: the draws of one block are of one kind, and these: {kinds}")
+        drawn = {n: np.broadcast_to(v, (size,)) for n, v in blocks.groups[0].numbers.items()}
     return drawn, np.ones(size) if weight is None else weight

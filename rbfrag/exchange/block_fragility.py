@@ -17,7 +17,6 @@ from rbfrag.fragility.model import Model
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.measure_type import IntensityType
-from rbfrag.hazards.site_probability import described
 
 FloatArray = NDArray[np.float64]
 
@@ -119,7 +118,8 @@ def probabilities_over(
     if measure not in _TYPES:
         raise InputError(f"measure = {measure!r}: use one of {', '.join(_TYPES)}")
     chosen = find_model(model, ("p2", "kr", measure), db, kind=kind)
-    columns = described(chosen, p2, kr, restitution)
+    stated = {} if restitution is None else {"restitution": restitution}
+    columns = chosen.method.block.filled({"p2": p2, "kr": kr, **stated})
 
     def rows() -> Iterator[FloatArray]:
         for start in range(0, p2.size, _CHUNK):

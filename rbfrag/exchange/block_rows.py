@@ -5,29 +5,20 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import partial
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_table import (
-    BLOCK_COLUMNS,
-    FRICTION,
-    NUMBERS,
-    RECTANGLE,
-    SIGMAS,
-    is_of_rectangles,
-    read_cells,
-    rectangle_columns,
-    rectangle_reasons,
-    sliding_reasons,
-)
+from rbfrag.exchange.block_table import BLOCK_FIELDS, read_cells
 from rbfrag.files import as_path
-from rbfrag.fragility.lookup import block_of
 from rbfrag.fragility.methods import TOPPLING_BLOCK
-from rbfrag.fragility.unusable import block_reasons, refuse, unusable_in_words
+from rbfrag.fragility.unusable import refuse, unusable_in_words
+from rbfrag.question.answers import block_reasons_of
+from rbfrag.question.blocks import NUMBERS, OF_A_SHAPE, SHAPES, kinds_by_numbers, many_blocks
+from rbfrag.question.fields import column_of
 from rbfrag.solver.kinds import KINDS, facts_of
 
 Columns = Mapping[str, NDArray[Any]]
@@ -41,8 +32,11 @@ TEXTS = ("block_id", "site_id", "kind", "mode")
 PORTFOLIO = ("count", "weight", "loss", "loss_sigma")
 """Columns of how many like blocks a row is, what a failure counts and costs, and its scatter."""
 
-IF_EMPTY = {**dict.fromkeys((*SIGMAS, "loss_sigma"), 0.0), "count": 1.0, "weight": 1.0}
+IF_EMPTY = {"loss_sigma": 0.0, "count": 1.0, "weight": 1.0}
 """What an empty cell of a column stands for."""
+
+_SIDES = frozenset(OF_A_SHAPE)
+"""Fields that answers do not read but by the numbers of a block."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,19 +183,26 @@ def read_blocks(
     *,
     reads: Collection[str] = (*PLACE, *PORTFOLIO),
     one_kind: bool = False,
+    only: Collection[str] = (),
+    for_all: Mapping[str, float] | None = None,
 ) -> BlockRows:
     """Return the blocks of a table, and its rows that cannot be used, each with its reason.
 
     Args:
-        source: file (.csv, .xlsx, .parquet), GeoJSON, or columns by name, with ``p2_1_s2`` [1/s²]
-            and ``kr``, or ``height_m`` and ``width_m`` (and ``dip_deg``); and, if it has them,
-            ``block_id``, ``site_id``, ``kind``, ``mode``, ``restitution``, ``p2_sigma``,
-            ``kr_sigma`` and the columns that are read.
-        kind: kind of the rows that state none, None for toppling; of a free-standing kind
-            rectangles are not backed by a slope.
+        source: file (.csv, .xlsx, .parquet), GeoJSON, or columns by name: fields of blocks under
+            any of their names, by numbers or by shape, dip and friction; and, if it has them,
+            ``block_id``, ``site_id``, ``kind``, ``mode`` and the columns that are read.
+        kind: kind of the rows that state none; None for what they are given by.
         reads: which of ``lon`` and ``lat`` [deg], ``weight``, ``count``, ``loss`` and
             ``loss_sigma`` the answer needs; what is wrong with others is no concern.
-        one_kind: all are answered as of that kind: rows that state another cannot be used.
+        one_kind: all are answered as of one kind, that which is named, or else that of most rows:
+            others cannot be used.
+        only: numbers that the answer reads of a block; () for those of every kind.
+        for_all: fields that are stated of all blocks; a cell goes before.
+
+    Returns:
+        The blocks, by the columns of the numbers that their kinds read, NaN where a kind does not,
+        and ``kind``.
 
     Raises:
         InputError: the file cannot be read, or no row of it can be used.
@@ -209,111 +210,100 @@ def read_blocks(
     """
     if isinstance(source, BlockRows):
         return source
+    if kind is not None:
+        facts_of(kind)  # refuses a kind that there is not
     name = "blocks"
     if not hasattr(source, "items"):
         source = as_path(source, "blocks", "a table of blocks")
         name = str(source)
-    cells = read_cells(
-        source,
-        (*NUMBERS, *SIGMAS, *RECTANGLE, FRICTION, "restitution", *reads),
-        TEXTS,
-    )
+    cells = read_cells(source, (*BLOCK_FIELDS, *reads), TEXTS)
     columns, size = cells.columns, len(cells.lines)
-    rectangles = is_of_rectangles(columns)
-    read = {*columns} if rectangles else {*columns} - {*RECTANGLE, FRICTION}
-    remarks = (
-        *cells.stated.remarks,
-        *cells.stated.unread(cells.header, (*read, *TEXTS, *PLACE, *PORTFOLIO, "reason")),
-    )
+    values = {f: columns.pop(c) for c, f in BLOCK_FIELDS.items() if c in columns}
+    for field in values:
+        if field.endswith("_sigma"):
+            values[field] = np.nan_to_num(values[field], nan=0.0, posinf=np.inf, neginf=-np.inf)
+    for field, value in (for_all or {}).items():
+        own = values.get(field, np.full(size, np.nan))
+        values[field] = np.where(np.isnan(own), value, own)
+    if not kinds_by_numbers(values) and not any(values.keys() >= {*shape} for shape in SHAPES):
+        missing = next(column_of(n) for n in TOPPLING_BLOCK.names if n not in values)
+        raise InputError(
+            f"{name}: there is no column {missing}: a table of blocks has p2_1_s2 and kr, or "
+            "height_m and width_m, or the numbers of another kind"
+        )
+    if ("lon" in columns) != ("lat" in columns):
+        raise InputError(f"{name}: lon and lat go together: give both columns, or neither")
     named = "block_id" in columns
     if not named:
         columns["block_id"] = np.array([str(i + 1) for i in range(size)], dtype=object)
-    default = kind or TOPPLING_BLOCK.kind
-    faults = foreign_reasons(columns, default, one_kind=one_kind) | cells.faults
-    kinds = np.array([each or default for each in columns.get("kind", [""] * size)], dtype=object)
-    if rectangles:
-        faults = rectangle_reasons(columns) | faults
-        for own in dict.fromkeys(kinds.tolist()):
-            slide = sliding_reasons(columns, own)
-            faults = {i: text for i, text in slide.items() if kinds[i] == own} | faults
-        columns |= _rectangles(columns, kinds)
-    for needed in NUMBERS:
-        if needed not in columns:
-            raise InputError(
-                f"{name}: there is no column {needed}: a table of blocks has p2_1_s2 and kr, or "
-                "height_m and width_m"
-            )
-    if ("lon" in columns) != ("lat" in columns):
-        raise InputError(f"{name}: lon and lat go together: give both columns, or neither")
     for column, value in IF_EMPTY.items():
         if column in columns:
             columns[column] = np.nan_to_num(
                 columns[column], nan=value, posinf=np.inf, neginf=-np.inf
             )
-    reasons = _reasons(columns, kinds)
-    for i, fault in faults.items():
+    kinds = [str(each or "").strip() or kind or "" for each in columns.get("kind", [""] * size)]
+    modes = columns["mode"].tolist() if "mode" in columns else None
+    blocks = many_blocks(values, size, kinds=kinds, modes=modes, rows=True)
+    for field in for_all or ():
+        if field not in blocks.read:
+            raise InputError(f"{field} does not go with the blocks of {name}", fields=(field,))
+    reasons = block_reasons_of(blocks, size)
+    known = {column_of(n): v for n, v in values.items() if n in (*NUMBERS, *blocks.read)}
+    known = {column: v.copy() for column, v in known.items() if BLOCK_FIELDS[column] not in _SIDES}
+    for group in blocks.groups:
+        for field, value in group.numbers.items():
+            column = column_of(field)
+            known.setdefault(column, np.full(size, np.nan))[group.places] = value
+    columns |= known
+    assert blocks.kinds is not None
+    columns["kind"] = np.array([*KINDS, ""], dtype=object)[blocks.kinds]
+    _refuse_kinds(columns["kind"], reasons, kind, one_kind=one_kind, only=only)
+    _refuse_columns(columns, reasons)
+    for i, fault in cells.faults.items():
         reasons[i] = fault
+    read = {*map(column_of, blocks.read), *TEXTS, *PLACE, *PORTFOLIO, "reason"}
+    remarks = (
+        *blocks.remarks,
+        *cells.stated.remarks,
+        *cells.stated.unread(cells.header, read),
+    )
     sound = np.asarray(reasons == "", dtype=bool)
     columns |= {"row": np.arange(size), "line": np.array(cells.lines, dtype=np.int64)}
     refused = {column: values[~sound] for column, values in columns.items()}
-    blocks = {column: values[sound] for column, values in columns.items()}
+    usable = {column: values[sound] for column, values in columns.items()}
     refused["reason"] = reasons[~sound]
-    return BlockRows(blocks, refused, name, cells.word, named, remarks).checked()
+    return BlockRows(usable, refused, name, cells.word, named, remarks).checked()
 
 
-def foreign_reasons(
-    columns: Mapping[str, Any], default: str, *, one_kind: bool = True
-) -> dict[int, str]:
-    """Return by index which rows fail in a way that the answer says nothing about, in words.
-
-    Args:
-        columns: ``kind`` and ``mode`` of the rows, texts, if there are any.
-        default: kind that answers for rows that state none.
-        one_kind: it answers alone; otherwise each row's own does.
-    """
-    facts_of(default)  # refuses a kind that there is not
-    stated = [columns[name] for name in ("kind", "mode") if name in columns]
-    if not stated:
-        return {}
-    kinds = columns.get("kind", [""] * len(stated[0]))
-    modes = columns.get("mode", [""] * len(stated[0]))
-
-    @cache
-    def why(kind: str, mode: str) -> str:
-        own = kind or default
-        if own not in KINDS:
-            return f"kind = {own[:40]!r} is none of {', '.join(sorted(KINDS))}"
-        if one_kind and own != default:
-            return f"the block's kind is {own}, and the answer is for kind {default}"
-        if not one_kind and block_of(_NAMES, own).kind != own:
-            return f"a block of kind {own} is not described by {' and '.join(NUMBERS)}"
-        if mode and mode != facts_of(own).mode:
-            shown = mode[:40].replace("_", " ")
-            return f"the block's mode is {shown}: the {own} model says nothing about it"
-        return ""
-
-    pairs = (
-        (str(k or "").strip(), str(m or "").strip()) for k, m in zip(kinds, modes, strict=True)
-    )
-    return {i: reason for i, pair in enumerate(pairs) if (reason := why(*pair))}
+def _refuse_kinds(
+    kinds: NDArray[np.object_],
+    reasons: NDArray[np.object_],
+    kind: str | None,
+    *,
+    one_kind: bool,
+    only: Collection[str],
+) -> None:
+    """Say of rows whose kind the answer is not for why they cannot be used."""
+    usable = np.asarray(reasons == "", dtype=bool)
+    if only:
+        for own in dict.fromkeys(kinds[usable].tolist()):
+            if {*only} - {*facts_of(own).parameters}:
+                reasons[usable & (kinds == own)] = (
+                    f"a block of kind {own} is not described by {' and '.join(only)}"
+                )
+    usable = np.asarray(reasons == "", dtype=bool)
+    if one_kind and usable.any():
+        counts = {own: int((kinds[usable] == own).sum()) for own in dict.fromkeys(kinds[usable])}
+        one = kind or max(counts, key=counts.__getitem__)
+        for own in counts:
+            if own != one:
+                reasons[usable & (kinds == own)] = (
+                    f"the block's kind is {own}, and the answer is for kind {one}"
+                )
 
 
-_NAMES = TOPPLING_BLOCK.names
-
-
-def _reasons(columns: Columns, kinds: NDArray[np.object_]) -> NDArray[np.object_]:
-    """Return why rows cannot be used; empty texts for those that can."""
-    reasons = np.full(kinds.size, "", dtype=object)
-    given = {**BLOCK_COLUMNS, **{name: name for name in SIGMAS}}
-    for kind in dict.fromkeys(kinds.tolist()):
-        own, block = np.asarray(kinds == kind), block_of(_NAMES, kind)
-        known = (*block.names, *block.options, *block.sigmas)
-        values = {
-            name: columns[column][own]
-            for column, name in given.items()
-            if column in columns and name in known
-        }
-        reasons[own] = block_reasons(block, values)
+def _refuse_columns(columns: Columns, reasons: NDArray[np.object_]) -> None:
+    """Say of rows why their place, count, weight or loss cannot be used."""
 
     def say(wrong: NDArray[np.bool_], text: Callable[[int], str]) -> None:
         for i in np.flatnonzero(wrong & (reasons == "")).tolist():
@@ -336,22 +326,7 @@ def _reasons(columns: Columns, kinds: NDArray[np.object_]) -> NDArray[np.object_
                 "or a weight"
             ),
         )
-    return reasons
 
 
 def _not_negative(name: str, numbers: NDArray[np.float64], i: int) -> str:
     return f"{name} = {numbers[i]:g}: give a number not below zero"
-
-
-def _rectangles(columns: Columns, kinds: NDArray[np.object_]) -> dict[str, NDArray[Any]]:
-    """Return the numbers of rectangles, each by its kind: those of free-standing ones differ."""
-    backed = rectangle_columns(columns)
-    is_free = {name for name, model in KINDS.items() if model.free_standing}
-    free = np.array([kind in is_free for kind in kinds.tolist()], dtype=bool)
-    if not free.any():
-        return backed
-    free_standing = rectangle_columns(columns, free_standing=True)
-    numbers_of = {name: np.where(free, free_standing[name], backed[name]) for name in NUMBERS}
-    stated = columns.get("restitution", np.full(free.size, np.nan))
-    own = np.where(free & np.isnan(stated), free_standing["restitution"], stated)
-    return {**numbers_of, "restitution": own}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,35 +27,11 @@ from rbfrag.exchange.tables.files import (
 from rbfrag.exchange.tables.parts import Part, Parts, cells_of
 from rbfrag.files import reading, written_whole
 from rbfrag.fragility.unusable import in_list
+from rbfrag.question.fields import BlockFields, column_of
 from rbfrag.question.table import Column, Header, Numeric, columns_in
-from rbfrag.solver.block.formulas import array_elementwise, tan_deg
-from rbfrag.solver.described import rectangle_numbers
-from rbfrag.solver.stability.modes import yield_coefficient
 
-NUMBERS = ("p2_1_s2", "kr")
-"""Columns of a block that topples."""
-
-BLOCK_COLUMNS = {
-    "p2_1_s2": "p2",
-    "kr": "kr",
-    "ky": "ky",
-    "displacement_m": "displacement_m",
-    "dip_deg": "beta_deg",
-    "ks": "ks",
-    "ps2_1_s2": "ps2",
-    "leaves_g": "leaves_g",
-    "restitution": "restitution",
-}
-"""Columns that describe blocks of any kind, with the names that `predict` has for them."""
-
-SIGMAS = ("p2_sigma", "kr_sigma")
-"""Columns of the standard deviations of ln p² and ln k_r of such a block; an empty cell is 0."""
-
-RECTANGLE = ("height_m", "width_m", "dip_deg")
-"""Columns of a rectangle, which are read where those are not all there; the dip may be missing."""
-
-FRICTION = "phi_deg"
-"""Column of the friction angle of a rectangle, which is taken to topple where the cell is empty."""
+BLOCK_FIELDS = {column_of(name): name for name in BlockFields.__optional_keys__}
+"""The fields that describe blocks, by what written tables call them."""
 
 TABLE = "a block table"
 """What messages say that a file should hold."""
@@ -241,91 +217,3 @@ def _is_missing(cell: object) -> bool:
     """Whether a cell is empty, as Python, numpy and pandas have it."""
     is_nan = isinstance(cell, float) and math.isnan(cell)
     return cell is None or is_nan or type(cell).__name__ in ("NAType", "NaTType")
-
-
-def is_of_rectangles(names: Collection[str]) -> bool:
-    """Return whether columns of these names describe blocks by height and width."""
-    return not {*NUMBERS} <= {*names} and {"height_m", "width_m"} <= {*names}
-
-
-def rectangle_columns(
-    columns: Mapping[str, Any], *, free_standing: bool = False
-) -> dict[str, NDArray[Any]]:
-    """Return ``p2_1_s2`` and ``kr`` of rectangles, NaN where there is none.
-
-    Args:
-        columns: ``height_m``, ``width_m`` and, unless the bases are level, ``dip_deg``; with
-            ``phi_deg`` one that slides at rest has a k_r below zero.
-        free_standing: whether nothing backs them: k_r is then that of the weaker sense, and
-            ``restitution`` is returned too, 1 - 1.5 sin² α (Housner 1963), 0 where that is less.
-    """
-    height, width, dip = (
-        np.asarray(columns.get(name, 0.0), dtype=np.float64) for name in RECTANGLE
-    )
-    with np.errstate(all="ignore"):
-        leans = np.abs(dip) if free_standing else dip
-        p2_and_kr = rectangle_numbers(height, width, leans, array_elementwise())
-        columns_of_kind = dict(zip(NUMBERS, p2_and_kr, strict=True))
-        if free_standing:
-            sine2 = width * width / (width * width + height * height)
-            columns_of_kind["restitution"] = np.maximum(1.0 - 1.5 * sine2, 0.0)
-        slides, ky = sliding_rectangles(columns)
-        falls = slides & (ky <= 0.0)  # slides at rest: as unstable as one that topples at rest
-        columns_of_kind["kr"] = np.where(falls, np.minimum(ky, 0.0), columns_of_kind["kr"])
-        is_block = (height > 0.0) & (width > 0.0) & (np.abs(dip) < 90.0)
-        return {
-            name: np.where(is_block & np.isfinite(values), values, np.nan)
-            for name, values in columns_of_kind.items()
-        }
-
-
-def sliding_rectangles(columns: Mapping[str, Any]) -> tuple[NDArray[np.bool_], NDArray[Any]]:
-    """Return where rectangles slide before they topple, and k_y = tan(phi - dip) of all.
-
-    A rectangle slides where tan(phi) <= width/height (mode boundaries belong to sliding); where no
-    friction angle is stated it is taken not to.
-
-    Args:
-        columns: ``height_m``, ``width_m`` and, if there are, ``dip_deg`` and ``phi_deg``.
-    """
-    functions = array_elementwise()
-    height, width, dip = (
-        np.asarray(columns.get(name, 0.0), dtype=np.float64) for name in RECTANGLE
-    )
-    phi = np.asarray(columns.get(FRICTION, np.nan), dtype=np.float64)
-    with np.errstate(all="ignore"):
-        tan_phi = tan_deg(phi, functions)
-        tan_dip = tan_deg(np.nan_to_num(dip, nan=0.0), functions)
-        ky = yield_coefficient(tan_phi, 1.0, tan_dip, 1.0, functions)
-        return np.asarray(width / height >= tan_phi), np.asarray(ky)
-
-
-def sliding_reasons(columns: Mapping[str, Any], kind: str) -> dict[int, str]:
-    """Return by index which rectangles slide, of which the kind says nothing, in words.
-
-    One that slides at rest is none of them: whatever is asked, it fails (:func:`rectangle_columns`
-    gives it a strength below zero).
-    """
-    slides, ky = sliding_rectangles(columns)
-    return {
-        i: f"slides (yield {ky[i]:.2g} g), and the {kind} model says nothing about it: answer it "
-        "by kind sliding, with ky and displacement_m"
-        for i in np.flatnonzero(slides & (ky > 0.0)).tolist()
-    }
-
-
-def rectangle_reasons(columns: Mapping[str, Any]) -> dict[int, str]:
-    """Return by index which lengths and angles are those of no rectangle, in words."""
-    reasons: dict[int, str] = {}
-    friction = np.asarray(columns.get(FRICTION, ()), dtype=np.float64)
-    for i in np.flatnonzero((friction < 0.0) | (friction >= 90.0)).tolist():
-        reasons[i] = f"{FRICTION} = {friction[i]:g} is not from 0 to below 90"
-    for name in RECTANGLE:
-        values = np.asarray(columns.get(name, ()), dtype=np.float64)
-        low, high, wanted = (
-            (-90.0, 90.0, "between -90 and 90") if name == "dip_deg" else (0.0, np.inf, "above 0")
-        )
-        for i in np.flatnonzero(~((values > low) & (values < high))).tolist():
-            text = "is empty" if np.isnan(values[i]) else f"= {values[i]:g} is not {wanted}"
-            reasons.setdefault(i, f"{name} {text}")
-    return reasons

@@ -19,6 +19,7 @@ from rbfrag.fragility.unusable import FROM_SUMS
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.losses import LossAnswer, Run, event_losses
 from rbfrag.hazards.portfolio import Portfolio
+from rbfrag.solver.kinds import facts_of
 
 
 def losses(
@@ -89,7 +90,7 @@ def losses(
     meaning = component_named("single" if component is None else component)
     events = read_events(job, imts=imt, investigation_time=investigation_time, ses=ses)
     measures = tuple(events.measures)
-    rows = _with_models(_at_sites(rows, events.site_ids), measures, kind, model, db)
+    rows = _with_models(_at_sites(rows, events.site_ids), measures, model, db)
     portfolio = Portfolio.of(
         rows.blocks, events.site_ids, measures, meaning, kind=kind, model=model, db=db
     )
@@ -130,17 +131,14 @@ def _at_sites(rows: BlockRows, site_ids: Sequence[str]) -> BlockRows:
 def _with_models(
     rows: BlockRows,
     measures: Sequence[str],
-    kind: str | None,
     model: Model | None,
     db: str | PathLike[str] | None,
 ) -> BlockRows:
     """Return the table without blocks of kinds that there is no model of, if there is any."""
-    if "kind" not in rows.blocks:
-        return rows
     kinds, without = rows.blocks["kind"], {}
     for own in dict.fromkeys(kinds.tolist()):
         try:
-            find_model(model, ("p2", "kr", *measures), db, kind=own or kind)
+            find_model(model, (*facts_of(own).parameters, *measures), db, kind=own)
         except (InputError, UnknownModelError) as error:
             without[own] = error
     if len(without) == len(set(kinds.tolist())):

@@ -19,6 +19,7 @@ from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text, without_d
 from rbfrag.exchange.share_fragility import share_functions
 from rbfrag.files import output_path, write_text
 from rbfrag.fragility.measures import SPECTRAL
+from rbfrag.fragility.methods import TOPPLING_BLOCK
 from rbfrag.fragility.model import Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.curve import ANSWERED
@@ -102,7 +103,10 @@ def nrml(
         DatabaseError: the database cannot be read.
     """
     target = output_path(out, (".xml",), "NRML file")
-    rows = given_blocks(p2, kr, blocks, restitution=restitution, kind=kind)
+    rows = given_blocks(
+        {"p2": p2, "kr": kr, "restitution": restitution}, blocks, kind, only=TOPPLING_BLOCK.names
+    )
+    kind = str(rows.blocks["kind"][0])
     table, measure = rows.whole(EACH_NEEDED), _measure(imt)
     single = one_class or (blocks is None and len(table["kr"]) == 1)
     notes: Sequence[str] = ()
@@ -168,7 +172,10 @@ def pelicun(
     """
     target = output_path(out, (".csv",), "fragility table")
     beside = output_path(str(target.with_suffix(".json")), (".json",), "description")
-    rows = given_blocks(p2, kr, blocks, restitution=restitution, kind=kind)
+    rows = given_blocks(
+        {"p2": p2, "kr": kr, "restitution": restitution}, blocks, kind, only=TOPPLING_BLOCK.names
+    )
+    kind = str(rows.blocks["kind"][0])
     table, measure = rows.whole(EACH_NEEDED), _measure(imt)
     single = one_class or (blocks is None and len(table["kr"]) == 1)
     functions, about = block_functions(

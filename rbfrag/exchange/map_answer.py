@@ -13,12 +13,20 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import PLACE, BlockRows, Blocks, read_blocks
 from rbfrag.exchange.shakemap import ShakeMapEvent, at_places, read_shakemap
+from rbfrag.fragility.methods import TOPPLING_BLOCK
 from rbfrag.fragility.model import Model
 from rbfrag.fragility.unusable import FROM_MEAN, FROM_SUMS
 from rbfrag.frames import Tabular
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.map_failures import MapFailures, Places, map_failures
 from rbfrag.hazards.site_probability import site_probability
+from rbfrag.question.blocks import (
+    has_shape,
+    kinds_by_numbers,
+    numbers_in,
+    taken_as_medians,
+)
+from rbfrag.question.fields import column_of
 
 NOTABLE = 1e-4
 """P above which a place outside the fitted ranges is warned of."""
@@ -74,7 +82,6 @@ def shakemap(
     *,
     blocks: Blocks | None = None,
     kind: str | None = None,
-    restitution: ArrayLike | None = None,
     uncertainty: str | PathLike[str] | None = None,
     component: str = "larger",
     allow_partial: bool = False,
@@ -83,6 +90,7 @@ def shakemap(
     model: Model | None = None,
     level: float = 0.95,
     db: str | PathLike[str] | None = None,
+    **block: ArrayLike | None,
 ) -> ShakeMapAnswer:
     """Return the probability that blocks fail across a ShakeMap.
 
@@ -96,9 +104,7 @@ def shakemap(
         kr: toppling yield acceleration coefficients.
         blocks: instead of these a table of blocks: a file, or columns by name, such as a pandas
             table.
-        kind: how the blocks fail; None for toppling, backed by a slope.
-        restitution: of blocks that rock: speed after an impact over that before it; None for what
-            angular momentum leaves.
+        kind: how the blocks fail; None for what they are given by.
         uncertainty: uncertainty.xml of the same map: the answer is integrated over it.
         component: what the map's measures mean: larger, rotd50, geometric_mean or single.
         allow_partial: read a grid that has not its declared size.
@@ -108,6 +114,8 @@ def shakemap(
         model: as in :func:`rbfrag.predict`.
         level: confidence level of the interval.
         db: as in :func:`rbfrag.predict`.
+        block: instead of `p2` and `kr`, or beside them, fields of blocks as :func:`rbfrag.predict`
+            reads them, scalars or of shape (m,).
 
     Raises:
         InputError: a file that cannot be used, blocks given in no way or in two, none of them on
@@ -115,9 +123,7 @@ def shakemap(
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    rows = given_blocks(
-        p2, kr, blocks, restitution=restitution, kind=kind, reads=(*PLACE, "weight")
-    )
+    rows = given_blocks({"p2": p2, "kr": kr, **block}, blocks, kind, reads=(*PLACE, "weight"))
     meaning = component_named(component)
     shaken = read_shakemap(grid, uncertainty=uncertainty, allow_partial=allow_partial)
     own = "lon" in rows.blocks
@@ -139,13 +145,14 @@ def shakemap(
         if meaning.name != "single"
         else "the map is taken to be of one component"
     )
-    a, b = table["p2_1_s2"], table["kr"]
-    options_of: dict[str, Any] = {name: table[name] for name in ("restitution",) if name in table}
+    kind = str(table["kind"][0])
+    stated, medians = taken_as_medians(numbers_in(table))
+    warnings = [*medians, *warnings]
+    numbers = {name: values for name, values in stated.items() if not np.isnan(values).all()}
     weight = table.get("weight")
     answer = site_probability(
-        measures, a, b, component=meaning, weight=None if own else weight, own_block=own,
-        std_ln=std_ln, kind=kind,
-        model=model, level=level, db=db, **options_of,
+        measures, component=meaning, weight=None if own else weight, own_block=own, std_ln=std_ln,
+        kind=kind, model=model, level=level, db=db, **numbers,
     )  # fmt: skip
     shaking, chosen = answer.shaking, answer.shaking.model
     if chosen.term.advice:
@@ -160,8 +167,7 @@ def shakemap(
         )
     names = table.get("site_id") if own else None
     failures = map_failures(
-        answer, a, b,
-        Places.of(lon, lat, names), weight=weight, draws=draws, seed=seed, **options_of,
+        answer, numbers, Places.of(lon, lat, names), weight=weight, draws=draws, seed=seed
     )  # fmt: skip
     warnings += failures.warnings
     outside = int((~answer.in_domain & (answer.probability > NOTABLE)).sum())
@@ -217,34 +223,39 @@ def shakemap(
 
 
 def given_blocks(
-    p2: ArrayLike | None,
-    kr: ArrayLike | None,
+    given: Mapping[str, ArrayLike | None],
     blocks: Blocks | None,
-    *,
-    restitution: ArrayLike | None = None,
     kind: str | None = None,
+    *,
     reads: Collection[str] = (),
+    only: Collection[str] = (),
 ) -> BlockRows:
     """Return the blocks of a question; arguments as for :func:`shakemap` and `read_blocks`.
+
+    Args:
+        given: fields of the blocks, None for what is not stated.
+        blocks: instead of these, a table.
+        kind: how they fail.
+        reads: as for `read_blocks`, like `only`.
+        only: see there.
 
     Raises:
         InputError: blocks given in no way or in two, or none that waits for an earthquake.
     """
-    if blocks is not None:
-        if p2 is not None or kr is not None or restitution is not None:
-            raise InputError("blocks says all of the blocks: leave p2, kr and restitution out")
-        return read_blocks(blocks, kind, reads=reads, one_kind=True)
-    if p2 is None or kr is None:
-        raise InputError(
-            f"{'p2' if p2 is None else 'kr'} is missing: give p2 and kr, or a table of blocks"
-        )
-    given = {"p2_1_s2": p2, "kr": kr, "restitution": restitution}
     known = {name: value for name, value in given.items() if value is not None}
+    if blocks is not None:
+        if known:
+            raise InputError("blocks says all of the blocks: leave p2, kr and restitution out")
+        return read_blocks(blocks, kind, reads=reads, one_kind=True, only=only)
+    if not has_shape(known) and not kinds_by_numbers(known):
+        missing = next((name for name in TOPPLING_BLOCK.names if name not in known), "p2")
+        raise InputError(f"{missing} is missing: give p2 and kr, or a table of blocks")
     try:
         arrays = np.broadcast_arrays(*known.values())
     except ValueError:
-        raise InputError("p2, kr and restitution differ in length") from None
-    return read_blocks(dict(zip(known, arrays, strict=True)), kind, one_kind=True)
+        raise InputError(f"{', '.join(known)} differ in length") from None
+    columns = {column_of(name): each for name, each in zip(known, arrays, strict=True)}
+    return read_blocks(columns, kind, one_kind=True, only=only)
 
 
 def _name_of(event: ShakeMapEvent) -> str:
@@ -253,9 +264,12 @@ def _name_of(event: ShakeMapEvent) -> str:
 
 
 def _what(blocks: Mapping[str, Any], own: bool) -> str:
-    size = blocks["kr"].size
+    size = blocks["kind"].size
     if own:
         return f"{size} blocks at their places"
     if size == 1:
-        return f"block with p² = {blocks['p2_1_s2'][0]:g} 1/s², $k_r$ = {blocks['kr'][0]:g}"
+        numbers = {name: values[0] for name, values in numbers_in(blocks).items()}
+        if "kr" in numbers:
+            return f"block with p² = {numbers['p2']:g} 1/s², $k_r$ = {numbers['kr']:g}"
+        return "block with " + ", ".join(f"{name} = {each:g}" for name, each in numbers.items())
     return f"mean of {size} blocks"

@@ -13,6 +13,11 @@ from rbfrag.errors import InputError
 from rbfrag.exchange.block_rows import BlockRows
 from rbfrag.hazards.answer import HazardAnswer
 from rbfrag.hazards.curve import HazardCurve
+from rbfrag.question.blocks import numbers_in
+from rbfrag.question.fields import column_of
+
+OTHERS = ("ky", "displacement_m", "ks", "ps2_1_s2")
+"""Columns of numbers that only blocks of other kinds have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +31,11 @@ class SiteBlocks:
 
     curves: tuple[HazardCurve, ...]
     columns: Mapping[str, Any]
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What answers read of the blocks, by field, and their kinds."""
+        return {**numbers_in(self.columns), "kind": [str(kind) for kind in self.columns["kind"]]}
 
     @property
     def names(self) -> list[str | None]:
@@ -114,6 +124,14 @@ def _not_joined(has_ids: bool, sites: Sequence[str], blocks: int) -> tuple[str, 
     return ()
 
 
+def _numbers(site: SiteBlocks, *, alone: bool) -> dict[str, Any]:
+    """Return p² and k_r, and what else answers read of blocks of other kinds; NaN of a class."""
+    nothing = float("nan")
+    columns = {column_of(name): values for name, values in numbers_in(site.columns).items()}
+    names = dict.fromkeys(("p2_1_s2", "kr", *(n for n in columns if n in OTHERS)))
+    return {name: columns.get(name, nothing) if alone else nothing for name in names}
+
+
 def rate_columns(
     sites: Sequence[SiteBlocks], answers: Sequence[HazardAnswer], rows: BlockRows | None = None
 ) -> dict[str, NDArray[Any]]:
@@ -129,15 +147,14 @@ def rate_columns(
     parts: dict[str, list[NDArray[Any]]] = {}
     for site, answer in zip(sites, answers, strict=True):
         size, curve = len(site.names), site.curves[0]
-        alone = len(site.columns["kr"]) == size  # a class of blocks has no single p² and k_r
+        alone = len(site.columns["kind"]) == size  # a class of blocks has no single p² and k_r
         names = ["" if name is None else str(name) for name in site.names]
         own: dict[str, Any] = {
             "site": np.array([curve.place] * size, dtype=object),
             "lon": nothing if curve.lon is None else curve.lon,
             "lat": nothing if curve.lat is None else curve.lat,
             "block_id": np.array(names, dtype=object),
-            "p2_1_s2": site.columns["p2_1_s2"] if alone else nothing,
-            "kr": site.columns["kr"] if alone else nothing,
+            **_numbers(site, alone=alone),
             "annual_rate": answer.annual_rate,
             "ci_low": answer.ci_low,
             "ci_high": answer.ci_high,

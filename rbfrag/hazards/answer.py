@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.fragility.unusable import (
     FROM_MEAN,
     FROM_SUMS,
-    block_reasons,
     elements,
     refuse_elements,
     unusable_in_words,
@@ -37,6 +36,8 @@ from rbfrag.hazards.joint_rate import MOST_JOINT, USUAL_COUNTS, JointRate
 from rbfrag.hazards.joint_thresholds import JointThresholds
 from rbfrag.hazards.model_blocks import BlockTable, ModelBlocks
 from rbfrag.hazards.shaking import NOTABLE, Shaking, warn_of_ends
+from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
+from rbfrag.question.blocks import taken_as_medians
 
 FloatArray = NDArray[np.float64]
 
@@ -150,8 +151,8 @@ class HazardAnswer(Tabular):
 
 def hazard(
     curve: CurveLike | Sequence[CurveLike],
-    p2: ArrayLike,
-    kr: ArrayLike,
+    p2: ArrayLike | None = None,
+    kr: ArrayLike | None = None,
     *,
     imt: str | None = None,
     site: str | None = None,
@@ -161,16 +162,16 @@ def hazard(
     convert_sigma: float | None = None,
     component: str | None = None,
     years: float = 50.0,
-    kind: str | None = None,
-    restitution: ArrayLike | None = None,
+    kind: str | Sequence[str | None] | None = None,
     model: Model | None = None,
     level: float = 0.95,
     db: str | PathLike[str] | None = None,
     one_class: bool = False,
+    **block: ArrayLike | None,
 ) -> HazardAnswer:
-    """Return how often per year blocks topple under a seismic hazard curve.
+    """Return how often per year blocks fail under a seismic hazard curve.
 
-    λ_f = ∫ P(topples | x) (-dλ), see :func:`rbfrag.hazards.annual_rate.failure_rate`. The
+    λ_f = ∫ P(fails | x) (-dλ), see :func:`rbfrag.hazards.annual_rate.failure_rate`. The
     ends of the interval are the integrals of the ends of the fragility's own interval; since
     these are taken at every level at once, the interval is at least as wide as one from the
     joint distribution of the parameters. The model is one of the curve's own measure: what else
@@ -204,14 +205,15 @@ def hazard(
         component: what the curve's horizontal component means: single, geometric_mean,
             rotd50 or larger; None for single, with a warning.
         years: period for the probability [a].
-        kind: how the blocks fail; None for toppling, backed by a slope.
-        restitution: of blocks that rock: speed after an impact over that before it, scalar or
-            shape (m,); None, or NaN for one of them, for what angular momentum leaves.
+        kind: how the blocks fail, for all or one each; None for what they are given by.
         model: as in :func:`rbfrag.predict`.
         level: confidence level of the interval.
         db: as in :func:`rbfrag.predict`.
         one_class: the blocks stand for one class, and the answer is the rate of a block drawn
             from it: one rate, by the mean of their fragilities.
+        block: instead of `p2` and `kr`, or beside them, fields of blocks as :func:`rbfrag.predict`
+            reads them, scalars or of shape (m,): ky and displacement_m, ks and ps2, restitution,
+            height_m and width_m with beta_deg and phi_deg, ….
 
     Raises:
         InputError: no model reads the curve's measure, curves of several measures or sites, weights
@@ -222,34 +224,26 @@ def hazard(
     curves = as_curves(curve, imt=imt, site=site, convert=convert)
     refuse_unlike(curves)
     weight = checked_weights(stated_weights(weights, curves), len(curves))
-    p2s, krs = (np.ravel(values) for values in np.broadcast_arrays(p2, kr))
     checked_years(years)
     reading = Shaking.of(
         curves[0], convert=convert, convert_sigma=convert_sigma, component=component
     )
-    known = ("p2", "kr") if restitution is None else ("p2", "kr", "restitution")
-    chosen = find_model(model, (*known, reading.name), db, kind=kind)
-    columns = {"p2": p2s, "kr": krs}
-    if restitution is not None:
-        columns["restitution"] = np.broadcast_to(restitution, p2s.shape)
-    columns = {name: column.astype(np.float64) for name, column in columns.items()}
-    reason = block_reasons(chosen.method.block, columns)
-    refuse_elements(reason)
+    given, medians = taken_as_medians({"p2": p2, "kr": kr, **block})
+    parts_of, reason, whole = _by_model(given, kind, reading.name, model, db)
     sound = np.asarray(reason == "", dtype=bool)
-    columns = {name: column[sound] for name, column in columns.items()}
-    size = columns["kr"].size
+    size = int(sound.sum())
     counts = _checked_counts(at_least, size)
     unusable = unusable_in_words(
-        p2s.size - size, p2s.size, elements(reason), reason[~sound].tolist(),
+        whole - size, whole, elements(reason), reason[~sound].tolist(),
         FROM_MEAN if one_class else FROM_SUMS,
     )  # fmt: skip
-    warnings = [*unusable, *reading.warnings]
+    warnings = [*medians, *unusable, *reading.warnings]
     for one in curves:
         warnings.extend(one.warnings)
         warnings.extend(quantile_warning(one, "a rate"))
-    if chosen.term.advice:
-        warnings.append(chosen.term.advice)
-    blocks = _Site.of(columns, reading, chosen, level, curves, counts, one_class=one_class)
+    models = [part.model for part in parts_of]
+    warnings.extend(one.term.advice for one in models if one.term.advice)
+    blocks = _Site.of(parts_of, reading, level, curves, counts, one_class=one_class)
     each = [blocks.under(one, years) for one in curves]
     parts = (
         each[:1]
@@ -274,7 +268,9 @@ def hazard(
     if joints and blocks.thresholds is None:
         why = (
             "what the blocks share in one earthquake is not known to this model"
-            if chosen.dependence is None
+            if any(one.dependence is None for one in models)
+            else "what blocks of several models share in one earthquake is not known"
+            if len(models) > 1
             else f"what more than {MOST_JOINT} blocks share in one earthquake is not computed"
         )
         warnings.append(
@@ -301,9 +297,9 @@ def hazard(
         probability=placed(np.asarray(probability)),
         years=years,
         level=level,
-        model=chosen.name,
-        term=chosen.term.name,
-        method=chosen.row.method,
+        model=_listed(one.name for one in models),
+        term=_listed(one.term.name for one in models),
+        method=_listed(one.row.method for one in models),
         edges=widest.edges,
         contribution=placed(contribution),
         measure=curves[0].measure,
@@ -314,6 +310,58 @@ def hazard(
         warnings=tuple(dict.fromkeys(warnings)),
         reason=np.full(1, "", dtype=object) if one_class else reason,
     )
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(dict.fromkeys(names))
+
+
+class _Part(NamedTuple):
+    """Blocks that one model answers for.
+
+    Args:
+        places: where they stand among those that can be used, shape (m,).
+        numbers: what the model reads of them, by field, shape (m,) each.
+        model: the model.
+    """
+
+    places: NDArray[np.intp]
+    numbers: Mapping[str, FloatArray]
+    model: FragilityModel
+
+
+def _by_model(
+    given: Mapping[str, Any],
+    kind: str | Sequence[str | None] | None,
+    measure: str,
+    model: Model | None,
+    db: str | PathLike[str] | None,
+) -> tuple[list[_Part], NDArray[np.object_], int]:
+    """Return the blocks by the model that answers for them, why others wait for none, and all.
+
+    Raises:
+        InputError: none can be used.
+        UnknownModelError: no model of that name, or of the one kind that there is.
+    """
+    blocks, whole = blocks_of_arrays(given, kind)
+    reason = block_reasons_of(blocks, whole)
+    parts = []
+    for group in blocks.groups:
+        places = np.arange(whole) if group.places is None else group.places
+        try:
+            chosen = find_model(model, (*group.numbers, measure), db, kind=group.kind)
+        except (InputError, UnknownModelError) as error:
+            if len(blocks.groups) == 1:
+                raise
+            reason[places] = np.where(reason[places] == "", str(error), reason[places])
+            continue
+        own = np.flatnonzero(reason[places] == "")
+        if own.size:
+            values = {n: np.broadcast_to(v, places.shape)[own] for n, v in group.numbers.items()}
+            parts.append(_Part(places[own], values, chosen))
+    refuse_elements(reason)
+    rank = np.cumsum(reason == "") - 1
+    return [part._replace(places=rank[part.places]) for part in parts], reason, whole
 
 
 _RATES = ("annual_rate", "ci_low", "ci_high", "numerical_error", "above", "above_at_most")
@@ -342,6 +390,7 @@ class _Site:
     Args:
         blocks: the blocks in parts.
         tables: P and both ends by bands x blocks of each part; of a class the mean of all blocks.
+        order: where the blocks stand in the parts one after the other.
         any_of: P that any fails under full dependence and if independent, laws in rows; None for
             one block or a class.
         thresholds: levels at which blocks fail by the model's copula; None where it is not known.
@@ -349,37 +398,40 @@ class _Site:
 
     blocks: list[ModelBlocks]
     tables: list[BlockTable]
+    order: NDArray[np.intp]
     any_of: BlockTable | None
     thresholds: JointThresholds | None
 
     @classmethod
     def of(
         cls,
-        columns: Mapping[str, FloatArray],
+        parts: Sequence[_Part],
         reading: Shaking,
-        model: FragilityModel,
         level: float,
         curves: list[HazardCurve],
         counts: Sequence[int],
         *,
         one_class: bool,
     ) -> _Site:
-        """Return the blocks: p2, kr and, if stated, restitution; others as those of `hazard`."""
-        p2 = columns["p2"]
-        starts = [0] if one_class else range(0, p2.size, _CHUNK)
-        length = p2.size if one_class else _CHUNK
-        blocks = [
-            ModelBlocks.certain(
-                **{name: column[i : i + length] for name, column in columns.items()},
-                shaking=reading,
-                model=model,
-                level=level,
-            )
-            for i in starts
-        ]
+        """Return the blocks of some models; the arguments are those of `hazard`."""
+        blocks, places = [], []
+        for part in parts:
+            length = part.places.size if one_class else _CHUNK
+            for start in range(0, part.places.size, length):
+                some = slice(start, start + length)
+                numbers = {name: each[some] for name, each in part.numbers.items()}
+                places.append(part.places[some])
+                blocks.append(
+                    ModelBlocks.certain(numbers, shaking=reading, model=part.model, level=level)
+                )
+        order = np.argsort(np.concatenate(places))
         tables = [some.tabled(curves, mean=one_class) for some in blocks]
-        if one_class or p2.size < 2:
-            return cls(blocks, tables, None, None)
+        if one_class and len(tables) > 1:
+            shares = np.array([some.count for some in blocks]) / order.size
+            mean = sum(share * one.values for share, one in zip(shares, tables, strict=True))
+            tables = [BlockTable(tables[0].low, tables[0].step, np.asarray(mean))]
+        if one_class or order.size < 2:
+            return cls(blocks, tables, order, None, None)
         size = tables[0].values.shape[-1]
         greatest, none = np.zeros((1, 1, size)), np.ones((1, 1, size))
         for table in tables:
@@ -388,10 +440,12 @@ class _Site:
             none = none * (1.0 - p).prod(axis=2)
         first = tables[0]
         any_of = BlockTable(first.low, first.step, np.stack([greatest, 1.0 - none]))
-        thresholds = None
-        if model.dependence is not None and p2.size <= MOST_JOINT:
-            thresholds = JointThresholds.of(first, blocks[0].placement(), model.dependence, counts)
-        return cls(blocks, tables, any_of, thresholds)
+        thresholds, law = None, parts[0].model.dependence
+        placement = blocks[0].placement()
+        one_model = len(parts) == 1 and order.size <= MOST_JOINT
+        if one_model and law is not None and placement is not None:
+            thresholds = JointThresholds.of(first, placement, law, counts)
+        return cls(blocks, tables, order, any_of, thresholds)
 
     def under(self, curve: HazardCurve, years: float) -> _Rates:
         """Return the rates under a curve."""
@@ -400,7 +454,8 @@ class _Site:
         def joined(name: str, row: int = 0) -> FloatArray:
             """Return one value of all blocks; of the rates, the rows are P and its two ends."""
             parts = (getattr(one, name) for one in failures)
-            return np.concatenate([part.reshape(3, -1, *part.shape[1:])[row] for part in parts])
+            rows = np.concatenate([part.reshape(3, -1, *part.shape[1:])[row] for part in parts])
+            return rows[self.order] if rows.shape[0] == self.order.size else rows
 
         rate, low, high = (joined("annual_rate", row) for row in range(3))
         warnings: list[str] = []
@@ -423,7 +478,7 @@ class _Site:
     ) -> Iterator[str]:
         """Yield what is to be said of rates that come from outside the model's domain."""
         middle = np.sqrt(edges[1:] * edges[:-1])
-        outside = np.concatenate([some.outside(middle) for some in self.blocks])
+        outside = np.concatenate([some.outside(middle) for some in self.blocks])[self.order]
         if contribution.shape[0] == 1:  # a class
             outside = outside.mean(axis=0, keepdims=True)
         part = (outside * contribution).sum(axis=1) / np.maximum(rate, np.finfo(np.float64).tiny)

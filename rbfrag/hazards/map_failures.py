@@ -28,7 +28,7 @@ from rbfrag.fragility.joint_sampling import JointSampler
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.correlations import correlations
-from rbfrag.hazards.site_probability import SiteProbability, described
+from rbfrag.hazards.site_probability import SiteProbability
 from rbfrag.hazards.site_shaking import SiteShaking
 from rbfrag.hazards.spatial_field import SpatialField, correlation_range_km
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
@@ -182,12 +182,10 @@ class Places:
 
 def map_failures(
     answer: SiteProbability,
-    p2: FloatArray,
-    kr: FloatArray,
+    numbers: Mapping[str, FloatArray],
     places: Places,
     *,
     weight: FloatArray | None = None,
-    restitution: FloatArray | None = None,
     draws: int | None = None,
     seed: int = 0,
     between: float = BETWEEN,
@@ -197,11 +195,9 @@ def map_failures(
 
     Args:
         answer: probabilities of the sites and their blocks.
-        p2: frequency parameters [1/s²] that they were answered for, shape (m,).
-        kr: toppling yield acceleration coefficients, shape (m,).
+        numbers: what the model read of the blocks, by field, shape (m,) each.
         places: where the sites lie.
         weight: how many blocks each one stands for, shape (m,); None for 1.
-        restitution: that they were answered for, shape (m,); None for their own.
         draws: number of draws, 10 or more; None for 100, and for more where blocks are few.
         seed: of the random numbers.
         between: β, 0 to 1.
@@ -211,10 +207,11 @@ def map_failures(
     Raises:
         InputError: a number of draws, a seed or a share that makes no sense.
     """
-    weights = np.ones(p2.size) if weight is None else weight
+    columns = answer.shaking.model.method.block.filled(numbers)
+    weights = np.ones(next(iter(columns.values())).size) if weight is None else weight
     each = answer.each * weights[answer.block]
     some = _worth_drawing(each)
-    site, block = answer.site[some], answer.block[some]
+    site, blocks = answer.site[some], answer.block[some]
     draws = _number(draws, site.size)
     if not 0.0 <= between <= 1.0:
         raise InputError(f"between = {between:g}: a share of the variance is between 0 and 1")
@@ -224,12 +221,11 @@ def map_failures(
         range_km = correlation_range_km(answer.shaking.names[0])
     used, here = np.unique(site, return_inverse=True)
     residuals = _Residuals(answer.shaking, used, places.only(used), between, range_km)
-    laws = _laws(answer, p2[block], kr[block], places.group[site])
+    laws = _laws(answer, {n: v[blocks] for n, v in columns.items()}, places.group[site])
     generator = np.random.default_rng(seed)
     drawn = {name: np.zeros(draws) for name in laws}
     any_fails = {name: np.zeros(draws, dtype=np.bool_) for name in laws}
-    columns = described(answer.shaking.model, p2, kr, restitution)
-    given = {name: values[block, None] for name, values in columns.items()}
+    given = {name: values[blocks, None] for name, values in columns.items()}
     at_once = max(1, _VALUES_AT_ONCE // max(site.size, 1))
     start = 0
     for logs in residuals.in_parts(draws if site.size else 0, at_once, generator):
@@ -244,7 +240,7 @@ def map_failures(
         assert isinstance(prediction, PredictionArray)
         for name, normals in laws.items():
             fails = ndtr(normals(count, generator).T) <= prediction.probability
-            drawn[name][part] = weights[block] @ fails
+            drawn[name][part] = weights[blocks] @ fails
             any_fails[name][part] = fails.any(axis=0)
     counted = answer.each[each > 0.0]
     bounds = float(counted.max(initial=0.0)), min(float(counted.sum()), 1.0)
@@ -277,20 +273,21 @@ def _worth_drawing(expected: FloatArray) -> Indices:
 
 
 def _laws(
-    answer: SiteProbability, p2: FloatArray, kr: FloatArray, site: Indices
+    answer: SiteProbability, numbers: Mapping[str, FloatArray], site: Indices
 ) -> dict[str, Normals]:
     """Return draws of Z of some blocks, shape (draws, n), by the law that joins them."""
-    law = answer.shaking.model.dependence
-    if law is not None:
-        p = np.sqrt(p2)
-        y = kr * STANDARD_GRAVITY_M_S2 / p
+    law, block = answer.shaking.model.dependence, answer.shaking.model.method.block
+    strength = numbers[block.strength]
+    if law is not None and block.size is not None:
+        p = np.sqrt(numbers[block.size])
+        y = strength * STANDARD_GRAVITY_M_S2 / p
         where = Placement.of(np.log(p), np.log(y), site=site, polarity=UNKNOWN)
         return {COPULA: JointSampler(law, where).normals}
     return {
         DEPENDENT: lambda draws, generator: np.broadcast_to(
-            generator.standard_normal((draws, 1)), (draws, p2.size)
+            generator.standard_normal((draws, 1)), (draws, strength.size)
         ),
-        INDEPENDENT: lambda draws, generator: generator.standard_normal((draws, p2.size)),
+        INDEPENDENT: lambda draws, generator: generator.standard_normal((draws, strength.size)),
     }
 
 

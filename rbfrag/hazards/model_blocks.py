@@ -18,11 +18,12 @@ from rbfrag.fragility.model import FragilityModel, Model
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.uncertain import normal_steps
-from rbfrag.fragility.unusable import block_reasons, refuse_elements
+from rbfrag.fragility.unusable import refuse_elements
 from rbfrag.hazards.annual_rate import Fragility
 from rbfrag.hazards.curve import HazardCurve
 from rbfrag.hazards.shaking import Shaking
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
 from rbfrag.solver.scatter import fraction, lognormal
 
 FloatArray = NDArray[np.float64]
@@ -35,10 +36,9 @@ FEWEST_NODES = 65
 ALL_STAND = "that all of them stand is the question"
 """Why blocks of which one cannot be used are refused."""
 
-_OF_ROCKING = ("p2", "kr", "restitution")
 _SIGMA_POINTS, _SIGMA_REACH = 15, 5.0
 _ALWAYS = 2
-"""p² and k_r have their points even where certain: what else is uncertain does not move them."""
+"""Size and strength have their points even where certain: what else scatters does not move them."""
 _AT_ONCE, _BLOCKS_AT_ONCE = 400_000, 512
 
 
@@ -96,92 +96,105 @@ class BlockTable:
 
 @dataclass(frozen=True, eq=False)
 class ModelBlocks:
-    """Blocks, as certain or uncertain as they are, and the model that answers for them.
+    """Blocks of one kind, as certain or uncertain as they are, and the model that answers for them.
 
     Args:
-        p2: p² [1/s²], draws x blocks.
-        kr: k_r, draws x blocks.
+        numbers: what the model reads of them, by field, draws x blocks each.
         weight: weights of the draws, which sum to 1, shape (k,).
-        medians: p² and k_r of the medians, shape (m,) each.
+        medians: the same of the medians, shape (m,) each.
         shaking: what the curve's levels are to the model.
         model: the model.
         level: confidence level.
-        restitution: of blocks that rock, draws x blocks; None for what angular momentum leaves.
-        stated_restitution: the one about which they are drawn, shape (m,); None likewise.
     """
 
-    p2: FloatArray
-    kr: FloatArray
+    numbers: Mapping[str, FloatArray]
     weight: FloatArray
-    medians: tuple[FloatArray, FloatArray]
+    medians: Mapping[str, FloatArray]
     shaking: Shaking
     model: FragilityModel
     level: float
-    restitution: FloatArray | None = None
-    stated_restitution: FloatArray | None = None
 
     @classmethod
     def of(
         cls,
-        p2: ArrayLike | None,
-        kr: ArrayLike | None,
+        given: Mapping[str, ArrayLike | None],
         *,
-        p2_sigma: ArrayLike,
-        kr_sigma: ArrayLike,
-        restitution: ArrayLike | None,
-        restitution_sigma: ArrayLike,
         draws: int,
         seed: int,
-        kind: str | None,
+        kind: str | Sequence[str | None] | None,
         model: Model | None,
         level: float,
         db: str | PathLike[str] | None,
         shaking: Shaking,
     ) -> ModelBlocks:
-        """Return the blocks of medians and sigmas; arguments as for :func:`rbfrag.survival`."""
-        if p2 is None or kr is None:
+        """Return the blocks of medians and sigmas; arguments as for :func:`rbfrag.survival`.
+
+        Args:
+            given: fields of the blocks.
+            draws: number of draws of several.
+            seed: of the draws.
+            kind: how they fail.
+            model: as in :func:`rbfrag.predict`.
+            level: confidence level.
+            db: as in :func:`rbfrag.predict`.
+            shaking: what the curve's levels are to the model.
+        """
+        stated = {name: value for name, value in given.items() if value is not None}
+        sigmas = [name for name in stated if name.endswith("_sigma")]
+        if not stated.keys() - {*sigmas}:
             raise InputError("give p2 and kr of the blocks, or a fragility of the curve's measure")
-        columns = {
-            "p2": p2, "kr": kr, "p2_sigma": p2_sigma, "kr_sigma": kr_sigma,
-            "restitution_sigma": restitution_sigma,
-            "restitution": np.nan if restitution is None else restitution,
-        }  # fmt: skip
-        values = np.broadcast_arrays(
-            *(np.atleast_1d(np.asarray(one, dtype=np.float64)) for one in columns.values())
+        for name in sigmas:
+            if name == "restitution_sigma" and "restitution" not in stated:
+                if np.any(stated[name]):
+                    raise InputError(f"{name} goes with restitution: give its mean, too")
+                del stated[name]
+        blocks, size = blocks_of_arrays(stated, kind)
+        refuse_elements(block_reasons_of(blocks, size), ALL_STAND)
+        kinds = dict.fromkeys(str(group.kind) for group in blocks.groups)
+        if len(kinds) > 1:
+            raise InputError(
+                f"the blocks are of kinds {' and '.join(kinds)}: ask of each kind by itself"
+            )
+        (group,) = blocks.groups
+        order = np.argsort(np.arange(size) if group.places is None else group.places)
+        values = {n: np.broadcast_to(v, (size,))[order] for n, v in group.numbers.items()}
+        numbers = {name: value for name, value in values.items() if not name.endswith("_sigma")}
+        chosen = find_model(model, (*numbers, shaking.name), db, kind=group.kind)
+        block = chosen.method.block
+        for name in sigmas:
+            if name not in block.sigmas and np.any(stated.get(name, 0.0)):
+                raise InputError(f"{name} does not go with kind {group.kind}: leave it out")
+        medians = {name: np.asarray(each) for name, each in block.filled(numbers).items()}
+        scatters = {name: f"{name}_sigma" for name in block.sigmas.values() if name in medians}
+        z, weight = _standard_draws(
+            [values.get(sigma, np.zeros(size)) for sigma in scatters.values()], draws, seed
         )
-        stated = None if restitution is None else values[5]
-        names = ("p2", "kr", shaking.name) if stated is None else (*_OF_ROCKING, shaking.name)
-        chosen = find_model(model, names, db, kind=kind)
-        given = dict(zip(columns, values, strict=True))
-        if stated is None:
-            del given["restitution"], given["restitution_sigma"]
-            if values[4].any():
-                raise InputError("restitution_sigma goes with restitution: give its mean, too")
-        refuse_elements(block_reasons(chosen.method.block, given), ALL_STAND)
-        medians = (values[0], values[1])
-        z, weight = _standard_draws(values[2:5], draws, seed)
-        p2s, krs = (lognormal(z[i], medians[i], values[2 + i]) for i in (0, 1))
-        if stated is None:
-            return cls(p2s, krs, weight, medians, shaking, chosen, level)
-        own = _with_own(chosen, medians, stated)
-        scattered = fraction(z[2], own, values[4])
-        return cls(p2s, krs, weight, medians, shaking, chosen, level, scattered, own)
+        drawn = {name: each[None] for name, each in medians.items()}
+        for (name, sigma), points in zip(scatters.items(), z, strict=True):
+            law = fraction if name in block.fractions else lognormal
+            drawn[name] = law(points, medians[name], values.get(sigma, np.zeros(size)))
+        whole = (weight.size, size)
+        drawn = {name: np.broadcast_to(each, whole) for name, each in drawn.items()}
+        return cls(drawn, weight, medians, shaking, chosen, level)
 
     @classmethod
     def certain(
         cls,
-        p2: FloatArray,
-        kr: FloatArray,
+        numbers: Mapping[str, FloatArray],
         *,
         shaking: Shaking,
         model: FragilityModel,
         level: float,
-        restitution: FloatArray | None = None,
     ) -> ModelBlocks:
         """Return blocks whose parameters are known, shape (m,) each."""
-        own = None if restitution is None else _with_own(model, (p2, kr), restitution)
-        drawn = None if own is None else own[None]
-        return cls(p2[None], kr[None], np.ones(1), (p2, kr), shaking, model, level, drawn, own)
+        medians = {n: np.asarray(v) for n, v in model.method.block.filled(numbers).items()}
+        drawn = {name: each[None] for name, each in medians.items()}
+        return cls(drawn, np.ones(1), medians, shaking, model, level)
+
+    @property
+    def count(self) -> int:
+        """Number of blocks."""
+        return next(iter(self.medians.values())).size
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -191,11 +204,14 @@ class ModelBlocks:
         advice = (self.model.term.advice,) if self.model.term.advice else ()
         return (*self.shaking.warnings, *advice, *presumed, *self.model.notes)
 
-    def placement(self) -> Placement:
-        """Return the blocks as those of one site with unknown azimuths."""
-        p2, kr = self.medians
-        p = np.sqrt(p2)
-        return Placement.of(np.log(p), np.log(kr * STANDARD_GRAVITY_M_S2 / p), polarity=UNKNOWN)
+    def placement(self) -> Placement | None:
+        """Return the blocks as those of one site with unknown azimuths; None without a size."""
+        block = self.model.method.block
+        if block.size is None:
+            return None
+        p = np.sqrt(self.medians[block.size])
+        ln_y = np.log(self.medians[block.strength] * STANDARD_GRAVITY_M_S2 / p)
+        return Placement.of(np.log(p), ln_y, polarity=UNKNOWN)
 
     def tabled(self, curves: Sequence[HazardCurve], *, mean: bool = False) -> BlockTable:
         """Return P and the ends of its interval over the levels of some curves.
@@ -217,15 +233,12 @@ class ModelBlocks:
         size += 1 - size % 2  # so that every second node is a table too
         reach = each * (shift.size - 1)
         values = np.exp(low + float(shift[0]) + step * np.arange(size + reach))
-        k, m = self.p2.shape
+        k, m = self.weight.size, self.count
         table = np.zeros((k, 3, 1 if mean else m, size))
         for draws in _slices(k, _AT_ONCE // (min(m, _BLOCKS_AT_ONCE) * values.size)):
             for some in _slices(m, _BLOCKS_AT_ONCE):
-                answer = self._predicted(
-                    self.p2[draws, some, None], self.kr[draws, some, None],
-                    None if self.restitution is None else self.restitution[draws, some, None],
-                    {self.shaking.name: values},
-                )  # fmt: skip
+                own = {name: each[draws, some, None] for name, each in self.numbers.items()}
+                answer = self._predicted(own, {self.shaking.name: values})
                 bands = np.stack([answer.probability, answer.ci_low, answer.ci_high], axis=1)
                 if mean:
                     bands = bands.sum(axis=2, keepdims=True) / m
@@ -246,32 +259,15 @@ class ModelBlocks:
         return share
 
     def _at_medians(self, levels: FloatArray) -> PredictionArray:
-        p2, kr = self.medians
         shaking = {self.shaking.name: levels[None, :] * self.shaking.median}
-        stated = self.stated_restitution
-        own = None if stated is None else stated[:, None]
-        return self._predicted(p2[:, None], kr[:, None], own, shaking)
+        return self._predicted({n: each[:, None] for n, each in self.medians.items()}, shaking)
 
     def _predicted(
-        self,
-        p2: FloatArray,
-        kr: FloatArray,
-        restitution: FloatArray | None,
-        shaking: Mapping[str, Any],
+        self, numbers: Mapping[str, FloatArray], shaking: Mapping[str, Any]
     ) -> PredictionArray:
-        own = {} if restitution is None else {"restitution": restitution}
-        answer = answer_given(self.model, {"p2": p2, "kr": kr, **own, **shaking}, self.level)
+        answer = answer_given(self.model, {**numbers, **shaking}, self.level)
         assert isinstance(answer, PredictionArray)
         return answer
-
-
-def _with_own(
-    model: FragilityModel, medians: tuple[FloatArray, FloatArray], stated: FloatArray
-) -> FloatArray:
-    """Return restitutions, with that of the block itself where none is stated."""
-    p2, kr = medians
-    own = model.method.block.filled({"p2": p2, "kr": kr, "restitution": stated})["restitution"]
-    return np.asarray(own)
 
 
 def _standard_draws(

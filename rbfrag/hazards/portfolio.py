@@ -23,6 +23,7 @@ from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import Component
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.question.blocks import numbers_in
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -45,16 +46,14 @@ class Portfolio:
         site_ids: names of the sites of these rows.
         row: row of the table that each block is of, shape (n,).
         site: index of each block's site, rising, shape (n,).
-        p2: p² [1/s²], the median, shape (n,).
-        kr: k_r, the median, shape (n,).
-        p2_sigma: standard deviation of ln p², shape (n,).
-        kr_sigma: standard deviation of ln k_r, shape (n,).
+        numbers: what a model may read of a block, by field, the medians, shape (n,) each; NaN where
+            it is not stated.
+        size_sigma: standard deviation of the logarithm of its frequency parameter, shape (n,).
+        strength_sigma: the same of its yield acceleration, shape (n,).
         weight: what a failure counts, shape (n,).
         loss: what a failure costs in the median, its weight included, shape (n,); None where
             nothing is stated.
         loss_sigma: standard deviation of the logarithm of that, shape (n,).
-        options: what else a model may read of a block, by name, shape (n,) each; NaN where it is
-            not stated.
         model: index of the model that answers for each block, shape (n,).
         models: the models as stored.
         measures: what the models read of the shaking.
@@ -65,14 +64,12 @@ class Portfolio:
     site_ids: tuple[str, ...]
     row: IntArray
     site: IntArray
-    p2: FloatArray
-    kr: FloatArray
-    p2_sigma: FloatArray
-    kr_sigma: FloatArray
+    numbers: Mapping[str, FloatArray]
+    size_sigma: FloatArray
+    strength_sigma: FloatArray
     weight: FloatArray
     loss: FloatArray | None
     loss_sigma: FloatArray
-    options: Mapping[str, FloatArray]
     model: IntArray
     models: tuple[ModelRow, ...]
     measures: tuple[str, ...]
@@ -93,10 +90,10 @@ class Portfolio:
         """Return the blocks of a table.
 
         Args:
-            columns: ``block_id``, ``p2_1_s2`` [1/s²] and ``kr`` of each row that can be used, and,
-                if there are, ``site_id``, ``kind``, ``count`` (like blocks, each with an azimuth of
-                its own), ``weight`` (what a failure counts), ``loss``, ``loss_sigma``,
-                ``p2_sigma``, ``kr_sigma`` and options of the kind such as ``restitution``.
+            columns: ``block_id`` of each row that can be used and the numbers that its kind reads,
+                such as ``p2_1_s2`` [1/s²] and ``kr``, and, if there are, ``site_id``, ``kind``,
+                ``count`` (like blocks, each with an azimuth of its own), ``weight`` (what a
+                failure counts), ``loss``, ``loss_sigma`` and standard deviations.
             site_ids: names of the sites of the event set.
             measures: what is known of the shaking, by the names of :func:`rbfrag.predict`.
             component: what its values mean.
@@ -117,8 +114,8 @@ class Portfolio:
         sites = _site_indices(columns, site_ids)
         kinds = _kinds(columns, n, kind)
         chosen = {
-            one: find_model(model, ("p2", "kr", *measures), db, kind=one or None)
-            for one in dict.fromkeys(kinds)
+            one: find_model(model, (*names_of, *measures), db, kind=one or None)
+            for one, names_of in _described(columns, kinds).items()
         }
         places = {one: i for i, one in enumerate(chosen)}
         count, weight = numbers("count", 1.0), numbers("weight", 1.0)
@@ -130,23 +127,33 @@ class Portfolio:
         row = np.repeat(np.arange(n), count.astype(np.int64))
         row = row[np.argsort(sites[row], kind="stable")]
         loss = numbers("loss", 0.0) * weight if "loss" in columns else None
-        reads = {name for one in chosen.values() for name in one.method.block.options}
+        blocks = [chosen[one].method.block for one in kinds]
+        stated = numbers_in(columns)
+        reads = {name for block in set(blocks) for name in (*block.names, *block.options)}
+
+        def sigma(of: Sequence[str | None]) -> FloatArray:
+            """Return the standard deviation of each row's own size or strength."""
+            names = np.array([f"{name}_sigma" for name in of])
+            result = np.zeros(n)
+            for name in {*names.tolist()} & {*stated}:
+                own = names == name
+                result[own] = np.nan_to_num(stated[name][own])
+            return result[row]
+
         return cls(
             block_ids=tuple(str(name) for name in names),
             site_ids=tuple(site_ids[i] for i in sites.tolist()),
             row=row,
             site=sites[row],
-            p2=np.asarray(columns["p2_1_s2"], dtype=np.float64)[row],
-            kr=np.asarray(columns["kr"], dtype=np.float64)[row],
-            p2_sigma=numbers("p2_sigma", 0.0)[row],
-            kr_sigma=numbers("kr_sigma", 0.0)[row],
+            numbers={
+                name: np.asarray(stated[name], dtype=np.float64)[row]
+                for name in sorted(reads & {*stated})
+            },
+            size_sigma=sigma([block.size for block in blocks]),
+            strength_sigma=sigma([block.strength for block in blocks]),
             weight=weight[row],
             loss=None if loss is None else loss[row],
             loss_sigma=numbers("loss_sigma", 0.0)[row],
-            options={
-                name: np.asarray(columns[name], dtype=np.float64)[row]
-                for name in sorted(reads & set(columns))
-            },
             model=np.array([places[one] for one in kinds], dtype=np.int64)[row],
             models=tuple(one.row for one in chosen.values()),
             measures=tuple(dict.fromkeys(n for one in chosen.values() for n in one.term.inputs)),
@@ -170,7 +177,9 @@ class Portfolio:
     @cached_property
     def dependence(self) -> Dependence | None:
         """What the failures of one earthquake share; None where that is not known."""
-        return self._answering[0].dependence if len(self.models) == 1 else None
+        one = self._answering[0]
+        known = len(self.models) == 1 and one.method.block.size is not None
+        return one.dependence if known else None
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -189,12 +198,14 @@ class Portfolio:
     @property
     def is_uncertain(self) -> bool:
         """Whether a block's own parameters scatter."""
-        return bool(self.p2_sigma.any() or self.kr_sigma.any())
+        return bool(self.size_sigma.any() or self.strength_sigma.any())
 
     def placement(self, some: NDArray[np.intp]) -> Placement:
         """Return some of the blocks as those of one earthquake, of unknown azimuths."""
-        p = np.sqrt(self.p2[some])
-        ln_y = np.log(self.kr[some] * STANDARD_GRAVITY_M_S2 / p)
+        block = self._answering[0].method.block
+        assert block.size is not None
+        p = np.sqrt(self.numbers[block.size][some])
+        ln_y = np.log(self.numbers[block.strength][some] * STANDARD_GRAVITY_M_S2 / p)
         return Placement.of(np.log(p), ln_y, site=self.site[some], polarity=UNKNOWN)
 
     def scatter_points(self) -> tuple[FloatArray, FloatArray]:
@@ -202,7 +213,8 @@ class Portfolio:
 
         What does not scatter has the one point 0.
         """
-        scatters = (self.component.scatter, float(self.p2_sigma.max()), float(self.kr_sigma.max()))
+        sigmas = (float(self.size_sigma.max()), float(self.strength_sigma.max()))
+        scatters = (self.component.scatter, *sigmas)
         axes = [normal_steps(_points(scatter), _REACH) for scatter in scatters]
         grids = np.meshgrid(*(x for x, _ in axes), indexing="ij")
         weight = np.einsum("i,j,k->ijk", *(w for _, w in axes))
@@ -228,31 +240,34 @@ class Portfolio:
         """
         xi, z_p, z_k = points
         shift = np.exp(self.component.scatter * np.asarray(xi)) / self.component.ratio
-        given: dict[str, Any] = {
-            "p2": self.p2[some] * np.exp(self.p2_sigma[some] * z_p),
-            "kr": self.kr[some] * np.exp(self.kr_sigma[some] * z_k),
-            **{name: shaking[name] * shift for name in self.measures},
-        }
-        shape = np.broadcast_shapes(*(value.shape for value in given.values()))
-        given = {name: np.broadcast_to(value, shape) for name, value in given.items()}
+        values = {name: shaking[name] * shift for name in self.measures}
+        factors = np.exp(self.size_sigma[some] * z_p), np.exp(self.strength_sigma[some] * z_k)
+        shape = np.broadcast_shapes(*(each.shape for each in (*values.values(), *factors)))
         p, in_domain = np.empty(shape), np.empty(shape, dtype=np.bool_)
         for number, model in enumerate(self._answering):
-            own = self.model[some] == number
+            own, block = self.model[some] == number, model.method.block
             if not own.any():
                 continue
-            part = {name: given[name][..., own] for name in ("p2", "kr", *model.term.inputs)}
-            for name in set(self.options) & set(model.method.block.options):
-                part[name] = self.options[name][some][own]
-            part = model.method.block.filled(part)
+
+            def of_these(value: Any, own: Any = own) -> Any:
+                return np.broadcast_to(value, shape)[..., own]
+
+            part = {name: of_these(values[name]) for name in model.term.inputs}
+            for name in {*self.numbers} & {*block.names, *block.options}:
+                part[name] = self.numbers[name][some][own]
+            for scattered, factor in zip((block.size, block.strength), factors, strict=True):
+                if scattered is not None:
+                    part[scattered] = part[scattered] * of_these(factor)
+            part = block.filled(part)
             answer = answer_given(model, part, _LEVEL, interval=False)
             assert isinstance(answer, PredictionArray)
             p[..., own], in_domain[..., own] = answer.probability, answer.in_domain
         if np.isnan(p).any():
-            block = int(some[np.argwhere(np.isnan(p))[0][-1]])
+            wrong = int(some[np.argwhere(np.isnan(p))[0][-1]])
             raise InputError(
-                f"block {self.block_ids[self.row[block]]}: model "
-                f"{self.models[self.model[block]].name!r} has no probability for p2 = "
-                f"{self.p2[block]:g} and kr = {self.kr[block]:g}"
+                f"block {self.block_ids[self.row[wrong]]}: model "
+                f"{self.models[self.model[wrong]].name!r} has no probability for "
+                + " and ".join(f"{n} = {v[wrong]:g}" for n, v in self.numbers.items())
             )
         return p, in_domain
 
@@ -273,6 +288,16 @@ def _site_indices(columns: Mapping[str, Any], site_ids: Sequence[str]) -> IntArr
         )
     index = {name: i for i, name in enumerate(site_ids)}
     return np.array([index[str(name)] for name in columns["site_id"]], dtype=np.int64)
+
+
+def _described(columns: Mapping[str, Any], kinds: Sequence[str]) -> dict[str, list[str]]:
+    """Return the fields that describe the blocks of each kind."""
+    stated = {n: np.asarray(v) for n, v in numbers_in(columns).items() if not n.endswith("_sigma")}
+    of_kind = {kind: np.array([each == kind for each in kinds]) for kind in dict.fromkeys(kinds)}
+    return {
+        kind: [name for name, values in stated.items() if not np.isnan(values[own]).all()]
+        for kind, own in of_kind.items()
+    }
 
 
 def _kinds(columns: Mapping[str, Any], n: int, kind: str | None) -> list[str]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rbfrag.fragility.joint import event_ranges
 from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import FragilityModel, Model
+from rbfrag.fragility.model import Model
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.uncertain import normal_steps
@@ -73,28 +73,20 @@ class SiteProbability:
     each: FloatArray
 
 
-def described(
-    model: FragilityModel, p2: FloatArray, kr: FloatArray, restitution: FloatArray | None
-) -> dict[str, FloatArray]:
-    """Return blocks by the names of their values, an empty restitution filled with their own."""
-    known = {} if restitution is None else {"restitution": restitution}
-    return model.method.block.filled({"p2": p2, "kr": kr, **known})
-
-
 def site_probability(
     measures: Mapping[str, FloatArray],
-    p2: FloatArray,
-    kr: FloatArray,
+    p2: FloatArray | None = None,
+    kr: FloatArray | None = None,
     *,
     component: Component,
     weight: FloatArray | None = None,
     own_block: bool = False,
     std_ln: Mapping[str, FloatArray] | None = None,
     kind: str | None = None,
-    restitution: FloatArray | None = None,
     model: Model | None = None,
     level: float = 0.95,
     db: str | PathLike[str] | None = None,
+    **others: FloatArray,
 ) -> SiteProbability:
     """Return probabilities at sites, integrated over what is not known of the shaking.
 
@@ -114,19 +106,22 @@ def site_probability(
         std_ln: standard deviations of the measures' logarithms by name, shape (n,); where one that
             the model reads is missing all values are taken as certain, but PGA beside PGV alone.
         kind: as in :func:`rbfrag.predict`.
-        restitution: of blocks that rock, shaped as `p2`; NaN for what angular momentum leaves.
         model: as in :func:`rbfrag.predict`.
         level: confidence level.
         db: as in :func:`rbfrag.predict`.
+        others: what else their kind reads of them, or instead, shaped as `p2`; NaN of an option for
+            the blocks' own.
     """
+    numbers = {**({} if p2 is None else {"p2": p2}), **({} if kr is None else {"kr": kr}), **others}
     shaking = SiteShaking.of(
-        measures, component, std_ln or {}, find_model(model, ("p2", "kr", *measures), db, kind=kind)
+        measures, component, std_ln or {}, find_model(model, (*numbers, *measures), db, kind=kind)
     )
-    columns = described(shaking.model, p2, kr, restitution)
+    columns = shaking.model.method.block.filled(numbers)
+    size = next(iter(columns.values())).size
     chosen, n = shaking.model, shaking.median.shape[0]
-    weights = np.full(p2.size, 1.0) if weight is None else weight
+    weights = np.full(size, 1.0) if weight is None else weight
     weights = np.ones(n) if own_block else weights / weights.sum()
-    blocks = 1 if own_block else p2.size
+    blocks = 1 if own_block else size
     across = bool(shaking.integrated)
     widest = float(shaking.factors[:, 0, 0].max(initial=0.0))
 

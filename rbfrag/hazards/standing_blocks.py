@@ -64,11 +64,12 @@ class StandingBlocks:
     @classmethod
     def of_blocks(cls, blocks: ModelBlocks, curves: list[HazardCurve]) -> StandingBlocks:
         """Return blocks that a model answers for, over the levels of some curves."""
-        table, count, law = blocks.tabled(curves), blocks.p2.shape[1], blocks.model.dependence
+        table, count, law = blocks.tabled(curves), blocks.count, blocks.model.dependence
         any_of = BlockTable(table.low, table.step, _rows(bounds(table.values)))
         thresholds = each = None
-        if count > 1 and law is not None:
-            thresholds = JointThresholds.of(table, blocks.placement(), law)
+        placement = blocks.placement()
+        if count > 1 and law is not None and placement is not None:
+            thresholds = JointThresholds.of(table, placement, law)
             if thresholds.every is not None:
                 each = BlockTable(table.low, table.step, table.values[0, 0])
         laws = (*((COPULA,) if thresholds is not None else ()), *_laws(count))

@@ -144,11 +144,7 @@ def survival(
     imt: str | None = None,
     site: str | None = None,
     weights: Weights | None = None,
-    p2_sigma: ArrayLike = 0.0,
-    kr_sigma: ArrayLike = 0.0,
-    restitution: ArrayLike | None = None,
-    restitution_sigma: ArrayLike = 0.0,
-    kind: str | None = None,
+    kind: str | Sequence[str | None] | None = None,
     fragility: Fragility | None = None,
     convert: str | None = None,
     convert_sigma: float | None = None,
@@ -158,6 +154,7 @@ def survival(
     draws: int = DRAWS,
     seed: int = 0,
     db: str | PathLike[str] | None = None,
+    **block: ArrayLike | None,
 ) -> SurvivalAnswer:
     """Return how likely blocks of one site are to stand after an age, if a hazard is right.
 
@@ -181,12 +178,7 @@ def survival(
         imt: as in :func:`rbfrag.hazard`, like `site` and `weights`.
         site: see there.
         weights: see there.
-        p2_sigma: standard deviations of ln p², independent of block to block, as `p2`.
-        kr_sigma: the same of ln k_r.
-        restitution: of blocks that rock: speed after an impact over that before it; None, or NaN
-            for one of them, for what angular momentum leaves.
-        restitution_sigma: standard deviation of it; it is cut off at 0 and 1.
-        kind: how the blocks fail; None for toppling, backed by a slope.
+        kind: how the blocks fail, all in one way; None for what they are given by.
         fragility: instead of blocks, a function from levels of the curves' measure, shape (n,), to
             probabilities of failure, shape (n,) or one row for each block, (m, n).
         convert: as in :func:`rbfrag.hazard`, like `convert_sigma`, `component` and `model`.
@@ -198,10 +190,12 @@ def survival(
             by quadrature.
         seed: seed of these draws.
         db: as in :func:`rbfrag.predict`.
+        block: instead of `p2` and `kr`, or beside them, fields of blocks as :func:`rbfrag.predict`
+            reads them; standard deviations such as kr_sigma are independent of block to block.
 
     Raises:
-        InputError: curves of several measures or sites, weights that do not add up to 1, or a
-            value that cannot be used.
+        InputError: curves of several measures or sites, weights that do not add up to 1, blocks of
+            several kinds, or a value that cannot be used.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
@@ -215,12 +209,11 @@ def survival(
             each[0], convert=convert, convert_sigma=convert_sigma, component=component
         )
         known = ModelBlocks.of(
-            p2, kr, p2_sigma=p2_sigma, kr_sigma=kr_sigma, restitution=restitution,
-            restitution_sigma=restitution_sigma, draws=draws, seed=seed, kind=kind, model=model,
+            {"p2": p2, "kr": kr, **block}, draws=draws, seed=seed, kind=kind, model=model,
             level=level, db=db, shaking=shaking,
         )  # fmt: skip
         blocks = StandingBlocks.of_blocks(known, each)
-    elif p2 is None and kr is None:
+    elif p2 is None and kr is None and not block:
         blocks = StandingBlocks.of_fragility(fragility, each[0].levels)
     else:
         raise InputError("fragility says all of the blocks: leave p2 and kr out")

@@ -8,12 +8,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbfrag.errors import InputError, ModelError
+from rbfrag.errors import InputError, ModelError, UnknownFieldError
+from rbfrag.fragility.lookup import block_of
 from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reasons, flat, index_of
+from rbfrag.fragility.unusable import block_reasons
 from rbfrag.question.blocks import Blocks, Refused, many_blocks
+from rbfrag.question.fields import BlockFields
 
 _COLUMNS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "y_m_s", "intensity_m_s",
@@ -84,6 +87,42 @@ def ask_many(
     return _together(parts, refused, blocks, shape, level, index_of(numbers))
 
 
+def blocks_of_arrays(
+    given: Mapping[str, Any], kind: str | Sequence[str | None] | None = None
+) -> tuple[Blocks, int]:
+    """Return blocks as answers read them, and their number.
+
+    Args:
+        given: fields of the blocks: numbers, or arrays of shape (m,); None for what is not stated.
+        kind: how they fail, for all or one each; None or an empty text for what they say.
+
+    Raises:
+        InputError: a name that is no field of a block, or arrays of different lengths.
+    """
+    known = {name: value for name, value in given.items() if value is not None}
+    for name in known:
+        if name not in BlockFields.__optional_keys__ | {"back_fracture"}:
+            raise UnknownFieldError(f"{name[:60]} is no field of a block")
+    backed = {name: known.pop(name) for name in ("back_fracture",) if name in known}
+    each = {} if kind is None or isinstance(kind, str) else {"kind": np.zeros(len(kind))}
+    values, shape = flat({**known, **each})
+    size = int(np.prod(shape))
+    numbers: dict[str, Any] = {name: values[name] for name in known}
+    return many_blocks({**numbers, **backed}, size, kinds=kind), size
+
+
+def block_reasons_of(blocks: Blocks, size: int) -> NDArray[np.object_]:
+    """Return why blocks wait for no earthquake, shape (m,); empty texts for those that do."""
+    reasons = np.full(size, "", dtype=object)
+    for each in (*blocks.refused, *blocks.unstable):
+        reasons[each.places] = each.texts()
+    for group in blocks.groups:
+        places = np.arange(size) if group.places is None else group.places
+        own = {n: np.broadcast_to(v, places.shape) for n, v in group.numbers.items()}
+        reasons[places] = block_reasons(block_of(own, group.kind), own)
+    return reasons
+
+
 def _refuse(
     refused: Sequence[Refused],
     parts: Sequence[tuple[NDArray[np.intp], PredictionArray]],
@@ -98,8 +137,8 @@ def _refuse(
         missing = np.flatnonzero(np.isnan(answer.probability) | (answer.reason == "unstable"))
         texts = answer.reason[missing].tolist()
         reasons |= dict(zip(places[missing].tolist(), texts, strict=True))
-    if blocks.unstable is not None:
-        reasons |= dict.fromkeys(blocks.unstable.tolist(), "unstable")
+    for each in blocks.unstable:
+        reasons |= dict.fromkeys(each.places.tolist(), "unstable")
     if reasons:
         first = min(reasons)
         where = tuple(int(i) for i in np.unravel_index(first, shape))
@@ -117,7 +156,7 @@ def _of_draws(
     """Return the one answer over draws of a block, all of which fail in one way."""
     whole = [group for group in blocks.groups if group.places is not None]
     if len(whole) != 1 or whole[0].places is None or whole[0].places.size != size:
-        at_rest = 0 if blocks.unstable is None else int(blocks.unstable.size)
+        at_rest = sum(each.places.size for each in blocks.unstable)
         first = next((f": {each.texts()[0]}" for each in blocks.refused), "")
         kinds = " and ".join(str(group.kind) for group in whole) or "none"
         raise InputError(
@@ -153,8 +192,9 @@ def _together(
         in_domain[at] = part.in_domain
         reasons += [(at[places], texts) for places, texts in part.reasons.parts]
     reasons += [(each.places, each.texts) for each in refused]
-    unstable = blocks.unstable
-    if unstable is not None and unstable.size:
+    nothing = np.empty(0, dtype=np.intp)
+    unstable = np.concatenate([nothing, *(each.places for each in blocks.unstable)])
+    if unstable.size:
         for name in ("probability", "ci_low", "ci_high", "event_low", "event_high"):
             columns[name][unstable] = 1.0
         if "block_sd" in columns:

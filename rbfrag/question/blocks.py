@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import block_of
+from rbfrag.question.fields import BlockFields, column_of
 from rbfrag.solver.block.formulas import SCALAR, tan_deg
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.described import (
@@ -119,7 +120,7 @@ class Blocks(NamedTuple):
         groups: those that a model may answer for.
         remarks: what is to be said of all of them.
         refused: those that cannot be used.
-        unstable: those that fall at rest, shape (m,).
+        unstable: those that fall at rest.
         kinds: kind of each, a place in ``KINDS``, -1 for none; None where all are of one group.
         modes: failure mode of each, a place in :data:`MODES`, -1 where that is not known.
         read: the fields that were read.
@@ -128,7 +129,7 @@ class Blocks(NamedTuple):
     groups: tuple[Group, ...]
     remarks: tuple[str, ...] = ()
     refused: tuple[Refused, ...] = ()
-    unstable: NDArray[np.intp] | None = None
+    unstable: tuple[Refused, ...] = ()
     kinds: NDArray[np.int8] | None = None
     modes: NDArray[np.int8] | None = None
     read: frozenset[str] = frozenset()
@@ -146,6 +147,67 @@ def kinds_by_numbers(given: Collection[str]) -> list[KindFacts]:
         for facts in KINDS.values()
         if facts.parameters and all(name in given for name in facts.parameters)
     ]
+
+
+def missing_number(
+    given: Collection[str], kind: str | None = None
+) -> tuple[str, tuple[str, ...]] | None:
+    """Return the first number that a block by numbers lacks, and all of its kind; None for none.
+
+    Args:
+        given: names of the numbers.
+        kind: how the block is asked to fail; None for what the numbers say.
+    """
+    block = block_of(given, kind)
+    missing = [name for name in block.names if name not in given]
+    return (missing[0], block.names) if missing and kind in (None, block.kind) else None
+
+
+def refuse_foreign(given: Collection[str], kind: str | None = None) -> None:
+    """Refuse numbers that a block of a kind has not.
+
+    Args:
+        given: names of the numbers.
+        kind: how the block fails; None for what the numbers say.
+    """
+    block = block_of(given, kind)
+    known = (*block.names, *block.options, *block.sigmas)
+    if foreign := [name for name in given if name not in known]:
+        raise InputError(
+            f"{foreign[0]} does not go with kind {kind or block.kind}: leave it out",
+            fields=(foreign[0],),
+        )
+
+
+def numbers_in(columns: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what answers read of blocks, by field, from columns of a table that was written."""
+    return {
+        name: columns[column_of(name)]
+        for name in BlockFields.__optional_keys__
+        if name not in OF_A_SHAPE and column_of(name) in columns
+    }
+
+
+def taken_as_medians(given: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return fields without standard deviations, and what is said where there are any.
+
+    Args:
+        given: fields of blocks, numbers or arrays.
+    """
+    sigmas = [name for name in given if name.endswith("_sigma")]
+    stated = [name for name in sigmas if any(_listed_numbers(given[name]))]
+    others = {name: value for name, value in given.items() if name not in sigmas}
+    if not stated:
+        return others, ()
+    return others, (
+        f"{' and '.join(stated)} of the blocks are not integrated here: each block is taken as its "
+        "median (predict, survival and losses integrate)",
+    )
+
+
+def _listed_numbers(value: Any) -> list[float]:
+    numbers = value.ravel().tolist() if hasattr(value, "ravel") else value
+    return [each for each in (numbers if isinstance(numbers, list) else [numbers]) if each == each]
 
 
 def shape_among(given: Collection[str]) -> tuple[str, ...] | None:
@@ -479,7 +541,7 @@ class _Sorted:
         self.given = {name: value for name, value in given.items() if name != "back_fracture"}
         self.groups: list[Group] = []
         self.refused: list[Refused] = []
-        self.unstable: list[Any] = []
+        self.unstable: list[Refused] = []
         self.free = np.ones(size, dtype=np.bool_)
         """Which blocks no reason is known against."""
         self.kinds = np.full(size, -1, dtype=np.int8)
@@ -493,6 +555,7 @@ class _Sorted:
         np = self.np
         self._state(kinds, modes)
         shape = self._shape()
+        self._state_free(shape)
         if shape is None:
             by_shape = np.zeros(self.size, dtype=np.bool_)
         elif any(name in self.given for name in NUMBERS):
@@ -503,10 +566,9 @@ class _Sorted:
             self._sort_shapes(shape, np.flatnonzero(by_shape))
         if not by_shape.all():
             self._sort_numbers(np.flatnonzero(~by_shape))
-        nothing = np.empty(0, dtype=np.intp)
         return Blocks(
             tuple(self.groups), tuple(self.remarks), tuple(self.refused),
-            np.concatenate([nothing, *self.unstable]), self.kinds, self.modes,
+            tuple(self.unstable), self.kinds, self.modes,
             frozenset(self.read),
         )  # fmt: skip
 
@@ -547,6 +609,16 @@ class _Sorted:
                     here, f"the block's mode is {shown}: {model} model says nothing about it"
                 )
 
+    def _state_free(self, shape: tuple[str, ...] | None) -> None:
+        """Enter that blocks stand free of which a restitution is stated."""
+        restitution = self.given.get("restitution")
+        if restitution is None or (shape is None and not {"p2", "kr"} & self.given.keys()):
+            return
+        facts = _requested(None, ("restitution",))
+        assert facts is not None
+        stated = ~self.np.isnan(restitution) if self.rows else True
+        self.kinds[(self.kinds < 0) & stated] = _codes()[facts.kind]
+
     def _shape(self) -> tuple[str, ...] | None:
         """Return the shape that is stated; of a table, one that is needed."""
         numbers = [name for name in NUMBERS if name in self.given]
@@ -580,14 +652,14 @@ class _Sorted:
     def _sort_numbers(self, places: Any) -> None:
         """Sort blocks that are given by numbers."""
         np = self.np
-        first = block_of(list(self.given)).kind
-        unsaid = self.kinds < 0
-        if unsaid.any():
-            for facts in kinds_by_numbers(self.given):
-                kind = block_of([name for name in self.given if name in _numbers_of(facts)]).kind
-                here = unsaid & self._known(facts.parameters)
-                self.kinds[here & (self.kinds < 0)] = _codes()[kind]
-            self.kinds[self.kinds < 0] = _codes()[first]
+        # a restitution has told already
+        names = [name for name in self.given if not name.startswith("restitution")]
+        if (self.kinds < 0).any():
+            for facts in kinds_by_numbers(names):
+                kind = block_of([name for name in names if name in _numbers_of(facts)]).kind
+                here = (self.kinds < 0) & self._known(facts.parameters)
+                self.kinds[here] = _codes()[kind]
+            self.kinds[self.kinds < 0] = _codes()[block_of(names).kind]
         of_these = self.kinds[places]
         for code in np.unique(of_these[self.free[places]]).tolist():
             facts = tuple(KINDS.values())[code]
@@ -634,17 +706,12 @@ class _Sorted:
             if wrong.any():
                 wrong, values = (np.broadcast_to(each, places.shape) for each in (wrong, values))
                 empty = wrong & np.isnan(values)
+                name = column_of(name) if self.rows else name
                 self.refuse(places[empty], f"{name} is empty")
                 wrong = wrong & ~empty
                 self.refuse(
                     places[wrong], name + " = {value:g} is not " + wanted, value=values[wrong]
                 )
-        if "restitution" in self.given and "p2" not in self.given:
-            free_kind = _requested(None, ("restitution",))
-            assert free_kind is not None
-            self.kinds[places] = np.where(
-                self.kinds[places] < 0, _codes()[free_kind.kind], self.kinds[places]
-            )
         standing = [facts.free_standing for facts in KINDS.values()]
         is_free = np.array([*standing, not self.backed])[self.kinds[places]]
         for free_standing in (False, True):
@@ -719,7 +786,8 @@ class _Sorted:
         words: dict[str, Any] = {"mode": words_of_mode(mode), "kind": facts.kind}
         falls = k <= 0.0
         if falls.any():
-            self.unstable.append(places[falls])
+            at_rest = {**words, "k": k[falls]}
+            self.unstable.append(Refused(places[falls], UNSTABLE_AT_REST, at_rest))
             self.free[places[falls]] = False
         if facts.mode != mode:
             instead = _INSTEAD.get(mode, "")

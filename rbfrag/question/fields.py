@@ -141,3 +141,13 @@ def option_of(name: str) -> str:
 def parameter_of(name: str) -> str:
     """Return what a field is called in requests: spectral accelerations as in tables."""
     return name if name in SPECTRAL or name == "leaves_g" else word_of(name)
+
+
+@cache
+def _by_word() -> dict[str, str]:
+    return {word_of(name): name for name in declared()}
+
+
+def name_of(word: str) -> str:
+    """Return the field that people call so; the word itself where it is none."""
+    return _by_word().get(word, word)

@@ -247,8 +247,8 @@ class Motion(Parameters):
     model: Annotated[Text | None, MODEL] = None
 
 
-class PredictQuery(Motion, TopplingBlock):
-    """Parameters of `GET /v1/predict`."""
+class AnyBlock(TopplingBlock):
+    """A block that fails in any way: numbers, or a shape."""
 
     kind: Annotated[Text | None, KIND] = None
     ky: Annotated[Positive | None, KY] = None
@@ -256,6 +256,11 @@ class PredictQuery(Motion, TopplingBlock):
     ks: Annotated[Positive | None, KS] = None
     ps2: Annotated[Positive | None, PS2] = None
     restitution: Annotated[Positive | None, RESTITUTION] = None
+
+
+class PredictQuery(Motion, AnyBlock):
+    """Parameters of `GET /v1/predict`."""
+
     p2_sigma: Annotated[NotNegative | None, P2_SIGMA] = None
     kr_sigma: Annotated[NotNegative | None, KR_SIGMA] = None
     ky_sigma: Annotated[NotNegative | None, KY_SIGMA] = None
@@ -369,11 +374,9 @@ class RockmassQuery(Motion):
     level: Annotated[float | None, LEVEL] = None
 
 
-class HazardQuery(TopplingBlock):
+class HazardQuery(AnyBlock):
     """Parameters of `/v1/hazard`."""
 
-    kind: Annotated[Text | None, KIND] = None
-    restitution: Annotated[Positive | None, RESTITUTION] = None
     years: Positive = 50.0
     """Period of the probability [years]."""
     imt: Text | None = None

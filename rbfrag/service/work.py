@@ -20,6 +20,7 @@ from rbfrag.errors import InputError, MotionFileError
 from rbfrag.files import unique_keys
 from rbfrag.service.parameters import (
     MEASURES,
+    WAYS,
     CriticalQuery,
     HazardQuery,
     Reading,
@@ -148,9 +149,19 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     from rbfrag.hazards.conversions import velocity_conversion
     from rbfrag.hazards.curve_file import hazard_curves_in, suited_curves
     from rbfrag.hazards.report import as_dict
+    from rbfrag.question.blocks import missing_number
+    from rbfrag.question.fields import parameter_of
+    from rbfrag.question.question import described
 
-    kind, block, remarks = query.toppling("p2", "kr", kind=query.kind)
-    known: dict[str, Any] = {**block, **query.given({"restitution": "restitution"})}
+    others = {"restitution": "restitution", "displacement": "displacement_m"}
+    blocks = described({**query.block_fields(), **query.given(others)}, query.kind)
+    (group,) = blocks.groups
+    if (missing := missing_number(group.numbers, group.kind)) is not None:
+        raise InputError(
+            f"{parameter_of(missing[0])} is missing: a block is given by "
+            f"{' and '.join(map(parameter_of, missing[1]))}, or by {WAYS}"
+        )
+    known: dict[str, Any] = {**group.numbers, "kind": group.kind}
     try:
         curves = hazard_curves_in(_text(body), FILE, imt=query.imt, site=query.site)
     except RecursionError:
@@ -163,8 +174,8 @@ def hazard(body: bytes, query: HazardQuery, db: str | None) -> bytes:
     chosen = query.model_dump(
         include={"years", "level", "convert", "convert_sigma", "component", "model"}
     )
-    rates = [answer(curve, **known, **chosen, kind=kind, db=db) for curve in curves]
-    return json_text(as_dict(curves, [[None]] * len(curves), rates, remarks))
+    rates = [answer(curve, **known, **chosen, db=db) for curve in curves]
+    return json_text(as_dict(curves, [[None]] * len(curves), rates, blocks.remarks))
 
 
 def _motion(body: bytes, query: Reading) -> GroundMotion:

@@ -12,10 +12,6 @@ from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.solver.block.formulas import (
-    Elementwise,
-    N,
-    frequency_parameter,
-    shape_factor,
     tan_deg,
 )
 from rbfrag.solver.block.geometry import Block
@@ -184,18 +180,6 @@ def _refuse_part_of_a_shape(
                 f"{spell(name)} is missing: {', '.join(map(spell, first.names))} together are "
                 "the shape of a block"
             )
-
-
-def rectangle_numbers(
-    height_m: N, width_m: N, dip_deg: N, functions: Elementwise[N]
-) -> tuple[N, N]:
-    """Return p² [1/s²] and k_r = tan(atan(width/height) - dip) of rectangles backed by a slope."""
-    slenderness = width_m / height_m
-    r3_m = 0.5 * height_m * functions.sqrt(1.0 + slenderness * slenderness)
-    p2 = frequency_parameter(shape_factor(-slenderness, slenderness), r3_m)
-    tan_dip = tan_deg(dip_deg, functions)
-    # in units of the height: sin δ* and cos δ* up to a positive factor
-    return p2, yield_coefficient(width_m, height_m, tan_dip, 1.0, functions)
 
 
 def toppling_rectangle(described: DescribedBlock) -> dict[str, float]:

@@ -150,7 +150,7 @@ def test_respond_and_predict_from_a_block_file(shell: Shell, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (("phi_deg = 35", "phi_deg = 20"), ["slide", "0.267"]),
+        (("phi_deg = 35", "phi_deg = 20"), ["slides (yield 0.27 g)"]),
         (("alpha1_deg = -10", "alpha1_deg = -40"), ["confined topple"]),
         (("beta_deg = 5", "beta_deg = 26"), ["unstable"]),
         (("beta_deg = 5", "beta_deg = 25"), ["yield 0 g"]),

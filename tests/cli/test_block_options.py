@@ -117,7 +117,7 @@ def test_the_mode_of_a_rectangle_is_checked_where_friction_is_known(
     said = shell.json(*asked)["warnings"]
     assert any("taken to topple" in text for text in said)
     assert not any("taken to topple" in t for t in shell.json(*asked, "--phi", "45")["warnings"])
-    assert "its mode is slide" in refuses(*asked, "--phi", "10")
+    assert "the block slides" in refuses(*asked, "--phi", "10")
 
 
 ALPHA1 = ("--alpha1", "-10", "--alpha3", "20", "--r3", "1")

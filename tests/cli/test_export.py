@@ -75,7 +75,8 @@ def test_functions_of_free_standing_blocks(shell: Shell, refuses: Callable[..., 
     assert "Overturning of free-standing rock blocks" in Path("a.xml").read_text()
     assert "that stands free" in json.loads(Path("a.json").read_text())["block"]["Description"]
     backed = ("export", "nrml", "--p2", "3", "--kr", "0.1", "--out", "b.xml")
-    assert "--kind rocking" in refuses(*backed, "--restitution", "0.8")
+    message = refuses(*backed, "--restitution", "0.8", "--kind", "toppling")
+    assert "--restitution does not go with kind toppling" in message
     with pytest.raises(InputError, match="shares are of a rock mass"):
         rbfrag.export.nrml("b.xml", 3.0, 0.1, kind="rocking", shares=[50.0])
 

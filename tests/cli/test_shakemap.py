@@ -198,5 +198,5 @@ def test_free_standing_blocks_with_their_restitution(
     first = json.loads(Path("b.geojson").read_text())["features"][0]["properties"]
     assert first["probability"] == pytest.approx(float(rows[1]["probability"]), rel=1e-9)
     assert told["model"] == "rocking-pgv_pga"
-    message = refuses("shakemap", grid, *one, *SINGLE)
-    assert "--restitution goes with blocks that stand free" in message
+    message = refuses("shakemap", grid, *one, *SINGLE, "--kind", "toppling")
+    assert "--restitution does not go with kind toppling" in message

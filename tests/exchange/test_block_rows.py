@@ -211,14 +211,18 @@ def test_kinds_of_rows() -> None:
     columns: dict[str, Any] = {
         "p2_1_s2": np.full(5, 3.0), "kr": np.full(5, 0.1),
         "kind": ["", "rocking", "sliding", "rolling", "toppling"],
-        "restitution": [2.0, 1.2, 0.9, 0.9, 0.9],
+        "restitution": [np.nan, 1.2, 0.9, 0.9, 0.9],
     }  # fmt: skip
     own: BlockRows = read_blocks(columns)
     assert own.blocks["row"].tolist() == [0, 4]
     rocking, sliding, rolling = own.refused["reason"].tolist()
     assert rocking.startswith("restitution = 1.2 is no ratio of speeds")
-    assert sliding == "a block of kind sliding is not described by p2_1_s2 and kr"
+    assert sliding == (
+        "the block's mode is slide, and ky is missing: a block of kind sliding is given by ky and "
+        "displacement_m"
+    )
     assert rolling.startswith("kind = 'rolling' is none of confined_toppling, rocking")
+    columns["restitution"][1] = 0.9
     one = read_blocks(columns, one_kind=True)
     assert one.refused["reason"][0] == (
         "the block's kind is rocking, and the answer is for kind toppling"

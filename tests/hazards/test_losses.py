@@ -267,7 +267,7 @@ def test_closed_form_is_near_the_samples(tmp_path: Path) -> None:
     # the same law by quadrature, without a sampler
     everything = np.arange(sampled.portfolio.size)
     pgv = np.where(sampled.portfolio.site == 2, 0.5, 0.45)
-    p = probability(sampled.portfolio.kr * STANDARD_GRAVITY_M_S2 / 2.0, pgv)
+    p = probability(sampled.portfolio.numbers["kr"] * STANDARD_GRAVITY_M_S2 / 2.0, pgv)
     law = sampled.portfolio.dependence
     assert law is not None
     joint = JointFailures.of(p, sampled.portfolio.placement(everything), law)

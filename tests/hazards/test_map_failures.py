@@ -72,7 +72,9 @@ def test_each_block_fails_as_often_as_the_map_says(row: Row, term: str) -> None:
             model=FragilityModel.from_row(measure_row(term, dependence=shares(0.1, 0.3, 0.2, 0.4))),
         )  # fmt: skip
     for seed in (0, 1):
-        found = map_failures(answer, P2, KR, PLACES, weight=BITS, draws=60_000, seed=seed)
+        found = map_failures(
+            answer, {"p2": P2, "kr": KR}, PLACES, weight=BITS, draws=60_000, seed=seed
+        )
         p = answer.probability
         error = np.sqrt(p * (1.0 - p) / 60_000)
         assert (np.abs(which(found).mean(axis=0) - p) < 4.0 * error + 1e-4).all()
@@ -84,7 +86,9 @@ def test_against_dense_matrices(row: Row) -> None:
     law, between = shares(0.3, 0.7), 0.4
     answer = blocks_at_places(row(dependence=law))
     draws = 40_000
-    found = map_failures(answer, P2, KR, PLACES, weight=BITS, draws=draws, between=between)
+    found = map_failures(
+        answer, {"p2": P2, "kr": KR}, PLACES, weight=BITS, draws=draws, between=between
+    )
     random = np.random.default_rng(9)
     x = np.radians(LON) * np.cos(np.radians(45.05)) * 6371.0
     y = np.radians(LAT) * 6371.0
@@ -108,7 +112,9 @@ def test_against_dense_matrices(row: Row) -> None:
 
 def test_nothing_in_common_is_a_sum_of_independent_blocks(row: Row) -> None:
     answer = blocks_at_places(row(dependence=shares(0.0, 1.0)))
-    found = map_failures(answer, P2, KR, PLACES, draws=40_000, between=0.0, range_km=1e-6, seed=3)
+    found = map_failures(
+        answer, {"p2": P2, "kr": KR}, PLACES, draws=40_000, between=0.0, range_km=1e-6, seed=3
+    )
     p = answer.probability
     assert found.drawn[COPULA].mean() == pytest.approx(p.sum(), abs=4 * np.sqrt(p.sum() / 40_000))
     assert found.drawn[COPULA].var() == pytest.approx((p * (1.0 - p)).sum(), rel=0.03)
@@ -122,7 +128,9 @@ def test_all_in_common_is_all_or_nothing(row: Row) -> None:
         {"pgv_m_s": 0.6 * one}, 3.0 * one, 0.1 * one, component=component("single"),
         own_block=True, std_ln={"pgv_m_s": 0.5 * one}, model=model,
     )  # fmt: skip
-    found = map_failures(answer, 3.0 * one, 0.1 * one, PLACES, draws=20_000, between=1.0)
+    found = map_failures(
+        answer, {"p2": 3.0 * one, "kr": 0.1 * one}, PLACES, draws=20_000, between=1.0
+    )
     assert set(found.drawn[COPULA].tolist()) == {0.0, 4.0}
     p = answer.probability[0]
     error = np.sqrt(p * (1.0 - p) / 20_000)
@@ -131,13 +139,13 @@ def test_all_in_common_is_all_or_nothing(row: Row) -> None:
 
 def test_certain_shaking_leaves_the_blocks_own_dependence(row: Row) -> None:
     answer = blocks_at_places(row(dependence=shares(0.0, 1.0)), certain=True, meaning="single")
-    found = map_failures(answer, P2, KR, PLACES, draws=40_000)
+    found = map_failures(answer, {"p2": P2, "kr": KR}, PLACES, draws=40_000)
     p = answer.probability
     assert found.drawn[COPULA].var() == pytest.approx((p * (1.0 - p)).sum(), rel=0.03)
     assert found.range_km is None
     # of one site instead, however far apart
     together = Places.of(LON, LAT, np.array(["A"] * 4, dtype=object))
-    found = map_failures(answer, P2, KR, together, draws=40_000)
+    found = map_failures(answer, {"p2": P2, "kr": KR}, together, draws=40_000)
     assert found.by_law[COPULA].probability_any == pytest.approx(p.max(), abs=0.01)
 
 
@@ -148,7 +156,7 @@ def test_places_within_a_hundred_metres_are_one_site() -> None:
 
 def test_without_an_estimate_there_are_bounds(row: Row) -> None:
     answer = blocks_at_places(row(dependence=None), certain=True, meaning="single")
-    found = map_failures(answer, P2, KR, PLACES, draws=20_000)
+    found = map_failures(answer, {"p2": P2, "kr": KR}, PLACES, draws=20_000)
     p = answer.probability
     assert found.by_law[DEPENDENT].probability_any == pytest.approx(p.max(), abs=0.015)
     assert found.by_law[INDEPENDENT].probability_any == pytest.approx(
@@ -163,7 +171,9 @@ def test_without_an_estimate_there_are_bounds(row: Row) -> None:
 def test_a_seed_repeats_and_another_differs(row: Row) -> None:
     answer = blocks_at_places(row())
     runs = [
-        map_failures(answer, P2, KR, PLACES, weight=BITS, draws=500, seed=seed).drawn[COPULA]
+        map_failures(answer, {"p2": P2, "kr": KR}, PLACES, weight=BITS, draws=500, seed=seed).drawn[
+            COPULA
+        ]
         for seed in (4, 4, 5)
     ]
     assert (runs[0] == runs[1]).all()
@@ -176,7 +186,7 @@ def test_a_class_at_every_node_counts_its_weights(row: Row) -> None:
         SHAKING, p2, kr, component=component("rotd50"), weight=weight, std_ln=STD,
         model=FragilityModel.from_row(row()),
     )  # fmt: skip
-    found = map_failures(answer, p2, kr, PLACES, weight=weight, draws=20_000)
+    found = map_failures(answer, {"p2": p2, "kr": kr}, PLACES, weight=weight, draws=20_000)
     assert found.expected == pytest.approx(4.0 * answer.probability.sum(), rel=1e-12)
     spread = found.drawn[COPULA].std() / np.sqrt(20_000)
     assert found.drawn[COPULA].mean() == pytest.approx(found.expected, abs=4.0 * spread)
@@ -190,15 +200,15 @@ def test_where_nothing_fails(row: Row) -> None:
         {"pgv_m_s": np.zeros(4)}, P2, KR, component=component("single"), own_block=True,
         model=FragilityModel.from_row(row()),
     )  # fmt: skip
-    told = map_failures(answer, P2, KR, PLACES).as_dict()
+    told = map_failures(answer, {"p2": P2, "kr": KR}, PLACES).as_dict()
     assert told["expected_failures"] == told["failures_p95"] == told["probability_any"] == 0.0
 
 
 def test_refusals(row: Row) -> None:
     answer = blocks_at_places(row(), certain=True)
     with pytest.raises(InputError, match="draws = 3"):
-        map_failures(answer, P2, KR, PLACES, draws=3)
+        map_failures(answer, {"p2": P2, "kr": KR}, PLACES, draws=3)
     with pytest.raises(InputError, match="seed = -1"):
-        map_failures(answer, P2, KR, PLACES, seed=-1)
+        map_failures(answer, {"p2": P2, "kr": KR}, PLACES, seed=-1)
     with pytest.raises(InputError, match="between = 2"):
-        map_failures(answer, P2, KR, PLACES, between=2.0)
+        map_failures(answer, {"p2": P2, "kr": KR}, PLACES, between=2.0)

@@ -35,10 +35,12 @@ class FunctionOptions(BlocksOptions):
 
     def keywords(self, standing: StandingOptions) -> tuple[dict[str, Any], tuple[str, ...]]:
         """Return the keywords of `rbfrag.export`, and what is to be said of the blocks."""
-        given = self.toppling_blocks(standing)
+        from rbfrag.fragility.methods import TOPPLING_BLOCK
+
+        given = self.given_blocks(standing, only=TOPPLING_BLOCK.names, one_kind=True)
         keywords = {
             "one_class": given.is_class, "imt": self.imt, "name": self.name, "levels": self.levels,
-            "model": self.model, "db": self.db, "kind": given.kind,
+            "model": self.model, "db": self.db, "kind": str(given.columns["kind"][0]),
         }  # fmt: skip
         if given.rows is None and not given.is_class:
             named = {"p2": "p2_1_s2", "kr": "kr", "restitution": "restitution"}

@@ -16,7 +16,7 @@ from rbfrag.cli.output import (
     write_table,
 )
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
+from rbfrag.cli.parameters.block import BlocksOptions, FailureOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.errors import InputError
 from rbfrag.fragility.words import percent
@@ -81,7 +81,7 @@ def hazard(
         metavar="CURVE...",
     ),
     blocks: BlocksOptions,
-    standing: StandingOptions,
+    standing: FailureOptions,
     meaning: options.Curve,
     answering: options.Answering,
     wanted: RateOptions,
@@ -111,7 +111,7 @@ def hazard(
     from rbfrag.hazards.report import as_dict
 
     check_files(table=out, plot=plot, excel_text=excel_text)
-    table, is_class, remarks, rows, kind = blocks.toppling_blocks(standing)
+    table, is_class, remarks, rows = blocks.given_blocks(standing)
     files = [
         suited_in(path, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
         for path in curve
@@ -128,12 +128,11 @@ def hazard(
     most = max(len(one.names) for one in sites)
     answers = [
         answer(
-            one.curves, one.columns["p2_1_s2"], one.columns["kr"],
-            weights=wanted.weights, at_least=wanted.counts(len(one.names), most),
+            one.curves, **one.numbers, weights=wanted.weights,
+            at_least=wanted.counts(len(one.names), most),
             convert=meaning.convert, convert_sigma=meaning.convert_sigma,
             component=meaning.component, years=wanted.years, model=answering.model,
-            level=answering.level, db=answering.db, one_class=is_class, kind=kind,
-            restitution=one.columns.get("restitution"),
+            level=answering.level, db=answering.db, one_class=is_class,
         )
         for one in sites
     ]  # fmt: skip
@@ -146,7 +145,7 @@ def hazard(
         plot_contribution(first[0], answers[0], plot)
     document = as_dict(
         first, [one.names for one in sites], answers,
-        (*remarks, *taken_as_medians(table), *joined),
+        (*remarks, *joined),
         None if rows is None else rows.refused_by_row(),
     )  # fmt: skip
     if printing.json:

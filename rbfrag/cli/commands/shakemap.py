@@ -8,7 +8,7 @@ from typing import Any
 from rbfrag.cli.hazard_sentences import map_in_words, rounded_values
 from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings, write_table
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions, taken_as_medians
+from rbfrag.cli.parameters.block import BlocksOptions, FailureOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 
 EXAMPLE = (
@@ -58,7 +58,7 @@ def shakemap(
     ),
     excel_text: bool = option(options.EXCEL_TEXT, False),
     blocks: BlocksOptions,
-    standing: StandingOptions,
+    standing: FailureOptions,
     meaning: MapOptions,
     drawing: DrawOptions,
     answering: options.Answering,
@@ -80,13 +80,13 @@ def shakemap(
 
     target = output_path(out, SUFFIXES, "map")
     check_files(table=out if excel_text else None, plot=plot, excel_text=excel_text)
-    given = blocks.toppling_blocks(standing, n=n, reads=(*PLACE, "weight"))
+    given = blocks.given_blocks(standing, n=n, reads=(*PLACE, "weight"), one_kind=True)
     answer = answered(
-        grid, blocks=given.question, kind=given.kind, uncertainty=meaning.uncertainty,
+        grid, blocks=given.question, uncertainty=meaning.uncertainty,
         component=meaning.component, allow_partial=meaning.allow_partial, draws=drawing.draws,
         seed=drawing.seed, model=answering.model, level=answering.level, db=answering.db,
     )  # fmt: skip
-    warnings = [*given.remarks, *taken_as_medians(given.columns), *answer.warnings]
+    warnings = [*given.remarks, *answer.warnings]
     about = {**answer.about, "warnings": warnings}
     _write(dict(answer.columns), about, target, excel_text=excel_text)
     if plot is not None:

@@ -16,7 +16,7 @@ from rbfrag.cli.output import (
     print_warnings,
 )
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import StandingOptions, TableOptions
+from rbfrag.cli.parameters.block import FailureOptions, TableOptions
 from rbfrag.cli.parameters.stack import argument, option, stacked
 from rbfrag.cli.sentences import rounded
 
@@ -54,6 +54,11 @@ class Uncertainty:
         0.0,
     )
     restitution_sigma: float = option("Rocking: standard deviation of the restitution.", 0.0)
+
+    def sigmas(self) -> dict[str, float]:
+        """Return the standard deviations of all blocks, by field."""
+        return {name: value for name, value in vars(self).items() if name.endswith("_sigma")}
+
     draws: int = option("Number of draws where several uncertain blocks are given.", 128)
     seed: int = option("Seed of these draws.", 0)
 
@@ -67,7 +72,7 @@ def survival(
         metavar="CURVE...",
     ),
     blocks: TableOptions,
-    standing: StandingOptions,
+    standing: FailureOptions,
     known: Uncertainty,
     meaning: options.Curve,
     answering: options.Answering,
@@ -91,16 +96,15 @@ def survival(
     from rbfrag.hazards.survival import survival as answered
 
     check_files(plot=plot)
-    table, _, remarks, rows, kind = blocks.toppling_blocks(standing)
+    given = blocks.given_blocks(standing)
+    numbers, remarks, rows = given.numbers, given.remarks, given.rows
     if rows is not None:
         rows.whole(ALL_STAND)
         remarks += rows.remarks
     read = as_curves(curves, imt=meaning.imt, site=meaning.site, convert=meaning.convert)
     answer = answered(
-        read, table["p2_1_s2"], table["kr"], age_years=known.age, age_sd_years=known.age_sd,
-        weights=weights, p2_sigma=table.get("p2_sigma", known.p2_sigma),
-        kr_sigma=table.get("kr_sigma", known.kr_sigma), restitution=table.get("restitution"),
-        restitution_sigma=known.restitution_sigma, kind=kind, convert=meaning.convert,
+        read, age_years=known.age, age_sd_years=known.age_sd, weights=weights,
+        **{**known.sigmas(), **numbers}, convert=meaning.convert,
         convert_sigma=meaning.convert_sigma, component=meaning.component, model=answering.model,
         level=answering.level, draws=known.draws, seed=known.seed, db=answering.db,
     )  # fmt: skip

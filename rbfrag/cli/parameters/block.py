@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
@@ -11,7 +11,7 @@ import typer
 from rbfrag.cli.parameters.options import EXCEL_TEXT
 from rbfrag.cli.parameters.stack import option
 from rbfrag.errors import InputError
-from rbfrag.question.fields import option_of
+from rbfrag.question.fields import column_of, name_of, option_of
 from rbfrag.solver.described import DescribedBlock, describe
 
 if TYPE_CHECKING:
@@ -169,43 +169,33 @@ class StandingOptions:
     """Whether blocks are backed by a slope."""
 
     kind: str | None = option(
-        "toppling (backed by a slope, the default) or rocking (free-standing, which fails at "
-        "weaker shaking)."
+        "toppling (backed by a slope) or rocking (free-standing, which fails at weaker shaking). "
+        "Default: what the blocks are given by."
     )
     restitution: _Number = option(
         "Rocking: speed after an impact over that before it, above 0 and up to 1; a column "
         "restitution goes before. Default: what angular momentum leaves."
     )
 
-    def is_free(self, kind: str | None) -> bool:
-        """Return whether blocks of a kind stand free; None for what is stated here."""
-        kind = kind or self.kind
-        if kind is None:
-            return False
-        from rbfrag.solver.kinds import facts_of
+    @property
+    def stated(self) -> dict[str, float]:
+        """What is stated of all blocks, by field."""
+        numbers = {name_of(name): value for name, value in vars(self).items() if name != "kind"}
+        return {name: value for name, value in numbers.items() if value is not None}
 
-        return facts_of(kind).free_standing
 
-    def completed(self, columns: dict[str, Any], kind: str | None = None) -> dict[str, Any]:
-        """Return a table of blocks with what is stated for all; backed ones have no restitution.
+@dataclass(frozen=True, kw_only=True)
+class FailureOptions(StandingOptions):
+    """How blocks fail, and the numbers of those that do not topple."""
 
-        Args:
-            columns: the table.
-            kind: how they fail; None for what is stated here.
-
-        Raises:
-            InputError: a restitution of blocks that do not stand free.
-        """
-        import numpy as np
-
-        if not self.is_free(kind):
-            if self.restitution is not None:
-                raise InputError("--restitution goes with blocks that stand free: --kind rocking")
-            return {name: column for name, column in columns.items() if name != "restitution"}
-        if self.restitution is None:
-            return columns
-        own = columns.get("restitution", np.full(columns["kr"].size, np.nan))
-        return {**columns, "restitution": np.where(np.isnan(own), self.restitution, own)}
+    kind: str | None = option(
+        "How the blocks fail: toppling (backed by a slope), rocking (free-standing), slumping or "
+        "sliding. Default: what they are given by."
+    )
+    ky: _Number = option("Sliding: yield acceleration coefficient tan(phi - beta), with --beta.")
+    displacement: _Number = option("Sliding: the displacement that is too far [m].")
+    ks: _Number = option("Slumping: yield acceleration coefficient k_s, with --ps2.")
+    ps2: _Number = option("Slumping: frequency parameter p_s² at rest [1/s²].")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,49 +204,76 @@ class TableOptions(BlockOptions):
 
     blocks: str | None = option(
         "Table of blocks (.csv, .xlsx, .parquet, .geojson) with p2_1_s2 [1/s²] and kr, or "
-        "height_m and width_m [m] (and dip_deg, phi_deg); one answer a row.",
+        "height_m and width_m [m] (and dip_deg, phi_deg), or the numbers of another kind; one "
+        "answer a row.",
         metavar="FILE",
     )
 
-    def toppling_blocks(
+    def given_blocks(
         self,
         standing: StandingOptions | None = None,
         *,
         name: str | None = None,
         reads: Collection[str] = (),
-    ) -> TopplingBlocks:
+        one_kind: bool = False,
+        only: Collection[str] = (),
+    ) -> GivenBlocks:
         """Return the blocks that the options describe.
 
         Args:
-            standing: how they stand; None for backed by a slope.
+            standing: how they stand and fail; None for what they are given by.
             name: identifier of a single block.
             reads: which further columns of a table the command reads, as for `read_blocks`.
+            one_kind: whether all must be of one kind, as for `read_blocks`.
+            only: numbers that the command reads of a block; () for those of every kind.
         """
-        import numpy as np
+        from rbfrag.exchange.block_rows import read_blocks
+        from rbfrag.question.blocks import refuse_foreign
 
         standing = standing or StandingOptions()
+        kind, stated = standing.kind, standing.stated
         if self.blocks is not None:
-            from rbfrag.exchange.block_rows import read_blocks
-
-            rows = read_blocks(self.blocks, standing.kind, reads=reads, one_kind=True)
-            rows = replace(rows, blocks=standing.completed({**rows.blocks}))
-            return TopplingBlocks(rows.blocks, False, (), rows, standing.kind)
-        from rbfrag.solver.quantity import positive
-
-        kind, values, remarks = self.toppling(standing.kind)
-        if missing := [each for each in ("p2", "kr") if each not in values]:
-            raise InputError(
-                f"a block of kind {kind} has no {missing[0]}: this command answers for "
-                "blocks that topple or rock; predict answers for others"
+            table: Any = self.blocks
+            rows = read_blocks(
+                table, kind, reads=reads, one_kind=one_kind, only=only, for_all=stated
             )
-        columns: dict[str, Any] = {
-            "block_id": [name],
-            "p2_1_s2": np.array([positive(values["p2"], "p2", "1/s²")]),
-            "kr": np.array([positive(values["kr"], "kr", "g")]),
-        }
-        if standing.restitution is None and "restitution" in values:
-            columns["restitution"] = np.array([values["restitution"]])
-        return TopplingBlocks(standing.completed(columns, kind), False, remarks, None, kind)
+            return GivenBlocks(rows.blocks, False, (), rows)
+        described = self.described()
+        remarks: tuple[str, ...] = ()
+        numbers: dict[str, Any] = {"p2": self.p2, "kr": self.kr, **stated}
+        if described is None and self.beta is not None:
+            numbers["beta_deg"] = self.beta
+        numbers = {field: value for field, value in numbers.items() if value is not None}
+        if described is not None:
+            from rbfrag.question.blocks import described_block
+
+            blocks = described_block(described, numbers, kind)
+            (group,) = blocks.groups
+            kind, numbers, remarks = group.kind, {**group.numbers}, blocks.remarks
+        else:
+            self._refuse_part(numbers, kind)
+        if absent := [each for each in only if each not in numbers]:
+            raise InputError(
+                f"a block of kind {kind} has no {absent[0]}: this command answers for blocks that "
+                "topple or rock; predict answers for others"
+            )
+        refuse_foreign(numbers, kind)
+        columns = {column_of(field): [value] for field, value in numbers.items()}
+        names = {} if name is None else {"block_id": [name]}
+        read = read_blocks({**columns, **names}, kind, one_kind=True).whole()
+        return GivenBlocks({**read, "block_id": [name]}, False, remarks)
+
+    def _refuse_part(self, numbers: Collection[str], kind: str | None) -> None:
+        """Refuse a block of which a number is missing."""
+        from rbfrag.question.blocks import missing_number
+
+        missing = missing_number(numbers, kind)
+        if missing is not None:
+            field, names = missing
+            raise InputError(
+                f"{option_of(field)} is missing: a block is given by "
+                f"{' and '.join(map(option_of, names))}, or by {WAYS}"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,49 +284,63 @@ class BlocksOptions(TableOptions):
         "Rock mass file (.toml, .csv): the mean over its stable toppling blocks.", metavar="FILE"
     )
 
-    def toppling_blocks(
+    def given_blocks(
         self,
         standing: StandingOptions | None = None,
         *,
         name: str | None = None,
         reads: Collection[str] = (),
+        one_kind: bool = False,
+        only: Collection[str] = (),
         n: int | None = None,
-    ) -> TopplingBlocks:
+    ) -> GivenBlocks:
         """Return the blocks that the options describe.
 
         Args:
-            standing: how they stand; None for backed by a slope.
+            standing: how they stand and fail; None for what they are given by.
             name: identifier of a single block.
             reads: which further columns of a table the command reads, as for `read_blocks`.
+            one_kind: whether all must be of one kind, as for `read_blocks`.
+            only: numbers that the command reads of a block; () for those of every kind.
             n: number of realisations of the rock mass; None for what its file says.
         """
         if self.rockmass is None:
-            return super().toppling_blocks(standing, name=name, reads=reads)
-        if standing is not None and standing.is_free(None):
+            return super().given_blocks(
+                standing, name=name, reads=reads, one_kind=one_kind, only=only
+            )
+        from rbfrag.fragility.methods import TOPPLING_BLOCK
+
+        if standing is not None and standing.kind not in (None, TOPPLING_BLOCK.kind):
             raise InputError(
                 f"--rockmass does not go with --kind {standing.kind}: its blocks are backed by the "
-                "rock behind them"
+                "rock behind them, and those that topple are answered for"
             )
         return _of_rock_mass(self.rockmass, n)
 
 
-class TopplingBlocks(NamedTuple):
-    """Toppling blocks that a command answers for.
+class GivenBlocks(NamedTuple):
+    """Blocks that a command answers for.
 
     Args:
-        columns: ``block_id``, ``p2_1_s2`` [1/s²] and ``kr``, and of a table that has them the
-            columns that are read.
+        columns: ``block_id``, ``kind`` and the numbers that the kinds read, and of a table that has
+            them the columns that are read.
         is_class: they stand for one class, the stable toppling blocks of a rock mass.
         remarks: warnings.
         rows: the table that they are of, with what cannot be used of it; None without one.
-        kind: how they fail; None for toppling.
     """
 
     columns: Mapping[str, Any]
     is_class: bool
     remarks: tuple[str, ...]
     rows: BlockRows | None = None
-    kind: str | None = None
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What answers read of the blocks, by field, and their kinds."""
+        from rbfrag.question.blocks import numbers_in
+
+        kinds = [str(kind) for kind in self.columns["kind"]]
+        return {**numbers_in(self.columns), "kind": kinds}
 
     @property
     def question(self) -> BlockRows | dict[str, Any]:
@@ -320,19 +351,8 @@ class TopplingBlocks(NamedTuple):
         return {name: values for name, values in self.columns.items() if name != "block_id"}
 
 
-def taken_as_medians(columns: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what a command says that leaves standard deviations of blocks aside."""
-    sigmas = ("p2_sigma", "kr_sigma")
-    stated = [name for name in sigmas if name in columns and columns[name].any()]
-    if not stated:
-        return ()
-    return (
-        f"{' and '.join(stated)} of the blocks are not integrated here: each block is taken as its "
-        "median (predict, survival and losses integrate)",
-    )
-
-
-def _of_rock_mass(path: str, n: int | None) -> TopplingBlocks:
+def _of_rock_mass(path: str, n: int | None) -> GivenBlocks:
+    from rbfrag.fragility.methods import TOPPLING_BLOCK
     from rbfrag.rockmasses.file import read_rock_mass
     from rbfrag.rockmasses.report import toppling_blocks as stable_topples
 
@@ -343,8 +363,9 @@ def _of_rock_mass(path: str, n: int | None) -> TopplingBlocks:
         f"the answer is the mean over {krs.size} stable toppling blocks, "
         f"{100.0 * share:.3g} % of the rock mass; the others have no part in it"
     )
-    columns = {"block_id": ["rock mass"], "p2_1_s2": p2s, "kr": krs}
-    return TopplingBlocks(columns, True, (remark,))
+    kinds = [TOPPLING_BLOCK.kind] * krs.size
+    columns = {"block_id": ["rock mass"], "p2_1_s2": p2s, "kr": krs, "kind": kinds}
+    return GivenBlocks(columns, True, (remark,))
 
 
 class ChartedBlocks(NamedTuple):
