@@ -19,6 +19,7 @@ from rbfrag.fragility.unusable import FROM_SUMS
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.losses import LossAnswer, Run, event_losses
 from rbfrag.hazards.portfolio import Portfolio
+from rbfrag.question.shaking import doubts_about
 from rbfrag.solver.kinds import facts_of
 
 
@@ -103,7 +104,13 @@ def losses(
         if meaning.name != "single"
         else "the measures are of a single component, as the models are"
     )
-    texts = (*rows.unusable_in_words(FROM_SUMS), *_without_loss(rows), *events.warnings, about)
+    texts = (
+        *rows.unusable_in_words(FROM_SUMS),
+        *_without_loss(rows),
+        *events.warnings,
+        *doubts_about(events.measures),
+        about,
+    )
     answer = event_losses(
         replace(events, warnings=texts), portfolio, samples=0 if expected else samples, seed=seed,
         level=level, run=run, on_progress=on_progress,

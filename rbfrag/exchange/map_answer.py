@@ -27,6 +27,7 @@ from rbfrag.question.blocks import (
     taken_as_medians,
 )
 from rbfrag.question.fields import column_of
+from rbfrag.question.shaking import doubts_about
 
 NOTABLE = 1e-4
 """P above which a place outside the fitted ranges is warned of."""
@@ -139,6 +140,7 @@ def shakemap(
         measures, std_ln = shaken.measures, shaken.std_ln
     table = rows.blocks
     warnings = [*rows.unusable_in_words(FROM_SUMS if own else FROM_MEAN), *shaken.warnings]
+    warnings += doubts_about(measures)
     warnings.append(
         f"the map's measures are taken as {meaning.title}; Beyer and Bommer (2006) relate them "
         "to one component"

@@ -286,7 +286,7 @@ def _answer_with_diagnostics(
 
     def refuse(holds: bool, finding: Finding) -> None:
         if holds:
-            raise InputError(finding.about(finding.value))
+            raise InputError(finding.about(finding.value), fields=(finding.name,))
 
     judgement = answer_with_findings(
         model, given, tuple(given), quantiles, SINGLE,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.checks import Finding, refusals
-from rbfrag.fragility.methods import BlockParameters
+from rbfrag.fragility.methods import BlockParameters, arrays
 
 FROM_SUMS = " and are left out of all sums, which are lower bounds"
 """What becomes of such blocks where numbers of several are added."""
@@ -56,9 +56,12 @@ def block_reasons(
             "is not above zero: the block is unstable and fails without an earthquake",
         )  # fmt: skip
         say(at_rest.holds, at_rest)
+        adjusted = dict(own)
+        if block.adjust is not None:
+            block.adjust(adjusted, arrays())
         for bound in block.refuses:
             if bound.about in names:
-                finding = Finding(bound.holds(own), bound.about, own[bound.about], bound.text)
+                finding = Finding(bound.holds(adjusted), bound.about, own[bound.about], bound.text)
                 say(finding.holds, finding)
     return reasons
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.frames import Tabular
+from rbfrag.question.shaking import doubts_about, doubts_about_rates
 
 FloatArray = NDArray[np.float64]
 
@@ -122,6 +123,9 @@ def rates_from_probabilities(probability: FloatArray, years: float) -> FloatArra
     return -np.log1p(-probability) / years
 
 
+_SELDOM = 1e-6
+
+
 def hazard_curve(
     measure: str,
     levels: ArrayLike,
@@ -182,6 +186,11 @@ def hazard_curve(
             f"{source}: a curve needs at least two levels with a rate between zero and infinity, "
             f"and has {x.size}"
         )
+    # a curve may go on to levels that nothing reaches, at rates that say so
+    reached = x[rate > _SELDOM]
+    name = SPECTRAL.get(period_s or 0.0, measure) if measure == "sa_g" else measure
+    warnings += [f"{source}: {text}" for text in doubts_about({name: reached})]
+    warnings += [f"{source}: {text}" for text in doubts_about_rates(rate)]
     return HazardCurve(
         measure=measure,
         levels=x,

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import block_of
+from rbfrag.fragility.measures import HIGHEST
 from rbfrag.question.fields import BlockFields, column_of
 from rbfrag.solver.block.formulas import SCALAR, tan_deg
 from rbfrag.solver.block.geometry import Block
@@ -50,6 +51,9 @@ _PLANES = ("phi_deg", "phi_back_deg", "back_fracture", "kv", "cohesion_pa", "den
 OF_A_SHAPE = ("block", *(name for names in SHAPES for name in names), *_PLANES)
 """Fields that describe a block by its shape and its planes; the dip stands with numbers too."""
 
+_IF_EMPTY = {"beta_deg": 0.0, "leaves_g": HIGHEST}
+"""What an option stands for that is not stated: a level base, and a back plane never left."""
+
 WAYS = ", or by ".join(" ".join(names) for names in SHAPES)
 
 _RANGES = {
@@ -64,6 +68,12 @@ _RANGES = {
 }  # fmt: skip
 
 FRICTION_MISSING = "phi_deg is missing: the mode of a block depends on dip and friction"
+
+_ANGLES = ("phi_deg", "phi_back_deg")
+LEAST_DEG = 1.6
+"""Friction angles below this are seldom meant [deg]: it may be one in radians."""
+
+_RADIANS = "{name} is less than a rock's: angles are in degrees, is it in radians?"
 
 LEAST_M, MOST_M = 0.05, 60.0
 """Blocks smaller or larger than this are seldom meant: another unit may have been typed."""
@@ -288,6 +298,9 @@ def one_block(given: Mapping[str, Any], kind: str | None = None) -> Blocks:
         facts, values, remarks = _without_friction(block, beta_deg, planes, requested)
     else:
         raise InputError(FRICTION_MISSING, fields=("phi_deg",))
+    remarks += tuple(
+        _RADIANS.format(name=n) for n in _ANGLES if 0.0 < given.get(n, 0.0) < LEAST_DEG
+    )
     across_m = 2.0 * block.r3_m
     if not LEAST_M <= across_m <= MOST_M:
         remarks += (f"the block measures some {across_m:.2g} m: lengths are in m",)
@@ -544,6 +557,8 @@ class _Sorted:
         self.unstable: list[Refused] = []
         self.free = np.ones(size, dtype=np.bool_)
         """Which blocks no reason is known against."""
+        self.done = np.zeros(size, dtype=np.bool_)
+        """Which blocks are sorted."""
         self.kinds = np.full(size, -1, dtype=np.int8)
         self.modes = np.full(size, -1, dtype=np.int8)
         self.remarks: dict[str, None] = {}
@@ -554,18 +569,22 @@ class _Sorted:
     ) -> Blocks:
         np = self.np
         self._state(kinds, modes)
-        shape = self._shape()
-        self._state_free(shape)
-        if shape is None:
-            by_shape = np.zeros(self.size, dtype=np.bool_)
-        elif any(name in self.given for name in NUMBERS):
-            by_shape = ~self._complete()
-        else:
-            by_shape = np.ones(self.size, dtype=np.bool_)
-        if shape is not None and by_shape.any():
-            self._sort_shapes(shape, np.flatnonzero(by_shape))
-        if not by_shape.all():
-            self._sort_numbers(np.flatnonzero(~by_shape))
+        shapes = self._shapes()
+        self._state_free(shapes)
+        left = ~self._complete()
+        for shape in shapes:
+            own = left & self._known(shape)
+            left &= ~own
+            if own.any():
+                self._sort_shapes(shape, np.flatnonzero(own))
+            self.done |= own
+        if shapes:  # of which part of a shape is empty, and no number is stated either
+            own = left & ~self._known_any(NUMBERS)
+            if own.any():
+                self._sort_shapes(shapes[0], np.flatnonzero(own))
+            self.done |= own
+        if not self.done.all():
+            self._sort_numbers(np.flatnonzero(~self.done))
         return Blocks(
             tuple(self.groups), tuple(self.remarks), tuple(self.refused),
             tuple(self.unstable), self.kinds, self.modes,
@@ -609,32 +628,31 @@ class _Sorted:
                     here, f"the block's mode is {shown}: {model} model says nothing about it"
                 )
 
-    def _state_free(self, shape: tuple[str, ...] | None) -> None:
+    def _state_free(self, shapes: Sequence[tuple[str, ...]]) -> None:
         """Enter that blocks stand free of which a restitution is stated."""
         restitution = self.given.get("restitution")
-        if restitution is None or (shape is None and not {"p2", "kr"} & self.given.keys()):
+        if restitution is None or not (shapes or {"p2", "kr"} & self.given.keys()):
             return
         facts = _requested(None, ("restitution",))
         assert facts is not None
         stated = ~self.np.isnan(restitution) if self.rows else True
         self.kinds[(self.kinds < 0) & stated] = _codes()[facts.kind]
 
-    def _shape(self) -> tuple[str, ...] | None:
-        """Return the shape that is stated; of a table, one that is needed."""
-        numbers = [name for name in NUMBERS if name in self.given]
-        whole = [names for names in SHAPES if all(name in self.given for name in names)]
+    def _shapes(self) -> list[tuple[str, ...]]:
+        """Return the shape that is stated; of a table those that its rows may have."""
         if self.rows:
-            if whole:
-                return whole[0]
+            whole = [names for names in SHAPES if all(name in self.given for name in names)]
             begun = any(name in self.given for names in SHAPES for name in names)
-            return shape_among(self.given) if begun and not kinds_by_numbers(self.given) else None
+            if begun and not whole and not kinds_by_numbers(self.given):
+                shape_among(self.given)
+            return whole
         shape = shape_among({*self.given, *(() if self.backed else ("back_fracture",))})
-        if shape is not None and numbers:
+        if shape is not None and (numbers := [name for name in NUMBERS if name in self.given]):
             raise InputError(
                 f"{numbers[0]} does not go with {shape[0]}: a block is described once",
                 fields=(numbers[0], *shape),
             )
-        return shape
+        return [] if shape is None else [shape]
 
     def _complete(self) -> Any:
         """Return which blocks have all numbers of a kind."""
@@ -642,6 +660,20 @@ class _Sorted:
         for facts in kinds_by_numbers(self.given):
             complete |= self._known(facts.parameters)
         return complete
+
+    def _stated(self, name: str) -> Any:
+        """Return the values of a field; what an empty cell of a table stands for."""
+        values = self.given[name]
+        if self.rows and name in _IF_EMPTY:
+            return self.np.where(self.np.isnan(values), _IF_EMPTY[name], values)
+        return values
+
+    def _known_any(self, names: Collection[str]) -> Any:
+        known = self.np.zeros(self.size, dtype=self.np.bool_)
+        for name in names:
+            if name in self.given:
+                known |= ~self.np.isnan(self.given[name])
+        return known
 
     def _known(self, names: Collection[str]) -> Any:
         known = self.np.ones(self.size, dtype=self.np.bool_)
@@ -677,7 +709,9 @@ class _Sorted:
                     f"missing: a block of kind {facts.kind} is given by {whole}",
                 )
                 continue
-            numbers = {name: self.given[name] for name in _numbers_of(facts) if name in self.given}
+            numbers = {
+                name: self._stated(name) for name in _numbers_of(facts) if name in self.given
+            }
             self.read |= numbers.keys()
             self.group(facts, here, {name: _at(value, here) for name, value in numbers.items()})
 
@@ -745,6 +779,9 @@ class _Sorted:
         for code in np.unique(reasons[reasons > 0]).tolist():
             self.refuse(places[reasons == code], REASONS[code])
         self.modes[places] = np.where(reasons == 0, codes, -1)
+        for name in _ANGLES:
+            if ((stated[name] > 0.0) & (stated[name] < LEAST_DEG)).any():
+                self.remarks[_RADIANS.format(name=name)] = None
         across_m = 2.0 * np.broadcast_to(blocks.r3_m, (n,))
         unusual = int(np.count_nonzero((across_m < LEAST_M) | (across_m > MOST_M)))
         if unusual:
@@ -852,6 +889,7 @@ class _Sorted:
                     phi_back_deg=_at(judged.back, here),
                     functions=array_elementwise(), trigonometry=np,
                 )  # fmt: skip
+            leaves_g = np.minimum(leaves_g, HIGHEST)
             return {"ks": k, "ps2": ps2, "leaves_g": leaves_g, **sigmas}
         if not facts.free_standing:
             return {"p2": _at(judged.blocks.p2, here), "kr": k, **sigmas}

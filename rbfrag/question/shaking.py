@@ -1,0 +1,43 @@
+"""Shaking wherever it enters: values that another unit may have been meant for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from rbfrag.fragility.measures import CREDIBLE
+from rbfrag.question.fields import ShakingFields, declared
+
+MOST_A_YEAR = 100.0
+"""Rates of exceedance above this are of another unit, or of no earthquakes [1/a]."""
+
+
+def doubts_about(measures: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what is to be said of values of measures that no earthquake has.
+
+    Args:
+        measures: values by the names of :func:`rbfrag.predict`, arrays or numbers; NaN is passed
+            over.
+    """
+    for name in ShakingFields.__optional_keys__ & measures.keys() & CREDIBLE.keys():
+        values = np.asarray(measures[name], dtype=np.float64)
+        values = values[np.isfinite(values)]
+        _, most, text = CREDIBLE[name]
+        if values.size and (largest := float(values.max())) > most:
+            yield f"{name} = {largest:.4g} {declared()[name].unit} is {text}"
+
+
+def doubts_about_rates(annual_rate: Any) -> Iterator[str]:
+    """Yield what is to be said of rates of exceedance that no earthquakes have.
+
+    Args:
+        annual_rate: rates [1/a], finite, shape (n,).
+    """
+    largest = float(np.max(annual_rate, initial=0.0))
+    if largest > MOST_A_YEAR:
+        yield (
+            f"the curve has a rate of {largest:.4g} a year: are these rates of exceedance in one "
+            "year?"
+        )
