@@ -14,6 +14,7 @@ from rbfrag.db.insert import update_rows
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.schema import fragility_model
 from tests.cli.conftest import Refuses, Shell
+from tests.synthetic import write_suite
 
 
 @pytest.fixture
@@ -74,3 +75,16 @@ def test_a_model_that_cannot_be_read_is_told(shell: Shell, database: Path) -> No
 
 def test_without_a_database_it_is_refused(refuses: Refuses, tmp_path: Path) -> None:
     assert "none.db" in refuses("models", "check", "--db", tmp_path / "none.db")
+
+
+def test_models_are_listed_where_none_is_named(shell: Shell) -> None:
+    assert shell.json("models", "show") == shell.json("models", "list")
+
+
+def test_a_campaign_of_two_sizes_ends_in_one_sentence(
+    shell: Shell, refuses: Refuses, tmp_path: Path
+) -> None:
+    shell("motions", "add", write_suite(tmp_path / "records"))
+    shell("simulate", "--p2", "10,1", "--jobs", "1")
+    message = refuses("fit", "--term", "pgv", "--method", "bounded")
+    assert "do not tell the 5 parameters of method bounded apart" in message

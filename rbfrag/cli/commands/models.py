@@ -10,7 +10,7 @@ from rbfrag.cli.hazard_sentences import several
 from rbfrag.cli.output import print_json, print_table
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.completion import model_names
-from rbfrag.cli.parameters.stack import command_group, stacked
+from rbfrag.cli.parameters.stack import argument, command_group, stacked
 
 app = command_group(
     "List, show and choose fitted fragility models.",
@@ -53,8 +53,20 @@ def list_models(db: options.Db = None, json: options.Json = False) -> None:
 
 @app.command("show", epilog="Example:  rbfrag models show wls-pgv")
 @stacked
-def show_model(name: Name, printing: options.Printing, db: options.Db = None) -> None:
-    """Print the report of a fitted model from its stored row."""
+def show_model(
+    printing: options.Printing,
+    name: str | None = argument(
+        "Name of the model. Default: all are listed.",
+        None,
+        metavar="NAME",
+        autocompletion=model_names,
+    ),
+    db: options.Db = None,
+) -> None:
+    """Print the report of a fitted model from its stored row, or the list of them."""
+    if name is None:
+        list_models(db, json=printing.json)
+        return
     from rbfrag.cli.commands.fit import print_report
     from rbfrag.fragility.fit.report import FitReport
     from rbfrag.fragility.lookup import stored_row

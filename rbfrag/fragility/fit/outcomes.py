@@ -8,6 +8,7 @@ cannot fail are not fitted: P is 0.
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,7 +76,17 @@ def fit_outcomes(
             f"{failures} outcomes on the grid toppled; a fit needs {FEWEST_FAILURES}: add stronger "
             "motions or more block sizes (p²)"
         )
-    b, cr1, naive = fit_by_statsmodels(rows.data)
+    with np.errstate(invalid="ignore"), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "The design matrix is rank-deficient")
+        b, cr1, naive = fit_by_statsmodels(rows.data)
+    # a parameter that these blocks leave open has no variance that is one
+    variances = np.concatenate([np.diag(cr1), np.diag(naive)])
+    if not (np.isfinite(variances) & (variances >= 0.0)).all():
+        raise FitError(
+            f"the blocks and {len(data.event_names)} earthquakes do not tell the {len(names)} "
+            f"parameters of method {method.name} apart: simulate more block sizes (p²) or "
+            "earthquakes, or fit a method of fewer parameters, such as logistic"
+        )
     steps = jackknife_steps(rows.data, b)
 
     def resampled(times: FloatArray) -> FloatArray:
