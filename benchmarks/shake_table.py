@@ -37,7 +37,7 @@ from rbfrag.fragility.fit.likelihood import Binomial, most_likely
 from rbfrag.fragility.fit.scores import CLIP
 from rbfrag.fragility.methods import LOGIT
 from rbfrag.solver.integrator.free_rocking import STABLE, TOPPLED
-from rbfrag.solver.models.rocking import Rocking
+from rbfrag.solver.models.rocking import MODEL as ROCKING
 
 FloatArray = NDArray[np.float64]
 Labels = NDArray[np.intp]
@@ -232,7 +232,7 @@ def shipped_fragility(trials: Trials, restitution: Sequence[float | None]) -> Ca
     p, settings = [], []
     for e in restitution:
         given = shaking if e is None else {**shaking, "restitution": e}
-        p.append(rbfrag.predict(kind=Rocking.kind, p2=P2, **given).probability.reshape(kr.shape))
+        p.append(rbfrag.predict(kind=ROCKING.kind, p2=P2, **given).probability.reshape(kr.shape))
         settings += [(alpha, np.nan, np.nan if e is None else e) for alpha in MEDIAN_RAD]
     return Candidates(np.concatenate(p), np.array(settings))
 

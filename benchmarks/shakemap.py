@@ -58,7 +58,9 @@ def main() -> None:
     answer(slice(0, 10))  # the first call loads the model
     answers, took = timed(lambda: answer(slice(None)))
     places = Places.of(grid.lon, grid.lat)
-    failures, joint = timed(lambda: map_failures(answers, {"p2": p2, "kr": kr}, places, draws=given.draws))
+    failures, joint = timed(
+        lambda: map_failures(answers, {"p2": p2, "kr": kr}, places, draws=given.draws)
+    )
     print(f"{grid.lon.size} nodes x {given.blocks} blocks, processor time (wall time):")
     print(f"  read {read}, answered {took}, {given.draws} draws {joint}")
     print(f"  {answers.each.size} pairs of node and block can fail; {failures.as_dict()}")

@@ -16,8 +16,9 @@ from rbfrag.bench.cases import Records
 from rbfrag.errors import InputError
 from rbfrag.motions.ground_motion import GroundMotion
 from rbfrag.motions.recognise import read_motions
+from rbfrag.question.blocks import described_block
 from rbfrag.solver.block.geometry import Block
-from rbfrag.solver.described import DescribedBlock, numbers_of_kind
+from rbfrag.solver.described import DescribedBlock
 from rbfrag.solver.excitation import excitation
 from rbfrag.solver.integrator.free_batch import simulate_free
 from rbfrag.solver.kind import model_of_kind
@@ -392,7 +393,8 @@ def test_without_a_back_plane_a_block_that_topples_rocks() -> None:
     assert any("no plane backs the block" in text for text in backed.warnings)
     assert not any("no plane backs" in text for text in alone.warnings)
     described = DescribedBlock(block, {**planes, "back_fracture": False})
-    assert any("no plane backs" in text for text in numbers_of_kind(described, "toppling")[1])
+    told = described_block(described, {}, "toppling").remarks
+    assert any("no plane backs" in text for text in told)
     assert rbfrag.respond(motion, p2=3.0, kr=0.2).kind == "toppling"
     flat = Block.from_fractures(1.0, 2.0, 90.0)
     slides = rbfrag.respond(motion, block=flat, beta_deg=20.0, phi_deg=30.0, back_fracture=False)

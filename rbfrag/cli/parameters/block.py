@@ -261,7 +261,8 @@ class TableOptions(BlockOptions):
         columns = {column_of(field): [value] for field, value in numbers.items()}
         names = {} if name is None else {"block_id": [name]}
         read = read_blocks({**columns, **names}, kind, one_kind=True).whole()
-        return GivenBlocks({**read, "block_id": [name]}, False, remarks)
+        own = {column: values for column, values in read.items() if column not in ("row", "line")}
+        return GivenBlocks({**own, "block_id": [name]}, False, remarks)
 
     def _refuse_part(self, numbers: Collection[str], kind: str | None) -> None:
         """Refuse a block of which a number is missing."""
