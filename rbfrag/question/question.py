@@ -92,52 +92,54 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
     and ``block_sd`` how much P differs among them. Strength and size are lognormal, a restitution
     is normal, cut off at 0 and 1, and all are independent.
 
+    The keywords:
+
+    - ``kind``: how it fails; None for what shape, dip and friction, or the numbers say.
+    - ``height_m``, ``width_m``: sides of a rectangle [m]; or alpha1_deg, alpha3_deg, r3_m; or s1_m,
+      s2_m, gamma_deg; or block, a :class:`rbfrag.Block`.
+    - ``beta_deg``: dip of the base, out of the slope positive [deg]; level if not given.
+    - ``phi_deg``, ``phi_back_deg``: friction angles of base and back plane [deg]. A rectangle
+      without is taken to topple.
+    - ``back_fracture``: False for a block that no plane backs.
+    - ``ky``: yield acceleration coefficient of sliding, tan(phi - beta) [-].
+    - ``displacement_m``: the displacement down the base that is too far [m].
+    - ``ks``: yield acceleration coefficient of slumping [-].
+    - ``ps2``: frequency parameter p_s² of slumping at rest [1/s²].
+    - ``rotation_deg``: with ks: rotation that counts as failure [deg], of which there must be a
+      model; None for failure past recovery.
+    - ``leaves_g``: with ks: acceleration at which the block leaves its back plane [g]: above it the
+      answer warns.
+    - ``restitution``: of a block that rocks: speed after an impact over that before it, above 0 and
+      up to 1; None for what angular momentum leaves.
+    - ``p2_sigma``, ``kr_sigma``, ``ky_sigma``, ``ks_sigma``, ``ps2_sigma``: standard deviations of
+      logarithms.
+    - ``restitution_sigma``: standard deviation of the restitution.
+    - ``pgv_m_s``: peak ground velocity of the horizontal component [m/s].
+    - ``pga_g``: peak ground acceleration [g].
+    - ``tm_s``: mean period [s].
+    - ``pgd_m``: peak ground displacement [m].
+    - ``sa03_g``, ``sa10_g``, ``sa20_g``, ``sa30_g``: spectral accelerations of the horizontal
+      component at 5 % damping [g]; or all of them as sa_g, by their period: ``{1.0: 0.4}``.
+    - ``motion``: the accelerogram itself or its file, instead of its measures.
+    - ``polarity``: ``forward`` or ``reverse`` where it is known how the motion points at the slope;
+      ``both`` gives the mean of the two, which stand beside it (motion only).
+    - ``model``: a model, the name of a stored one, or None for the one of the best score that what
+      is given suffices for, or the database's default where no other reads more of the motion.
+    - ``level``: confidence level of the interval and of the range of one earthquake, between 0 and
+      1.
+    - ``db``: database of the model: a path or SQLAlchemy URL; None for ``RBFRAG_DB``, or else
+      ``rbfrag.db`` in the current folder, or else the reference that is shipped.
+    - ``nan``: in arrays, ``propagate`` answers NaN with its reason where the input cannot be used,
+      ``raise`` refuses such arrays.
+    - ``interval``: in arrays, False leaves interval and range out (their ends are then NaN), which
+      takes less time.
+    - ``weights``: makes the arrays that describe the block draws of one block, of these weights (1:
+      all the same): one answer, over all of them.
+
     Args:
         p2: frequency parameter p² of the block [1/s²].
         kr: its yield acceleration coefficient for toppling at rest [-].
-        question: the fields of block and shaking, and what is asked of them:
-
-            kind: how it fails; None for what shape, dip and friction, or the numbers say.
-            height_m, width_m: sides of a rectangle [m]; or alpha1_deg, alpha3_deg, r3_m; or s1_m,
-                s2_m, gamma_deg; or block, a :class:`rbfrag.Block`.
-            beta_deg: dip of the base, out of the slope positive [deg]; level if not given.
-            phi_deg, phi_back_deg: friction angles of base and back plane [deg]. A rectangle without
-                is taken to topple.
-            back_fracture: False for a block that no plane backs.
-            ky: yield acceleration coefficient of sliding, tan(phi - beta) [-].
-            displacement_m: the displacement down the base that is too far [m].
-            ks: yield acceleration coefficient of slumping [-].
-            ps2: frequency parameter p_s² of slumping at rest [1/s²].
-            rotation_deg: with ks: rotation that counts as failure [deg], of which there must be a
-                model; None for failure past recovery.
-            leaves_g: with ks: acceleration at which the block leaves its back plane [g]: above it
-                the answer warns.
-            restitution: of a block that rocks: speed after an impact over that before it, above 0
-                and up to 1; None for what angular momentum leaves.
-            p2_sigma, kr_sigma, ky_sigma, ks_sigma, ps2_sigma: standard deviations of logarithms.
-            restitution_sigma: standard deviation of the restitution.
-            pgv_m_s: peak ground velocity of the horizontal component [m/s].
-            pga_g: peak ground acceleration [g].
-            tm_s: mean period [s].
-            pgd_m: peak ground displacement [m].
-            sa03_g, sa10_g, sa20_g, sa30_g: spectral accelerations of the horizontal component at
-                5 % damping [g]; or all of them as sa_g, by their period: ``{1.0: 0.4}``.
-            motion: the accelerogram itself or its file, instead of its measures.
-            polarity: ``forward`` or ``reverse`` where it is known how the motion points at the
-                slope; ``both`` gives the mean of the two, which stand beside it (motion only).
-            model: a model, the name of a stored one, or None for the one of the best score that
-                what is given suffices for, or the database's default where no other reads more of
-                the motion.
-            level: confidence level of the interval and of the range of one earthquake, between 0
-                and 1.
-            db: database of the model: a path or SQLAlchemy URL; None for ``RBFRAG_DB``, or else
-                ``rbfrag.db`` in the current folder, or else the reference that is shipped.
-            nan: in arrays, ``propagate`` answers NaN with its reason where the input cannot be
-                used, ``raise`` refuses such arrays.
-            interval: in arrays, False leaves interval and range out (their ends are then NaN),
-                which takes less time.
-            weights: makes the arrays that describe the block draws of one block, of these weights
-                (1: all the same): one answer, over all of them.
+        question: the fields of block and shaking, and what is asked of them, by keyword.
 
     Returns:
         :class:`Prediction` when every argument is a single number (with `motion` and both
