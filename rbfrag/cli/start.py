@@ -17,29 +17,16 @@ from typing import Any
 
 from rbfrag.cli.output import show_prediction
 from rbfrag.errors import RbfragError
-
-BLOCKS = ({"p2", "kr"}, {"ky", "displacement_m"}, {"ks", "ps2"})
-"""What whole blocks are given by."""
+from rbfrag.question.fields import BlockFields, ShakingFields, option_of
 
 NUMBERS = {
-    "--p2": "p2",
-    "--kr": "kr",
-    "--ky": "ky",
-    "--beta": "beta_deg",
-    "--displacement": "displacement_m",
-    "--ks": "ks",
-    "--ps2": "ps2",
-    "--restitution": "restitution",
-    "--rotation": "rotation_deg",
-    "--pgv": "pgv_m_s",
-    "--pga": "pga_g",
-    "--tm": "tm_s",
-    "--pgd": "pgd_m",
-    "--sa03": "sa03_g",
-    "--sa10": "sa10_g",
-    "--sa20": "sa20_g",
-    "--sa30": "sa30_g",
-    "--level": "level",
+    option_of(name): name
+    for name in (
+        *sorted(BlockFields.__optional_keys__ - {"leaves_g"}),
+        *sorted(ShakingFields.__optional_keys__),
+        "rotation_deg",
+        "level",
+    )
 }
 """Options with a number, with the names that `rbfrag.predict` has for them."""
 
@@ -89,9 +76,10 @@ def quick_predict(arguments: Sequence[str]) -> int | None:
         if name in given:
             stated[name] = given.pop(name)
     try:
-        from rbfrag.question.document import prediction_document
+        from rbfrag.question.document import question_document
 
-        show_prediction(prediction_document(given, **stated), given, **flags)
+        document, read = question_document(given, **stated)
+        show_prediction(document, read, **flags)
         sys.stdout.flush()
     except RbfragError:
         return None  # the full command refuses it in its words
@@ -117,14 +105,21 @@ def numbers_and_names(
         option, equals, value = word.partition("=")
         if not equals:
             value = next(rest, "")
-        if option in NUMBERS and _NUMBER.fullmatch(value):
+        if option == "--dip" and _NUMBER.fullmatch(value):
+            numbers["dip"] = float(value)
+        elif option in NUMBERS and _NUMBER.fullmatch(value):
             numbers[NUMBERS[option]] = float(value)
         elif option in NAMES and value and not value.startswith("-"):
             names[NAMES[option]] = value
         else:
             return None
-    if not any(block <= set(numbers) for block in BLOCKS):
+    if not numbers:
         return None
+    dip = numbers.pop("dip", None)
+    if dip is not None:  # of a rectangle it is the dip of the base, unless that is stated too
+        if "beta_deg" in numbers or "height_m" not in numbers:
+            return None
+        numbers["beta_deg"] = dip
     return numbers, names, flags
 
 
