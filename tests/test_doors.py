@@ -238,6 +238,16 @@ def test_arrays_answer_likewise() -> None:
             agree(told, expected_of(i), question)
 
 
+@pytest.mark.parametrize("size", [None, 2])
+def test_what_the_blocks_do_not_read_is_refused_alone_and_in_arrays(size: int | None) -> None:
+    question: dict[str, Any] = {"height_m": 2.0, "width_m": 0.4, "phi_deg": 35.0, "pgv_m_s": 0.6}
+    if size is not None:
+        question = {name: np.full(size, value) for name, value in question.items()}
+    for name in ("restitution", "ky_sigma"):
+        with pytest.raises(RbfragError, match=f"{name} does not go with kind toppling"):
+            rbfrag.predict(**question, kind="toppling", **{name: 0.5})
+
+
 def table(folder: Path, form: str) -> tuple[Path, list[int]]:
     """Write the questions about certain blocks as the rows of one table."""
     rows = [i for i, each in enumerate(QUESTIONS) if "_sigma" not in words(each)]

@@ -63,6 +63,12 @@ def ask_many(
     measures = {name: value for name, value in values.items() if name in MEASURES}
     block: dict[str, Any] = {n: v for n, v in values.items() if n not in {*measures, *texts}}
     blocks = many_blocks({**block, **backed}, size, kinds=kind, modes=mode, rows=rows)
+    unread = [name for name in block if name not in blocks.read]
+    if unread and blocks.groups and not rows:
+        kinds = " or ".join(dict.fromkeys(str(group.kind) for group in blocks.groups))
+        raise InputError(
+            f"{unread[0]} does not go with kind {kinds}: leave it out", fields=(unread[0],)
+        )
     if weights is not None:
         return _of_draws(blocks, given, level, weights, size, find)
     refused, parts = list(blocks.refused), []

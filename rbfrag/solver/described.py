@@ -11,9 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from rbfrag.errors import InputError
-from rbfrag.solver.block.formulas import (
-    tan_deg,
-)
+from rbfrag.solver.block.formulas import tan_deg
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.modes import yield_coefficient
 
