@@ -1,15 +1,26 @@
-"""What may be said of a block and of its shaking: every field once, with its unit and its names.
+"""What may be said of a block and of its shaking, and what is asked: every field once.
 
-A field is a key of one of the classes; its annotation says what else it is called. No physics here,
-and no library is loaded.
+A field is a key of one of the classes; its annotation says what else there is to know of it.
+Options of the shell, columns of tables, parameters of requests, keywords and their documentation
+are made from these declarations. No physics here, and no library is loaded.
 """
 
 from __future__ import annotations
 
+import operator
 import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any, Generic, TypedDict, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Generic, TypedDict, TypeVar, get_type_hints
+
+from rbfrag.errors import InputError
+
+if TYPE_CHECKING:
+    from os import PathLike
+
+    from rbfrag.fragility.model import Model
+    from rbfrag.solver.block.geometry import Block
 
 V = TypeVar("V")
 """A number, or an array of numbers."""
@@ -20,58 +31,225 @@ class Field:
     """One thing that may be said.
 
     Args:
-        help: what it is.
+        help: what it is, as a sentence; fields in braces stand for their names at each door.
         unit: its unit; empty for a pure number or a text.
         others: what else its column may be called, in small letters and without a unit.
         column: its column in tables that are written; empty for its own name.
+        word: what people call it; empty for its name without the unit.
         is_text: whether it is a text.
+        is_flag: whether it is a truth value that is true unless something is said.
+        above: what it is above; None for no such limit.
+        least: the least that it may be.
+        below: what it is below.
+        most: the most that it may be.
     """
 
     help: str
     unit: str = ""
     others: tuple[str, ...] = ()
     column: str = ""
+    word: str = ""
     is_text: bool = False
+    is_flag: bool = False
+    above: float | None = None
+    least: float | None = None
+    below: float | None = None
+    most: float | None = None
+
+    def usable(self, value: Any) -> Any:
+        """Return whether a number, or which of many, may be used; NaN may not."""
+        fine = value == value
+        for limit, holds in (
+            (self.above, operator.gt),
+            (self.least, operator.ge),
+            (self.below, operator.lt),
+            (self.most, operator.le),
+        ):
+            if limit is not None:
+                fine = fine & holds(value, limit)
+        return fine
+
+    @property
+    def wanted(self) -> str:
+        """The range in words."""
+        above, least, below, most = (
+            None if each is None else f"{each:g}"
+            for each in (self.above, self.least, self.below, self.most)
+        )
+        if above is not None and below is not None:
+            return f"between {above} and {below}"
+        low = (
+            f"above {above}" if above is not None else f"from {least}" if least is not None else ""
+        )
+        high = (
+            f"up to {most}" if most is not None else f"below {below}" if below is not None else ""
+        )
+        if low and high:
+            return (
+                f"{low} and {high}"
+                if above is not None
+                else f"{low} to {high.removeprefix('up to ')}"
+            )
+        return (f"not below {least}" if least is not None else low) or high
+
+    @property
+    def what(self) -> str:
+        """What it is, in a few words that go on a sentence: "dip of the base"."""
+        text = re.split("[,;(]", self.help)[0].rpartition(": ")[2].strip()
+        return f"{text[:1].lower()}{text[1:]}".removeprefix("the ")
+
+    def sentence(self, spell: Callable[[str], str]) -> str:
+        """Return what it is, with its unit and other fields as a door spells them."""
+        text = self.help.format_map(_Spelled(spell))
+        return f"{text} [{self.unit}]." if self.unit else f"{text}."
 
 
-SPECTRAL = ("sa03_g", "sa10_g", "sa20_g", "sa30_g")
+class _Spelled(dict[str, str]):
+    """Fields as a door spells them, made when they are asked for."""
+
+    def __init__(self, spell: Callable[[str], str]) -> None:
+        super().__init__()
+        self._spell = spell
+
+    def __missing__(self, name: str) -> str:
+        return self._spell(name)
+
+
+def _length(help: str, *others: str) -> Field:
+    return Field(help, "m", others, above=0.0)
+
+
+def _angle(help: str, *others: str, column: str = "") -> Field:
+    return Field(help, "deg", others, column, above=-90.0, below=90.0)
+
+
+def _friction(help: str, *others: str) -> Field:
+    return Field(help, "deg", others, least=0.0, below=90.0)
 
 
 def _scatter(of: str) -> Field:
-    return Field(f"standard deviation of {of}")
+    return Field(f"Standard deviation of {of} of what the block may be", least=0.0)
 
 
 def _spectral(period: str) -> Field:
     code = f"sa{period.replace('.', '')}"
-    return Field(f"spectral acceleration at {period} s", "g", (code, f"sa({period})"))
+    return Field(
+        f"Spectral acceleration at {period} s, 5 % damping", "g", (code, f"sa({period})"), least=0.0
+    )
 
 
-class BlockFields(TypedDict, Generic[V], total=False):
-    """What may be said of a block: numbers, or its sides and planes."""
+class NumberFields(TypedDict, Generic[V], total=False):
+    """What says of a block all that a model of its kind reads of its shape."""
 
-    p2: Annotated[V, Field("frequency parameter p²", "1/s²", ("p²", "p^2"), "p2_1_s2")]
-    kr: Annotated[V, Field("yield acceleration of toppling, tan(critical angle)", "", ("k_r",))]
-    height_m: Annotated[V, Field("height of a rectangle", "m", ("height", "h"))]
-    width_m: Annotated[V, Field("width of a rectangle along its base", "m", ("width", "w", "b"))]
-    alpha1_deg: Annotated[V, Field("angle of the heel", "deg", ("alpha1", "α1"))]
-    alpha3_deg: Annotated[V, Field("angle of the toe", "deg", ("alpha3", "α3"))]
-    r3_m: Annotated[V, Field("distance from centroid to toe", "m", ("r3",))]
-    s1_m: Annotated[V, Field("spacing of the base fractures", "m", ("s1",))]
-    s2_m: Annotated[V, Field("spacing of the back fractures", "m", ("s2",))]
-    gamma_deg: Annotated[V, Field("dip of the back plane less that of the base", "deg", ("gamma",))]
+    p2: Annotated[
+        V,
+        Field(
+            "Frequency parameter p² of the block, with {kr}",
+            "1/s²",
+            ("p²", "p^2"),
+            "p2_1_s2",
+            above=0.0,
+        ),
+    ]
+    kr: Annotated[
+        V,
+        Field(
+            "Rocking acceleration coefficient k_r = tan(critical angle), with {p2}", "", ("k_r",)
+        ),
+    ]
+    ky: Annotated[
+        V,
+        Field(
+            "Sliding: yield acceleration coefficient tan(phi - beta), with {beta_deg}",
+            "",
+            ("k_y",),
+        ),
+    ]
+    ks: Annotated[
+        V, Field("Slumping: yield acceleration coefficient k_s, with {ps2}", "", ("k_s",))
+    ]
+    ps2: Annotated[
+        V, Field("Slumping: frequency parameter p_s² at rest", "1/s²", (), "ps2_1_s2", above=0.0)
+    ]
+    leaves_g: Annotated[
+        V,
+        Field(
+            "Slumping: acceleration at which the block leaves its back plane", "g", word="leaves_g"
+        ),
+    ]
+
+
+class FailureFields(TypedDict, Generic[V], total=False):
+    """What a model reads of a block beside its numbers or its shape."""
+
+    displacement_m: Annotated[
+        V, _length("Sliding: the displacement that is too far", "displacement")
+    ]
+    restitution: Annotated[
+        V,
+        Field(
+            "Rocking: speed after an impact over that before it, above 0 and up to 1; default: "
+            "what angular momentum leaves",
+            above=0.0, most=1.0,
+        ),
+    ]  # fmt: skip
+
+
+class ShapeFields(TypedDict, Generic[V], total=False):
+    """What describes the shape of a block."""
+
+    height_m: Annotated[
+        V,
+        _length("Height of a rectangle, perpendicular to its base, with {width_m}", "height", "h"),
+    ]
+    width_m: Annotated[
+        V, _length("Width of a rectangle along its base, with {height_m}", "width", "w", "b")
+    ]
+    alpha1_deg: Annotated[
+        V,
+        _angle(
+            "Angle from the normal of the base to the line centroid-heel, with {alpha3_deg} and "
+            "{r3_m}",
+            "alpha1", "α1",
+        ),
+    ]  # fmt: skip
+    alpha3_deg: Annotated[V, _angle("The same angle of the toe", "alpha3", "α3")]
+    r3_m: Annotated[V, _length("Distance from centroid to toe", "r3")]
+    s1_m: Annotated[V, _length("Spacing of the base fractures, with {s2_m} and {gamma_deg}", "s1")]
+    s2_m: Annotated[V, _length("Spacing of the back fractures", "s2")]
+    gamma_deg: Annotated[
+        V,
+        Field(
+            "Dip of the back plane less dip of the base", "deg", ("gamma",), above=0.0, below=180.0
+        ),
+    ]
+
+
+class PlaneFields(TypedDict, Generic[V], total=False):
+    """What describes the planes of a block."""
+
     beta_deg: Annotated[
-        V, Field("dip of the base", "deg", ("beta", "dip", "dip_deg", "β", "base_dip"), "dip_deg")
-    ]
+        V,
+        _angle(
+            "Dip of the base, out of the slope positive; a rectangle's is 0 if not given",
+            "beta", "dip", "dip_deg", "β", "base_dip", column="dip_deg",
+        ),
+    ]  # fmt: skip
     phi_deg: Annotated[
-        V, Field("friction angle of the base", "deg", ("phi", "φ", "friction", "friction_angle"))
+        V,
+        _friction(
+            "Friction angle of the base; only a rectangle is taken to topple without",
+            "phi", "φ", "friction", "friction_angle",
+        ),
+    ]  # fmt: skip
+    phi_back_deg: Annotated[
+        V, _friction("Friction angle of the back plane; default: that of the base", "phi_back")
     ]
-    phi_back_deg: Annotated[V, Field("friction angle of the back plane", "deg", ("phi_back",))]
-    ky: Annotated[V, Field("yield acceleration of sliding", "", ("k_y",))]
-    displacement_m: Annotated[V, Field("displacement that is too far", "m", ("displacement",))]
-    ks: Annotated[V, Field("yield acceleration of slumping", "", ("k_s",))]
-    ps2: Annotated[V, Field("frequency parameter of slumping", "1/s²", (), "ps2_1_s2")]
-    leaves_g: Annotated[V, Field("acceleration at which the block leaves its back plane", "g")]
-    restitution: Annotated[V, Field("speed after an impact over that before it")]
+
+
+class ScatterFields(TypedDict, Generic[V], total=False):
+    """How well a block is known: what is stated is the median, and P the mean over it."""
+
     p2_sigma: Annotated[V, _scatter("ln p²")]
     kr_sigma: Annotated[V, _scatter("ln k_r")]
     ky_sigma: Annotated[V, _scatter("ln k_y")]
@@ -80,32 +258,121 @@ class BlockFields(TypedDict, Generic[V], total=False):
     restitution_sigma: Annotated[V, _scatter("the restitution")]
 
 
+class BlockFields(
+    NumberFields[V], FailureFields[V], ShapeFields[V], PlaneFields[V], ScatterFields[V], total=False
+):
+    """What may be said of a block: numbers, or its sides and planes."""
+
+
 class ShakingFields(TypedDict, Generic[V], total=False):
     """What may be said of the shaking: measures of one horizontal component."""
 
-    pgv_m_s: Annotated[V, Field("peak ground velocity", "m/s", ("pgv", "peak_ground_velocity"))]
-    pga_g: Annotated[V, Field("peak ground acceleration", "g", ("pga", "peak_ground_acceleration"))]
-    tm_s: Annotated[V, Field("mean period", "s", ("tm", "mean_period"))]
-    pgd_m: Annotated[V, Field("peak ground displacement", "m", ("pgd",))]
+    pgv_m_s: Annotated[
+        V, Field("Peak ground velocity", "m/s", ("pgv", "peak_ground_velocity"), least=0.0)
+    ]
+    pga_g: Annotated[
+        V, Field("Peak ground acceleration", "g", ("pga", "peak_ground_acceleration"), least=0.0)
+    ]
+    tm_s: Annotated[V, Field("Mean period", "s", ("tm", "mean_period"), above=0.0)]
+    pgd_m: Annotated[
+        V, Field("Peak ground displacement", "m", ("pgd", "peak_ground_displacement"), least=0.0)
+    ]
     sa03_g: Annotated[V, _spectral("0.3")]
     sa10_g: Annotated[V, _spectral("1.0")]
     sa20_g: Annotated[V, _spectral("2.0")]
     sa30_g: Annotated[V, _spectral("3.0")]
 
 
+_KIND = Field(
+    "How the blocks fail: toppling (backed by a slope), rocking (free-standing), slumping "
+    "or sliding; default: what they are given by",
+    is_text=True,
+)
+
+
+class WholeFields(TypedDict, total=False):
+    """What holds for all blocks of a question."""
+
+    block: Annotated[Block | None, Field("A block by its corners, a rbfrag.Block")]
+    back_fracture: Annotated[
+        bool | None, Field("There is no fracture behind the block", word="no_back", is_flag=True)
+    ]
+    cohesion_pa: Annotated[
+        float | None, Field("Cohesion of the base, with {density_kg_m3}", "Pa", least=0.0)
+    ]
+    density_kg_m3: Annotated[float | None, Field("Density of the rock", "kg/m³", above=0.0)]
+    kind: Annotated[str | None, _KIND]
+
+
+class AtRestFields(TypedDict, total=False):
+    """What may be said of the ground under a block that no earthquake shakes."""
+
+    kv: Annotated[
+        float | None, Field("Vertical acceleration of the ground, up positive", "g", above=-1.0)
+    ]
+
+
+class AnsweringFields(TypedDict, total=False):
+    """Which model answers, and how wide its interval is."""
+
+    model: Annotated[
+        Model | None,
+        Field(
+            "Name of a stored model; default: the database's default if the given measures suffice "
+            "for it, else the best that they suffice for",
+            is_text=True,
+        ),
+    ]
+    level: Annotated[
+        float,
+        Field(
+            "Level of the interval of P, and of the range of one earthquake", above=0.0, below=1.0
+        ),
+    ]
+    db: Annotated[
+        str | PathLike[str] | None,
+        Field(
+            "Database: a path or an SQLAlchemy URL; default: RBFRAG_DB, else rbfrag.db in the "
+            "current folder, else the reference that is shipped",
+            is_text=True,
+        ),
+    ]
+
+
+class RequestFields(AnsweringFields, total=False):
+    """What is asked of blocks and their shaking."""
+
+    rotation_deg: Annotated[
+        float | None,
+        Field(
+            "Slumping: rotation that counts as failure, of which there must be a model; default: "
+            "failure past recovery",
+            "deg",
+        ),
+    ]
+
+
 class RowFields(TypedDict, total=False):
     """What a row of a table says beside its block and its shaking."""
 
-    block_id: Annotated[str, Field("name of the block", "", ("block", "name", "id"), is_text=True)]
-    site_id: Annotated[str, Field("name of its site", "", ("site",), is_text=True)]
-    kind: Annotated[str, Field("how it fails", is_text=True)]
-    mode: Annotated[str, Field("its failure mode", "", ("failure_mode",), is_text=True)]
-    lon: Annotated[float, Field("longitude", "deg", ("longitude",))]
-    lat: Annotated[float, Field("latitude", "deg", ("latitude",))]
-    count: Annotated[float, Field("number of like blocks")]
-    weight: Annotated[float, Field("what a failure counts")]
-    loss: Annotated[float, Field("what a failure costs")]
-    loss_sigma: Annotated[float, _scatter("the logarithm of the loss")]
+    block_id: Annotated[str, Field("Name of the block", "", ("block", "name", "id"), is_text=True)]
+    site_id: Annotated[str, Field("Name of its site", "", ("site",), is_text=True)]
+    kind: Annotated[str, _KIND]
+    mode: Annotated[str, Field("Its failure mode", "", ("failure_mode",), is_text=True)]
+    lon: Annotated[float, Field("Longitude", "deg", ("longitude",))]
+    lat: Annotated[float, Field("Latitude", "deg", ("latitude",))]
+    count: Annotated[float, Field("Number of like blocks")]
+    weight: Annotated[float, Field("What a failure counts")]
+    loss: Annotated[float, Field("What a failure costs")]
+    loss_sigma: Annotated[float, Field("Standard deviation of the logarithm of the loss")]
+
+
+SPECTRAL = tuple(name for name in ShakingFields.__annotations__ if name.startswith("sa"))
+
+_CLASSES = (BlockFields, ShakingFields, WholeFields, AtRestFields, RequestFields, RowFields)
+
+# nothing but the annotations' own words is read: what the types are called does not matter
+_TYPES = dict.fromkeys(("V", "Block", "Model", "PathLike"), Any) | {"PathLike": list}
 
 
 @cache
@@ -113,11 +380,26 @@ def declared() -> dict[str, Field]:
     """Return all fields by name."""
     return {
         name: about
-        for fields in (BlockFields, ShakingFields, RowFields)
-        for name, hint in get_type_hints(fields, localns={"V": Any}, include_extras=True).items()
+        for fields in _CLASSES
+        for name, hint in get_type_hints(fields, localns=_TYPES, include_extras=True).items()
         for about in getattr(hint, "__metadata__", ())
         if isinstance(about, Field)
     }
+
+
+def names_of(*classes: Any) -> tuple[str, ...]:
+    """Return the fields that classes declare, in their order."""
+    return tuple(dict.fromkeys(name for each in classes for name in _hints(each)))
+
+
+def _hints(fields: Any) -> Mapping[str, Any]:
+    annotations: Mapping[str, Any] = fields.__annotations__
+    return annotations
+
+
+def columns_declared() -> tuple[str, ...]:
+    """Return the fields that may be columns of tables."""
+    return names_of(BlockFields, ShakingFields, RowFields)
 
 
 def column_of(name: str) -> str:
@@ -125,12 +407,16 @@ def column_of(name: str) -> str:
     return declared()[name].column or name
 
 
-_UNIT = re.compile("_(deg|m_s|m|g|s)$")
+_UNIT = re.compile("_(deg|m_s|kg_m3|pa|m|g|s)$")
+
+OTHER_WORDS = {"dip": "beta_deg"}
+"""Further words for fields, which shell and requests take too."""
 
 
 def word_of(name: str) -> str:
     """Return what people call a field that has its unit in its name: ``beta`` of ``beta_deg``."""
-    return "no_back" if name == "back_fracture" else _UNIT.sub("", name)
+    about = declared().get(name)
+    return about.word if about and about.word else _UNIT.sub("", name)
 
 
 def option_of(name: str) -> str:
@@ -140,12 +426,35 @@ def option_of(name: str) -> str:
 
 def parameter_of(name: str) -> str:
     """Return what a field is called in requests: spectral accelerations as in tables."""
-    return name if name in SPECTRAL or name == "leaves_g" else word_of(name)
+    return name if name in SPECTRAL else word_of(name)
+
+
+def by_field(words: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what was said in words of shell or requests by field; None and False say nothing.
+
+    Raises:
+        InputError: two words for one field.
+    """
+    given: dict[str, Any] = {}
+    words_of: dict[str, str] = {}
+    for word, value in words.items():
+        if value is None or value is False:
+            continue
+        name = name_of(word)
+        if name in given:
+            raise InputError(
+                f"{word} does not go with {words_of[name]}: both are the {declared()[name].what}",
+                fields=(word, words_of[name]),
+            )
+        words_of[name] = word
+        given[name] = False if declared()[name].is_flag else value
+    return given
 
 
 @cache
 def _by_word() -> dict[str, str]:
-    return {word_of(name): name for name in declared()}
+    names = declared()
+    return {parameter_of(n): n for n in names} | {word_of(n): n for n in names} | OTHER_WORDS
 
 
 def name_of(word: str) -> str:

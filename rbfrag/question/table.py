@@ -8,7 +8,7 @@ from functools import cache
 from typing import NamedTuple
 
 from rbfrag.errors import InputError
-from rbfrag.question.fields import column_of, declared
+from rbfrag.question.fields import column_of, columns_declared, declared
 
 FACTORS = {
     "m": {"m": 1.0, "cm": 0.01, "mm": 0.001},
@@ -91,8 +91,8 @@ def _sounds_like_input(name: str) -> bool:
 def _names() -> dict[str, str]:
     """Return the fields by all the names that a column may have."""
     by_name: dict[str, str] = {}
-    for name, field in declared().items():
-        for each in (name, column_of(name), *field.others):
+    for name in columns_declared():
+        for each in (name, column_of(name), *declared()[name].others):
             by_name[each] = name
     return by_name
 
@@ -166,13 +166,13 @@ def columns_in(header: Sequence[str], source: object, read: Collection[str]) -> 
             twice = (
                 f"the column {text} is there twice"
                 if text == other
-                else (f"the columns {other} and {text} both state {field.help}")
+                else (f"the columns {other} and {text} both state the {field.what}")
             )
             raise InputError(f"{source}: {twice}: leave one of them out")
         factor = 1.0 if unit is None else _factor(field.unit, unit)
         if factor is None:
             raise InputError(
-                f"{source}: the column {text} is in {unit!r}, and {field.help} is read in "
+                f"{source}: the column {text} is in {unit!r}, and the {field.what} is read in "
                 f"{' or '.join(_units(field.unit))}: convert it, or name another unit"
             )
         if factor != 1.0:
@@ -199,7 +199,7 @@ def _refuse_near_miss(text: str, source: object, read: Collection[str]) -> None:
         if column_of(field) in read and _is_near(bare, name):
             raise InputError(
                 f"{source}: the column {text[:60]} is no name of a field: did you mean {name}, "
-                f"{declared()[field].help}? Rename it"
+                f"the {declared()[field].what}? Rename it"
             )
 
 

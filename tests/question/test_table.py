@@ -10,7 +10,7 @@ import pytest
 from rbfrag.errors import InputError
 from rbfrag.exchange.batch import READ, predict_table
 from rbfrag.exchange.block_rows import read_blocks
-from rbfrag.question.fields import column_of, declared
+from rbfrag.question.fields import column_of, columns_declared, declared
 from rbfrag.question.question import predict
 from rbfrag.question.table import columns_in, field_of
 from rbfrag.solver.block.geometry import Block
@@ -42,8 +42,8 @@ def test_a_column_states_a_field_under_any_of_its_names(
 
 def test_no_name_stands_for_two_fields() -> None:
     owners: dict[str, str] = {}
-    for name, field in declared().items():
-        for each in {name, column_of(name), *field.others}:
+    for name in columns_declared():
+        for each in {name, column_of(name), *declared()[name].others}:
             assert owners.setdefault(each, name) == name, each
 
 
@@ -52,7 +52,7 @@ def test_no_name_stands_for_two_fields() -> None:
     [
         (["hieght_m", "width_m"], "did you mean height_m"),
         (["height_m", "restitutoin"], "did you mean restitution"),
-        (["dip", "beta"], "both state dip of the base"),
+        (["dip", "beta"], "both state the dip of the base"),
         (["kr", "kr"], "kr is there twice"),
         (["Height [ft]"], "'ft'"),
         (["PGA (gal)"], "'gal'"),
