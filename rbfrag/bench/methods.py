@@ -38,7 +38,6 @@ class Method:
     Args:
         family: methods of one family are joined by a line in the figure.
         setting: what distinguishes it within the family.
-        run: how one case is run.
         of_use: the setting that users of rbfrag get.
     """
 

@@ -28,7 +28,6 @@ class LengthRow:
 
     Args:
         lengthened: ``rest`` (zeros before it) or ``shaking`` (the record repeated).
-        samples: samples of the longer record.
         moved: sample intervals in which the block moves.
         run_s: time of one run with the excitation at hand [s].
         excitation_s: time to make the excitation from the record [s].
@@ -46,8 +45,6 @@ class WorkersRow:
     """One set of critical searches by local worker processes, wall time.
 
     Args:
-        workers: processes.
-        combinations: searches.
         seconds: wall time, with the workers started and warm [s].
         per_s: combinations per second.
     """

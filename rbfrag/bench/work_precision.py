@@ -20,10 +20,7 @@ class WorkPrecision:
     """What one method did on all cases.
 
     Args:
-        family: the method.
-        setting: its setting.
         of_use: the setting that users of rbfrag get.
-        cases: number of cases.
         wrong: cases whose outcome differs from the reference's.
         error_median: median relative error of the peak rotation, where the block stays.
         error_worst: greatest of these errors.
@@ -59,7 +56,6 @@ def measure(
     """Run every method on every case and compare with the extended-precision reference.
 
     Args:
-        cases: what to run.
         methods: with what; one of them `of_use`, to which times are compared.
         judge: returns what is right; for another kind than toppling.
         seed: of the order in which the methods take turns on each case.

@@ -50,11 +50,9 @@ class Workforce:
         """Have all work done and stored.
 
         Args:
-            engine: the database.
             settings: what the campaign was asked for.
             do: does one chunk of work; a function of a module, which workers can find.
             work: the chunks.
-            chunks: their number.
             store: stores the answers to one chunk, which belong to the campaign of this row id, and
                 returns the number of combinations.
             total: number of combinations.

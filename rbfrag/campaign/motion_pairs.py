@@ -23,8 +23,6 @@ class MotionPair:
     """Two horizontal motions, one after the other.
 
     Args:
-        first: the first.
-        second: the second.
         pairing: ``station`` for two shocks of one station, ``drawn`` for others.
     """
 
@@ -40,7 +38,6 @@ def motion_pairs(
 
     Args:
         suite: only the horizontal motions of this suite.
-        seed: of the draws.
         draws: how many first motions are drawn for each that is no later shock of a station.
 
     Raises:
@@ -73,7 +70,6 @@ def shocks_of_stations(
     events, in which catalogues number the shocks of a sequence.
 
     Args:
-        rows: horizontal motions.
         times: time or year by event id, of earthquakes that metadata state.
     """
     places: defaultdict[tuple[str, object], list[MotionRow]] = defaultdict(list)
@@ -107,9 +103,7 @@ def drawn_pairs(
     and a motion that is added later changes only the pairs that it is drawn for.
 
     Args:
-        rows: horizontal motions.
         without: ids of motions that are no second ones here.
-        seed: of the draws.
         draws: first motions for each second one.
     """
     pairs = []

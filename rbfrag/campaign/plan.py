@@ -51,9 +51,7 @@ class MotionPlan:
     """All combinations of one horizontal motion, so that its samples travel once.
 
     Args:
-        motion: the horizontal motion.
         vertical: the vertical motion of its recording, where some of the cases need it.
-        cases: the combinations.
     """
 
     motion: MotionRow
@@ -66,7 +64,6 @@ class CampaignPlan:
     """What a campaign is made of.
 
     Args:
-        kind: what the blocks do.
         motions: the longest records first, so that no worker is left with one at the end.
         without_vertical: horizontal motions that vertical shaking was asked for and have none.
         warnings: sentences about these.
@@ -88,7 +85,6 @@ class MotionTasks:
     """What is to do on one horizontal motion.
 
     Args:
-        plan: the motion.
         tasks: what its combinations lack.
         spectrum: p² [1/s²] at which its toppling spectrum is missing, by polarity.
     """
@@ -127,7 +123,6 @@ def plan_campaign(
     """Return every combination: horizontal motions x vertical or not x polarity x cases.
 
     Args:
-        kind: what the blocks do.
         cases: the blocks and what counts as failure, from the kind.
         suite: only the horizontal motions of this suite; their verticals need not be in it.
         vertical: ``without`` vertical motion, ``with`` that of the same recording, or ``both``.
@@ -180,7 +175,6 @@ def remaining_work(connection: Connection, plan: CampaignPlan, wanted: Wanted) -
     """Compare a plan with what is stored.
 
     Args:
-        plan: the campaign.
         wanted: what it asks for beside critical values and outcome grids.
     """
     known = known_combinations(connection, (case.natural_key for case in plan.cases))
@@ -219,8 +213,6 @@ def missing_sizes(
     """Return the p² [1/s²] at which X(p) of a motion is not stored, by polarity.
 
     Args:
-        known: what is stored.
-        motion_id: the motion.
         p2: frequency parameters asked for [1/s²].
     """
     missing: dict[Polarity, tuple[float, ...]] = {}

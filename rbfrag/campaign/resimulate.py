@@ -62,7 +62,6 @@ class End(NamedTuple):
     """How one simulated block ended.
 
     Args:
-        outcome: its outcome.
         theta_n: peak rotation over the critical angle; None where there is none.
         displacement_m: how far it slid [m]; None where it does not.
         sensitive: whether the outcome is; None of kinds whose outcomes are not.
@@ -83,8 +82,6 @@ class Resimulation:
         exact: of these, equal bit for bit.
         within_error: equal within the error of the solver, made on another machine.
         eligible: combinations of the present numerics whose samples are stored.
-        seed: of the random choice.
-        findings: what was wrong.
     """
 
     sampled: int
@@ -104,7 +101,6 @@ def resimulate(connection: Connection, *, sample: int, seed: int = 0) -> Resimul
 
     Args:
         sample: number of combinations; all there are when there are fewer.
-        seed: of the random choice.
     """
     keys = keys_with_samples(connection, numerics_version=NUMERICS_VERSION)
     pairs = pair_keys_with_samples(connection, numerics_version=NUMERICS_VERSION)

@@ -52,17 +52,7 @@ class PairTasks:
 
 @dataclass(frozen=True, eq=False)
 class PairWork:
-    """Two motions with all that is to do on them: they travel once.
-
-    Args:
-        kind: what the blocks do.
-        first_id: row id of the first motion.
-        second_id: row id of the second one.
-        pairing: how they were paired.
-        first: the first motion.
-        second: the second one.
-        tasks: what to do.
-    """
+    """Two motions with all that is to do on them: they travel once."""
 
     kind: str
     first_id: int
@@ -105,13 +95,9 @@ def simulate_sequences(
     """Store what pairs of motions do to the blocks of a kind, and tabulate it.
 
     Args:
-        kind: what the blocks do.
         cases: what the campaign is asked for: the blocks of slumps, and what counts as failure.
-        db: the database.
-        suite: only the motions of this suite.
         seed: of the pairs that are drawn.
         draws: first motions that are drawn for each second one.
-        workforce: who does the work.
     """
     if draws < 1:
         raise InputError(f"--draws must be at least 1, not {draws}")

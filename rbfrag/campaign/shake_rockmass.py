@@ -42,12 +42,9 @@ def shake(
     The answer does not depend on the number of workers.
 
     Args:
-        blocks: blocks of a rock mass.
-        motion: horizontal ground motion.
         scales: factors on the motion.
         vertical: vertical motion of the same recording, upward positive; scaled likewise.
         polarity: ``forward`` (positive samples drive out of the slope) or ``reverse``.
-        limits: what counts as failure.
         jobs: worker processes; None for one per processor, where there is work enough for them.
         on_progress: called at the beginning and after each chunk of work; counts blocks.
 

@@ -44,7 +44,6 @@ def read_traces(
     """Return every trace of a file with its row of the metadata.
 
     Args:
-        file: the file.
         metadata: the table, or None.
         units: unit that the caller states for files that state none, neither by themselves nor
             by the table; :attr:`Trace.other_unit` names one that does state another.
@@ -90,7 +89,6 @@ def missing_files(
     """Yield the files at or below some paths that the metadata name but that are not there.
 
     Args:
-        metadata: the table.
         paths: files and folders that are being read; rows that point elsewhere are passed over.
     """
     folder = Path(metadata.path).absolute().parent

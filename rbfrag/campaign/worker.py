@@ -57,7 +57,6 @@ class Task:
     """What is still to do for one combination.
 
     Args:
-        planned: the combination.
         search: look for the critical value; False when it is stored.
         grid: run the outcome grid of the kind; False when it is stored.
         full_map: map what fails and what does not; the search is repeated for it.
@@ -94,7 +93,6 @@ class TaskResult:
     """What a task gave; None and () where nothing was asked for.
 
     Args:
-        task: the task.
         critical: the search; None also where the kind has none.
         grid: outcomes of its grid.
         blocks: blocks run for themselves.
@@ -120,10 +118,7 @@ class MotionWork:
     """One horizontal motion with all that is to do on it: it travels once.
 
     Args:
-        motion_id: row id of the motion.
-        motion: the motion.
         vertical: the vertical one of its recording, if a task needs it.
-        tasks: what to do.
         spectrum: p² [1/s²] at which to compute its toppling spectrum, by polarity.
         map_depth: width of k/PGA that maps may leave undecided at a border.
     """

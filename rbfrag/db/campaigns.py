@@ -44,16 +44,10 @@ class CombinationRecord:
 
     Args:
         natural_key: from :func:`rbfrag.db.keys.combination_key`.
-        motion_id: the horizontal motion.
-        vertical_motion_id: the vertical one, or None.
-        polarity: ``forward`` or ``reverse``.
-        kind: response kind.
         p2: the same that went into the key [1/s²].
-        settings: the same that went into the key.
         result: the critical value; None where none was looked for.
         block: which block it is, the same that went into the key; None where p² says all.
         grid: the blocks of the kind's grid, number i of it at place i; None to add them later.
-        numerics_version: the same that went into the key.
     """
 
     natural_key: str
@@ -74,7 +68,6 @@ class KnownCombination:
     """What a campaign asks about a combination that is stored already.
 
     Args:
-        id: its row.
         status: of its search.
         kr_over_pga: its critical value, if one was found.
         certified: whether that is proven.

@@ -65,7 +65,6 @@ def unchecked_engine(
 
     Args:
         place: what :func:`rbfrag.db.location.locate` returned.
-        read_only: forbid writes.
         foreign_keys: False lets a migration rebuild a table that others point to (SQLite).
         busy_timeout_s: how long to wait for another process's lock [s].
     """

@@ -17,7 +17,6 @@ class ColumnMeaning:
     """One column.
 
     Args:
-        name: its name.
         type: ``integer``, ``number`` (float64), ``true/false``, ``text`` or ``array`` (float64).
         unit: its unit; empty for none, ``k_r/PGA`` for a k_r over the motion's PGA in g.
         meaning: one sentence.
@@ -38,7 +37,6 @@ class TableMeaning:
     """One table.
 
     Args:
-        name: its name.
         meaning: one sentence.
         columns: its columns, in order.
     """

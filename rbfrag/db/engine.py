@@ -74,13 +74,7 @@ def open_database(
 def opened_database(
     db: str | PathLike[str] | None = None, *, create: bool = False, read_only: bool = False
 ) -> Iterator[Engine]:
-    """Open a database for a ``with`` block and close its connections behind it.
-
-    Args:
-        db: as for :func:`open_database`.
-        create: as for :func:`open_database`.
-        read_only: as for :func:`open_database`.
-    """
+    """Open a database for a ``with`` block and close its connections behind it."""
     engine = open_database(db, create=create, read_only=read_only)
     try:
         yield engine

@@ -63,7 +63,6 @@ def insert_rows(
     value would cost more than the insertion.
 
     Args:
-        table: the table.
         columns: names of the columns that the rows fill.
         rows: tuples of None, bool, int, float, str and bytes, in the order of `columns`; numpy's
             scalars are not understood by every driver.
@@ -124,7 +123,6 @@ def table_digests(
     """Return the digests of rows of a table.
 
     Args:
-        table: the table.
         columns: names of the columns that the rows fill; the others are NULL.
         rows: their values, in the order of `columns`.
     """

@@ -62,7 +62,6 @@ def pair_key(
     Args:
         first_sha256: hash of the samples of the first motion.
         first_dt_s: their interval [s].
-        block: which block it is.
         inputs: the second motion without a vertical one, polarity, kind and numerics, as for
             :func:`combination_key`.
 

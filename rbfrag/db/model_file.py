@@ -206,7 +206,6 @@ def unknown_model(name: str | None, known: Sequence[str], where: str) -> str:
 
     Args:
         name: the name asked for; None for the default.
-        known: names of the models there are.
         where: the database as the user names it.
     """
     if not known:

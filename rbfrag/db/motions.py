@@ -231,8 +231,6 @@ def same_measure(
 
     Args:
         name: one of :data:`MEASURES`.
-        one: its value.
-        other: its value elsewhere.
         pgv_m_s: PGV of the motion [m/s], which a final velocity is what is left of.
         pgd_m: PGD of the motion [m].
     """
@@ -407,7 +405,6 @@ def earthquake_id_for(connection: Connection, info: EarthquakeInfo, *, recording
     Args:
         info: the earthquake. Without an event_id nothing is known, and the recording
             stands for an event of its own.
-        recording: name of the recording.
     """
     if info.magnitude is not None and not -5.0 < info.magnitude < 11.0:
         raise InputError(

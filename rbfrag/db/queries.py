@@ -40,7 +40,6 @@ class DatabaseInfo:
         revision: its schema.
         dialect: ``sqlite`` or ``postgresql``.
         rows: number of rows by table.
-        combinations_by_status: number of combinations by status.
         numerics_versions: versions of the solver that made its combinations.
         default_model: name of the model of toppling that answers when none is named.
     """
@@ -95,9 +94,6 @@ def combination_table(
     the displacements. Versions of the numerics never mix.
 
     Args:
-        suite: only motions of this suite.
-        vertical: ``without`` vertical motion, ``with`` it, or ``both``.
-        kind: response kind.
         rotation_deg: the rotation that counts as failure [deg]; None for failure past recovery
             and of kinds that know none.
         numerics_version: of the solver.

@@ -49,15 +49,10 @@ class ShockPairRecord:
 
     Args:
         natural_key: from :func:`rbfrag.db.keys.pair_key`.
-        first_motion_id: the first motion.
-        second_motion_id: the second one.
         pairing: ``station`` for two shocks of one station, ``drawn`` for others.
         polarity: of both.
-        kind: response kind.
-        block: the same that went into the key.
         yield_g: yield acceleration in its first place [g].
         critical_rad: rotation without strength [rad]; None of slides.
-        numerics_version: the same that went into the key.
         first: after the first motion.
         second: after both.
         intact: after the second alone.
@@ -107,9 +102,7 @@ class StoredShockPair:
     """One stored block under two motions.
 
     Args:
-        id: its row.
         processor: the processor and numba of its campaign.
-        record: what is stored.
     """
 
     id: int

@@ -31,11 +31,8 @@ def store_spectrum(
     """Store values of one motion's spectrum; values that are there already stay.
 
     Args:
-        motion_id: the motion.
-        polarity: ``forward`` or ``reverse``.
         p2: frequency parameters [1/s²], shape (n,).
         x_m_s: X(p) at each of them [m/s], shape (n,).
-        numerics_version: of the computation.
     """
     rows: list[tuple[object, ...]] = [
         (motion_id, polarity, float(size), numerics_version, float(velocity))
@@ -54,7 +51,6 @@ def spectrum_values(
 
     Args:
         p2: only these frequency parameters [1/s²].
-        numerics_version: of the computation.
     """
     query = select(
         toppling_spectrum.c.motion_id,

@@ -75,8 +75,6 @@ def connect_sqlite(
     `immutable`, which is safe as long as no -wal file with content lies beside it.
 
     Args:
-        path: the file.
-        read_only: forbid writes.
         busy_timeout_s: how long to wait for another process's lock [s].
         check_same_thread: as for :func:`sqlite3.connect`.
     """

@@ -30,9 +30,6 @@ class StoredCombination:
     """What a database says about one critical search.
 
     Args:
-        id: its row.
-        motion_id: the horizontal motion.
-        vertical_motion_id: the vertical one, or None.
         pga_g: PGA of the horizontal motion [g].
         values: the columns of the combination by name.
         settings: what else went into its natural key.

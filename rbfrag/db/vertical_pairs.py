@@ -23,7 +23,6 @@ class VerticalPair:
     """A horizontal motion and the vertical one of the same recording.
 
     Args:
-        motion_id: the horizontal motion.
         vertical_id: the vertical motion; None where there is none to use.
         vertical_sha256: hash of its samples, as natural keys need it.
         vertical_pga_g: its peak acceleration [g].
@@ -45,9 +44,6 @@ def vertical_pairs(connection: Connection, *, suite: str | None = None) -> dict[
     A companion is the one vertical motion of the same recording, whether or not it is in the
     suite, with the same sampling interval, start and processing, upward positive. Components
     of different lengths are companions: the shorter is followed by rest, and a remark says so.
-
-    Args:
-        suite: only the horizontal motions of this suite.
     """
     horizontals = [row for row in motion_rows(connection, suite=suite) if not row.is_vertical]
     recording_of = recordings_of_motions(connection)

@@ -72,7 +72,6 @@ class Finding:
     Args:
         holds: whether (where) it is so.
         name: the value concerned.
-        value: what it is.
         text: what is wrong and what to do.
     """
 
@@ -99,7 +98,6 @@ class Contradiction(Finding):
 
     Args:
         ratio: what is out of its range.
-        values: the values by name.
         fitted: least and greatest ratio of the fitted motions; None where the model says nothing
             of it.
     """
@@ -181,11 +179,9 @@ def answer_with_findings(
     """Answer a question of which there may be something to say.
 
     Args:
-        model: the model that answers.
         given: what is given, by name: numbers, or arrays of one shape.
         needed: names of the values without which there is no answer.
         quantiles: of the confidence level; None for no interval.
-        ns: functions for the kind of number given.
         say: called with where a sentence holds, and the finding.
         refuse: the same for what makes an answer impossible.
         unstable: the same where a block fails without an earthquake.

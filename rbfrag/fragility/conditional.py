@@ -33,10 +33,7 @@ class Share(NamedTuple):
     """A share of blocks that fail, with what the finite number of earthquakes leaves open.
 
     Args:
-        fails: how many.
-        probability: the share.
-        ci_low: lower end of its interval, clustered by the earthquake of the second shock.
-        ci_high: upper end.
+        ci_low: lower end of the interval, clustered by the earthquake of the second shock.
     """
 
     fails: int
@@ -175,7 +172,6 @@ def share_of_events(fails: np.ndarray, event: np.ndarray, level: float = LEVEL) 
     Args:
         fails: whether each block fails, shape (n,).
         event: number of its earthquake, from 0, shape (n,).
-        level: of the interval.
     """
     n, count = fails.size, int(fails.sum())
     share, events = count / n, int(event.max()) + 1

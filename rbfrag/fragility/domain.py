@@ -44,7 +44,6 @@ class Ratio:
         symbol: its formula for people.
         unit: its unit, empty for none.
         of: the values that it is made of; the first is the one that does not go with the others.
-        formula: the ratio from the values by name.
         shipped: its range over the motions of the shipped reference, which judges where a model
             says nothing of it; None where models say it all.
     """
@@ -86,8 +85,6 @@ class Ratio:
         """Return the sentence for values whose ratio is outside its range.
 
         Args:
-            values: the values by name.
-            ratio: theirs.
             fitted: range of the fitted motions; None where the shipped ones judge.
         """
         first, *others = (
@@ -236,7 +233,6 @@ def stored_spread(name: str, diagnostics: Mapping[str, Any]) -> Spread | None:
 
     Args:
         name: the model's name.
-        diagnostics: what is stored with it.
 
     Raises:
         ModelError: it is not whole.

@@ -25,7 +25,6 @@ class Quantiles(NamedTuple):
     """What an interval of one confidence level reaches to.
 
     Args:
-        level: confidence level.
         normal: quantile of the normal distribution.
         student: Student's quantile as a polynomial in w = 4/ν - 1, highest power first.
     """
@@ -67,7 +66,6 @@ class ParameterErrors:
         Args:
             x: slopes of eta by the parameters, numbers or arrays.
             quantiles: of the confidence level.
-            ns: functions for the kind of number given.
         """
         g = len(self.steps)
         if not g:

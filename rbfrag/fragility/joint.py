@@ -189,8 +189,6 @@ def count_moments(
 
     Args:
         probability: P of each block, shape (n,).
-        blocks: where they stand.
-        dependence: the copula.
         weights: weight or loss of each block, shape (n,); None for 1.
     """
     p, w = checked(probability, blocks, weights)
@@ -241,7 +239,6 @@ def _probability_any(n: int, mean: Any, variance: Any, least: Any) -> FloatArray
     """Return the probability that any of n blocks fails, of the law of `FailureCount`.
 
     Args:
-        n: number of blocks.
         mean: expected number of failures, any shape.
         variance: its variance, same shape.
         least: greatest P of one block, same shape.
@@ -292,9 +289,7 @@ class FailureCount:
     binomial number; then it is the binomial law of as many blocks as have this mean and variance.
 
     Args:
-        n: number of blocks.
         mean: expected number of failures.
-        variance: its variance.
         least_any: greatest P of one block, below which the probability of any failure cannot lie.
     """
 

@@ -39,7 +39,6 @@ def uniform_points(size: int, power: int, seed: int) -> Iterator[FloatArray]:
     Args:
         size: number of coordinates; those beyond the first `MOST_EVEN` are drawn at random.
         power: base-2 logarithm of the number of points.
-        seed: seed of the scrambles.
     """
     from scipy.stats.qmc import Sobol
 
@@ -56,7 +55,6 @@ class _Part:
 
     Args:
         kind: row of the values that it adds to: common, symmetric, antisymmetric.
-        member: the blocks.
         slot: whether it is of the first or the second component that each may face.
         loading: from independent normals to its values, shape (members, rank).
     """
@@ -74,8 +72,6 @@ class LatentPoints:
     likely; one of known azimuth has the same in all four.
 
     Args:
-        dependence: the copula.
-        blocks: where the blocks stand.
         points: number of points of all replicates, of which a power of two in each is taken.
         seed: seed of the scrambles.
     """

@@ -41,10 +41,6 @@ class JointSampler:
 
     Blocks that are equal in all that a placement says have the same Z: they fail together if P is
     the same.
-
-    Args:
-        dependence: the copula.
-        blocks: where the blocks stand.
     """
 
     def __init__(self, dependence: Dependence, blocks: Placement) -> None:
@@ -69,8 +65,6 @@ class JointSampler:
 
         Args:
             probability: P of each block, shape (n,).
-            draws: number of samples.
-            generator: source of random numbers.
         """
         p, _ = checked(probability, self._blocks, None)
         return np.asarray(self.normals(draws, generator) <= ndtri(p))
@@ -86,8 +80,6 @@ class JointSampler:
 
         Args:
             probability: P of each block, shape (n,).
-            draws: number of samples.
-            generator: source of random numbers.
             weights: weight or loss of each block, shape (n,); None for 1.
         """
         p, w = checked(probability, self._blocks, weights)

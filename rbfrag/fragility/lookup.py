@@ -315,7 +315,6 @@ def stored_row(name: str, db: str | PathLike[str] | None = None) -> ModelRow:
     """Return a model of a database as it is stored.
 
     Args:
-        name: of the model.
         db: database, as for :func:`find_model`.
 
     Raises:

@@ -50,11 +50,8 @@ class Answer(NamedTuple):
 
     Args:
         probability: P.
-        low: lower end of the confidence interval of P.
-        high: upper end of it.
         event_low: lower end of the share failing in one future earthquake; None where the model
             does not know it.
-        event_high: upper end of it.
         eta: argument of the link; None where nothing had to be evaluated, and where the block is
             uncertain.
         log_sigma: logarithm of the scatter, of models that have one.
@@ -79,9 +76,7 @@ class FragilityModel:
     """One fitted fragility model: a stored row in the form that answers.
 
     Args:
-        row: the model as stored.
         term: the intensity term it reads.
-        method: how it was fitted.
         form: the method's formula on that term.
         parameters: values of the coefficients.
         errors: how well they are known.
@@ -119,7 +114,6 @@ class FragilityModel:
         """Return the model of a stored row.
 
         Args:
-            row: the row.
             data: the database that it is stored in, as people call it.
 
         Raises:
@@ -302,7 +296,6 @@ class FragilityModel:
         Args:
             values: completed values, within what the bounds allow.
             quantiles: of the confidence level; None for P and eta alone.
-            ns: functions for the kind of number given.
             given: the values that were completed, which a model of uncertain blocks completes
                 for each that one may be.
         """

@@ -178,7 +178,6 @@ def predict_many(
     """Return the answers for broadcast arrays; see :func:`rbfrag.question.question.predict`.
 
     Args:
-        model: the model that answers.
         given: block and measures of the motion by name, numbers or arrays.
         quantiles: of the confidence level.
         interval: whether interval and range of one earthquake are asked for.

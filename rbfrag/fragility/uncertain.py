@@ -65,7 +65,6 @@ class Scatter:
     """Strength and size lognormal about medians, fractions normal cut at 0 and 1; independent.
 
     Args:
-        fractions: names of the fractions.
         z: standard normal points by the name of the value, shape (k,) each.
         weight: their weights, shape (k,).
     """
@@ -132,11 +131,7 @@ class Draws:
 
 @dataclass(frozen=True)
 class UncertainModel(FragilityModel):
-    """A fitted model that answers for blocks that are not known exactly.
-
-    Args:
-        possible: what the blocks may be.
-    """
+    """A fitted model that answers for blocks that are not known exactly."""
 
     possible: Possible = field(kw_only=True)
 

@@ -57,9 +57,7 @@ class UnknownOutcomes:
         """Return what a model's diagnostics hold, None where all outcomes are known.
 
         Args:
-            diagnostics: of the stored model.
             strength: name of its block's strength.
-            name: of the model.
 
         Raises:
             ModelError: the curves are torn.

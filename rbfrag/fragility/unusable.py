@@ -72,8 +72,6 @@ def unusable_in_words(
     """Return what is said of blocks that could not be used; nothing where there are none.
 
     Args:
-        count: their number.
-        total: that of all blocks.
         places: where they stand, or the first.
         reasons: why they could not be used.
         effect: what becomes of them in numbers of several blocks; those of a mean have no row.
@@ -96,7 +94,6 @@ def refuse(
         source: what messages call them.
         places: where those stand that cannot be used; if none can, of the first.
         reasons: why each cannot be used.
-        total: number of all blocks.
         why: why the others do not do; empty where there are no others.
     """
     if not why or len(places) == total:

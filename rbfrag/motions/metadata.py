@@ -37,7 +37,6 @@ class TraceMetadata:
     """What the table states about one trace; empty or None where it states nothing.
 
     Args:
-        file: the file as the table names it.
         line: line of the table, from 1.
         trace_index: position of the trace in its file, from 0; None for all traces of the file.
         event_id: key of the earthquake.
@@ -48,8 +47,6 @@ class TraceMetadata:
         processing: what was done to the record.
         earthquake: name of the earthquake for people.
         year: year or time of the earthquake, as text.
-        station: station.
-        component: component.
         dt_s: sampling interval [s].
     """
 
@@ -74,7 +71,6 @@ class MotionMetadata:
     """The rows of a metadata table, found by file and trace.
 
     Args:
-        path: the table.
         rows: every row, in the table's order.
     """
 

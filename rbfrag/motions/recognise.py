@@ -105,8 +105,6 @@ def motions_in(
     Args:
         raw: what the file holds.
         name: what messages call it; nothing of that name is looked for.
-        units: as for :func:`read_motions`.
-        dt_s: as for :func:`read_motions`.
     """
     _check_stated(units, dt_s)
     # readers look for an index beside a file, and beside this one there is nothing
@@ -251,9 +249,6 @@ def read_motion(
 
     Args:
         text: a path; for a file of several traces with ``#`` and the index, from 0.
-        units: as for :func:`read_motions`.
-        dt_s: as for :func:`read_motions`.
-        allow_partial: as for :func:`read_motions`.
     """
     name = os.fspath(text)
     index: int | None = None

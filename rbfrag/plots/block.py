@@ -118,11 +118,6 @@ def plot_block(block: Block, stability: Stability, path: str | PathLike[str]) ->
     The contacts are 1 heel, 2 back and 3 toe, C is the centroid. The arrow is the direction of
     the resultant of weight and inertia at the yield acceleration; a block that no acceleration
     moves, or that none holds, has the direction of its weight.
-
-    Args:
-        block: the block.
-        stability: its stability.
-        path: file to write: .png, .pdf or .svg.
     """
     plot_path(path)
     figure = new_figure(7.4, 4.8)

@@ -39,7 +39,6 @@ def plot_calibration(
 
     Args:
         models: bins by name of the model, at most four.
-        path: file to write: .png, .pdf or .svg.
         scores: held-out scores by name of the model, for the legend.
         data: what the outcomes are, for the title.
     """

@@ -79,7 +79,6 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
     """Write a figure as PNG, PDF or SVG by the suffix of the path, whole or not at all.
 
     Args:
-        figure: the figure.
         path: file to write, which is returned; an existing file is replaced.
     """
     target = plot_path(path)
@@ -224,7 +223,6 @@ def density(
     """Draw dots, or of many points hexagons shaded by their number; axes linear or logarithmic.
 
     Args:
-        figure: the sheet.
         axes: where to draw; their scales are set before.
         x: abscissae, shape (n,).
         y: ordinates, shape (n,).

@@ -75,7 +75,6 @@ def plot_chart(
 
     Args:
         model: a model of one number, pgv_pga or pgv_pga_tm.
-        path: file to write: .png, .pdf or .svg.
         held: what is held; None for the middle of the fitted ranges.
     """
     plot_path(path)
@@ -98,8 +97,6 @@ def draw_chart(
 
     Args:
         axes: empty axes.
-        model: the model.
-        held: what is held.
         point: intensity and toppling velocity of a block to show [m/s], or measure in its unit.
     """
     across, up = _known_ranges(model, held)

@@ -97,8 +97,6 @@ def plot_sensitivity(table: CombinationTable, path: str | PathLike[str], *, data
     The legend says how many of the critical values lie above each line.
 
     Args:
-        table: the critical values.
-        path: file to write: .png, .pdf or .svg.
         data: what the data are, for the title.
 
     Raises:
@@ -204,7 +202,6 @@ def plot_vertical(pairs: VerticalPairs, path: str | PathLike[str]) -> Path:
 
     Args:
         pairs: critical values of the same motion, polarity and p².
-        path: file to write: .png, .pdf or .svg.
     """
     plot_path(path)
     if not pairs.ln_ratio.size:

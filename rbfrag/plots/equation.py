@@ -45,7 +45,6 @@ def rounded(value: float, *, signed: bool = False) -> str:
     """Return a number with three significant digits as mathtext.
 
     Args:
-        value: the number.
         signed: with its sign and blanks around it, as a further term of a sum.
     """
     size = abs(value)

@@ -59,13 +59,10 @@ def film(
     """Write a film of a block on its planes, as seen by somebody who moves with the ground.
 
     Args:
-        response: a response asked for with its history.
-        block: the block.
         path: .gif, .mp4 (by the program ffmpeg), or .html with buttons.
         beta_deg: dip of the base, out of the slope positive [deg].
         back_fracture: draw the back plane.
         exaggerate: factor on displacement and rotation; 1 is true scale.
-        title: name of the motion.
 
     Raises:
         InputError: no history, a factor that is not positive, an unknown suffix, a folder that

@@ -68,9 +68,6 @@ def plot_fit(
     each motion.
 
     Args:
-        table: the critical values.
-        model: the model.
-        path: file to write: .png, .pdf or .svg.
         log: logarithmic axes.
         xp_m_s: toppling spectrum of each row [m/s], which models of the term xp need.
 

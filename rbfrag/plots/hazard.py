@@ -39,9 +39,7 @@ def plot_contribution(curve: HazardCurve, answer: HazardAnswer, path: str | Path
     """Draw a hazard curve and, below it, where the failures of the first block come from.
 
     Args:
-        curve: the hazard curve.
         answer: the answer; its first block is drawn.
-        path: file to write: .png, .pdf or .svg.
     """
     plot_path(path)
     figure = new_figure(6.4, 6.4)

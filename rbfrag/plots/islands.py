@@ -61,9 +61,7 @@ def plot_islands(
     Args:
         motion: the horizontal motion that was searched.
         result: its critical search, made with ``full_map=True``.
-        path: .png, .pdf or .svg.
         vertical: the vertical motion of that search.
-        title: name of the motion.
     """
     if not result.intervals.outcome:
         why = f"no map of outcomes (status {result.status})"

@@ -66,8 +66,6 @@ def write_near(
     """Write a text with a halo beside a place of the data.
 
     Args:
-        axes: where to write.
-        text: the label.
         at: the place, in data coordinates unless `style` has ``xycoords``.
         offset: where the label is best, from the place [points]; it begins there on that side.
         movable: whether it may stand on another side where it would cover something.

@@ -38,7 +38,6 @@ def plot_losses(answer: LossAnswer, path: str | PathLike[str]) -> Path:
 
     Args:
         answer: the answer, with samples.
-        path: file to write: .png, .pdf or .svg.
 
     Raises:
         InputError: the answer has no curve.

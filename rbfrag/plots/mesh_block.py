@@ -40,10 +40,6 @@ def plot_mesh_block(block: MeshBlock, path: str | PathLike[str]) -> Path:
     At the left the contact points, their hull and the whole block from above, C being the centre
     of mass. At the right k_r towards each azimuth, for the heights of contact of the sensitivity;
     the arrow at the left and the point at the right are the weakest azimuth.
-
-    Args:
-        block: the block.
-        path: file to write: .png, .pdf or .svg.
     """
     plot_path(path)
     figure = new_figure(10.0, 5.4)

@@ -77,7 +77,6 @@ def plot_modes(
     accelerations, and what is unstable or locked, do.
 
     Args:
-        path: file to write: .png, .pdf or .svg.
         phi_deg: friction angle of the base [deg].
         beta_deg: dip of the base for the yield accelerations [deg].
         phi_back_deg: friction angle of the back plane [deg]; None for that of the base.

@@ -53,12 +53,8 @@ def plot_response(
     1 is the point of balance.
 
     Args:
-        response: a response asked for with its history.
-        path: .png, .pdf or .svg.
         p2: the block's p² [1/s²], for the title.
         kr: the block's k_r, for the title.
-        reverse: polarity was reversed, for the title.
-        title: name of the motion.
     """
     history = response.history
     if history is None:
@@ -161,12 +157,6 @@ def plot_motion(
     The upper panel shows the driving acceleration k_h/(1 + k_v) against the strength where
     the block is: it gains speed down the slope where the first is above the second. The lower
     panel shows the displacement along the base, and the rotation of a block that rotates.
-
-    Args:
-        response: a response asked for with its history.
-        path: .png, .pdf or .svg.
-        title: name of the motion.
-        reverse: polarity was reversed, for the title.
     """
     history = response.history
     if history is None or history.displacement_m is None or history.strength_g is None:
@@ -243,12 +233,6 @@ def plot_rocking(
     either corner: the block speeds up forward where it is above the upper line, backward where it
     is below the lower one. The lower panel shows the rotation over the critical angle of its
     sense, forward positive, and the impacts.
-
-    Args:
-        response: a response asked for with its history.
-        path: .png, .pdf or .svg.
-        title: name of the motion.
-        reverse: polarity was reversed, for the title.
     """
     history = response.history
     if history is None or history.impact_s is None:

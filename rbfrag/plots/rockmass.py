@@ -53,10 +53,6 @@ def plot_rockmass(realisations: Realisations, path: str | PathLike[str]) -> Path
 
     The counts are not divided by the number of blocks in the mode, so that curves may be
     compared; where two of them cross is marked.
-
-    Args:
-        realisations: the realisations.
-        path: file to write: .png, .pdf or .svg.
     """
     plot_path(path)
     counts = mode_counts(realisations)
@@ -140,8 +136,6 @@ def plot_failures(shaken: ShakenMass, path: str | PathLike[str], *, level: float
 
     Args:
         shaken: the outcomes of the blocks.
-        path: file to write: .png, .pdf or .svg.
-        level: confidence level of the bands.
     """
     plot_path(path)
     by_scale = failures(shaken, level)

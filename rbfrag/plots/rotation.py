@@ -69,8 +69,6 @@ def plot_rotation(
     The figures 3.20a, 3.20b and 3.21 of Gibson's dissertation, for any block.
 
     Args:
-        block: the block.
-        path: file to write: .png, .pdf or .svg.
         beta_deg: dip of the base, out of the slope positive [deg].
         phi_deg: friction angle of the base [deg].
         phi_back_deg: friction angle of the back plane [deg]; None for that of the base.

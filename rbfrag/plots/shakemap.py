@@ -49,8 +49,6 @@ def plot_shakemap(
         lon: longitudes [deg], shape (n,).
         lat: latitudes [deg], shape (n,).
         probability: probabilities, NaN where there is none, shape (n,).
-        path: file to write: .png, .pdf or .svg.
-        title: what is drawn.
         epicentre: longitude and latitude of the epicentre [deg].
         shape: rows and columns if the places are the nodes of a whole grid; points otherwise.
     """

@@ -61,7 +61,6 @@ def plot_spectrum(
 
     Args:
         motions: at most eight.
-        path: file to write: .png, .pdf or .svg.
         polarities: the polarities to draw, forward solid, reverse dashed.
         p2: the figure spans at least these frequency parameters [1/s²].
         names: names of the motions in the legend; their labels if empty.

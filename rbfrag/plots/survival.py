@@ -47,9 +47,7 @@ def plot_survival(
     """Draw hazard curves, the survival of the blocks over a factor on their rates, and weights.
 
     Args:
-        curves: the hazard curves.
         answer: what the blocks say of them.
-        path: file to write: .png, .pdf or .svg.
     """
     plot_path(path)
     weighted = [one for one in answer.branches if one.weight is not None]

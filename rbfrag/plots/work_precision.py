@@ -64,7 +64,6 @@ def plot_work_precision(points: Sequence[Point], path: str | os.PathLike[str]) -
 
     Args:
         points: measured methods; those of a family in the order of their settings.
-        path: .png, .pdf or .svg.
     """
     figure = new_figure(width_in=8.0, height_in=5.4)
     axes = figure.subplots()

@@ -28,11 +28,7 @@ class ModeCount:
     """The blocks of one mode.
 
     Args:
-        mode: name of the mode.
-        count: number of blocks.
-        share: their share of all blocks.
         share_error: standard error of the share from the finite number of realisations.
-        states: number of blocks by state.
         yield_quantiles_g: yield acceleration of the stable ones at :data:`QUANTILES` [g];
             empty if there are none.
     """
@@ -103,8 +99,6 @@ def cumulative_counts(
     These are counts of blocks, not shares of their mode: the curves of two modes may be compared.
 
     Args:
-        realisations: the realisations.
-        mode: name of the mode.
         pga_g: accelerations [g], shape (m,).
     """
     return np.searchsorted(sorted_yields(realisations, mode), pga_g, side="right").astype(np.int64)

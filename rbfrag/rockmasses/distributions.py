@@ -45,7 +45,6 @@ class Distribution:
     """The law of one variable of a rock mass; make one with :meth:`of`.
 
     Args:
-        law: name of the law.
         location: value of a constant, mean, median, or centre of the circular law.
         scale: standard deviation, that of the logarithm, or the concentration kappa.
         low: lower end; -inf for none.
@@ -146,7 +145,6 @@ class Distribution:
         """Return n independent values.
 
         Args:
-            n: how many.
             random: generator of the uniform numbers; n are taken, whatever the law.
         """
         uniform = np.maximum(random.random(n), _SMALLEST_UNIFORM)

@@ -38,13 +38,7 @@ QUANTILES = (0.5, 0.95)
 
 @dataclass(frozen=True)
 class Share:
-    """A counted share with the interval that the finite number of blocks leaves.
-
-    Args:
-        value: the share.
-        low: lower end of its interval.
-        high: upper end.
-    """
+    """A counted share with the interval that the finite number of blocks leaves."""
 
     value: float
     low: float
@@ -66,7 +60,6 @@ class ModeFailures:
 
     Args:
         mode: the mode; None for all.
-        count: number of blocks.
         outcomes: number of blocks by outcome, in the order of
             :data:`~rbfrag.rockmasses.shaking.OUTCOMES`; they add up to `count`.
         moved: number of blocks that were set in motion.
@@ -106,7 +99,6 @@ class ScaleFailures:
         scale: factor on the motion.
         pga_g: its PGA [g].
         modes: by mode, for the modes that have blocks.
-        total: all blocks.
     """
 
     scale: float

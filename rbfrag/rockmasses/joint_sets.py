@@ -34,7 +34,6 @@ class Variable(NamedTuple):
     Args:
         stream: number of its own stream of random numbers; never to be given to another.
         low: lower end of its permitted range.
-        high: upper end of it.
         from_low: whether the lower end itself is permitted.
         default: value when the description leaves it out; NaN if it must be there.
     """
@@ -242,8 +241,6 @@ class Realisations:
     """Blocks drawn from a rock mass; all arrays have shape (n,).
 
     Args:
-        rock_mass: where they come from.
-        seed: seed of the random numbers.
         beta_deg: dip of the base [deg].
         gamma_deg: dip of the back less dip of the base [deg].
         s1_m: thickness normal to the base [m].
@@ -252,8 +249,7 @@ class Realisations:
         phi_back_deg: friction angle of the back [deg].
         kv: vertical acceleration of the ground [g].
         cohesion_pa: cohesion of the base [Pa]; 0 where the description states none.
-        blocks: the blocks.
-        stability: their modes, states and yield accelerations.
+        stability: the modes of the blocks, states and yield accelerations.
         reason_code: why a realisation is no block, a place in :data:`IMPOSSIBLE`.
     """
 

@@ -116,7 +116,6 @@ def block_columns(
     ``yield_g`` is the yield of the governing mode.
 
     Args:
-        realisations: the realisations.
         answer: the answers to a scenario of theirs, which add the measures of the motion and
             ``probability, ci_low, ci_high, event_low, event_high, in_domain``.
     """

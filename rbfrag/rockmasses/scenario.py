@@ -40,7 +40,6 @@ class Average:
     """A probability of failure averaged over blocks.
 
     Args:
-        count: number of blocks.
         probability: mean of their probabilities; None without blocks.
         standard_error: its standard error from the finite number of realisations; None
             without at least two blocks.
@@ -61,9 +60,6 @@ class ScenarioMode:
     """The answer for the blocks of one mode.
 
     Args:
-        mode: name of the mode.
-        count: number of blocks.
-        share: their share of all blocks.
         has_model: whether a fragility model answers for the mode.
         unstable: number of blocks that fail at rest, P = 1 whatever the mode.
         covered: average over the blocks for which there is an answer.
@@ -84,11 +80,9 @@ class Scenario:
     """What one motion does to the blocks of a rock mass.
 
     Args:
-        measures: the measures of the motion by name.
         model: name of the model that answered; None if no block needed one.
         term: its intensity term.
         method: how it was fitted.
-        level: confidence level of the intervals.
         modes: answers by mode, for the modes that have blocks.
         covered: average over all blocks for which there is an answer, and over no others.
         covered_share: the share of these among all blocks.
@@ -144,11 +138,9 @@ def scenario(
     every average; the answer says how many they are.
 
     Args:
-        realisations: blocks of a rock mass.
         measures: what is known of the motion, by name: pgv_m_s [m/s], pga_g [g], tm_s [s], pgd_m
             [m], sa03_g, sa10_g, sa20_g, sa30_g [g].
         model: as in :func:`rbfrag.question.question.predict`.
-        level: confidence level of the intervals.
         db: database of the models.
         displacement_m: how far is too far for a block that slides [m]; None for an answer of
             toppling alone.

@@ -99,7 +99,6 @@ class Shaking:
     """One recorded motion at several scales.
 
     Args:
-        motion: horizontal ground motion.
         scales: factors on it, and on the vertical one, rising.
         vertical: vertical motion of the same recording, upward positive.
         polarity: ``forward`` (positive samples drive out of the slope) or ``reverse``.
@@ -122,14 +121,10 @@ class BlocksToRun:
 
     Args:
         place: places of the blocks among the realisations.
-        mode_code: their modes.
         numbers: ``yield_g`` [g], ``s1_m`` and ``s2_m`` [m], ``gamma_deg``, ``beta_deg``,
             ``phi_deg``, ``phi_back_deg`` and ``cohesion_pa`` [Pa], as :class:`Realisations`
             has them.
         back_fracture: whether there is a plane behind them.
-        moves: at which scale which of them moves.
-        shaking: the motion.
-        limits: what counts as failure.
     """
 
     place: NDArray[np.intp]
@@ -152,7 +147,6 @@ class BlockOutcomes:
         rotation_rad: greatest rotation; NaN likewise.
         about: sentences on what a model takes for granted, and how many of the blocks each is
             about, by mode code and sentence.
-        runs: number of simulations.
     """
 
     place: NDArray[np.intp]
@@ -231,9 +225,7 @@ class ShakingPlan:
     """What is known of the blocks without running any, and which ones have to be run.
 
     Args:
-        realisations: the realisations.
         shaking: the motion and its scales.
-        limits: what counts as failure.
         code: places in :data:`OUTCOMES`, -1 for no block, shape (scales, n); ``at_rest`` where a
             block is still to be run.
         moves: which block moves, and is to be run, at which scale, shape (scales, n).
@@ -310,7 +302,6 @@ class ShakenMass(ShakingPlan):
         displacement_m: greatest displacement along the base, of the block or, where it turns, of
             its contact on the base; NaN where there is none to tell.
         rotation_rad: greatest rotation; NaN for sliding, and where there is none to tell.
-        runs: number of simulations.
         about: how many blocks of a mode a sentence is about.
     """
 
@@ -335,11 +326,8 @@ def plan_shaking(
     samples, because k_h/(1 + k_v) is monotone between them.
 
     Args:
-        realisations: blocks of a rock mass.
-        motion: horizontal ground motion.
         scales: factors on the motion; each is taken once, in rising order.
         vertical: vertical motion of the same recording, upward positive; scaled likewise.
-        polarity: ``forward`` or ``reverse``.
         limits: what counts as failure; None for the usual.
 
     Raises:

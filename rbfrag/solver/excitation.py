@@ -145,7 +145,6 @@ class Excitation:
 
         Args:
             duration_s: length of the rest [s].
-            intervals: number of intervals of it.
         """
         end = self.time_s[-1]
         tail_s = end + duration_s * np.arange(1, intervals + 1) / intervals

@@ -58,7 +58,6 @@ class Release:
 
     Args:
         time_s: when [s].
-        pose: where it is.
         velocity_m_s: velocity of the centroid in the base frame [m/s].
         spin_rad_s: rate of its rotation, counter-clockwise [rad/s].
     """
@@ -98,7 +97,6 @@ class FreeMotion:
         error_rad: difference of the rotation from a run of twice the step [rad].
         error_m: the same of the displacement [m].
         steps: steps of both runs.
-        block: the block.
         contact: the contact whose displacement is told, from the centroid [m].
         rows: what the kernel kept of the motion.
     """
@@ -141,8 +139,6 @@ def free_motion(
     """Return what a block does from where its mechanism has left it.
 
     Args:
-        site: the block on its planes.
-        excited: the excitation.
         release: where and how fast it is.
         at_toe: whether displacements along the base are those of the toe, else of the heel.
         stop_at_landing: whether an impact of the whole base ends the run.
@@ -357,8 +353,6 @@ def released(time_s: float, pose: Callable[[float], Pose], position: float, rate
     Args:
         time_s: when [s].
         pose: where the block is at a position of the mechanism.
-        position: the position.
-        rate: its rate.
     """
     here = pose(position)
     if rate == 0.0:

@@ -77,9 +77,7 @@ class Shaking:
     """What a model is asked: which motion, and what to keep.
 
     Args:
-        motion: horizontal ground motion.
         vertical: vertical motion of the same recording, upward positive.
-        polarity: ``forward`` or ``reverse``.
         history: keep the motion in time.
         remarks: what is known about the block that the answer should say.
         start: the state that the motion finds; None for a block at rest in its first place.
@@ -108,7 +106,6 @@ class RunEnd:
     """The end of one run, without its history.
 
     Args:
-        outcome: how it ended.
         moved: whether the block moved at all.
         peak_rad: peak rotation [rad]; None for a block that slides, or that has failed.
         peak_displacement_m: greatest displacement of the contact on the base along it [m]; None
@@ -134,7 +131,6 @@ class Case:
     """One combination of a campaign, whatever the motion.
 
     Args:
-        kind: name of the model.
         p2: frequency parameter of the block [1/s²]; None where it has none.
         block: what else describes the block, as it is stored; None where p² is all.
         settings: what else decides the answer, as it goes into the natural key.
@@ -334,7 +330,6 @@ def each_once(values: Sequence[float | None], option: str, for_none: str = "None
     """Refuse an empty list, and one that names a value twice.
 
     Args:
-        values: the values.
         option: their name, for the message.
         for_none: what None is called there.
     """

@@ -23,7 +23,6 @@ class KindFacts:
     """What is known of a kind of failure before anything is computed.
 
     Args:
-        kind: its name.
         mode: failure mode of its blocks; None where no geometry chooses it.
         parameters: what describes its block in predictions, and in `rbfrag.respond` without a
             shape; () where no fragility is fitted.
@@ -118,7 +117,6 @@ def stands_free_of(facts: KindFacts, back_fracture: bool) -> bool:
     """Return whether a block is asked of a kind of backed blocks though nothing backs it.
 
     Args:
-        facts: the kind that is asked.
         back_fracture: whether there is a plane behind the block.
     """
     if back_fracture or facts.free_standing or facts.mode is None:

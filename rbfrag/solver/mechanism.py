@@ -98,7 +98,6 @@ class WholeRun:
 
     Args:
         mechanism: the block as its model describes it.
-        site: the block on its planes.
         start: the state that it started from; None for its first place.
         run: what its mechanism did; None for a start that no mechanism describes.
         free: what the block did after it; None where the mechanism goes to the end.
@@ -222,8 +221,6 @@ def whole_run(
 
     Args:
         mechanism: the block as its model describes it.
-        site: the block on its planes.
-        excited: the excitation.
         history: keep the motion in time.
         start: the state that the motion finds; None for the first place.
     """
@@ -413,7 +410,6 @@ class ShakenMechanism:
     """A stable block of a mechanism that rotates.
 
     Args:
-        kind: name of the model.
         mechanism: its motion.
         yield_name: symbol of the yield acceleration.
         yield_g: acceleration that starts it where 1 + k_v = 1 [g].
@@ -421,7 +417,6 @@ class ShakenMechanism:
         leaves_g: k_h at which a contact opens as the motion starts [g]; infinite where none does.
         most_rad: rotation at which the model ends whatever the motion [rad].
         remarks: what is known about the block that an answer should say.
-        site: the block on its planes.
     """
 
     kind: str

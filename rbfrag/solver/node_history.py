@@ -17,7 +17,6 @@ def with_free_motion(excited: Excitation, p: float) -> Excitation:
     """Return the shaking and the stretch of rest after it in which free motion is shown.
 
     Args:
-        excited: the excitation.
         p: frequency parameter of the block [1/s].
     """
     return excited.with_rest_after(TAIL_PERIODS / p, TAIL_INTERVALS)

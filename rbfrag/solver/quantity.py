@@ -11,7 +11,6 @@ def number(value: object, name: str, what: str) -> float:
     """Return a finite number as a float.
 
     Args:
-        value: what was given.
         name: its name, for the message.
         what: what it should be, for the message.
     """

@@ -185,10 +185,6 @@ def wilson(failed: int, count: int) -> tuple[float, float]:
 
     Wilson (1927), Journal of the American Statistical Association 22, 209-212: also where none or
     all have failed it is not a point.
-
-    Args:
-        failed: how many of them.
-        count: how many in all.
     """
     from scipy.special import ndtri
 

@@ -115,8 +115,6 @@ def rocking_history(excited: Excitation, block: FreeBlock, impacts: int) -> Rock
     """Run over the record and a stretch of rest after it, keeping every node and event.
 
     Args:
-        excited: the excitation.
-        block: the block.
         impacts: number of impacts within the record, which decides the size of the arrays.
     """
     longer = with_free_motion(excited, block.slowest_p)
@@ -153,7 +151,6 @@ def corner_force(
     across it (physics of toppling, section 5); backward rotation is the mirror image.
 
     Args:
-        block: the block.
         history: its motion.
         tan_phi: coefficient of friction of the base; infinite where it does not slip.
         until_s: time up to which it is of interest [s].

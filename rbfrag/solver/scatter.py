@@ -16,7 +16,6 @@ def lognormal(z: FloatArray, median: Any, sigma: Any) -> FloatArray:
 
     Args:
         z: the points.
-        median: the median.
         sigma: standard deviation of the logarithm.
     """
     return np.asarray(median * np.exp(sigma * z))

@@ -79,7 +79,6 @@ def respond_in_sequence(
 
     Args:
         run: answers one motion.
-        motions: the motions.
         carries_state: whether the next motion finds the block where the last one left it.
         start: the state that the first of them finds.
     """

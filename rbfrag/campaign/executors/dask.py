@@ -75,7 +75,6 @@ def run_on_cluster(
     Args:
         client: from :func:`connected`.
         run_work: does one chunk of work; a function of a module, which workers can find.
-        work: what to do.
         after_a_death: what to do next when workers have died.
 
     Raises:

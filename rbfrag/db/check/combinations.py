@@ -137,7 +137,6 @@ def displacement_problems(row: RowMapping, points: Sequence[Point]) -> Iterator[
     """Yield what cannot be of blocks that slide: displacements fall with strength.
 
     Args:
-        row: the combination.
         points: its rows of `simulation`, by rising k_y/PGA.
     """
     slid = [(p.kr_over_pga, p.displacement_m) for p in points if p.displacement_m is not None]

@@ -31,7 +31,6 @@ def interval_problems(
     lift a block. A gap says that nothing is known in it.
 
     Args:
-        row: the combination.
         intervals: its rows of `outcome_interval`, by rising k_lo.
         toppled: kr/PGA of its simulations that toppled.
         stable: kr/PGA of those that did not.

@@ -65,9 +65,7 @@ class Merge:
     """The two databases, and where the rows of the other are now.
 
     Args:
-        source: the other database.
         target: the database that is merged into, inside the caller's transaction.
-        ledger: what was done.
         motions: the row id here of each motion there.
         campaigns: the row id here of each campaign there.
         other_bits: of motions made from the same samples of a file by the same filter, whose

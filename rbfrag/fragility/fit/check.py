@@ -28,7 +28,6 @@ class ModelCheck:
     """What became of one model's data.
 
     Args:
-        name: the model.
         state: ``unchanged``; ``changed`` (fit it again); ``no data`` (the database holds models
             without the data they came from, as a reference does); ``unreadable``.
         remark: what changed or why it cannot be told; empty if unchanged.
@@ -92,9 +91,7 @@ class HeldOut:
     """Calibration of one model on earthquakes left out.
 
     Args:
-        name: the model.
         bins: predicted and observed.
-        scores: its scores.
         outcomes: what the outcomes are, in words.
     """
 
@@ -108,9 +105,7 @@ def held_out_of(connection: Connection, name: str | None, *, seed: int = 0) -> H
     """Fit a stored model again, once without each earthquake.
 
     Args:
-        connection: the database.
         name: the model; None for the default.
-        seed: of the draws.
     """
     row = load_model(connection, name)
     method = method_named(row.method)

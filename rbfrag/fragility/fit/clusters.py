@@ -68,8 +68,6 @@ def bootstrap(
     Args:
         event: number of each row's earthquake, shape (n,).
         fit: returns the parameters from how many times each row counts, shape (n,).
-        replicates: how many resamples.
-        seed: seed of the random numbers.
         enough: whether a draw can be fitted; another is drawn if not.
     """
     random = np.random.default_rng(seed)

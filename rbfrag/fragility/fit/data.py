@@ -142,13 +142,11 @@ def read_source(
     """Read critical values, spectra and outcomes of one kind from the database.
 
     Args:
-        connection: the database.
         block: what describes the kind's block.
         kind: response kind; None for the one that `block` stands for.
         rotation_deg: the rotation that counts as failure [deg], of kinds that have one; None for
             failure past recovery.
         suite: only motions of this suite.
-        vertical: ``without`` vertical motion, ``with`` it, or ``both``.
         doubtful_pgd: read the PGD of records with a doubtful baseline too.
     """
     from rbfrag.db.queries import combination_table, outcome_grid, recordings_of_motions
@@ -338,7 +336,6 @@ def fit_data(source: FitSource, method: Method, term: Term, *, kind: str | None 
     Args:
         source: critical values, spectra and outcomes as the database returns them.
         method: the method of fitting.
-        term: the intensity term.
         kind: response kind; None for the one that the method's block stands for.
 
     Raises:

@@ -44,11 +44,9 @@ class DependenceEstimate:
     """An estimated copula.
 
     Args:
-        dependence: the parameters.
         errors: standard error of each by its name, from resamples of earthquakes.
         earthquakes: number of earthquakes with pairs.
         pairs: number of pairs read of other sites, other components of a site, same component.
-        replicates: number of resamples.
         seed: seed of resamples and of the pairs drawn.
     """
 
@@ -125,7 +123,6 @@ def dependence_of_fit(
     that differ in more than size and strength those are read that have the most of it.
 
     Args:
-        data: the rows of the fit.
         block: what describes its blocks.
         held_out: probabilities of the blocks of the grid without their earthquake, shape (n, m).
         seed: of pairs drawn and of resamples.
@@ -313,7 +310,6 @@ def _least(
     """Return where a function of shares and logarithms of lengths is least, from several starts.
 
     Args:
-        loss: the function.
         starts: where the search begins.
         shares: how many of its arguments are shares.
         most: greatest share.

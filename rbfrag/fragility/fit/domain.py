@@ -30,7 +30,6 @@ def joint_scatter(
     """Return how the fitted points scatter in the logarithms of what a model reads.
 
     Args:
-        names: the values that the model reads.
         values: by name, of a shape that broadcasts to that of `fitted`.
         fitted: which points are fitted, shape (n, m).
 

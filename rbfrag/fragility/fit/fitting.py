@@ -34,8 +34,6 @@ class Fitted:
     """A fit with what only a study of fits needs.
 
     Args:
-        report: the report.
-        data: the rows.
         result: what the method handed back, with its held-out probabilities.
     """
 

@@ -85,7 +85,6 @@ class Binomial:
     """Rows of a fit of outcomes, P = F(features · b).
 
     Args:
-        link: F, one of `LINKS`.
         columns: features, shape (n, k).
         outcome: 1 failed, 0 not, shape (n,).
         weights: weight of each row, shape (n,).
@@ -242,7 +241,6 @@ def maximise(
     .21 s by scipy's trust-exact with the same derivatives, .28 s by its BFGS.
 
     Args:
-        rows: the likelihood.
         start: parameters to start from, shape (k,).
         times: how many times each row counts, shape (n,); None for once.
         tolerance: relative change of the log likelihood that ends the iteration.

@@ -80,8 +80,7 @@ class BinVariances(NamedTuple):
     """Variances of residuals in the bins that hold points, shape (m,).
 
     Args:
-        counts: points in each.
-        centre: their mean intensity [m/s].
+        centre: mean intensity of the points of each [m/s].
         variance: mean square of their residuals, with the two parameters of the line taken off the
             degrees of freedom [m²/s²].
     """
@@ -97,7 +96,6 @@ def bin_variances(
     """Return the variances of the residuals in bins.
 
     Args:
-        bins: the bins.
         squared_residuals: r² [m²/s²] of each point, in the order of ``bins.x``.
         multiplicity: how many times each point counts.
     """
@@ -129,7 +127,6 @@ def fit_variance(
     variance of normal residuals, so that bins of weak motions count as much as strong ones.
 
     Args:
-        bins: the bins.
         squared_residuals: r² [m²/s²] of each point, in the order of ``bins.x``.
         multiplicity: how many times each point counts (a resampled earthquake counts
             several times or not at all).
@@ -226,7 +223,6 @@ class ClusteredLine(NamedTuple):
         covariance: clustered by earthquake, with the usual correction G/(G-1)·(n-1)/(n-2) for G
             earthquakes, shape (2, 2).
         naive_errors: standard errors that take all points for independent, shape (2,).
-        r_squared: weighted R².
     """
 
     line: FloatArray
@@ -265,8 +261,6 @@ def fit_wls(data: FitData, method: Method, term: Term, *, seed: int) -> MethodRe
     fits that each leave an earthquake out; a bootstrap by earthquake is reported beside it.
 
     Args:
-        data: the rows.
-        method: the method.
         term: the intensity term, which sets the degree of v(x).
         seed: seed of the bootstrap.
 
@@ -373,8 +367,6 @@ def event_bootstrap(
         events: number of each point's earthquake.
         degree: degree of the variance polynomial.
         start: parameters of the fit to all data.
-        replicates: how many resamples.
-        seed: seed of the random numbers.
 
     Returns:
         The parameters, and how many replicates did not become stable.

@@ -137,14 +137,7 @@ def parameter_names(method: Method, term: Term, *, estimate_m: bool = False) -> 
 
 
 def outcome_rows(data: FitData, method: Method, term: Term, names: tuple[str, ...]) -> OutcomeRows:
-    """Return the known outcomes with their features.
-
-    Args:
-        data: the rows of the fit.
-        method: the method.
-        term: the intensity term.
-        names: names of the parameters that are fitted.
-    """
+    """Return the known outcomes with their features."""
     form, shape = method.forms[term.name], data.failed.shape
     positive = data.read & (data.grid("intensity_m_s") > 0.0) & (data.grid("pga_g") > 0.0)
     known = positive & np.isfinite(data.failed)

@@ -66,7 +66,6 @@ class PairTable:
         sign: product of the polarities in each cell, shape (c,).
         event: number of each earthquake that has pairs, shape (g,).
         value: log likelihood at R = sin of `ANGLES`, shape (g, c, angles).
-        pairs: number of pairs read.
     """
 
     distance_l: FloatArray

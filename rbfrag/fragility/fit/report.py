@@ -111,10 +111,7 @@ class PowerLaw:
     """k_r/PGA = C (ω_m/p)^(-M), fitted by least squares of the logarithms.
 
     Args:
-        exponent_m: M.
-        exponent_m_se: its standard error, clustered by earthquake.
-        constant_c: C.
-        n: number of critical values.
+        exponent_m_se: standard error of M, clustered by earthquake.
     """
 
     exponent_m: float

@@ -27,7 +27,6 @@ class MethodResult:
         standard_errors: standard error of each parameter by name.
         scores: how well the model predicts, by name.
         details: everything else the report states, JSON-able.
-        warnings: sentences for people.
         held_out: probability of each block of the grid by a fit without its earthquake,
             shape (n, m).
     """
@@ -46,7 +45,6 @@ class Estimates:
     """Parameters with what is known of their errors.
 
     Args:
-        names: of the parameters.
         values: shape (k,).
         steps: change of the parameters without each earthquake, shape (G, k).
         samples: of a bootstrap by earthquake, shape (replicates, k).
@@ -90,14 +88,11 @@ def method_result(
     """Return the result of a method whose errors are clustered by leaving out earthquakes.
 
     Args:
-        data: the rows of the fit.
-        estimates: its parameters.
         in_sample: probabilities of the blocks of the grid, shape (n, m).
         held_out: the same by fits without the earthquake concerned.
         ln_residual: ln y less its median where known, shape (n,), to be split by earthquakes.
         scores: further scores.
         details: what else the report states.
-        warnings: sentences for people.
     """
     judged, spread = data.judged, estimates.samples.std(axis=0, ddof=1)
     return MethodResult(

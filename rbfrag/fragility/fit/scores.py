@@ -129,7 +129,6 @@ def scores_of(judged: Judged, in_sample: FloatArray, held_out: FloatArray) -> di
     """Return the scores of a report.
 
     Args:
-        judged: the outcomes.
         in_sample: probabilities by the fit to all data, shape (n, m).
         held_out: probabilities by fits without the earthquake concerned.
     """
@@ -184,9 +183,6 @@ class CalibrationBins:
         predicted: mean predicted probability of each bin, shape (m,).
         observed: share that failed, shape (m,).
         low: lower end of its 95 % interval, whole earthquakes drawn with replacement.
-        high: upper end of it.
-        blocks: number of blocks in the bin.
-        events: number of earthquakes they are from.
     """
 
     predicted: FloatArray
@@ -201,9 +197,7 @@ def calibration_bins(judged: Judged, held_out: FloatArray, *, seed: int = 0) -> 
     """Sort the blocks of known outcome by the probability that held-out fits gave them.
 
     Args:
-        judged: outcomes of the blocks.
         held_out: probabilities by fits without the earthquake concerned, shape (n, m).
-        seed: of the draws.
 
     Bins with fewer than 20 blocks are left out.
     """

@@ -26,9 +26,6 @@ class Numbers(NamedTuple):
     """The functions that formulas need, for numbers or for arrays.
 
     Args:
-        log: natural logarithm.
-        exp: exponential.
-        sqrt: square root.
         ndtr: standard normal distribution function.
         expm1: exponential less one.
         maximum: the larger of two.
@@ -196,7 +193,6 @@ class BlockParameters:
     """What describes a block in predictions.
 
     Args:
-        names: the names of its parameters.
         kind: the kind of failure that they stand for where none is named.
         strength: name of the yield acceleration coefficient among them.
         size: name of the squared frequency parameter [1/s²] among them, if there is one.
@@ -298,10 +294,6 @@ class SizeFactor(NamedTuple):
 
     A and B are chosen, not estimated: such that the calibration slope of each block size is level
     on earthquakes left out (docs/theory/fragility.md).
-
-    Args:
-        a: A.
-        b: B.
     """
 
     a: float
@@ -365,7 +357,6 @@ class Form:
         Args:
             parameters: of the formula, in its order.
             values: completed values by name.
-            ns: functions for the kind of number given.
         """
         formula = self.formula(parameters, values, ns)
         return formula, 1.0 if self.size_factor is None else self.size_factor.of(values["p"], ns)

@@ -117,7 +117,6 @@ class RecordFile:
     """A file that is being read. Every refusal is a MotionFileError that names the line.
 
     Args:
-        path: for labels and messages.
         text: the file's text.
         units: unit of acceleration that the caller states, or None.
         dt_s: sampling interval that the caller states [s], or None.

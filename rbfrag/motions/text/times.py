@@ -103,7 +103,6 @@ def sampling_interval(
     0.0078125, and not the rounded difference of two of them.
 
     Args:
-        path: for messages.
         tokens: the times as printed, shape (n,).
         times_s: the same as numbers [s].
         line_numbers: their 1-based lines.

@@ -31,7 +31,6 @@ class Elementwise(Generic[N]):
     """The functions that the formulas need, for one kind of number.
 
     Args:
-        sqrt: square root.
         where: ``where(condition, a, b)`` is a where the condition holds, else b.
     """
 

@@ -33,7 +33,6 @@ class PolygonContacts:
         toe: from the centroid to the toe [m].
         lowest_on_back: from the centroid to the lowest vertex on the back plane [m].
         gamma_deg: angle of the back plane [deg].
-        cot_gamma: cot γ.
         properties: area, centroid and inertia.
     """
 

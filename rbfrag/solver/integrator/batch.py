@@ -70,7 +70,6 @@ def simulate_many(excitation: Excitation, *, p2: ArrayLike, kr: ArrayLike) -> Ru
     """Run many blocks under one excitation.
 
     Args:
-        excitation: the excitation.
         p2: frequency parameters p² [1/s²], > 0.
         kr: rocking acceleration coefficients k_r > 0; broadcast with `p2`.
 

@@ -58,7 +58,6 @@ class Excursion(NamedTuple):
 
     Args:
         event: IMPACT, TOPPLED, IN_AIR (at the end of the record), STOPPED or ORDER_LOST.
-        place: where.
         state: state of the block there.
         steps: integration steps taken.
     """
@@ -167,10 +166,8 @@ def integrate_excursion(
     """Integrate an excursion until the block impacts, topples or the stop comes.
 
     Args:
-        excitation: the excitation of a block.
         kr: rocking acceleration coefficient.
         start: where it begins.
-        state: state of the block there.
         lifting: theta >= 0, theta' >= 0 and q >= kr at the start: until q next falls below
             kr the rotation rate cannot become negative, so that no impact is looked for.
         stop: where it ends; the last node for none.

@@ -89,7 +89,6 @@ def simulate_free(
     """Run many free-standing blocks under one excitation.
 
     Args:
-        excited: the excitation.
         corners: numbers of both corners of each block, toe before heel, shape (n, 2, 6).
         slowest: speed after an impact below which each block rests [rad/s], shape (n,).
         most_impacts: impacts beyond which a run is given up.

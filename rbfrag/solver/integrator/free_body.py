@@ -65,7 +65,6 @@ class Frame(NamedTuple):
     Args:
         inertia_m2: moment of inertia about the centroid per mass [m²].
         sine: of the dip of the base.
-        cosine: of it.
         backward_rad: rotation at which the back edge lies on the base [rad].
         forward_rad: clockwise rotation at which the front face does [rad].
     """
@@ -92,7 +91,6 @@ class FreeRun(NamedTuple):
     """The end of a run.
 
     Args:
-        stop: how it ended.
         time_s: when it came to rest, or ended [s].
         motion: place and velocity then.
         steps: integration steps.
@@ -264,7 +262,6 @@ def run_free(
         corners: pairs of corner and plane.
         frame: the block on its slope.
         start_s: where in the record the run begins [s].
-        at: motion there.
         h: greatest step [s].
         stop_at_landing: whether an impact of the whole base ends the run.
         work: what the steps write to.

@@ -22,8 +22,6 @@ class Corner(NamedTuple):
     Args:
         kr: tangent of its critical angle: k_h that lifts the other corner where 1 + k_v = 1.
         theta_c: critical angle [rad].
-        sin: its sine.
-        cos: its cosine.
         p: frequency parameter [1/s].
         passed_on: part of the speed that an impact leaves, where the pivot changes from this
             corner to the other.
@@ -65,7 +63,6 @@ def free_peak(corner: Corner, border: float, rate: float, error: float) -> Peak:
     """Return the rotation at which motion without the energy to overturn turns back.
 
     Args:
-        corner: the corner.
         border: rate that would just bring the block upright from here; above `rate`.
         rate: theta'/p, above 0.
         error: of the rate.

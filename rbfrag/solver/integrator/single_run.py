@@ -175,7 +175,6 @@ def step_errors(
     Args:
         order: degree N of U.
         ph: p times the step length.
-        state: at the start.
         shaking: over the step.
         turned: theta(1) - theta(0).
         highest: U[N - 2], U[N - 1] and U[N].
@@ -248,8 +247,6 @@ def cross_interval(
 
     Args:
         nodes: the excitation.
-        block: the block.
-        i: the interval.
         tau: fraction of it to begin at.
         state: state of the block there.
         known: what is known of the trajectory.
@@ -355,7 +352,6 @@ def after_impact(
 
     Args:
         nodes: the excitation.
-        block: the block.
         i: the interval.
         tau: fraction of it.
         stuck: whether the block has not moved since it was there last.
@@ -382,7 +378,6 @@ def errors_after_impact(
         known: what is known of the trajectory before it.
         rate: theta'/p of the impact.
         threshold: k_h - (1 + k_v) k_r there.
-        block: the block.
 
     Returns:
         What is known after it, and whether the error hides what comes then.

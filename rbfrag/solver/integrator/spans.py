@@ -101,7 +101,6 @@ def fill_spans(
         interval_s: interval lengths [s], shape (n - 1,).
         k_h: driving acceleration at the nodes [g], shape (n,).
         w: 1 + k_v at the nodes, shape (n,).
-        length: intervals of a span.
         rows: to be filled, shape (number of whole spans, COLUMNS).
     """
     for number in range(rows.shape[0]):

@@ -42,7 +42,6 @@ def even_parts(ph: float, fraction: float, ph_max: float) -> tuple[int, float, f
 
     Args:
         ph: p times its length.
-        fraction: of the interval.
         ph_max: greatest p·h of one step.
 
     Returns:

@@ -156,7 +156,6 @@ def cross_interval(
     Args:
         record: the excitation.
         corner: the corner that the block turns about.
-        rules: how to integrate.
         side: 1 for the toe, -1 for the heel.
         place: where to begin.
         start: state, its error, and the greatest rotation about this corner so far.
@@ -275,10 +274,7 @@ def through_impact(
 
     Args:
         record: the excitation.
-        place: where in it.
         side: the present corner, 1 or -1.
-        corner: that one.
-        other: the other one.
         rules: how to integrate.
         crossing: how the block came to the impact.
     """

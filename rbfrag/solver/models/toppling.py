@@ -155,7 +155,6 @@ def run_blocks_at(shaking: Shaking, p2: float, kr_over_pga: FloatArray) -> Searc
     Args:
         shaking: the motion; its PGA must be positive.
         p2: frequency parameter p² [1/s²].
-        kr_over_pga: block strengths over PGA.
     """
     from rbfrag.solver.integrator.batch import simulate_many
 

@@ -90,7 +90,6 @@ def border(
     """Close in on a border between two k_r of which one topples and the other does not.
 
     Args:
-        excitation: the excitation of a block.
         low: the smaller k_r.
         at_low: its distance from toppling, > 0 if it topples.
         high: the greater k_r, which does otherwise.

@@ -219,7 +219,6 @@ class SingleBlocks:
     """Single blocks of one p² under one excitation, each run once; k_r is k_r itself.
 
     Args:
-        excitation: the excitation.
         p2: frequency parameter p² [1/s²].
     """
 
@@ -258,7 +257,6 @@ def scan_down(blocks: SingleBlocks, top: float, bottom: float) -> tuple[float, f
     """Return a toppling k_r and a safe one just above it, from the first found below `top`.
 
     Args:
-        blocks: the blocks.
         top: k_r at and above which nothing topples.
         bottom: least k_r of interest.
     """

@@ -40,7 +40,6 @@ class SlidingBlocks:
     """Blocks on a level plane under one excitation.
 
     Args:
-        excited: the excitation.
         slide_m: displacement [m] of the block of a yield acceleration [g]; NaN where it is thrown.
     """
 
@@ -85,7 +84,6 @@ def critical_of(
         kind: name of the model, for the answer.
         blocks: the blocks, of which some displacements may be known.
         displacement_m: the distance on a level plane [m]; 0 for the strength that first moves.
-        polarity: ``forward`` or ``reverse``.
         search_limit: least k_y/PGA looked at.
         tolerance: width of the bracket, k_y/PGA.
         warnings: sentences about the motion.

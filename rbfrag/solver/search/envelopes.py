@@ -105,7 +105,6 @@ class Pair(NamedTuple):
         kind: LIFTED; TURNED_BACK where the lower one falls back at once; APART where there is no
             such pair; OVERTAKEN where the upper one ends before the lower one starts.
         latest: start of the lower trajectory, from rest.
-        upper: the upper trajectory.
     """
 
     kind: int
@@ -139,7 +138,6 @@ def decide(
     """Decide whether all blocks with k_r in [k1, k2] topple, or none, if that can be told.
 
     Args:
-        excitation: the excitation of a block.
         k1: smallest k_r.
         k2: greatest k_r.
         margin: the bounding trajectories are integrated with k1 (1 - margin) and k2 (1 + margin).

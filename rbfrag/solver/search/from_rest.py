@@ -57,9 +57,7 @@ def follow(
     """Follow a block at rest at a node; return its distance from toppling, > 0 if it topples.
 
     Args:
-        excitation: the excitation of a block.
         kr: rocking acceleration coefficient.
-        node: node of rest.
         table: excursions from rest of a k_r <= kr: where none is left that fails, the run ends.
         work: counts what it costs.
     """
@@ -100,7 +98,6 @@ def first_change(
     """Return the number of the first block from `first` on that does not do as the others.
 
     Args:
-        excitation: the excitation of a block.
         kr: rocking acceleration coefficients of blocks at rest when the record begins, shape (m,).
         first: number of the first block to look at.
         topples: what the others do.

@@ -103,7 +103,6 @@ class March(NamedTuple):
     """A march under way.
 
     Args:
-        settings: what it is to do.
         coarse: excursions from rest over the whole record, at one k_r.
         fine: those over the part of it that the coarse ones leave open, at a greater k_r.
         state: of dtype STATE.
@@ -128,7 +127,6 @@ def march(excitation: BlockExcitation, m: March, work: np.void) -> None:
     """Give verdicts from the top downwards until the goal or the bottom is reached.
 
     Args:
-        excitation: the excitation of a block.
         m: the march; its state and its intervals are filled.
         work: counts what it costs.
     """

@@ -112,7 +112,6 @@ def begin(
     """Begin anew at another k_r.
 
     Args:
-        table: the table.
         kr: the stretches are those of q > kr.
         margin: their excursions are integrated with kr (1 - margin).
         kr_other: the largest k_r that conclusions are drawn for.
@@ -213,9 +212,7 @@ def last_rest(
     """Rule D: the last instant of rest before the first failing stretch that is still to come.
 
     Args:
-        excitation: the excitation of a block.
-        table: the excursions from rest.
-        interval: that of the first impact: stretches that end before it are past.
+        interval: interval of the first impact: stretches that end before it are past.
         rest_from: node by which the present excursions are over; larger than any for never.
         rest: node at which all are known to be at rest; -1 for none.
     """

@@ -77,7 +77,6 @@ def common_start(
     It is there if min(q, k2) does not fall between the first start and the last.
 
     Args:
-        excitation: the excitation of a block.
         k2: greatest k_r.
         k_lower: k_r of the lower bounding trajectory, >= k2.
         earliest: start e of the weakest block.

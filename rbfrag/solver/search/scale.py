@@ -230,7 +230,6 @@ def critical_scales(
 
     Args:
         shaking: the motion; its vertical component is scaled with the horizontal one.
-        shaken: the block.
         rotations_deg: peak rotations that count as failure [deg]; None among them for failure
             past recovery.
         rules: how far and how finely the scales are looked at.

@@ -104,7 +104,6 @@ def upper_bound(
     """Find K_up between two k_r.
 
     Args:
-        excitation: the excitation of a block.
         bottom: least k_r of interest.
         top: greatest q of the record.
         margin: the excursions are integrated with k_r (1 - margin).

@@ -132,7 +132,6 @@ class Finding:
 
     Args:
         mode: failure mode.
-        state: state.
         k: yield acceleration of the mode.
         beta_deg: dip of the base [deg].
         phi_deg: friction angle of the base [deg].

@@ -49,7 +49,6 @@ def slump(heel_x: N, heel_y: N, back_x: N, back_y: N, cot: N, mu1: N, mu2: N) ->
         heel_y: the same, normal to the base.
         back_x: from the centroid to the back contact, along the base.
         back_y: the same, normal to the base.
-        cot: cot γ.
         mu1: tangent of the friction angle of the base.
         mu2: tangent of the friction angle of the back plane.
     """
@@ -72,7 +71,6 @@ def confined_topple(
         toe_y: the same, normal to the base.
         low_x: from the centroid to the lowest point on the back plane, along the base.
         low_y: the same, normal to the base.
-        cot: cot γ.
         mu1: tangent of the friction angle of the base.
         mu2: tangent of the friction angle of the back plane.
     """
@@ -96,7 +94,6 @@ def yield_coefficient(
         sine: sin δ* up to a positive factor.
         cosine: cos δ* up to the same factor.
         tan_beta: tangent of the dip of the base.
-        weight: 1 + k_v.
         functions: the functions for this kind of number.
         bond: what the bond adds to the numerator, in the same scale.
 
@@ -156,7 +153,6 @@ def mode_code(
 
     Args:
         tan_alpha1: tan α1.
-        tan_alpha3: tan α3.
         limit: tan φ of the base, or with a cohesive bond the tangent of the angle of the
             resultant at which the base slides.
         confined: whether the back plane hinders a rotation about the toe (γ > 90°).
@@ -180,8 +176,6 @@ def mode_code_without_back(
     heel (coded as a slump) if β < α1, and slides otherwise.
 
     Args:
-        tan_alpha1: tan α1.
-        tan_alpha3: tan α3.
         limit: as in :func:`mode_code`.
         tan_beta: tangent of the dip of the base.
         functions: the functions for this kind of number.

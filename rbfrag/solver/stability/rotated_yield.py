@@ -186,7 +186,6 @@ def slump_limit_deg(block: Block, *, back_follows: float = 0.0) -> float:
     """Return γ [deg], the rotation that lays the back edge of a slump on its base.
 
     Args:
-        block: the block.
         back_follows: share of the rotation by which the back plane turns, from 0 to 1, which does
             not change it.
     """

@@ -49,7 +49,6 @@ class Crossing(NamedTuple):
     Args:
         kind: `PASSED`, or the event.
         condition: which condition failed, if it is `BROKEN`.
-        tau: where in the interval.
         state: state of the block.
         peak: greatest x so far.
         filled: columns of the history that are filled.
@@ -101,10 +100,8 @@ def cross_interval(
     """Integrate to the end of an interval or to the first event in it.
 
     Args:
-        rules: those of the phase.
         table: coefficients of the equation of the present sense.
         series: work array for the series of a step.
-        line: the interval.
         tau: where in it the motion is.
         own: rate of the block's own time [1/s]; 0 where the equation is the same everywhere.
         state: state of the block.
@@ -171,7 +168,6 @@ def arrive(
     """Return the end of a step whose series is known: its first event, or its whole length.
 
     Args:
-        rules: those of the phase.
         table: coefficients of the equation of the present sense.
         u: Taylor coefficients of U.
         order: degree of U.

@@ -132,7 +132,6 @@ class Ending:
     """The end of a run.
 
     Args:
-        outcome: how it ended.
         sentence: what happened and what was not followed; empty where there is nothing to say.
         in_place: whether it is known where the block is; False where it ends in an impact
             that the model does not describe.
@@ -155,7 +154,6 @@ class Exit:
         reason: why.
         time_s: when [s].
         x: position.
-        rate: its rate.
         rest_max_q: greatest k_h/(1 + k_v) from here to the end of the record, rest included.
         rest_min_q: least of it.
     """

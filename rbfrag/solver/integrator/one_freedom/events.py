@@ -47,7 +47,6 @@ def find_event(
         u: Taylor coefficients of U.
         order: degree of U.
         leading: how many of the first of them are zero.
-        rules: those of the phase.
         state: state at the start.
         x_end: position at the end of the whole step.
     """
@@ -83,7 +82,6 @@ def first_standstill(series: FloatArray, degree: int) -> float:
 
     Args:
         series: coefficients of U, less the leading ones that are zero.
-        degree: their degree.
     """
     # divided by tau to the number of leading zeros: the start itself is not a standstill
     start = series[0]

@@ -145,7 +145,6 @@ def follow(
     """Run a mechanism from rest under one excitation until nothing moves any more.
 
     Args:
-        mechanism: the block.
         excitation: accelerations at nodes.
         history: keep the motion in time.
         turn_max: greatest step, in units of the block's own time; for convergence studies.

@@ -67,7 +67,6 @@ def leave_rest(
 
     Args:
         record: the excitation.
-        rules: those of the phase.
         state: the state of the block, its rate 0.
         place: where the rest begins.
         barred: sense in which the block has just come to a standstill, 0 for none. Its motion

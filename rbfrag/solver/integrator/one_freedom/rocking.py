@@ -17,7 +17,6 @@ def rocking_equation(block: Block, beta_rad: float, phi_rad: float | None = None
     With `phi_rad` its conditions are that the toe presses on the base and does not slip.
 
     Args:
-        block: the block.
         beta_rad: dip of the base [rad].
         phi_rad: friction angle of the base [rad]; None for a toe that is held fast, as the
             toppling model takes it to be.

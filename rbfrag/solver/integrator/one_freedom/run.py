@@ -67,7 +67,6 @@ def run_phase(
     Args:
         record: the excitation.
         rules: what governs the motion.
-        entry: where and how the phase is entered.
         work: work arrays of the kernels.
         history: shape (4, m), for time, x, x' and node (-1 between nodes); (4, 0) for none.
     """

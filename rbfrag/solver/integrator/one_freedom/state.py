@@ -151,7 +151,6 @@ class PhaseRun(NamedTuple):
         stop: why it ended.
         condition: which condition failed: 0 for the inertia, or the number of the contact from 1.
         time_s: when it ended [s].
-        end: where and how.
         peak: greatest position.
         started_s: first motion [s].
         stopped_s: last standstill [s].

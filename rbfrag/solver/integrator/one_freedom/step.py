@@ -249,7 +249,6 @@ def error_growth(
     """Return the errors after a step: the earlier ones carried on, and what the step adds.
 
     Args:
-        rules: those of the phase.
         table: coefficients of the equation of the present sense.
         u: Taylor coefficients of U.
         order: degree of U.
