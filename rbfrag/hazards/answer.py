@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from os import PathLike
-from typing import Any, NamedTuple
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import FragilityModel, Model
+from rbfrag.errors import InputError
 from rbfrag.fragility.unusable import (
     FROM_MEAN,
     FROM_SUMS,
@@ -30,14 +27,21 @@ from rbfrag.hazards.branches import (
     refuse_unlike,
     weighted_quantiles,
 )
-from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.hazards.joint_rate import MOST_JOINT, USUAL_COUNTS, JointRate
 from rbfrag.hazards.joint_thresholds import JointThresholds
-from rbfrag.hazards.model_blocks import BlockTable, ModelBlocks
+from rbfrag.hazards.model_blocks import (
+    BlockTable,
+    ModelBlocks,
+    ModelPart,
+    RateKeywords,
+    parts_by_model,
+)
 from rbfrag.hazards.shaking import NOTABLE, Shaking, warn_of_ends
-from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
 from rbfrag.question.blocks import taken_as_medians
+from rbfrag.question.keywords import LEVEL, BlockKeywords, ModelKeywords, parts_of
+from rbfrag.solver.kinds import mode_of_kind
 
 FloatArray = NDArray[np.float64]
 
@@ -109,6 +113,7 @@ class HazardAnswer(Tabular):
             `annual_rate` of shape (m,), and `annual_rate_any`; empty without weights.
         warnings: what to know about the answer.
         reason: why a block cannot be used, shape (m,); empty text elsewhere.
+        kinds: how each block fails, shape (m,); empty text where it cannot be used.
     """
 
     annual_rate: FloatArray
@@ -132,6 +137,12 @@ class HazardAnswer(Tabular):
     quantiles: Mapping[float, Mapping[str, Any]]
     warnings: tuple[str, ...]
     reason: NDArray[np.object_]
+    kinds: NDArray[np.object_]
+
+    @property
+    def modes(self) -> NDArray[np.object_]:
+        """Failure mode of each block, shape (m,)."""
+        return np.array([mode_of_kind(kind) for kind in self.kinds], dtype=object)
 
     @property
     def annual_rate_any(self) -> float | None:
@@ -151,23 +162,12 @@ class HazardAnswer(Tabular):
 
 def hazard(
     curve: CurveLike | Sequence[CurveLike],
-    p2: ArrayLike | None = None,
-    kr: ArrayLike | None = None,
-    *,
-    imt: str | None = None,
-    site: str | None = None,
+    *numbers: ArrayLike | None,
     weights: Weights | None = None,
     at_least: Sequence[int] | None = None,
-    convert: str | None = None,
-    convert_sigma: float | None = None,
-    component: str | None = None,
     years: float = 50.0,
-    kind: str | Sequence[str | None] | None = None,
-    model: Model | None = None,
-    level: float = 0.95,
-    db: str | PathLike[str] | None = None,
     one_class: bool = False,
-    **block: ArrayLike | None,
+    **question: Unpack[RateKeywords[ArrayLike | None]],
 ) -> HazardAnswer:
     """Return how often per year blocks fail under a seismic hazard curve.
 
@@ -186,64 +186,71 @@ def hazard(
     Several curves are branches of one logic tree with `weights`: rates and probabilities are the
     weighted means, `quantiles` their distribution. Without weights the first curve answers.
 
+    The keywords:
+
+    - the fields of blocks, with ``kind``, ``block`` and ``back_fracture``, as
+      :func:`rbfrag.predict` has them, each a number or of shape (m,); ``kind`` may be one for all
+      or one each.
+    - ``imt``: measure of the curve to take of a file that holds several, such as SA(1.0).
+    - ``site``: its site, by number or name, likewise.
+    - ``convert``: name of a published conversion from spectral acceleration to PGV, whose scatter
+      is integrated.
+    - ``convert_sigma``: standard deviation of ln PGV about the conversion; None for that of the
+      motions of the shipped reference.
+    - ``component``: what the curve's horizontal component means: single, geometric_mean, rotd50 or
+      larger; None for single, with a warning.
+    - ``model``, ``level``, ``db``: as in :func:`rbfrag.predict`.
+
     Args:
         curve: hazard curve of PGV, PGA or a spectral acceleration at 0.3, 1, 2 or 3 s, or of one
             that `convert` is for, or its file (OpenQuake CSV, USGS NSHM JSON, two columns); or
             several of one site and measure.
-        p2: frequency parameters p² [1/s²], scalar or shape (m,).
-        kr: toppling yield acceleration coefficients, scalar or shape (m,).
-        imt: measure of the curve to take of a file that holds several, such as SA(1.0).
-        site: its site, by number or name, likewise.
+        numbers: p2 [1/s²] and kr of the blocks, if they are not given by name.
         weights: weight of each curve as a branch of a logic tree, None for one that is no branch,
             or OpenQuake's file of realizations; they sum to 1.
         at_least: numbers of failures in one earthquake whose rates are wanted, from 1 to m; None
             for usual ones.
-        convert: name of a published conversion from spectral acceleration to PGV, whose scatter
-            is integrated.
-        convert_sigma: standard deviation of ln PGV about the conversion; None for that of the
-            motions of the shipped reference.
-        component: what the curve's horizontal component means: single, geometric_mean,
-            rotd50 or larger; None for single, with a warning.
         years: period for the probability [a].
-        kind: how the blocks fail, for all or one each; None for what they are given by.
-        model: as in :func:`rbfrag.predict`.
-        level: confidence level of the interval.
-        db: as in :func:`rbfrag.predict`.
         one_class: the blocks stand for one class, and the answer is the rate of a block drawn
             from it: one rate, by the mean of their fragilities.
-        block: instead of `p2` and `kr`, or beside them, fields of blocks as :func:`rbfrag.predict`
-            reads them, scalars or of shape (m,): ky and displacement_m, ks and ps2, restitution,
-            height_m and width_m with beta_deg and phi_deg, ….
+        question: the keywords above.
 
     Raises:
         InputError: no model reads the curve's measure, curves of several measures or sites, weights
             that do not add up to 1, or no block that can be used.
+        UnknownFieldError: a keyword that is none.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    curves = as_curves(curve, imt=imt, site=site, convert=convert)
+    given, meaning, answering = parts_of(
+        numbers, question, BlockKeywords, CurveKeywords, ModelKeywords
+    )
+    level = answering.get("level", LEVEL)
+    curves = as_curves(curve, **meaning)
     refuse_unlike(curves)
     weight = checked_weights(stated_weights(weights, curves), len(curves))
     checked_years(years)
-    reading = Shaking.of(
-        curves[0], convert=convert, convert_sigma=convert_sigma, component=component
-    )
-    given, medians = taken_as_medians({"p2": p2, "kr": kr, **block})
-    parts_of, reason, whole = _by_model(given, kind, reading.name, model, db)
+    reading = Shaking.of(curves[0], **meaning)
+    given, medians = taken_as_medians(given)
+    own, remarks, reason = parts_by_model(given, reading.name, answering)
+    refuse_elements(reason)
     sound = np.asarray(reason == "", dtype=bool)
     size = int(sound.sum())
     counts = _checked_counts(at_least, size)
     unusable = unusable_in_words(
-        whole - size, whole, elements(reason), reason[~sound].tolist(),
+        sound.size - size, sound.size, elements(reason), reason[~sound].tolist(),
         FROM_MEAN if one_class else FROM_SUMS,
     )  # fmt: skip
-    warnings = [*medians, *unusable, *reading.warnings]
+    warnings = [*remarks, *medians, *unusable, *reading.warnings]
     for one in curves:
         warnings.extend(one.warnings)
         warnings.extend(quantile_warning(one, "a rate"))
-    models = [part.model for part in parts_of]
+    models = [each.model for each in own]
+    kinds = np.full(sound.shape, "", dtype=object)
+    for of_model in own:
+        kinds[of_model.places] = of_model.model.row.kind
     warnings.extend(one.term.advice for one in models if one.term.advice)
-    blocks = _Site.of(parts_of, reading, level, curves, counts, one_class=one_class)
+    blocks = _Site.of(own, reading, level, curves, counts, one_class=one_class)
     each = [blocks.under(one, years) for one in curves]
     parts = (
         each[:1]
@@ -309,59 +316,12 @@ def hazard(
         quantiles=_quantiles(parts, shares, placed) if weight is not None else {},
         warnings=tuple(dict.fromkeys(warnings)),
         reason=np.full(1, "", dtype=object) if one_class else reason,
+        kinds=np.array([_listed(kinds)], dtype=object) if one_class else kinds,
     )
 
 
 def _listed(names: Iterable[str]) -> str:
     return ", ".join(dict.fromkeys(names))
-
-
-class _Part(NamedTuple):
-    """Blocks that one model answers for.
-
-    Args:
-        places: where they stand among those that can be used, shape (m,).
-        numbers: what the model reads of them, by field, shape (m,) each.
-        model: the model.
-    """
-
-    places: NDArray[np.intp]
-    numbers: Mapping[str, FloatArray]
-    model: FragilityModel
-
-
-def _by_model(
-    given: Mapping[str, Any],
-    kind: str | Sequence[str | None] | None,
-    measure: str,
-    model: Model | None,
-    db: str | PathLike[str] | None,
-) -> tuple[list[_Part], NDArray[np.object_], int]:
-    """Return the blocks by the model that answers for them, why others wait for none, and all.
-
-    Raises:
-        InputError: none can be used.
-        UnknownModelError: no model of that name, or of the one kind that there is.
-    """
-    blocks, whole = blocks_of_arrays(given, kind)
-    reason = block_reasons_of(blocks, whole)
-    parts = []
-    for group in blocks.groups:
-        places = np.arange(whole) if group.places is None else group.places
-        try:
-            chosen = find_model(model, (*group.numbers, measure), db, kind=group.kind)
-        except (InputError, UnknownModelError) as error:
-            if len(blocks.groups) == 1:
-                raise
-            reason[places] = np.where(reason[places] == "", str(error), reason[places])
-            continue
-        own = np.flatnonzero(reason[places] == "")
-        if own.size:
-            values = {n: np.broadcast_to(v, places.shape)[own] for n, v in group.numbers.items()}
-            parts.append(_Part(places[own], values, chosen))
-    refuse_elements(reason)
-    rank = np.cumsum(reason == "") - 1
-    return [part._replace(places=rank[part.places]) for part in parts], reason, whole
 
 
 _RATES = ("annual_rate", "ci_low", "ci_high", "numerical_error", "above", "above_at_most")
@@ -405,7 +365,7 @@ class _Site:
     @classmethod
     def of(
         cls,
-        parts: Sequence[_Part],
+        parts: Sequence[ModelPart],
         reading: Shaking,
         level: float,
         curves: list[HazardCurve],

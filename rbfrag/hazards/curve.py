@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,26 @@ MEASURES = ("pga_g", "pgv_m_s", "sa_g")
 
 ANSWERED = ", ".join(["PGV", "PGA", *(f"SA({period:g})" for period in SPECTRAL)])
 """The measures whose curves are answered, each by a model of that very measure."""
+
+
+class CurveKeywords(TypedDict, total=False):
+    """Which curve of a file is meant, and what its levels mean; see :func:`rbfrag.hazard`."""
+
+    imt: str | None
+    site: str | None
+    convert: str | None
+    convert_sigma: float | None
+    component: str | None
+
+
+class _Site(TypedDict, total=False):
+    """Where a curve is of, and of what; see :class:`HazardCurve`."""
+
+    period_s: float | None
+    site: str
+    lon: float | None
+    lat: float | None
+    statistic: str
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,11 +152,7 @@ def hazard_curve(
     annual_rate: ArrayLike,
     *,
     source: str = "hazard curve",
-    period_s: float | None = None,
-    site: str = "",
-    lon: float | None = None,
-    lat: float | None = None,
-    statistic: str = "",
+    **of: Unpack[_Site],
 ) -> HazardCurve:
     """Return a checked hazard curve; levels that say nothing are left out with a warning.
 
@@ -148,17 +164,14 @@ def hazard_curve(
         levels: levels in that unit, above zero, rising, shape (n,).
         annual_rate: rates of exceedance [1/a], not below zero, never rising, shape (n,).
         source: file and place, for messages.
-        period_s: oscillator period [s].
-        site: name of the site.
-        lon: longitude [deg].
-        lat: latitude [deg].
-        statistic: what of a logic tree the curve is.
+        of: period_s [s], site, lon and lat [deg], and statistic, as of :class:`HazardCurve`.
 
     Raises:
         InputError: levels or rates that make no hazard curve, with the offending value.
     """
     if measure not in MEASURES:
         raise InputError(f"{source}: measure {measure!r} is none of {', '.join(MEASURES)}")
+    period_s = of.get("period_s")
     if measure == "sa_g" and (period_s is None or not period_s > 0.0):
         raise InputError(f"{source}: a spectral acceleration needs its period above 0 s")
     x = np.asarray(levels, dtype=np.float64)
@@ -191,19 +204,7 @@ def hazard_curve(
     name = SPECTRAL.get(period_s or 0.0, measure) if measure == "sa_g" else measure
     warnings += [f"{source}: {text}" for text in doubts_about({name: reached})]
     warnings += [f"{source}: {text}" for text in doubts_about_rates(rate)]
-    return HazardCurve(
-        measure=measure,
-        levels=x,
-        annual_rate=rate,
-        end_level=end_level,
-        period_s=period_s,
-        site=site,
-        lon=lon,
-        lat=lat,
-        source=source,
-        warnings=tuple(warnings),
-        statistic=statistic,
-    )
+    return HazardCurve(measure, x, rate, end_level, source=source, warnings=tuple(warnings), **of)
 
 
 def _refuse_disorder(x: FloatArray, rate: FloatArray, measure: str, source: str) -> None:

@@ -7,14 +7,20 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
 from rbfrag.errors import InputError
 from rbfrag.files import csv_rows, is_number, json_document, source_text
 from rbfrag.hazards.conversions import velocity_conversion
-from rbfrag.hazards.curve import ANSWERED, HazardCurve, hazard_curve, rates_from_probabilities
+from rbfrag.hazards.curve import (
+    ANSWERED,
+    CurveKeywords,
+    HazardCurve,
+    hazard_curve,
+    rates_from_probabilities,
+)
 from rbfrag.hazards.measure_type import openquake_type
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 
@@ -23,25 +29,19 @@ CurveLike = HazardCurve | str | os.PathLike[str]
 
 
 def as_curves(
-    given: CurveLike | Sequence[CurveLike],
-    *,
-    imt: str | None = None,
-    site: str | None = None,
-    convert: str | None = None,
+    given: CurveLike | Sequence[CurveLike], **meaning: Unpack[CurveKeywords]
 ) -> list[HazardCurve]:
     """Return the curves that an argument gives, of each file the one that it means.
 
     Args:
         given: a curve or a file of one, or several of them.
-        imt: measure of the curves of a file that holds several.
-        site: site of them, by its number or name.
-        convert: name of the conversion to PGV that is asked for, if any.
+        meaning: which is meant, as for :func:`rbfrag.hazard`.
 
     Raises:
         InputError: something else, or a file that holds curves of several sites.
     """
     if isinstance(given, str | os.PathLike):
-        return [_one_curve(given, imt, site, convert)]
+        return [_one_curve(given, meaning)]
     if isinstance(given, HazardCurve):
         return [given]
     if not isinstance(given, Sequence):
@@ -49,15 +49,11 @@ def as_curves(
             f"curve is of type {type(given).__name__}: give a HazardCurve, the path of its file, "
             "or a list of them"
         )
-    return [
-        curve for each in given for curve in as_curves(each, imt=imt, site=site, convert=convert)
-    ]
+    return [curve for each in given for curve in as_curves(each, **meaning)]
 
 
-def _one_curve(
-    path: str | os.PathLike[str], imt: str | None, site: str | None, convert: str | None
-) -> HazardCurve:
-    curves = suited_in(path, imt=imt, site=site, convert=convert)
+def _one_curve(path: str | os.PathLike[str], meaning: CurveKeywords) -> HazardCurve:
+    curves = suited_in(path, **meaning)
     if len(curves) > 1:
         raise InputError(
             f"{path} has {len(curves)} sites, and the blocks stand at one: choose it with --site"
@@ -65,16 +61,12 @@ def _one_curve(
     return curves[0]
 
 
-def suited_in(
-    path: str | os.PathLike[str],
-    *,
-    imt: str | None = None,
-    site: str | None = None,
-    convert: str | None = None,
-) -> list[HazardCurve]:
+def suited_in(path: str | os.PathLike[str], **meaning: Unpack[CurveKeywords]) -> list[HazardCurve]:
     """Return the curves of a file that models can answer for, one a site; see :func:`as_curves`."""
+    convert = meaning.get("convert")
     period = None if convert is None else velocity_conversion(convert).period_s
-    return suited_curves(read_hazard_curves(path, imt=imt, site=site), converted_period_s=period)
+    curves = read_hazard_curves(path, imt=meaning.get("imt"), site=meaning.get("site"))
+    return suited_curves(curves, converted_period_s=period)
 
 
 def read_hazard_curves(

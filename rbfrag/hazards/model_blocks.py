@@ -5,25 +5,26 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from os import PathLike
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from rbfrag.errors import InputError
+from rbfrag.errors import InputError, UnknownModelError
 from rbfrag.fragility.joint import UNKNOWN, Placement
-from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import FragilityModel, Model
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.fragility.unusable import refuse_elements
 from rbfrag.hazards.annual_rate import Fragility
-from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.shaking import Shaking
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
+from rbfrag.question.blocks import NUMBERS
+from rbfrag.question.fields import V
+from rbfrag.question.keywords import LEVEL, BlockKeywords, ModelKeywords, model_for
 from rbfrag.solver.scatter import fraction, lognormal
 
 FloatArray = NDArray[np.float64]
@@ -94,6 +95,61 @@ class BlockTable:
         return np.clip(result, 0.0, 1.0, out=result)
 
 
+class RateKeywords(BlockKeywords[V], CurveKeywords, ModelKeywords, total=False):
+    """What blocks are asked about under hazard curves, and by which model."""
+
+
+class ModelPart(NamedTuple):
+    """Blocks that one model answers for.
+
+    Args:
+        places: where they stand among all, shape (m,).
+        numbers: what the model reads of them, by field, shape (m,) each.
+        model: the model.
+    """
+
+    places: NDArray[np.intp]
+    numbers: Mapping[str, FloatArray]
+    model: FragilityModel
+
+
+def parts_by_model(
+    given: Mapping[str, Any], measure: str, answering: ModelKeywords
+) -> tuple[list[ModelPart], tuple[str, ...], NDArray[np.object_]]:
+    """Return blocks by the model that answers for them.
+
+    Args:
+        given: fields of the blocks.
+        measure: what the model reads of the shaking.
+        answering: which model.
+
+    Returns:
+        The parts, what is to be said of the blocks, and of each why it cannot be used, empty for
+        those that can.
+
+    Raises:
+        InputError: blocks that are described twice or in part, or are of one kind without a model.
+        UnknownModelError: no model of that name, or of the one kind that there is.
+    """
+    blocks, whole = blocks_of_arrays(given)
+    reason = block_reasons_of(blocks, whole)
+    parts = []
+    for group in blocks.groups:
+        places = np.arange(whole) if group.places is None else group.places
+        try:
+            chosen = model_for(answering, (*group.numbers, measure), group.kind)
+        except (InputError, UnknownModelError) as error:
+            if len(blocks.groups) == 1:
+                raise
+            reason[places] = np.where(reason[places] == "", str(error), reason[places])
+            continue
+        own = np.flatnonzero(reason[places] == "")
+        if own.size:
+            values = {n: np.broadcast_to(v, places.shape)[own] for n, v in group.numbers.items()}
+            parts.append(ModelPart(places[own], values, chosen))
+    return parts, blocks.remarks, reason
+
+
 @dataclass(frozen=True, eq=False)
 class ModelBlocks:
     """Blocks of one kind, as certain or uncertain as they are, and the model that answers for them.
@@ -105,6 +161,7 @@ class ModelBlocks:
         shaking: what the curve's levels are to the model.
         model: the model.
         level: confidence level.
+        remarks: what is to be said of the blocks.
     """
 
     numbers: Mapping[str, FloatArray]
@@ -113,57 +170,49 @@ class ModelBlocks:
     shaking: Shaking
     model: FragilityModel
     level: float
+    remarks: tuple[str, ...] = ()
 
     @classmethod
     def of(
         cls,
-        given: Mapping[str, ArrayLike | None],
+        given: Mapping[str, Any],
+        shaking: Shaking,
         *,
         draws: int,
         seed: int,
-        kind: str | Sequence[str | None] | None,
-        model: Model | None,
-        level: float,
-        db: str | PathLike[str] | None,
-        shaking: Shaking,
+        answering: ModelKeywords,
     ) -> ModelBlocks:
-        """Return the blocks of medians and sigmas; arguments as for :func:`rbfrag.survival`.
+        """Return the blocks of medians and standard deviations.
 
         Args:
             given: fields of the blocks.
-            draws: number of draws of several.
-            seed: of the draws.
-            kind: how they fail.
-            model: as in :func:`rbfrag.predict`.
-            level: confidence level.
-            db: as in :func:`rbfrag.predict`.
             shaking: what the curve's levels are to the model.
+            draws: number of draws of several uncertain blocks.
+            seed: of the draws.
+            answering: which model answers, and the confidence level.
         """
-        stated = {name: value for name, value in given.items() if value is not None}
-        sigmas = [name for name in stated if name.endswith("_sigma")]
-        if not stated.keys() - {*sigmas}:
+        stated = dict(given)
+        for sigma in [name for name in stated if name.endswith("_sigma")]:
+            of = sigma.removesuffix("_sigma")
+            # what a block has of itself is not known before its model is
+            if of not in (*NUMBERS, *stated) and np.any(stated.pop(sigma)):
+                raise InputError(f"{sigma} goes with {of}: give its mean, too")
+        if all(name == "kind" or name.endswith("_sigma") for name in stated):
             raise InputError("give p2 and kr of the blocks, or a fragility of the curve's measure")
-        for name in sigmas:
-            if name == "restitution_sigma" and "restitution" not in stated:
-                if np.any(stated[name]):
-                    raise InputError(f"{name} goes with restitution: give its mean, too")
-                del stated[name]
-        blocks, size = blocks_of_arrays(stated, kind)
-        refuse_elements(block_reasons_of(blocks, size), ALL_STAND)
-        kinds = dict.fromkeys(str(group.kind) for group in blocks.groups)
-        if len(kinds) > 1:
-            raise InputError(
-                f"the blocks are of kinds {' and '.join(kinds)}: ask of each kind by itself"
-            )
-        (group,) = blocks.groups
-        order = np.argsort(np.arange(size) if group.places is None else group.places)
-        values = {n: np.broadcast_to(v, (size,))[order] for n, v in group.numbers.items()}
+        parts, remarks, reason = parts_by_model(stated, shaking.name, answering)
+        refuse_elements(reason, ALL_STAND)
+        if len(parts) > 1:
+            kinds = " and ".join(part.model.row.kind for part in parts)
+            raise InputError(f"the blocks are of kinds {kinds}: ask of each kind by itself")
+        (part,) = parts
+        size, block = reason.size, part.model.method.block
+        order = np.argsort(part.places)
+        values = {name: each[order] for name, each in part.numbers.items()}
+        for name in stated:
+            if name.endswith("_sigma") and name not in block.sigmas and np.any(stated[name]):
+                kind = part.model.row.kind
+                raise InputError(f"{name} does not go with kind {kind}: leave it out")
         numbers = {name: value for name, value in values.items() if not name.endswith("_sigma")}
-        chosen = find_model(model, (*numbers, shaking.name), db, kind=group.kind)
-        block = chosen.method.block
-        for name in sigmas:
-            if name not in block.sigmas and np.any(stated.get(name, 0.0)):
-                raise InputError(f"{name} does not go with kind {group.kind}: leave it out")
         medians = {name: np.asarray(each) for name, each in block.filled(numbers).items()}
         scatters = {name: f"{name}_sigma" for name in block.sigmas.values() if name in medians}
         z, weight = _standard_draws(
@@ -175,13 +224,13 @@ class ModelBlocks:
             drawn[name] = law(points, medians[name], values.get(sigma, np.zeros(size)))
         whole = (weight.size, size)
         drawn = {name: np.broadcast_to(each, whole) for name, each in drawn.items()}
-        return cls(drawn, weight, medians, shaking, chosen, level)
+        level = answering.get("level", LEVEL)
+        return cls(drawn, weight, medians, shaking, part.model, level, remarks)
 
     @classmethod
     def certain(
         cls,
         numbers: Mapping[str, FloatArray],
-        *,
         shaking: Shaking,
         model: FragilityModel,
         level: float,
@@ -202,7 +251,7 @@ class ModelBlocks:
         block = self.model.method.block
         presumed = (block.presumes,) if self.model.kind == block.kind and block.presumes else ()
         advice = (self.model.term.advice,) if self.model.term.advice else ()
-        return (*self.shaking.warnings, *advice, *presumed, *self.model.notes)
+        return (*self.remarks, *self.shaking.warnings, *advice, *presumed, *self.model.notes)
 
     def placement(self) -> Placement | None:
         """Return the blocks as those of one site with unknown azimuths; None without a size."""

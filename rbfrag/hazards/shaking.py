@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from rbfrag.errors import InputError
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import CONVERSIONS, velocity_conversion
 from rbfrag.hazards.conversions import component as component_named
-from rbfrag.hazards.curve import ANSWERED, HazardCurve
+from rbfrag.hazards.curve import ANSWERED, CurveKeywords, HazardCurve
 
 FloatArray = NDArray[np.float64]
 
@@ -45,17 +46,13 @@ class Shaking:
     warnings: tuple[str, ...]
 
     @classmethod
-    def of(
-        cls,
-        curve: HazardCurve,
-        *,
-        convert: str | None = None,
-        convert_sigma: float | None = None,
-        component: str | None = None,
-    ) -> Shaking:
+    def of(cls, curve: HazardCurve, **stated: Unpack[CurveKeywords]) -> Shaking:
         """Return what a curve's levels are; arguments as for :func:`rbfrag.hazard`."""
         warnings = list(curve.warnings)
-        name, factor, spread = _measure(curve, convert, convert_sigma, warnings)
+        name, factor, spread = _measure(
+            curve, stated.get("convert"), stated.get("convert_sigma"), warnings
+        )
+        component = stated.get("component")
         meaning = component_named("single" if component is None else component)
         if component is None:
             warnings.append(

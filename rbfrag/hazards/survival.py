@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from os import PathLike
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.fragility.model import Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.annual_rate import Fragility
 from rbfrag.hazards.branch_weights import Weights, stated_weights
@@ -21,12 +19,13 @@ from rbfrag.hazards.branches import (
     quantile_warning,
     refuse_unlike,
 )
-from rbfrag.hazards.curve import HazardCurve
+from rbfrag.hazards.curve import CurveKeywords, HazardCurve
 from rbfrag.hazards.curve_file import CurveLike, as_curves
-from rbfrag.hazards.model_blocks import ModelBlocks
+from rbfrag.hazards.model_blocks import ModelBlocks, RateKeywords
 from rbfrag.hazards.shaking import NOTABLE, Shaking
 from rbfrag.hazards.standing import Age, Standing, weights_given_standing
 from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT, AnyRate, StandingBlocks
+from rbfrag.question.keywords import LEVEL, BlockKeywords, ModelKeywords, parts_of
 
 FloatArray = NDArray[np.float64]
 
@@ -136,25 +135,14 @@ class SurvivalAnswer(Tabular):
 
 def survival(
     curves: CurveLike | Sequence[CurveLike],
-    p2: ArrayLike | None = None,
-    kr: ArrayLike | None = None,
-    *,
+    *numbers: ArrayLike | None,
     age_years: float,
     age_sd_years: float = 0.0,
-    imt: str | None = None,
-    site: str | None = None,
     weights: Weights | None = None,
-    kind: str | Sequence[str | None] | None = None,
     fragility: Fragility | None = None,
-    convert: str | None = None,
-    convert_sigma: float | None = None,
-    component: str | None = None,
-    model: Model | None = None,
-    level: float = 0.95,
     draws: int = DRAWS,
     seed: int = 0,
-    db: str | PathLike[str] | None = None,
-    **block: ArrayLike | None,
+    **question: Unpack[RateKeywords[ArrayLike | None]],
 ) -> SurvivalAnswer:
     """Return how likely blocks of one site are to stand after an age, if a hazard is right.
 
@@ -170,50 +158,39 @@ def survival(
     Args:
         curves: hazard curves of one site and one measure, or their files: a mean, quantiles,
             branches.
-        p2: frequency parameters p² [1/s²] of the blocks, medians, scalar or shape (m,).
-        kr: toppling yield acceleration coefficients, medians, scalar or shape (m,).
+        numbers: p2 [1/s²] and kr of the blocks, medians, if they are not given by name.
         age_years: how long the blocks have stood in this position [a], the mean of a lognormal
             law (:class:`rbfrag.hazards.standing.Age`).
         age_sd_years: its standard deviation [a].
-        imt: as in :func:`rbfrag.hazard`, like `site` and `weights`.
-        site: see there.
-        weights: see there.
-        kind: how the blocks fail, all in one way; None for what they are given by.
+        weights: as in :func:`rbfrag.hazard`.
         fragility: instead of blocks, a function from levels of the curves' measure, shape (n,), to
             probabilities of failure, shape (n,) or one row for each block, (m, n).
-        convert: as in :func:`rbfrag.hazard`, like `convert_sigma`, `component` and `model`.
-        convert_sigma: see there.
-        component: see there.
-        model: see there.
-        level: confidence level of the interval.
         draws: number of draws where several uncertain blocks are given; one block is integrated
             by quadrature.
         seed: seed of these draws.
-        db: as in :func:`rbfrag.predict`.
-        block: instead of `p2` and `kr`, or beside them, fields of blocks as :func:`rbfrag.predict`
-            reads them; standard deviations such as kr_sigma are independent of block to block.
+        question: the keywords of :func:`rbfrag.hazard`, with the standard deviations of blocks,
+            which are independent from block to block; the blocks are of one kind.
 
     Raises:
         InputError: curves of several measures or sites, weights that do not add up to 1, blocks of
             several kinds, or a value that cannot be used.
+        UnknownFieldError: a keyword that is none.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    each = as_curves(curves, imt=imt, site=site, convert=convert)
+    given, meaning, answering = parts_of(
+        numbers, question, BlockKeywords, CurveKeywords, ModelKeywords
+    )
+    each = as_curves(curves, **meaning)
     refuse_unlike(each)
     weight = checked_weights(stated_weights(weights, each), len(each))
     age = Age.of(age_years, age_sd_years)
     known: ModelBlocks | None = None
     if fragility is None:
-        shaking = Shaking.of(
-            each[0], convert=convert, convert_sigma=convert_sigma, component=component
-        )
-        known = ModelBlocks.of(
-            {"p2": p2, "kr": kr, **block}, draws=draws, seed=seed, kind=kind, model=model,
-            level=level, db=db, shaking=shaking,
-        )  # fmt: skip
+        shaking = Shaking.of(each[0], **meaning)
+        known = ModelBlocks.of(given, shaking, draws=draws, seed=seed, answering=answering)
         blocks = StandingBlocks.of_blocks(known, each)
-    elif p2 is None and kr is None and not block:
+    elif not given:
         blocks = StandingBlocks.of_fragility(fragility, each[0].levels)
     else:
         raise InputError("fragility says all of the blocks: leave p2 and kr out")
@@ -245,7 +222,7 @@ def survival(
         method=None if known is None else known.model.row.method,
         imt=each[0].imt,
         site=each[0].place,
-        level=level,
+        level=answering.get("level", LEVEL),
         warnings=tuple(dict.fromkeys(_warnings(each, rates, blocks))),
         standing=middle,
     )

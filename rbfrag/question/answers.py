@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbfrag.errors import InputError, ModelError, UnknownFieldError
+from rbfrag.errors import InputError, ModelError
 from rbfrag.fragility.lookup import block_of
 from rbfrag.fragility.measures import MEASURES
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import Prediction, answer_given
 from rbfrag.fragility.prediction_array import PredictionArray, ReasonPart, Reasons, flat, index_of
 from rbfrag.fragility.unusable import block_reasons
-from rbfrag.question.blocks import Blocks, Refused, many_blocks
-from rbfrag.question.fields import BlockFields
+from rbfrag.question.blocks import Blocks, Refused, many_blocks, one_block
 
 _COLUMNS = (
     "probability", "ci_low", "ci_high", "event_low", "event_high", "y_m_s", "intensity_m_s",
@@ -63,12 +62,8 @@ def ask_many(
     measures = {name: value for name, value in values.items() if name in MEASURES}
     block: dict[str, Any] = {n: v for n, v in values.items() if n not in {*measures, *texts}}
     blocks = many_blocks({**block, **backed}, size, kinds=kind, modes=mode, rows=rows)
-    unread = [name for name in block if name not in blocks.read]
-    if unread and blocks.groups and not rows:
-        kinds = " or ".join(dict.fromkeys(str(group.kind) for group in blocks.groups))
-        raise InputError(
-            f"{unread[0]} does not go with kind {kinds}: leave it out", fields=(unread[0],)
-        )
+    if not rows:
+        _refuse_unread(blocks, block)
     if weights is not None:
         return _of_draws(blocks, given, level, weights, size, find)
     refused, parts = list(blocks.refused), []
@@ -93,28 +88,38 @@ def ask_many(
     return _together(parts, refused, blocks, shape, level, index_of(numbers))
 
 
-def blocks_of_arrays(
-    given: Mapping[str, Any], kind: str | Sequence[str | None] | None = None
-) -> tuple[Blocks, int]:
+def blocks_of_arrays(given: Mapping[str, Any]) -> tuple[Blocks, int]:
     """Return blocks as answers read them, and their number.
 
     Args:
-        given: fields of the blocks: numbers, or arrays of shape (m,); None for what is not stated.
-        kind: how they fail, for all or one each; None or an empty text for what they say.
+        given: fields of the blocks, with ``kind``, ``block`` and ``back_fracture``: numbers, or
+            arrays of shape (m,); None for what is not stated.
 
     Raises:
-        InputError: a name that is no field of a block, or arrays of different lengths.
+        InputError: arrays of different lengths, or a field that the blocks do not read.
     """
     known = {name: value for name, value in given.items() if value is not None}
-    for name in known:
-        if name not in BlockFields.__optional_keys__ | {"back_fracture"}:
-            raise UnknownFieldError(f"{name[:60]} is no field of a block")
+    kind = known.pop("kind", None)
+    if "block" in known:
+        return one_block(known, kind), 1
     backed = {name: known.pop(name) for name in ("back_fracture",) if name in known}
     each = {} if kind is None or isinstance(kind, str) else {"kind": np.zeros(len(kind))}
     values, shape = flat({**known, **each})
     size = int(np.prod(shape))
     numbers: dict[str, Any] = {name: values[name] for name in known}
-    return many_blocks({**numbers, **backed}, size, kinds=kind), size
+    blocks = many_blocks({**numbers, **backed}, size, kinds=kind)
+    if not each:  # of a table that states the kinds, others may read what these do not
+        _refuse_unread(blocks, known)
+    return blocks, size
+
+
+def _refuse_unread(blocks: Blocks, names: Collection[str]) -> None:
+    unread = [name for name in names if name not in blocks.read]
+    if unread and blocks.groups:
+        kinds = " or ".join(dict.fromkeys(str(group.kind) for group in blocks.groups))
+        raise InputError(
+            f"{unread[0]} does not go with kind {kinds}: leave it out", fields=(unread[0],)
+        )
 
 
 def block_reasons_of(blocks: Blocks, size: int) -> NDArray[np.object_]:

@@ -5,7 +5,7 @@ For a single block neither numpy nor any other library is loaded.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
@@ -155,7 +155,7 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
         DatabaseError: the database cannot be read.
     """
     if not question.keys() <= _NAMES:
-        raise _unknown(question)
+        raise unknown_field(question, _NAMES)
     given: dict[str, Any] = {} if p2 is None else {"p2": p2}
     if kr is not None:
         given["kr"] = kr
@@ -183,14 +183,15 @@ def predict(p2: Any = None, kr: Any = None, /, **question: Any) -> Prediction | 
     return ask(given, kind=kind, **options)
 
 
-def _unknown(question: Mapping[str, object]) -> UnknownFieldError:
+def unknown_field(question: Collection[str], known: Collection[str]) -> UnknownFieldError:
+    """Return the error of the first keyword that is none, with the one that may be meant."""
     from difflib import get_close_matches
 
     from rbfrag.question.table import field_of
 
-    name = next(name for name in question if name not in _NAMES)
+    name = next(name for name in question if name not in known)
     stated = field_of(name)
-    near = [stated[0]] if stated else get_close_matches(name, _NAMES, 1)
+    near = [stated[0]] if stated else get_close_matches(name, known, 1)
     hint = f": did you mean {near[0]}?" if near else "; help(rbfrag.predict) lists them"
     return UnknownFieldError(f"{name[:60]} is no field of a question{hint}")
 

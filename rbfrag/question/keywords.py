@@ -1,0 +1,70 @@
+"""Keywords that answers about blocks share: what the blocks are, and which model answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import TYPE_CHECKING, Any, TypedDict
+
+from rbfrag.errors import InputError
+from rbfrag.fragility.lookup import find_model
+from rbfrag.question.fields import BlockFields, V
+from rbfrag.question.question import unknown_field
+
+if TYPE_CHECKING:
+    from rbfrag.fragility.model import FragilityModel, Model
+    from rbfrag.solver.block.geometry import Block
+
+LEVEL = 0.95
+"""Confidence level where none is asked for."""
+
+
+class BlockKeywords(BlockFields[V], total=False):
+    """What the blocks are, as :func:`rbfrag.predict` has it."""
+
+    block: Block | None
+    back_fracture: bool | None
+    kind: str | Sequence[str | None] | None
+
+
+class ModelKeywords(TypedDict, total=False):
+    """Which model answers, and the confidence level, as :func:`rbfrag.predict` has it."""
+
+    model: Model | None
+    level: float
+    db: str | PathLike[str] | None
+
+
+def parts_of(numbers: Sequence[Any], keywords: Mapping[str, Any], *parts: Any) -> list[Any]:
+    """Return the keywords of a question by the classes that declare them; None is not stated.
+
+    Args:
+        numbers: what is given without a name: p2 and kr.
+        keywords: what is given by name.
+        parts: classes of keywords.
+
+    Raises:
+        InputError: p2 or kr is given twice, or there are more numbers than these.
+        UnknownFieldError: a keyword that no class declares.
+    """
+    first = dict(zip(("p2", "kr"), numbers, strict=False))
+    if len(numbers) > len(first) or not first.keys().isdisjoint(keywords):
+        raise InputError("p2 and kr come first, or by their names: give each once")
+    whole = {name: value for name, value in {**first, **keywords}.items() if value is not None}
+    known = {name for part in parts for name in part.__optional_keys__}
+    if not keywords.keys() <= known:
+        raise unknown_field(keywords, known)
+    return [{n: v for n, v in whole.items() if n in part.__optional_keys__} for part in parts]
+
+
+def model_for(
+    answering: ModelKeywords, given: Sequence[str], kind: str | None = None
+) -> FragilityModel:
+    """Return the model that answers for what is given; see :func:`find_model`.
+
+    Args:
+        answering: which model.
+        given: names of what is known of block and motion.
+        kind: how the block fails.
+    """
+    return find_model(answering.get("model"), given, answering.get("db"), kind=kind)
