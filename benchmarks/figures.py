@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             continue
         print(shlex.join(["rbfrag", *asked]), flush=True)
         if not chosen.list:
-            start = "from rbfrag.cli.start import run; run()"
+            start = "from rbfrag.cli.main import run; run()"
             subprocess.run(
                 [sys.executable, "-c", start, *asked],
                 cwd=ROOT, check=True, stdout=subprocess.DEVNULL,

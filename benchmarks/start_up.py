@@ -46,10 +46,9 @@ QUESTION = ("predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6")
 TYPER = '`python -c "import typer"`'
 SHELL = {
     TYPER: ("import typer", ()),
-    "`rbfrag --version`": ("from rbfrag.cli.start import run; run()", ("--version",)),
-    "`rbfrag --help`": ("from rbfrag.cli.start import run; run()", ("--help",)),
-    "`rbfrag predict`": ("from rbfrag.cli.start import run; run()", QUESTION),
-    "`rbfrag predict` without its own parser": ("from rbfrag.cli.main import run; run()", QUESTION),
+    "`rbfrag --version`": ("from rbfrag.cli.main import run; run()", ("--version",)),
+    "`rbfrag --help`": ("from rbfrag.cli.main import run; run()", ("--help",)),
+    "`rbfrag predict`": ("from rbfrag.cli.main import run; run()", QUESTION),
 }
 
 

@@ -73,7 +73,7 @@ class Session:
     def answer(self, folder: Path) -> str:
         """Return what the program prints, with its warnings where the page prints some."""
         done = subprocess.run(
-            [sys.executable, "-m", "rbfrag.cli.start", *self.words[1:]],
+            [sys.executable, "-m", "rbfrag.cli.main", *self.words[1:]],
             cwd=folder, capture_output=True, text=True, check=False,
             env={**os.environ, "RBFRAG_DB": "", "COLUMNS": "100"},
         )  # fmt: skip
@@ -111,7 +111,7 @@ def prepare(folder: Path, formats: Path | None) -> None:
         formats: folder of the files of `FROM_OUTSIDE`; None where it is not at hand.
     """
     subprocess.run(
-        [sys.executable, "-m", "rbfrag.cli.start", "demo"],
+        [sys.executable, "-m", "rbfrag.cli.main", "demo"],
         cwd=folder, check=True, capture_output=True,
     )  # fmt: skip
     (folder / "examples").symlink_to(ROOT / "examples")

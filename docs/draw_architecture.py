@@ -22,7 +22,7 @@ START, END = "<!-- loaded -->\n", "<!-- end -->\n"
 
 ASK = """
 import sys
-from rbfrag.cli.start import run
+from rbfrag.cli.main import run
 sys.argv = ["rbfrag", "predict", "--p2", "3", "--kr", "0.1", "--pgv", "0.6"]
 try:
     run()

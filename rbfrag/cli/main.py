@@ -6,16 +6,28 @@ so that `rbfrag predict` starts without numba, pandas or matplotlib.
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 from importlib import import_module
-from typing import Annotated, Any
 
-import typer
-from typer.core import TyperGroup
+try:
+    from typing import Annotated, Any
 
-from rbfrag.errors import InputError, RbfragError, one_paragraph
-from rbfrag.question.fields import option_of
-from rbfrag.version import __version__
+    import typer
+    from typer.core import TyperGroup
+
+    from rbfrag.cli.parameters.stack import read_plainly
+    from rbfrag.errors import InputError, RbfragError, one_paragraph
+    from rbfrag.question.fields import option_of
+    from rbfrag.version import __version__
+except KeyboardInterrupt:  # Ctrl-C while libraries load
+    raise SystemExit(130) from None
+
+ONE_THREAD = "OPENBLAS_NUM_THREADS"
+"""Threads of linear algebra, read where numpy is loaded. The matrices here are too narrow to be
+shared, and threads that wait for one another on a busy machine spin
+(docs/evidence/performance.md)."""
 
 COMMANDS = {
     "block": "Print a block's failure mode, yield accelerations and size.",
@@ -43,31 +55,6 @@ COMMANDS = {
 """The modules of `rbfrag/cli/commands`, and the first line of each one's help."""
 
 
-_NEEDS = {
-    "float": "give a number, with a point before its decimals",
-    "int": "give a whole number",
-    "greater_than_equal": "give {ge} or more",
-    "less_than_equal": "give {le} or less",
-}
-"""What to give instead, by how the name of a fault of pydantic begins."""
-
-
-def in_our_words(error: Any) -> str | None:
-    """Return what is wrong with an option's value, with the value; None where there is none.
-
-    Args:
-        error: what typer raises, caused by pydantic, which checks the types of options.
-    """
-    faults = getattr(error.__cause__, "errors", None)
-    if faults is None:
-        return None
-    fault = faults()[0]
-    need = next((text for kind, text in _NEEDS.items() if fault["type"].startswith(kind)), None)
-    if need is None:
-        return None
-    return f"{fault['input']!r} cannot be used: {need.format(**fault.get('ctx', {}))}"
-
-
 _UsageError: Any = typer.BadParameter.__base__
 """What typer raises for a wrong command line; where it stands depends on typer's version."""
 
@@ -77,6 +64,7 @@ class _Commands(TyperGroup):
 
     def __init__(self, **about: Any) -> None:
         super().__init__(**about)
+        read_plainly(self)
         names: Any = dict.fromkeys(COMMANDS)
         self.commands = names  # for suggestions after a typing error
 
@@ -90,6 +78,7 @@ class _Commands(TyperGroup):
             group.command(cmd_name, epilog=module.EXAMPLE)(getattr(module, cmd_name))
         command = typer.main.get_command(group)
         command.name = cmd_name
+        read_plainly(command)
         return command
 
     def format_commands(self, _: Any, formatter: Any) -> None:
@@ -111,7 +100,7 @@ class _Commands(TyperGroup):
             print(f"rbfrag: {InputError(f'{error.filename}: {error.strerror}')}", file=sys.stderr)
             raise typer.Exit(InputError.exit_status) from None
         except _UsageError as error:
-            error.message = one_paragraph(in_our_words(error) or error.message)
+            error.message = one_paragraph(error.message)
             raise
 
 
@@ -148,4 +137,13 @@ def _options(
 
 def run() -> None:
     """Entry point of the console script."""
-    app()
+    os.environ.setdefault(ONE_THREAD, "1")
+    try:
+        app()
+    except KeyboardInterrupt:  # once more while the command ends
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        raise SystemExit(130) from None
+
+
+if __name__ == "__main__":
+    run()

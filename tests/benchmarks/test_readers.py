@@ -30,7 +30,6 @@ OPENING = frozenset({
 NO_READERS = {
     "__init__.py:_home_of_names": "the package's own stub",
     "campaign/machine.py:_processor": "the computer's own description",
-    "cli/start.py:quick_predict": "nowhere, as output",
     "plots/coast.py:world": "the package's own coastline",
     "plots/plot.py:_drawn": "the picture that it has just drawn",
     "service/app.py:lifespan": "opens the pool of processes",

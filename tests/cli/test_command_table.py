@@ -52,7 +52,7 @@ def test_help_and_version_load_no_command() -> None:
     for option in ("--help", "--version"):
         program = (
             f"import sys; sys.argv = ['rbfrag', '{option}']\n"
-            "from rbfrag.cli.start import run\n"
+            "from rbfrag.cli.main import run\n"
             "try:\n    run()\nexcept SystemExit:\n    pass\n"
             "own = [m for m in sys.modules if m.startswith('rbfrag.cli.commands')]\n"
             "print(own, file=sys.stderr)\n"

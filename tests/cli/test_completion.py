@@ -13,7 +13,7 @@ from tests.cli.conftest import Shell
 from tests.fragility.conftest import model_row
 from tests.synthetic import write_suite
 
-PROGRAM = "import sys; sys.argv = ['rbfrag']; from rbfrag.cli.start import run; run()"
+PROGRAM = "import sys; sys.argv = ['rbfrag']; from rbfrag.cli.main import run; run()"
 
 
 def offered(typed: str) -> list[str]:

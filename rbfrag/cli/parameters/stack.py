@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import MISSING, Field, field, fields, is_dataclass
-from functools import wraps
+from functools import partial, wraps
 from typing import Annotated, Any, get_type_hints
 
 import typer
@@ -106,3 +106,50 @@ def _word(option: inspect.Parameter) -> str | None:
         names = (about.default, *(about.param_decls or ()))
         return next((name for name in names if str(name).startswith("--")), None)
     return None
+
+
+_NEEDS: dict[type, str] = {
+    float: "give a number, with a point before its decimals",
+    int: "give a whole number",
+}
+"""What to give for an option of a type where its text is none."""
+
+
+def read_plainly(command: Any) -> None:
+    """Let a command and those below it read numbers and texts by themselves.
+
+    typer loads pydantic for this, even for options that are not given, which takes longer than
+    most answers.
+    """
+    usual = command.get_params
+
+    def params(context: Any) -> list[Any]:
+        every: list[Any] = usual(context)  # with --help, which the command itself does not list
+        for each in every:
+            each.process_value = partial(_read, each, type(each).process_value)
+        return every
+
+    command.get_params = params
+    for each in getattr(command, "commands", {}).values():
+        read_plainly(each)
+
+
+def _read(parameter: Any, usual: Any, context: Any, value: Any) -> Any:
+    """Return the value of an option or argument as a command takes it."""
+    kind = parameter.type_descriptor.annotation
+    if parameter.multiple or parameter.nargs == -1:
+        value = () if value is None else list(value)
+    missing = parameter.value_is_missing(value)
+    if parameter.required if missing else parameter.callback is not None:
+        return usual(parameter, context, value)  # which says what is missing
+    if kind not in _NEEDS or not isinstance(value, str):
+        return value
+    try:
+        number = kind(value)
+    except ValueError:
+        wanted = _NEEDS[kind]
+    else:
+        if parameter.min is None or number >= parameter.min:
+            return number
+        wanted = f"give {parameter.min} or more"
+    raise typer.BadParameter(f"{value!r} cannot be used: {wanted}", ctx=context, param=parameter)
