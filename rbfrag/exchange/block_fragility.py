@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from os import PathLike
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,17 +12,23 @@ from scipy.special import ndtr, ndtri
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.fragility_function import FragilityFunction
-from rbfrag.fragility.lookup import find_model
 from rbfrag.fragility.measures import SPECTRAL
-from rbfrag.fragility.model import Model
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.measure_type import IntensityType
+from rbfrag.hazards.shaking import rises_below
+from rbfrag.question.fields import AnsweringFields
+from rbfrag.question.keywords import LEVEL, model_for
+from rbfrag.solver.kinds import mode_of_kind
 
 FloatArray = NDArray[np.float64]
 
-LIMIT_STATE = "toppled"
-"""The limit state of a block."""
+FAILED = {"topple": "toppled", "slide": "slid", "slump": "slumped"}
+"""The limit state of a block by its mode."""
+
+BEGINS = "the functions begin there, and nothing fails below"
+"""What becomes of such models."""
 
 SMALLEST = 1e-7
 """Probabilities from this to one minus this are covered by a discrete function."""
@@ -38,61 +45,72 @@ _TYPES = {
 """What the levels of a function measure, by the measure's name in `predict`."""
 
 
+class BlockFunctions(NamedTuple):
+    """The fragilities of blocks.
+
+    Args:
+        functions: one of each block, or of their class.
+        about: name, term and method of the model.
+        warnings: what to know about them.
+    """
+
+    functions: list[FragilityFunction]
+    about: tuple[str, str, str]
+    warnings: tuple[str, ...] = ()
+
+
 def block_functions(
-    names: list[str],
-    p2: FloatArray,
-    kr: FloatArray,
+    names: Sequence[str],
+    numbers: Mapping[str, FloatArray],
     measure: str,
-    *,
     kind: str | None = None,
-    restitution: FloatArray | None = None,
+    *,
     one_class: bool = False,
     levels: int = 80,
-    model: Model | None = None,
-    db: str | PathLike[str] | None = None,
-) -> tuple[list[FragilityFunction], tuple[str, ...]]:
-    """Return the fragility of each block over one measure, and the model that answered.
+    **answering: Unpack[AnsweringFields],
+) -> BlockFunctions:
+    """Return the fragility of each block over one measure.
 
     A fragility that is lognormal to 1e-9 is returned as such, every other
     on a grid of levels with equal ratios between `SMALLEST` and one minus it, together with the
-    largest error of linear interpolation on that grid.
+    largest error of linear interpolation on that grid. One that rises again towards weak shaking
+    begins at its lowest.
 
     Args:
-        names: identifiers of the blocks.
-        p2: frequency parameters [1/s²], shape (m,).
-        kr: toppling yield acceleration coefficients, shape (m,).
+        names: identifiers of the blocks, or of their class.
+        numbers: what a model reads of them, by field, shape (m,) each; NaN of an option for the
+            block's own.
         measure: ``pgv_m_s``, ``pga_g``, ``sa03_g``, ``sa10_g``, ``sa20_g`` or ``sa30_g``, which
             a model reads alone.
-        kind: how they stand; None for backed by a slope.
-        restitution: of blocks that rock, shape (m,); None or NaN for what angular momentum
-            leaves.
+        kind: how they fail; None for what they are given by.
         one_class: the blocks stand for one class: one function, their mean, of one name.
         levels: number of levels of a discrete function.
-        model: as in :func:`rbfrag.predict`.
-        db: as in :func:`rbfrag.predict`.
-
-    Returns:
-        The functions, and name, term and method of the model.
+        answering: model and db, as in :func:`rbfrag.predict`.
 
     Raises:
         InputError: a block or a measure that no model can work with, or too few levels.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    x = scanned_levels()
-    measured, about, parts = probabilities_over(
-        x, p2, kr, measure, levels, model, db, kind=kind, restitution=restitution
-    )
+    x, model = scanned_levels(), model_for(answering, (*numbers, measure), kind)
+    measured, parts = probabilities_over(x, numbers, measure, levels, model)
+    state = FAILED.get(mode_of_kind(model.row.kind), "failed")
+    rows: Iterator[FloatArray] = (row for part in parts for row in part)
     if one_class:
-        total = np.zeros_like(x)
-        for part in parts:
-            total += part.sum(axis=0)
-        return [_function(names[0], measured, x, total / p2.size, levels)], about
-    rows = (row for part in parts for row in part)
+        size = next(iter(numbers.values())).size
+        rows = iter([sum(part.sum(axis=0) for part in parts) / size])
     functions = [
-        _function(name, measured, x, row, levels) for name, row in zip(names, rows, strict=True)
+        _function(FragilityFunction(name, state, measured), x, row, levels)
+        for name, row in zip(names, rows, strict=True)
     ]
-    return functions, about
+    begun = [each.no_damage_limit for each in functions if each.no_damage_limit is not None]
+    warnings = (rises_below(model, max(begun), BEGINS),) if begun else ()
+    return BlockFunctions(functions, about_model(model), warnings)
+
+
+def about_model(model: FragilityModel) -> tuple[str, str, str]:
+    """Return name, term and method of a model."""
+    return model.name, model.term.name, model.row.method
 
 
 def scanned_levels() -> FloatArray:
@@ -102,65 +120,59 @@ def scanned_levels() -> FloatArray:
 
 def probabilities_over(
     x: FloatArray,
-    p2: FloatArray,
-    kr: FloatArray,
+    numbers: Mapping[str, FloatArray],
     measure: str,
     levels: int,
-    model: Model | None,
-    db: str | PathLike[str] | None,
-    *,
-    kind: str | None = None,
-    restitution: FloatArray | None = None,
-) -> tuple[IntensityType, tuple[str, ...], Iterator[FloatArray]]:
-    """Return the meaning of the levels, the model, and probabilities, some blocks at a time."""
+    model: FragilityModel,
+) -> tuple[IntensityType, Iterator[FloatArray]]:
+    """Return the meaning of the levels, and probabilities at them, some blocks at a time."""
     if levels < 10:
         raise InputError(f"levels = {levels}: a discrete fragility needs at least 10")
     if measure not in _TYPES:
         raise InputError(f"measure = {measure!r}: use one of {', '.join(_TYPES)}")
-    chosen = find_model(model, ("p2", "kr", measure), db, kind=kind)
-    stated = {} if restitution is None else {"restitution": restitution}
-    columns = chosen.method.block.filled({"p2": p2, "kr": kr, **stated})
+    columns = model.method.block.filled(numbers)
 
     def rows() -> Iterator[FloatArray]:
-        for start in range(0, p2.size, _CHUNK):
+        for start in range(0, next(iter(columns.values())).size, _CHUNK):
             some = slice(start, start + _CHUNK)
             of_blocks = {name: column[some, None] for name, column in columns.items()}
-            given = {**of_blocks, measure: x[None, :]}
-            prediction = answer_given(chosen, given, 0.95, interval=False)
-            assert isinstance(prediction, PredictionArray)
-            yield prediction.probability
+            answer = answer_given(model, {**of_blocks, measure: x}, LEVEL, interval=False)
+            assert isinstance(answer, PredictionArray)
+            yield answer.probability
 
-    return _TYPES[measure], (chosen.name, chosen.term.name, chosen.row.method), rows()
+    return _TYPES[measure], rows()
 
 
 def _function(
-    name: str, kind: IntensityType, x: FloatArray, p: FloatArray, levels: int
+    empty: FragilityFunction, x: FloatArray, p: FloatArray, levels: int
 ) -> FragilityFunction:
+    """Return a function with the probabilities p at the levels x."""
     if np.isnan(p).any():
         raise InputError(
-            f"block {name!r} has no fragility: p2 and kr must be above zero and finite"
+            f"block {empty.name!r} has no fragility: its numbers must be above zero and finite"
         )
     # A normal score straight in ln x is a lognormal function; near 1 scores have few digits.
     middle = (p > 1e-9) & (p < 1.0 - 1e-5)
     if middle.sum() > 2:
         slope, intercept = np.polyfit(np.log(x[middle]), ndtri(p[middle]), 1)
         if slope > 0.0 and np.abs(ndtr(intercept + slope * np.log(x)) - p).max() < _STRAIGHT:
-            return FragilityFunction(
-                name, LIMIT_STATE, kind,
-                median=float(np.exp(-intercept / slope)), beta=float(1.0 / slope),
-            )  # fmt: skip
+            return replace(empty, median=float(np.exp(-intercept / slope)), beta=float(1.0 / slope))
+    lowest = int(np.argmin(p))
+    begins = float(x[lowest]) if p[0] - p[lowest] > SMALLEST else None
+    if begins is not None:
+        x, p = x[lowest:], p[lowest:]
     rising = np.maximum.accumulate(p)
     inside = np.flatnonzero((rising > SMALLEST) & (rising < 1.0 - SMALLEST))
     if inside.size < 2:
         raise InputError(
-            f"block {name!r}: the probability jumps from 0 to 1 between {x[0]:g} and {x[-1]:g}, "
-            "which a fragility function cannot show"
+            f"block {empty.name!r}: the probability jumps from 0 to 1 between {x[0]:g} and "
+            f"{x[-1]:g}, which a fragility function cannot show"
         )
     low, high = max(inside[0] - 1, 0), min(inside[-1] + 1, x.size - 1)
     grid = np.geomspace(x[low], x[high], levels)
     on_grid = np.interp(grid, x, rising)
     error = np.abs(np.interp(x[low : high + 1], grid, on_grid) - rising[low : high + 1]).max()
-    return FragilityFunction(
-        name, LIMIT_STATE, kind, levels=grid, probability=np.clip(on_grid, 0.0, 1.0),
+    return replace(
+        empty, levels=grid, probability=np.clip(on_grid, 0.0, 1.0), no_damage_limit=begins,
         grid_error=float(error),
     )  # fmt: skip

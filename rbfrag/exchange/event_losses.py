@@ -5,42 +5,51 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.exchange.block_rows import PORTFOLIO, BlockRows, read_blocks
+from rbfrag.exchange.block_rows import PORTFOLIO, BlockRows
+from rbfrag.exchange.given_blocks import given_blocks
 from rbfrag.exchange.openquake_events import JobFiles, read_events
 from rbfrag.files import as_path
-from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import Model
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.unusable import FROM_SUMS
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.losses import LossAnswer, Run, event_losses
 from rbfrag.hazards.portfolio import Portfolio
+from rbfrag.question.fields import AnsweringFields, V
+from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
 from rbfrag.question.shaking import doubts_about
 from rbfrag.solver.kinds import facts_of
 
 
+class _Lasted(TypedDict, total=False):
+    """How long events took, where no file of ruptures states it."""
+
+    investigation_time: float | None
+    ses: int | None
+
+
+class LossKeywords(BlockKeywords[V], AnsweringFields, _Lasted, total=False):
+    """What blocks are asked about under an event set, and by which model."""
+
+
 def losses(
     folder: str | PathLike[str] | None = None,
-    blocks: str | PathLike[str] | Mapping[str, Any] = "",
+    blocks: str | PathLike[str] | Mapping[str, Any] | None = None,
     *,
     files: Mapping[str, str | PathLike[str]] | None = None,
     samples: int = 100,
     expected: bool = False,
     seed: int = 0,
-    investigation_time: float | None = None,
-    ses: int | None = None,
     imt: Sequence[str] = ("PGV",),
     component: str | None = None,
-    kind: str | None = None,
-    model: Model | None = None,
-    level: float = 0.95,
-    db: str | PathLike[str] | None = None,
     run: Run | None = None,
     on_progress: Callable[[int, int], None] | None = None,
+    **question: Unpack[LossKeywords[ArrayLike | None]],
 ) -> LossAnswer:
     """Return how many blocks fail a year by an event set of the OpenQuake engine, at what loss.
 
@@ -49,52 +58,48 @@ def losses(
     (:func:`rbfrag.hazards.losses.event_losses`). A scenario has no rate: its answer is what is
     expected and probable given the event.
 
+    A block that cannot be used, as one of a site that the events do not have, has no rate but its
+    reason, and is left out of all sums.
+
     Args:
         folder: folder with the exports of one job (gmf-data, events, sitemesh, realizations and
             ruptures CSV), or None where `files` names them.
-        blocks: table of blocks (.csv, .xlsx, .parquet), or its columns: ``p2_1_s2`` [1/s²] and
-            ``kr``, or ``height_m`` and ``width_m`` [m], with ``site_id`` (text), and, if there are,
-            ``block_id``, ``kind``, ``count`` (like blocks, each with an azimuth of its own),
-            ``weight`` (what a failure counts, and its loss with it), ``loss`` (in the median) and
-            ``loss_sigma`` (standard deviation of its logarithm), ``p2_sigma``, ``kr_sigma`` and
-            ``restitution``.
+        blocks: table of blocks (.csv, .xlsx, .parquet), or its columns: fields of blocks with
+            ``site_id`` (text), and, if there are, ``block_id``, ``kind``, ``count`` (like blocks,
+            each with an azimuth of its own), ``weight`` (what a failure counts, and its loss with
+            it), ``loss`` (in the median) and ``loss_sigma`` (standard deviation of its logarithm).
         files: files by what they hold: gmf_data, events, sitemesh, realizations, ruptures.
         samples: samples of each event.
         expected: do without samples; then there are no curves of exceedance.
         seed: of the samples; the answer does not depend on the number of workers.
-        investigation_time: years of one event set, where no file of ruptures states it.
-        ses: number of event sets of each realization, likewise.
         imt: intensity measures that the models read, as OpenQuake names them. Several are drawn
             independently by the engine, which a warning tells of.
         component: what the measures mean: single, geometric_mean, rotd50 or larger; None for
             single, with a warning. Its scatter is common to the blocks of one site and event.
-        kind: kind of failure of rows that state none.
-        model: as in :func:`rbfrag.predict`.
-        level: confidence level of the intervals.
-        db: as in :func:`rbfrag.predict`.
         run: does the parts of the work; None for this process.
         on_progress: called with the numbers of events done and of all.
-
-    A block that cannot be used, as one of a site that the events do not have, has no rate but its
-    reason, and is left out of all sums.
+        question: instead of a table the fields of blocks at the one site, with ``kind``, as
+            :func:`rbfrag.predict` has them, beside one the kind of rows that state none;
+            ``model``, ``level`` and ``db``, likewise; ``investigation_time``: years of one event
+            set, where no file of ruptures states it; ``ses``: number of event sets of each
+            realization, likewise.
 
     Raises:
         InputError: a file that cannot be used, files of different jobs, an event that is unknown,
             a row that is there twice, or no block that can be used; the message names the line.
+        UnknownFieldError: a keyword that is none.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    if not hasattr(blocks, "items"):
+    given, answering, lasted = parts_of((), question, BlockKeywords, AnsweringFields, _Lasted)
+    if blocks is not None and not hasattr(blocks, "items"):
         blocks = as_path(blocks, "blocks", "a table of blocks")
     job = JobFiles.of(folder, files)
-    rows = read_blocks(blocks, kind, reads=PORTFOLIO)
+    rows = given_blocks(given, blocks, reads=PORTFOLIO, one_kind=False)
     meaning = component_named("single" if component is None else component)
-    events = read_events(job, imts=imt, investigation_time=investigation_time, ses=ses)
-    measures = tuple(events.measures)
-    rows = _with_models(_at_sites(rows, events.site_ids), measures, model, db)
-    portfolio = Portfolio.of(
-        rows.blocks, events.site_ids, measures, meaning, kind=kind, model=model, db=db
-    )
+    events = read_events(job, imts=imt, **lasted)
+    rows, models = _with_models(_at_sites(rows, events.site_ids), tuple(events.measures), answering)
+    portfolio = Portfolio.of(rows.blocks, events.site_ids, models, meaning)
     about = (
         "the measures are taken as those of single components, which the models are fitted on; "
         "ground motion models of the engine mostly mean rotd50 or the geometric mean: say which"
@@ -113,7 +118,7 @@ def losses(
     )
     answer = event_losses(
         replace(events, warnings=texts), portfolio, samples=0 if expected else samples, seed=seed,
-        level=level, run=run, on_progress=on_progress,
+        level=answering.get("level", LEVEL), run=run, on_progress=on_progress,
     )  # fmt: skip
     if "loss" in rows.blocks:
         answer.block_rates[2, np.isnan(rows.blocks["loss"])] = np.nan
@@ -136,21 +141,18 @@ def _at_sites(rows: BlockRows, site_ids: Sequence[str]) -> BlockRows:
 
 
 def _with_models(
-    rows: BlockRows,
-    measures: Sequence[str],
-    model: Model | None,
-    db: str | PathLike[str] | None,
-) -> BlockRows:
-    """Return the table without blocks of kinds that there is no model of, if there is any."""
-    kinds, without = rows.blocks["kind"], {}
+    rows: BlockRows, measures: Sequence[str], answering: AnsweringFields
+) -> tuple[BlockRows, dict[str, FragilityModel]]:
+    """Return the table without blocks of kinds that have no model, and the models of the others."""
+    kinds, without, models = rows.blocks["kind"], {}, {}
     for own in dict.fromkeys(kinds.tolist()):
         try:
-            find_model(model, (*facts_of(own).parameters, *measures), db, kind=own)
+            models[own] = model_for(answering, (*facts_of(own).parameters, *measures), own)
         except (InputError, UnknownModelError) as error:
             without[own] = error
-    if len(without) == len(set(kinds.tolist())):
+    if not models:
         raise without[kinds[0]]
-    return rows.without(np.isin(kinds, [*without]), lambda i: str(without[kinds[i]]))
+    return rows.without(np.isin(kinds, [*without]), lambda i: str(without[kinds[i]])), models
 
 
 def _without_loss(rows: BlockRows) -> tuple[str, ...]:

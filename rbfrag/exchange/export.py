@@ -5,26 +5,28 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import Any, NamedTuple, TypedDict, Unpack
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_fragility import block_functions
+from rbfrag.exchange.block_fragility import BlockFunctions, block_functions
 from rbfrag.exchange.block_rows import Blocks
-from rbfrag.exchange.fragility_function import FragilityFunction
-from rbfrag.exchange.map_answer import given_blocks
+from rbfrag.exchange.given_blocks import given_blocks, read_by_models
 from rbfrag.exchange.nrml import nrml_text
 from rbfrag.exchange.pelicun_table import metadata_text, pelicun_text, without_dashes
 from rbfrag.exchange.share_fragility import share_functions
 from rbfrag.files import output_path, write_text
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.methods import TOPPLING_BLOCK
-from rbfrag.fragility.model import Model
 from rbfrag.frames import Tabular
 from rbfrag.hazards.curve import ANSWERED
 from rbfrag.hazards.measure_type import openquake_type
-from rbfrag.solver.kinds import facts_of
+from rbfrag.question.fields import AnsweringFields, V
+from rbfrag.question.keywords import BlockKeywords, parts_of
+from rbfrag.question.words import numbers_in_words
+from rbfrag.solver.kinds import KindFacts, facts_of
 
 EACH_NEEDED = "an exposure model needs a function of each"
 """Why a table with a row that cannot be used is refused."""
@@ -62,90 +64,74 @@ class ExportAnswer(Tabular):
         return {**known, "warnings": list(self.warnings)}
 
 
+class _Functions(TypedDict, total=False):
+    """What functions are of, and how they are given."""
+
+    blocks: Blocks | None
+    imt: str
+    one_class: bool
+    name: str
+    levels: int
+
+
+class FunctionKeywords(BlockKeywords[V], AnsweringFields, _Functions, total=False):
+    """What functions are of, which blocks they are of, and by which model."""
+
+
 def nrml(
     out: str | PathLike[str],
-    p2: ArrayLike | None = None,
-    kr: ArrayLike | None = None,
-    *,
-    blocks: Blocks | None = None,
-    kind: str | None = None,
-    restitution: ArrayLike | None = None,
-    imt: str = "PGV",
+    *numbers: ArrayLike | None,
     shares: Sequence[float] | None = None,
-    one_class: bool = False,
-    name: str = "block",
-    levels: int = 80,
-    model: Model | None = None,
-    db: str | PathLike[str] | None = None,
+    **question: Unpack[FunctionKeywords[ArrayLike | None]],
 ) -> ExportAnswer:
     """Write an OpenQuake fragility model, NRML 0.5; PGV is in cm/s there.
 
+    The keywords:
+
+    - the fields of blocks, each a number or of shape (m,), with ``kind``, as
+      :func:`rbfrag.predict` has them; all blocks are of one kind.
+    - ``blocks``: instead of these a table of blocks: a file, or columns by name.
+    - ``imt``: measure of the functions: PGV (the default), PGA, or SA(T) at 0.3, 1, 2 or 3 s.
+    - ``one_class``: one function, the mean over the blocks.
+    - ``name``: identifier of a single block, or of the class; ``block`` if not given.
+    - ``levels``: number of levels of a function that is not lognormal; 80 if not given.
+    - ``model``, ``db``: as in :func:`rbfrag.predict`.
+
     Args:
         out: file to write (.xml).
-        p2: frequency parameters p² [1/s²], scalar or shape (m,), with `kr`.
-        kr: toppling yield acceleration coefficients.
-        blocks: instead of these a table of blocks: a file, or columns by name.
-        kind: how they stand: ``toppling`` (backed by a slope, the default) or ``rocking``.
-        restitution: of blocks that rock: speed after an impact over that before it; None for what
-            angular momentum leaves.
-        imt: measure of the functions: PGV, PGA, or SA(T) at 0.3, 1, 2 or 3 s.
+        numbers: p2 [1/s²] and kr of the blocks, if they are not given by name.
         shares: shares of the blocks [%]: a limit state each, that at least so many fail; None for
             a function of each block.
-        one_class: one function, the mean over the blocks.
-        name: identifier of a single block, or of the class.
-        levels: number of levels of a function that is not lognormal.
-        model: as in :func:`rbfrag.predict`.
-        db: as in :func:`rbfrag.predict`.
+        question: the keywords above.
 
     Raises:
         InputError: a measure, block or file that cannot be used.
+        UnknownFieldError: a keyword that is none.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
     target = output_path(out, (".xml",), "NRML file")
-    rows = given_blocks(
-        {"p2": p2, "kr": kr, "restitution": restitution}, blocks, kind, only=TOPPLING_BLOCK.names
-    )
-    kind = str(rows.blocks["kind"][0])
-    table, measure = rows.whole(EACH_NEEDED), _measure(imt)
-    single = one_class or (blocks is None and len(table["kr"]) == 1)
-    notes: Sequence[str] = ()
-    if shares is not None:
-        if _stands_free(kind):
-            raise InputError(
-                "shares are of a rock mass, whose blocks are backed by the rock behind them: leave "
-                "shares or the kind out"
-            )
-        functions, about, notes = share_functions(
-            name, table["p2_1_s2"], table["kr"], measure, list(shares), levels=levels, model=model,
-            db=db,
-        )  # fmt: skip
+    asked = _Asked.of(numbers, question)
+    if shares is None:
+        found = asked.functions()
+    elif asked.facts.free_standing or {*TOPPLING_BLOCK.names} - {*asked.numbers}:
+        raise InputError(
+            "shares are of a rock mass, whose blocks are backed by the rock behind them: leave "
+            "shares or the kind out"
+        )
     else:
-        functions, about = block_functions(
-            _names(table, name, single), table["p2_1_s2"], table["kr"], measure, kind=kind,
-            restitution=table.get("restitution"), one_class=one_class, levels=levels, model=model,
-            db=db,
-        )  # fmt: skip
-    what = f"{'Overturning of free-standing' if _stands_free(kind) else 'Toppling of'} rock blocks"
-    what += f", model {about[0]} ({about[2]} on {about[1]})"
-    write_text(nrml_text(functions, description=what), target)
-    return _answer(str(target), None, functions, about, notes)
+        p2, kr = (asked.numbers[name] for name in TOPPLING_BLOCK.names)
+        found = share_functions(asked.names[0], p2, kr, asked.measure, list(shares), **asked.how)
+    model, term, method = found.about
+    text = f"{asked.failing} rock blocks, model {model} ({method} on {term})"
+    write_text(nrml_text(found.functions, description=text), target)
+    return _answer(str(target), None, found, asked.remarks)
 
 
 def pelicun(
     out: str | PathLike[str],
-    p2: ArrayLike | None = None,
-    kr: ArrayLike | None = None,
-    *,
-    blocks: Blocks | None = None,
-    kind: str | None = None,
-    restitution: ArrayLike | None = None,
-    imt: str = "PGV",
-    one_class: bool = False,
-    name: str = "block",
-    levels: int = 80,
-    model: Model | None = None,
-    db: str | PathLike[str] | None = None,
+    *numbers: ArrayLike | None,
+    **question: Unpack[FunctionKeywords[ArrayLike | None]],
 ) -> ExportAnswer:
     """Write a fragility table of pelicun and SimCenter, and its description beside it.
 
@@ -153,56 +139,93 @@ def pelicun(
 
     Args:
         out: file to write (.csv).
-        p2: as for :func:`nrml`, like all that follow.
-        kr: see there.
-        blocks: see there.
-        kind: see there.
-        restitution: see there.
-        imt: see there.
-        one_class: see there.
-        name: see there.
-        levels: see there.
-        model: see there.
-        db: see there.
+        numbers: as for :func:`nrml`.
+        question: the keywords of :func:`nrml`.
 
     Raises:
         InputError: a measure, block or file that cannot be used.
+        UnknownFieldError: a keyword that is none.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
     target = output_path(out, (".csv",), "fragility table")
     beside = output_path(str(target.with_suffix(".json")), (".json",), "description")
-    rows = given_blocks(
-        {"p2": p2, "kr": kr, "restitution": restitution}, blocks, kind, only=TOPPLING_BLOCK.names
-    )
-    kind = str(rows.blocks["kind"][0])
-    table, measure = rows.whole(EACH_NEEDED), _measure(imt)
-    single = one_class or (blocks is None and len(table["kr"]) == 1)
-    functions, about = block_functions(
-        _names(table, name, single), table["p2_1_s2"], table["kr"], measure, kind=kind,
-        restitution=table.get("restitution"), one_class=one_class, levels=levels, model=model,
-        db=db,
-    )  # fmt: skip
-    count, free = len(table["kr"]), _stands_free(kind)
-    mean = "free-standing blocks" if free else "toppling blocks of a rock mass, backed by a slope"
-    stands = "that stands free" if free else "backed by a slope"
-    descriptions = (
-        [f"Mean over {count} stable {mean}."]
-        if one_class
-        else [
-            f"Rock block {stands}, p² = {a:.6g} 1/s², k_r = {b:.6g}."
-            for a, b in zip(table["p2_1_s2"].tolist(), table["kr"].tolist(), strict=True)
-        ]
-    )
-    functions, renamed = without_dashes(functions)
+    asked = _Asked.of(numbers, question)
+    found = asked.functions()
+    functions, renamed = without_dashes(found.functions)
     content = pelicun_text(functions)
-    write_text(metadata_text(functions, descriptions, about), beside)
+    write_text(metadata_text(functions, asked.descriptions(), found.about), beside)
     write_text(content, target)
-    return _answer(str(target), str(beside), functions, about, renamed)
+    return _answer(str(target), str(beside), found, (*asked.remarks, *renamed))
 
 
-def _stands_free(kind: str | None) -> bool:
-    return kind is not None and facts_of(kind).free_standing
+_FAILING = {"topple": "Toppling of", "slide": "Sliding of", "slump": "Slumping of"}
+
+
+class _Asked(NamedTuple):
+    """Blocks of one kind, and the functions that are asked for.
+
+    Args:
+        facts: their kind.
+        numbers: what a model reads of them, by field, shape (m,) each.
+        names: identifiers of the functions.
+        measure: what they run over, as `predict` calls it.
+        one_class: whether one function stands for all.
+        how: number of levels, model and database.
+        remarks: what is to be said of the blocks.
+    """
+
+    facts: KindFacts
+    numbers: dict[str, NDArray[np.float64]]
+    names: list[str]
+    measure: str
+    one_class: bool
+    how: dict[str, Any]
+    remarks: tuple[str, ...]
+
+    @classmethod
+    def of(cls, numbers: Sequence[Any], question: Mapping[str, Any]) -> _Asked:
+        given, answering, asked = parts_of(
+            numbers, question, BlockKeywords, AnsweringFields, _Functions
+        )
+        blocks, one_class = asked.get("blocks"), asked.get("one_class", False)
+        rows = given_blocks(given, blocks)
+        table, measure = rows.whole(EACH_NEEDED), _measure(asked.get("imt", "PGV"))
+        kind, read, medians = read_by_models(rows)
+        names = [str(each) for each in table["block_id"]]
+        if one_class or (blocks is None and len(names) == 1):
+            names = [asked.get("name", "block")]
+        how = {"levels": asked.get("levels", 80), **answering}
+        remarks = (*rows.remarks, *medians)
+        return cls(facts_of(kind), read, names, measure, one_class, how, remarks)
+
+    def functions(self) -> BlockFunctions:
+        """Return the function of each block, or their mean."""
+        of = self.names, self.numbers, self.measure, self.facts.kind
+        return block_functions(*of, one_class=self.one_class, **self.how)
+
+    @property
+    def failing(self) -> str:
+        """How the blocks fail, before what they are."""
+        if self.facts.free_standing:
+            return "Overturning of free-standing"
+        return _FAILING.get(self.facts.mode or "", "Failure of")
+
+    def descriptions(self) -> list[str]:
+        """Return a sentence on each block, or on all of a class."""
+        free, topples = self.facts.free_standing, self.facts.mode == "topple"
+        if self.one_class:
+            size = next(iter(self.numbers.values())).size
+            backed = "toppling blocks of a rock mass, backed by a slope"
+            mean = "free-standing blocks" if free else backed if topples else "blocks of a slope"
+            return [f"Mean over {size} stable {mean}."]
+        stands = "that stands free" if free else "backed by a slope" if topples else "on a slope"
+        rows = zip(*(values.tolist() for values in self.numbers.values()), strict=True)
+        return [
+            f"Rock block {stands}, {numbers_in_words(known, 6)}."
+            for row in rows
+            for known in [{n: v for n, v in zip(self.numbers, row, strict=True) if v == v}]
+        ]
 
 
 def _measure(imt: str) -> str:
@@ -214,26 +237,12 @@ def _measure(imt: str) -> str:
     return measure
 
 
-def _names(table: Mapping[str, Any], name: str, single: bool) -> list[str]:
-    return [name] if single else [str(each) for each in table["block_id"]]
-
-
 def _answer(
-    file: str,
-    description: str | None,
-    functions: Sequence[FragilityFunction],
-    about: tuple[str, ...],
-    warnings: Sequence[str],
+    file: str, description: str | None, found: BlockFunctions, warnings: Sequence[str]
 ) -> ExportAnswer:
-    errors = [function.grid_error for function in functions if function.grid_error is not None]
+    errors = [each.grid_error for each in found.functions if each.grid_error is not None]
     return ExportAnswer(
-        file=file,
-        description=description,
-        functions=len(functions),
-        lognormal=sum(function.is_lognormal for function in functions),
-        largest_grid_error=max(errors, default=0.0),
-        model=about[0],
-        term=about[1],
-        method=about[2],
-        warnings=tuple(warnings),
-    )
+        file, description, len(found.functions),
+        sum(each.is_lognormal for each in found.functions), max(errors, default=0.0), *found.about,
+        warnings=(*warnings, *found.warnings),
+    )  # fmt: skip

@@ -88,12 +88,7 @@ def discrete_function(
     if (np.diff(probability) < 0.0).any():
         raise InputError(f"{where}: the probability falls with rising level")
     return FragilityFunction(
-        name=name,
-        limit_state=limit_state,
-        kind=kind,
-        levels=levels,
-        probability=probability,
-        no_damage_limit=no_damage_limit,
+        name, limit_state, kind, None, None, levels, probability, no_damage_limit
     )
 
 
@@ -110,11 +105,4 @@ def lognormal_function(
     for value, what in ((median, "median"), (beta, "standard deviation of the logarithm")):
         if not (np.isfinite(value) and value > 0.0):
             raise InputError(f"{where}: the {what} is {value:g}: it must be above zero")
-    return FragilityFunction(
-        name=name,
-        limit_state=limit_state,
-        kind=kind,
-        median=median,
-        beta=beta,
-        no_damage_limit=no_damage_limit,
-    )
+    return FragilityFunction(name, limit_state, kind, median, beta, no_damage_limit=no_damage_limit)

@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rbfrag.errors import InputError
-from rbfrag.exchange.block_rows import PLACE, BlockRows, Blocks, read_blocks
+from rbfrag.exchange.block_rows import PLACE, Blocks
+from rbfrag.exchange.given_blocks import given_blocks, read_by_models
 from rbfrag.exchange.shakemap import ShakeMapEvent, at_places, read_shakemap
-from rbfrag.fragility.methods import TOPPLING_BLOCK
-from rbfrag.fragility.model import Model
 from rbfrag.fragility.unusable import FROM_MEAN, FROM_SUMS
 from rbfrag.frames import Tabular
 from rbfrag.hazards.conversions import component as component_named
 from rbfrag.hazards.map_failures import MapFailures, Places, map_failures
+from rbfrag.hazards.shaking import rise_in_words
 from rbfrag.hazards.site_probability import site_probability
-from rbfrag.question.blocks import (
-    has_shape,
-    kinds_by_numbers,
-    numbers_in,
-    taken_as_medians,
-)
-from rbfrag.question.fields import column_of
+from rbfrag.question.blocks import numbers_in
+from rbfrag.question.fields import AnsweringFields, V
+from rbfrag.question.keywords import BlockKeywords, parts_of
 from rbfrag.question.shaking import doubts_about
 
 NOTABLE = 1e-4
@@ -76,22 +71,20 @@ class ShakeMapAnswer(Tabular):
         }
 
 
+class MapKeywords(BlockKeywords[V], AnsweringFields, total=False):
+    """What blocks are asked about across a map, and by which model."""
+
+
 def shakemap(
     grid: str | PathLike[str],
-    p2: ArrayLike | None = None,
-    kr: ArrayLike | None = None,
-    *,
+    *numbers: ArrayLike | None,
     blocks: Blocks | None = None,
-    kind: str | None = None,
     uncertainty: str | PathLike[str] | None = None,
     component: str = "larger",
     allow_partial: bool = False,
     draws: int | None = None,
     seed: int = 0,
-    model: Model | None = None,
-    level: float = 0.95,
-    db: str | PathLike[str] | None = None,
-    **block: ArrayLike | None,
+    **question: Unpack[MapKeywords[ArrayLike | None]],
 ) -> ShakeMapAnswer:
     """Return the probability that blocks fail across a ShakeMap.
 
@@ -101,30 +94,27 @@ def shakemap(
 
     Args:
         grid: file of a ShakeMap, version 3 or 4.
-        p2: frequency parameters p² [1/s²], scalar or shape (m,), with `kr`.
-        kr: toppling yield acceleration coefficients.
-        blocks: instead of these a table of blocks: a file, or columns by name, such as a pandas
+        numbers: p2 [1/s²] and kr of the blocks, if they are not given by name.
+        blocks: instead of fields a table of blocks: a file, or columns by name, such as a pandas
             table.
-        kind: how the blocks fail; None for what they are given by.
         uncertainty: uncertainty.xml of the same map: the answer is integrated over it.
         component: what the map's measures mean: larger, rotd50, geometric_mean or single.
         allow_partial: read a grid that has not its declared size.
         draws: draws of shaking and blocks for the number of failures; None for 100, more where
             blocks are few.
         seed: of these draws.
-        model: as in :func:`rbfrag.predict`.
-        level: confidence level of the interval.
-        db: as in :func:`rbfrag.predict`.
-        block: instead of `p2` and `kr`, or beside them, fields of blocks as :func:`rbfrag.predict`
-            reads them, scalars or of shape (m,).
+        question: fields of the blocks, each a number or of shape (m,), with ``kind``, and
+            ``model``, ``level`` and ``db``, as :func:`rbfrag.predict` has them.
 
     Raises:
         InputError: a file that cannot be used, blocks given in no way or in two, none of them on
             the map, or a value that cannot be used.
+        UnknownFieldError: a keyword that is none.
         UnknownModelError: no model of that name.
         DatabaseError: the database cannot be read.
     """
-    rows = given_blocks({"p2": p2, "kr": kr, **block}, blocks, kind, reads=(*PLACE, "weight"))
+    given, answering = parts_of(numbers, question, BlockKeywords, AnsweringFields)
+    rows = given_blocks(given, blocks, reads=(*PLACE, "weight"))
     meaning = component_named(component)
     shaken = read_shakemap(grid, uncertainty=uncertainty, allow_partial=allow_partial)
     own = "lon" in rows.blocks
@@ -147,30 +137,29 @@ def shakemap(
         if meaning.name != "single"
         else "the map is taken to be of one component"
     )
-    kind = str(table["kind"][0])
-    stated, medians = taken_as_medians(numbers_in(table))
+    kind, read, medians = read_by_models(rows)
     warnings = [*medians, *warnings]
-    numbers = {name: values for name, values in stated.items() if not np.isnan(values).all()}
     weight = table.get("weight")
     answer = site_probability(
         measures, component=meaning, weight=None if own else weight, own_block=own, std_ln=std_ln,
-        kind=kind, model=model, level=level, db=db, **numbers,
+        kind=kind, **read, **answering,
     )  # fmt: skip
     shaking, chosen = answer.shaking, answer.shaking.model
     if chosen.term.advice:
         warnings.append(chosen.term.advice)
+    first = shaking.median[:, 0][shaking.median[:, 0] > 0.0]
+    if first.size:
+        warnings += rise_in_words(chosen, read, float(first.min()), float(first.max()))
     if "pgv_m_s" not in measures:
-        read = " and ".join(name.partition("_")[0].upper() for name in shaking.names)
-        warnings.append(f"the map has no PGV, which tells most: a model of {read} answers")
+        names = " and ".join(name.partition("_")[0].upper() for name in shaking.names)
+        warnings.append(f"the map has no PGV, which tells most: a model of {names} answers")
     if not shaking.integrated:
         warnings.append(
             f"the map's uncertainty of {' and '.join(shaking.names)} is not given: its values "
             "are taken as certain; name uncertainty.xml with --uncertainty"
         )
-    names = table.get("site_id") if own else None
-    failures = map_failures(
-        answer, numbers, Places.of(lon, lat, names), weight=weight, draws=draws, seed=seed
-    )  # fmt: skip
+    places = Places.of(lon, lat, table.get("site_id") if own else None)
+    failures = map_failures(answer, read, places, weight=weight, draws=draws, seed=seed)
     warnings += failures.warnings
     outside = int((~answer.in_domain & (answer.probability > NOTABLE)).sum())
     if outside:
@@ -210,7 +199,7 @@ def shakemap(
             "model": chosen.name,
             "term": chosen.term.name,
             "method": chosen.row.method,
-            "level": level,
+            "level": answer.level,
             "measures": " ".join(shaking.names),
             "uncertainty_integrated": bool(shaking.integrated),
             **failures.as_dict(),
@@ -222,42 +211,6 @@ def shakemap(
         epicentre=None if event.lon is None or event.lat is None else (event.lon, event.lat),
         shape=(shaken.rows, shaken.columns) if shaken.is_whole and not own else None,
     )
-
-
-def given_blocks(
-    given: Mapping[str, ArrayLike | None],
-    blocks: Blocks | None,
-    kind: str | None = None,
-    *,
-    reads: Collection[str] = (),
-    only: Collection[str] = (),
-) -> BlockRows:
-    """Return the blocks of a question; arguments as for :func:`shakemap` and `read_blocks`.
-
-    Args:
-        given: fields of the blocks, None for what is not stated.
-        blocks: instead of these, a table.
-        kind: how they fail.
-        reads: as for `read_blocks`, like `only`.
-        only: see there.
-
-    Raises:
-        InputError: blocks given in no way or in two, or none that waits for an earthquake.
-    """
-    known = {name: value for name, value in given.items() if value is not None}
-    if blocks is not None:
-        if known:
-            raise InputError("blocks says all of the blocks: leave p2, kr and restitution out")
-        return read_blocks(blocks, kind, reads=reads, one_kind=True, only=only)
-    if not has_shape(known) and not kinds_by_numbers(known):
-        missing = next((name for name in TOPPLING_BLOCK.names if name not in known), "p2")
-        raise InputError(f"{missing} is missing: give p2 and kr, or a table of blocks")
-    try:
-        arrays = np.broadcast_arrays(*known.values())
-    except ValueError:
-        raise InputError(f"{', '.join(known)} differ in length") from None
-    columns = {column_of(name): each for name, each in zip(known, arrays, strict=True)}
-    return read_blocks(columns, kind, one_kind=True, only=only)
 
 
 def _name_of(event: ShakeMapEvent) -> str:

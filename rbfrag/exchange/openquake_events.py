@@ -308,18 +308,9 @@ def read_events(
             "sets those of this job?"
         )
     return EventSet(
-        event_id=event_id,
-        realization=realization,
-        year=year,
-        weight=event_weights(realization, weights, duration),
-        site_ids=sites,
-        event=event,
-        site=site,
-        measures=measures,
-        duration=duration,
-        realization_weights=weights,
-        warnings=tuple(remarks),
-    )
+        event_id, realization, year, event_weights(realization, weights, duration),
+        sites, event, site, measures, duration, weights, tuple(remarks),
+    )  # fmt: skip
 
 
 def _refuse_other_jobs(heads: Mapping[str, _Head]) -> None:

@@ -5,20 +5,25 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from os import PathLike
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_fragility import probabilities_over, scanned_levels
-from rbfrag.exchange.fragility_function import FragilityFunction, discrete_function
+from rbfrag.exchange.block_fragility import (
+    BlockFunctions,
+    about_model,
+    probabilities_over,
+    scanned_levels,
+)
+from rbfrag.exchange.fragility_function import discrete_function
 from rbfrag.fragility.joint import Placement
 from rbfrag.fragility.joint_sampling import JointSampler
-from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import Model
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.question.fields import AnsweringFields
+from rbfrag.question.keywords import model_for
 
 FloatArray = NDArray[np.float64]
 
@@ -38,9 +43,8 @@ def share_functions(
     shares: Sequence[float],
     *,
     levels: int = 80,
-    model: Model | None = None,
-    db: str | PathLike[str] | None = None,
-) -> tuple[list[FragilityFunction], tuple[str, ...], list[str]]:
+    **answering: Unpack[AnsweringFields],
+) -> BlockFunctions:
     """Return the probabilities that at least some shares of a rock mass's blocks fail.
 
     The blocks of a rock mass stand at one site and face one way. In each draw of what they have in
@@ -56,17 +60,14 @@ def share_functions(
         measure: as for :func:`~rbfrag.exchange.block_fragility.block_functions`.
         shares: shares of the blocks in percent, rising, above 0 to 100.
         levels: number of levels, common to all limit states.
-        model: as in :func:`rbfrag.predict`; it must know what its blocks share.
-        db: as in :func:`rbfrag.predict`.
-
-    Returns:
-        One function a share, name, term and method of the model, and warnings.
+        answering: model, which must know what its blocks share, and db, as in
+            :func:`rbfrag.predict`.
 
     Raises:
         InputError: shares that make no sense, or a model without an estimate of the dependence.
     """
     _check(shares)
-    chosen = find_model(model, ("p2", "kr", measure), db)
+    chosen = model_for(answering, ("p2", "kr", measure))
     if chosen.dependence is None:
         raise InputError(
             f"model {chosen.name!r} does not know what the blocks of one earthquake share, so how "
@@ -74,7 +75,7 @@ def share_functions(
             "another with --model"
         )
     x = scanned_levels()[::_EVERY]
-    kind, about, parts = probabilities_over(x, p2, kr, measure, levels, chosen, db)
+    kind, parts = probabilities_over(x, {"p2": p2, "kr": kr}, measure, levels, chosen)
     scores = np.concatenate([_scores(part) for part in parts])
     p = np.sqrt(p2)
     blocks = Placement.of(np.log(p), np.log(kr * STANDARD_GRAVITY_M_S2 / p))
@@ -107,7 +108,7 @@ def share_functions(
             f"{few[0]:g} % of {p2.size} blocks is less than one: that limit state is one block; "
             "give the rock mass more realisations"
         )
-    return functions, about, warnings
+    return BlockFunctions(functions, about_model(chosen), tuple(warnings))
 
 
 def _check(shares: Sequence[float]) -> None:

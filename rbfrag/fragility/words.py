@@ -81,11 +81,11 @@ def block_in_words(method: str, given: Mapping[str, Any]) -> tuple[str, ...]:
         else ()
     )
     numbers = " and ".join(
-        f"{_SYMBOLS.get(name, name)} = {value:.3g}{units.get(name, '')}"
+        f"{SYMBOLS.get(name, name)} = {value:.3g}{units.get(name, '')}"
         for name, value in values.items()
     )
     stands = (f"{block.presumes[:1].upper()}{block.presumes[1:]}.",) if block.presumes else ()
     return (f"The block has {numbers}.", *limit, *stands)
 
 
-_SYMBOLS = {"p2": "p²", "ps2": "p_s²", "kr": "k_r", "ky": "k_y", "ks": "k_s"}
+SYMBOLS = {"p2": "p²", "ps2": "p_s²", "kr": "k_r", "ky": "k_y", "ks": "k_s"}

@@ -40,7 +40,8 @@ from rbfrag.hazards.model_blocks import (
 )
 from rbfrag.hazards.shaking import NOTABLE, Shaking, warn_of_ends
 from rbfrag.question.blocks import taken_as_medians
-from rbfrag.question.keywords import LEVEL, BlockKeywords, ModelKeywords, parts_of
+from rbfrag.question.fields import AnsweringFields
+from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
 from rbfrag.solver.kinds import mode_of_kind
 
 FloatArray = NDArray[np.float64]
@@ -223,7 +224,7 @@ def hazard(
         DatabaseError: the database cannot be read.
     """
     given, meaning, answering = parts_of(
-        numbers, question, BlockKeywords, CurveKeywords, ModelKeywords
+        numbers, question, BlockKeywords, CurveKeywords, AnsweringFields
     )
     level = answering.get("level", LEVEL)
     curves = as_curves(curve, **meaning)
@@ -250,6 +251,8 @@ def hazard(
     for of_model in own:
         kinds[of_model.places] = of_model.model.row.kind
     warnings.extend(one.term.advice for one in models if one.term.advice)
+    for of_model in own:
+        warnings.extend(reading.rise_in_words(curves[0], of_model.model, of_model.numbers))
     blocks = _Site.of(own, reading, level, curves, counts, one_class=one_class)
     each = [blocks.under(one, years) for one in curves]
     parts = (

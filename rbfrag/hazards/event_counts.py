@@ -190,17 +190,9 @@ def count_part(part: Part) -> PartCounts:
         )
     scenario = drawn is not None and events.is_scenario
     return PartCounts(
-        number=part.number,
-        failures=failures,
-        loss=loss,
-        loss_variance=variance,
-        any_fails=any_fails,
-        bounds=bounds,
-        blocks=blocks,
-        counts=counts,
-        losses=losses,
+        part.number, failures, loss, variance, any_fails, bounds, blocks, counts, losses,
         quantiles=drawn if scenario and drawn is not None else np.empty(0),
-    )
+    )  # fmt: skip
 
 
 def _shaken(part: Part) -> Iterator[tuple[int, Shaken]]:

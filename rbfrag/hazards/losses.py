@@ -27,7 +27,7 @@ from rbfrag.hazards.event_counts import (
 from rbfrag.hazards.event_set import EventSet
 from rbfrag.hazards.joint_rate import NO_LAW
 from rbfrag.hazards.portfolio import Portfolio
-from rbfrag.hazards.shaking import NOTABLE
+from rbfrag.hazards.shaking import NOTABLE, rise_in_words
 from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT
 
 FloatArray = NDArray[np.float64]
@@ -451,12 +451,7 @@ def _answer(
     )
     any_fails = whole("any_fails", len(laws))
     return LossAnswer(
-        events=events,
-        portfolio=portfolio,
-        samples=samples,
-        seed=seed,
-        level=level,
-        laws=laws,
+        events, portfolio, samples, seed, level, laws,
         failures=whole("failures"),
         loss=whole("loss"),
         loss_variance=whole("loss_variance", len(laws)),
@@ -467,7 +462,7 @@ def _answer(
         loss_exceedance=loss_exceedance,
         quantiles=_scenario_quantiles(events, groups, order, len(laws), samples),
         warnings=_warnings(events, portfolio, laws, blocks, any_fails, samples),
-    )
+    )  # fmt: skip
 
 
 def _curve(
@@ -629,10 +624,26 @@ def _warnings(
                 f"{int(rare.sum())} of {portfolio.size} blocks fail less than once in the "
                 f"{effective:.6g} years that the events cover: their rates are not resolved"
             )
+    warnings += _rises(events, portfolio)
     weak = _weakest_at_thin_shaking(events, portfolio)
     if weak is not None:
         warnings.append(weak)
     return tuple(warnings)
+
+
+def _rises(events: EventSet, portfolio: Portfolio) -> Iterator[str]:
+    """Yield where P of a model rises again towards weak shaking that the events have."""
+    for number, model in enumerate(portfolio.answering):
+        x = events.measures[model.term.inputs[0]]
+        ends = x[x > 0.0] / portfolio.component.ratio
+        block, own = model.method.block, portfolio.model == number
+        numbers = {
+            n: portfolio.numbers[n][own]
+            for n in (*block.names, *block.options)
+            if n in portfolio.numbers
+        }
+        if ends.size:
+            yield from rise_in_words(model, numbers, float(ends.min()), float(ends.max()))
 
 
 def _weakest_at_thin_shaking(events: EventSet, portfolio: Portfolio) -> str | None:

@@ -23,8 +23,8 @@ from rbfrag.hazards.shaking import Shaking
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.question.answers import block_reasons_of, blocks_of_arrays
 from rbfrag.question.blocks import NUMBERS
-from rbfrag.question.fields import V
-from rbfrag.question.keywords import LEVEL, BlockKeywords, ModelKeywords, model_for
+from rbfrag.question.fields import AnsweringFields, V
+from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for
 from rbfrag.solver.scatter import fraction, lognormal
 
 FloatArray = NDArray[np.float64]
@@ -95,7 +95,7 @@ class BlockTable:
         return np.clip(result, 0.0, 1.0, out=result)
 
 
-class RateKeywords(BlockKeywords[V], CurveKeywords, ModelKeywords, total=False):
+class RateKeywords(BlockKeywords[V], CurveKeywords, AnsweringFields, total=False):
     """What blocks are asked about under hazard curves, and by which model."""
 
 
@@ -114,7 +114,7 @@ class ModelPart(NamedTuple):
 
 
 def parts_by_model(
-    given: Mapping[str, Any], measure: str, answering: ModelKeywords
+    given: Mapping[str, Any], measure: str, answering: AnsweringFields
 ) -> tuple[list[ModelPart], tuple[str, ...], NDArray[np.object_]]:
     """Return blocks by the model that answers for them.
 
@@ -180,7 +180,7 @@ class ModelBlocks:
         *,
         draws: int,
         seed: int,
-        answering: ModelKeywords,
+        answering: AnsweringFields,
     ) -> ModelBlocks:
         """Return the blocks of medians and standard deviations.
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -16,8 +15,7 @@ from rbfrag.db.model_file import ModelRow
 from rbfrag.errors import InputError
 from rbfrag.fragility.dependence import Dependence
 from rbfrag.fragility.joint import UNKNOWN, Placement
-from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import FragilityModel, Model
+from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.uncertain import normal_steps
@@ -80,30 +78,22 @@ class Portfolio:
         cls,
         columns: Mapping[str, NDArray[Any]],
         site_ids: Sequence[str],
-        measures: Sequence[str],
+        models: Mapping[str, FragilityModel],
         component: Component,
-        *,
-        kind: str | None = None,
-        model: Model | None = None,
-        db: str | PathLike[str] | None = None,
     ) -> Portfolio:
         """Return the blocks of a table.
 
         Args:
-            columns: ``block_id`` of each row that can be used and the numbers that its kind reads,
-                such as ``p2_1_s2`` [1/s²] and ``kr``, and, if there are, ``site_id``, ``kind``,
+            columns: ``block_id`` and ``kind`` of each row that can be used and the numbers that its
+                kind reads, such as ``p2_1_s2`` [1/s²] and ``kr``, and, if there are, ``site_id``,
                 ``count`` (like blocks, each with an azimuth of its own), ``weight`` (what a
                 failure counts), ``loss``, ``loss_sigma`` and standard deviations.
             site_ids: names of the sites of the event set.
-            measures: what is known of the shaking, by the names of :func:`rbfrag.predict`.
-            component: what its values mean.
-            kind: kind of failure of rows that state none; None for toppling.
-            model: as in :func:`rbfrag.predict`.
-            db: as in :func:`rbfrag.predict`.
+            models: the models that answer, by the kind of blocks.
+            component: what the values of the shaking mean.
 
         Raises:
-            InputError: no sites of the blocks, more blocks than are answered, or no model that
-                reads the measures.
+            InputError: no sites of the blocks, or more blocks than are answered.
         """
         names = columns["block_id"]
         n = len(names)
@@ -112,11 +102,8 @@ class Portfolio:
             return np.asarray(np.nan_to_num(columns.get(name, np.full(n, missing)), nan=missing))
 
         sites = _site_indices(columns, site_ids)
-        kinds = _kinds(columns, n, kind)
-        chosen = {
-            one: find_model(model, (*names_of, *measures), db, kind=one or None)
-            for one, names_of in _described(columns, kinds).items()
-        }
+        kinds = columns["kind"].tolist()
+        chosen = {one: models[one] for one in dict.fromkeys(kinds)}
         places = {one: i for i, one in enumerate(chosen)}
         count, weight = numbers("count", 1.0), numbers("weight", 1.0)
         if count.sum() > MOST_BLOCKS:
@@ -177,7 +164,7 @@ class Portfolio:
     @cached_property
     def dependence(self) -> Dependence | None:
         """What the failures of one earthquake share; None where that is not known."""
-        one = self._answering[0]
+        one = self.answering[0]
         known = len(self.models) == 1 and one.method.block.size is not None
         return one.dependence if known else None
 
@@ -186,7 +173,7 @@ class Portfolio:
         """What the models take for granted, each text once."""
         texts = [
             text
-            for model in self._answering
+            for model in self.answering
             for text in (
                 model.term.advice,
                 model.method.block.presumes if model.kind == model.method.block.kind else "",
@@ -202,7 +189,7 @@ class Portfolio:
 
     def placement(self, some: NDArray[np.intp]) -> Placement:
         """Return some of the blocks as those of one earthquake, of unknown azimuths."""
-        block = self._answering[0].method.block
+        block = self.answering[0].method.block
         assert block.size is not None
         p = np.sqrt(self.numbers[block.size][some])
         ln_y = np.log(self.numbers[block.strength][some] * STANDARD_GRAVITY_M_S2 / p)
@@ -221,7 +208,8 @@ class Portfolio:
         return np.stack([grid.ravel() for grid in grids], axis=1), weight.ravel()
 
     @cached_property
-    def _answering(self) -> tuple[FragilityModel, ...]:
+    def answering(self) -> tuple[FragilityModel, ...]:
+        """The models, ready to answer."""
         return tuple(FragilityModel.from_row(row) for row in self.models)
 
     def probability(
@@ -244,7 +232,7 @@ class Portfolio:
         factors = np.exp(self.size_sigma[some] * z_p), np.exp(self.strength_sigma[some] * z_k)
         shape = np.broadcast_shapes(*(each.shape for each in (*values.values(), *factors)))
         p, in_domain = np.empty(shape), np.empty(shape, dtype=np.bool_)
-        for number, model in enumerate(self._answering):
+        for number, model in enumerate(self.answering):
             own, block = self.model[some] == number, model.method.block
             if not own.any():
                 continue
@@ -288,19 +276,3 @@ def _site_indices(columns: Mapping[str, Any], site_ids: Sequence[str]) -> IntArr
         )
     index = {name: i for i, name in enumerate(site_ids)}
     return np.array([index[str(name)] for name in columns["site_id"]], dtype=np.int64)
-
-
-def _described(columns: Mapping[str, Any], kinds: Sequence[str]) -> dict[str, list[str]]:
-    """Return the fields that describe the blocks of each kind."""
-    stated = {n: np.asarray(v) for n, v in numbers_in(columns).items() if not n.endswith("_sigma")}
-    of_kind = {kind: np.array([each == kind for each in kinds]) for kind in dict.fromkeys(kinds)}
-    return {
-        kind: [name for name, values in stated.items() if not np.isnan(values[own]).all()]
-        for kind, own in of_kind.items()
-    }
-
-
-def _kinds(columns: Mapping[str, Any], n: int, kind: str | None) -> list[str]:
-    """Return the kind of each row; empty for what a block is given by."""
-    stated = columns.get("kind", [""] * n)
-    return [str(one or "").strip() or (kind or "") for one in stated]

@@ -1,4 +1,4 @@
-"""The probability of toppling at many sites whose shaking is known with uncertainty."""
+"""The probability of failure at many sites whose shaking is known with uncertainty."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
-from os import PathLike
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.fragility.joint import event_ranges
-from rbfrag.fragility.lookup import find_model
-from rbfrag.fragility.model import Model
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.fragility.uncertain import normal_steps
 from rbfrag.hazards.conversions import Component
 from rbfrag.hazards.site_shaking import SiteShaking
+from rbfrag.question.fields import AnsweringFields, V
+from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
 
 FloatArray = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -73,20 +73,18 @@ class SiteProbability:
     each: FloatArray
 
 
+class _Question(BlockKeywords[V], AnsweringFields, total=False):
+    """What is asked of blocks at sites."""
+
+
 def site_probability(
     measures: Mapping[str, FloatArray],
-    p2: FloatArray | None = None,
-    kr: FloatArray | None = None,
-    *,
+    *numbers: FloatArray,
     component: Component,
     weight: FloatArray | None = None,
     own_block: bool = False,
     std_ln: Mapping[str, FloatArray] | None = None,
-    kind: str | None = None,
-    model: Model | None = None,
-    level: float = 0.95,
-    db: str | PathLike[str] | None = None,
-    **others: FloatArray,
+    **question: Unpack[_Question[FloatArray]],
 ) -> SiteProbability:
     """Return probabilities at sites, integrated over what is not known of the shaking.
 
@@ -98,25 +96,22 @@ def site_probability(
     Args:
         measures: what is known of the shaking at the sites, by the names of
             :func:`rbfrag.predict` (pgv_m_s [m/s], pga_g and sa10_g [g], …), each of shape (n,).
-        p2: frequency parameters [1/s²] of the blocks, shape (m,), or (n,) with `own_block`.
-        kr: their toppling yield acceleration coefficients.
+        numbers: p2 [1/s²] and kr of the blocks, shape (m,), or (n,) with `own_block`, if they are
+            not given by name.
         component: what the measures mean.
         weight: weights of the blocks of a class, shape (m,); None for equal ones.
         own_block: every site has its own block; otherwise all blocks stand at every site.
         std_ln: standard deviations of the measures' logarithms by name, shape (n,); where one that
             the model reads is missing all values are taken as certain, but PGA beside PGV alone.
-        kind: as in :func:`rbfrag.predict`.
-        model: as in :func:`rbfrag.predict`.
-        level: confidence level.
-        db: as in :func:`rbfrag.predict`.
-        others: what else their kind reads of them, or instead, shaped as `p2`; NaN of an option for
-            the blocks' own.
+        question: the numbers of blocks that their one kind reads, NaN of an option for the
+            blocks' own, and model, level and db as in :func:`rbfrag.predict`.
     """
-    numbers = {**({} if p2 is None else {"p2": p2}), **({} if kr is None else {"kr": kr}), **others}
+    given, answering = parts_of(numbers, question, BlockKeywords, AnsweringFields)
+    kind, level = given.pop("kind", None), answering.get("level", LEVEL)
     shaking = SiteShaking.of(
-        measures, component, std_ln or {}, find_model(model, (*numbers, *measures), db, kind=kind)
+        measures, component, std_ln or {}, model_for(answering, (*given, *measures), kind)
     )
-    columns = shaking.model.method.block.filled(numbers)
+    columns = shaking.model.method.block.filled(given)
     size = next(iter(columns.values())).size
     chosen, n = shaking.model, shaking.median.shape[0]
     weights = np.full(size, 1.0) if weight is None else weight
@@ -170,18 +165,9 @@ def site_probability(
     if chosen.event_spread is not None:
         event_low, event_high = event_ranges(probability, chosen.event_spread.root**2, level)
     return SiteProbability(
-        probability=probability,
-        ci_low=low,
-        ci_high=high,
-        event_low=event_low,
-        event_high=event_high,
-        in_domain=in_domain,
-        level=level,
-        shaking=shaking,
-        site=site,
-        block=block,
+        probability, low, high, event_low, event_high, in_domain, level, shaking, site, block,
         each=each[0],
-    )
+    )  # fmt: skip
 
 
 def _chunks(places: NDArray[np.intp], size: int) -> list[NDArray[np.intp]]:

@@ -25,7 +25,8 @@ from rbfrag.hazards.model_blocks import ModelBlocks, RateKeywords
 from rbfrag.hazards.shaking import NOTABLE, Shaking
 from rbfrag.hazards.standing import Age, Standing, weights_given_standing
 from rbfrag.hazards.standing_blocks import DEPENDENT, INDEPENDENT, AnyRate, StandingBlocks
-from rbfrag.question.keywords import LEVEL, BlockKeywords, ModelKeywords, parts_of
+from rbfrag.question.fields import AnsweringFields
+from rbfrag.question.keywords import LEVEL, BlockKeywords, parts_of
 
 FloatArray = NDArray[np.float64]
 
@@ -179,7 +180,7 @@ def survival(
         DatabaseError: the database cannot be read.
     """
     given, meaning, answering = parts_of(
-        numbers, question, BlockKeywords, CurveKeywords, ModelKeywords
+        numbers, question, BlockKeywords, CurveKeywords, AnsweringFields
     )
     each = as_curves(curves, **meaning)
     refuse_unlike(each)
@@ -292,8 +293,9 @@ def _warnings(
     for curve in curves:
         yield from curve.warnings
         yield from quantile_warning(curve, "survival")
-    if blocks.of_model is not None:
-        yield from blocks.of_model.warnings
+    if (known := blocks.of_model) is not None:
+        yield from known.warnings
+        yield from known.shaking.rise_in_words(curves[0], known.model, known.medians)
     for rate in rates:
         yield from rate.warnings
     outside = max(rate.outside for rate in rates)

@@ -3,36 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from os import PathLike
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
 from rbfrag.fragility.lookup import find_model
-from rbfrag.question.fields import BlockFields, V
+from rbfrag.question.fields import AnsweringFields, BlockFields, V, WholeFields
 from rbfrag.question.question import unknown_field
 
 if TYPE_CHECKING:
-    from rbfrag.fragility.model import FragilityModel, Model
-    from rbfrag.solver.block.geometry import Block
+    from rbfrag.fragility.model import FragilityModel
 
 LEVEL = 0.95
 """Confidence level where none is asked for."""
 
 
-class BlockKeywords(BlockFields[V], total=False):
-    """What the blocks are, as :func:`rbfrag.predict` has it."""
+class BlockKeywords(BlockFields[V], WholeFields, total=False):
+    """What the blocks are, as :func:`rbfrag.predict` has it; of many, each may state its kind."""
 
-    block: Block | None
-    back_fracture: bool | None
-    kind: str | Sequence[str | None] | None
-
-
-class ModelKeywords(TypedDict, total=False):
-    """Which model answers, and the confidence level, as :func:`rbfrag.predict` has it."""
-
-    model: Model | None
-    level: float
-    db: str | PathLike[str] | None
+    kind: str | Sequence[str | None] | None  # type: ignore[misc]
 
 
 def parts_of(numbers: Sequence[Any], keywords: Mapping[str, Any], *parts: Any) -> list[Any]:
@@ -58,7 +46,7 @@ def parts_of(numbers: Sequence[Any], keywords: Mapping[str, Any], *parts: Any) -
 
 
 def model_for(
-    answering: ModelKeywords, given: Sequence[str], kind: str | None = None
+    answering: AnsweringFields, given: Sequence[str], kind: str | None = None
 ) -> FragilityModel:
     """Return the model that answers for what is given; see :func:`find_model`.
 

@@ -25,7 +25,7 @@ LENGTHS = {"l_e": 1.0, "l_v": 1.0, "l_o": 1.0, "l_y": 0.5}
 
 def of(model: object, p2: object, kr: object, shares: list[float]) -> list[FragilityFunction]:
     return share_functions("m", np.asarray(p2, float), np.asarray(kr, float), "pgv_m_s", shares,
-                           levels=400, model=model)[0]  # type: ignore[arg-type]  # fmt: skip
+                           levels=400, model=model).functions  # type: ignore[arg-type]  # fmt: skip
 
 
 def test_shares_add_up_to_the_mean(model: FragilityModel) -> None:
@@ -81,7 +81,7 @@ def test_without_the_dependence_nothing_is_known() -> None:
 
 
 def test_a_share_of_less_than_one_block_is_said(model: FragilityModel) -> None:
-    _, _, warnings = share_functions(
+    warnings = share_functions(
         "m", np.full(30, 3.0), np.full(30, 0.1), "pgv_m_s", [1.0], model=model
-    )
+    ).warnings
     assert "1 % of 30 blocks is less than one" in warnings[-1]

@@ -9,7 +9,7 @@ import typer
 
 from rbfrag.cli.output import print_json, print_pairs, print_warnings
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import BlocksOptions, StandingOptions
+from rbfrag.cli.parameters.block import BlocksOptions, FailureOptions
 from rbfrag.cli.parameters.stack import command_group, option, stacked
 
 if TYPE_CHECKING:
@@ -33,24 +33,16 @@ class FunctionOptions(BlocksOptions):
     model: options.Model = None
     db: options.Db = None
 
-    def keywords(self, standing: StandingOptions) -> tuple[dict[str, Any], tuple[str, ...]]:
+    def keywords(self, standing: FailureOptions) -> tuple[dict[str, Any], tuple[str, ...]]:
         """Return the keywords of `rbfrag.export`, and what is to be said of the blocks."""
-        from rbfrag.fragility.methods import TOPPLING_BLOCK
-
-        given = self.given_blocks(standing, only=TOPPLING_BLOCK.names, one_kind=True)
+        given = self.given_blocks(standing, one_kind=True)
+        of_many = given.is_class or given.rows is not None
         keywords = {
+            **({"blocks": given.question} if of_many else given.numbers),
             "one_class": given.is_class, "imt": self.imt, "name": self.name, "levels": self.levels,
             "model": self.model, "db": self.db, "kind": str(given.columns["kind"][0]),
         }  # fmt: skip
-        if given.rows is None and not given.is_class:
-            named = {"p2": "p2_1_s2", "kr": "kr", "restitution": "restitution"}
-            columns = {
-                key: given.columns[name] for key, name in named.items() if name in given.columns
-            }
-            return keywords | columns, given.remarks
-        keywords["blocks"] = given.question
-        of_columns = () if given.rows is None else given.rows.remarks
-        return keywords, (*given.remarks, *of_columns)
+        return keywords, given.remarks
 
 
 @app.command("nrml", epilog="Example:  rbfrag export nrml --height 2.4 --width 0.5 --out block.xml")
@@ -58,7 +50,7 @@ class FunctionOptions(BlocksOptions):
 def nrml(
     out: Out,
     blocks: FunctionOptions,
-    standing: StandingOptions,
+    standing: FailureOptions,
     shares: str | None = option(
         "Shares of the blocks of a rock mass [%]: a limit state each, that at least so many fail. "
         "Example: 1,10,50.",
@@ -79,7 +71,7 @@ def nrml(
 )
 @stacked
 def pelicun(
-    out: Out, blocks: FunctionOptions, standing: StandingOptions, json: options.Json = False
+    out: Out, blocks: FunctionOptions, standing: FailureOptions, json: options.Json = False
 ) -> None:
     """Write a fragility table of pelicun and SimCenter (.csv), and its description (.json).
 
