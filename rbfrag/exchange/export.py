@@ -111,21 +111,23 @@ def nrml(
         DatabaseError: the database cannot be read.
     """
     target = output_path(out, (".xml",), "NRML file")
-    asked = _Asked.of(numbers, question)
+    request = _Request.of(numbers, question)
     if shares is None:
-        found = asked.functions()
-    elif asked.facts.free_standing or {*TOPPLING_BLOCK.names} - {*asked.numbers}:
+        result = request.functions()
+    elif request.facts.free_standing or {*TOPPLING_BLOCK.names} - {*request.numbers}:
         raise InputError(
             "shares are of a rock mass, whose blocks are backed by the rock behind them: leave "
             "shares or the kind out"
         )
     else:
-        p2, kr = (asked.numbers[name] for name in TOPPLING_BLOCK.names)
-        found = share_functions(asked.names[0], p2, kr, asked.measure, list(shares), **asked.how)
-    model, term, method = found.about
-    text = f"{asked.failing} rock blocks, model {model} ({method} on {term})"
-    write_text(nrml_text(found.functions, description=text), target)
-    return _answer(str(target), None, found, asked.remarks)
+        p2, kr = (request.numbers[name] for name in TOPPLING_BLOCK.names)
+        result = share_functions(
+            request.names[0], p2, kr, request.measure, list(shares), **request.how
+        )
+    model, term, method = result.about
+    text = f"{request.failing} rock blocks, model {model} ({method} on {term})"
+    write_text(nrml_text(result.functions, description=text), target)
+    return _answer(str(target), None, result, request.remarks)
 
 
 def pelicun(
@@ -150,19 +152,19 @@ def pelicun(
     """
     target = output_path(out, (".csv",), "fragility table")
     beside = output_path(str(target.with_suffix(".json")), (".json",), "description")
-    asked = _Asked.of(numbers, question)
-    found = asked.functions()
-    functions, renamed = without_dashes(found.functions)
+    request = _Request.of(numbers, question)
+    result = request.functions()
+    functions, renamed = without_dashes(result.functions)
     content = pelicun_text(functions)
-    write_text(metadata_text(functions, asked.descriptions(), found.about), beside)
+    write_text(metadata_text(functions, request.descriptions(), result.about), beside)
     write_text(content, target)
-    return _answer(str(target), str(beside), found, (*asked.remarks, *renamed))
+    return _answer(str(target), str(beside), result, (*request.remarks, *renamed))
 
 
 _FAILING = {"topple": "Toppling of", "slide": "Sliding of", "slump": "Slumping of"}
 
 
-class _Asked(NamedTuple):
+class _Request(NamedTuple):
     """Blocks of one kind, and the functions that are asked for.
 
     Args:
@@ -184,18 +186,18 @@ class _Asked(NamedTuple):
     remarks: tuple[str, ...]
 
     @classmethod
-    def of(cls, numbers: Sequence[Any], question: Mapping[str, Any]) -> _Asked:
-        given, answering, asked = parts_of(
+    def of(cls, numbers: Sequence[Any], question: Mapping[str, Any]) -> _Request:
+        given, answering, request = parts_of(
             numbers, question, BlockKeywords, AnsweringFields, _Functions
         )
-        blocks, one_class = asked.get("blocks"), asked.get("one_class", False)
+        blocks, one_class = request.get("blocks"), request.get("one_class", False)
         rows = given_blocks(given, blocks)
-        table, measure = rows.whole(EACH_NEEDED), _measure(asked.get("imt", "PGV"))
+        table, measure = rows.whole(EACH_NEEDED), _measure(request.get("imt", "PGV"))
         kind, read, medians = read_by_models(rows)
         names = [str(each) for each in table["block_id"]]
         if one_class or (blocks is None and len(names) == 1):
-            names = [asked.get("name", "block")]
-        how = {"levels": asked.get("levels", 80), **answering}
+            names = [request.get("name", "block")]
+        how = {"levels": request.get("levels", 80), **answering}
         remarks = (*rows.remarks, *medians)
         return cls(facts_of(kind), read, names, measure, one_class, how, remarks)
 
@@ -238,11 +240,12 @@ def _measure(imt: str) -> str:
 
 
 def _answer(
-    file: str, description: str | None, found: BlockFunctions, warnings: Sequence[str]
+    file: str, description: str | None, result: BlockFunctions, warnings: Sequence[str]
 ) -> ExportAnswer:
-    errors = [each.grid_error for each in found.functions if each.grid_error is not None]
+    errors = [each.grid_error for each in result.functions if each.grid_error is not None]
+    lognormal = sum(each.is_lognormal for each in result.functions)
     return ExportAnswer(
-        file, description, len(found.functions),
-        sum(each.is_lognormal for each in found.functions), max(errors, default=0.0), *found.about,
-        warnings=(*warnings, *found.warnings),
+        file, description, len(result.functions), lognormal, max(errors, default=0.0),
+        *result.about,
+        warnings=(*warnings, *result.warnings),
     )  # fmt: skip

@@ -51,10 +51,10 @@ def given_blocks(
         missing = next((name for name in TOPPLING_BLOCK.names if name not in known), "p2")
         raise InputError(f"{missing} is missing: give p2 and kr, or a table of blocks")
     if {"block", "back_fracture"} & {*known}:
-        found = one_block(known, kind)
-        (group,) = found.groups
+        described = one_block(known, kind)
+        (group,) = described.groups
         rows = given_blocks({**group.numbers, "kind": group.kind}, None, reads=reads)
-        return replace(rows, remarks=found.remarks)
+        return replace(rows, remarks=described.remarks)
     blocks_of_arrays(given)  # refuses what columns of a table may state
     try:
         arrays = np.broadcast_arrays(*map(np.atleast_1d, known.values()))
