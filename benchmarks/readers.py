@@ -19,9 +19,8 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import reference_file
 from rbfrag.db.model_file import read_models
 from rbfrag.db.models import save_model
-from rbfrag.exchange.batch import predict_table
 from rbfrag.exchange.block_draws import read_draws
-from rbfrag.exchange.block_rows import waiting_blocks
+from rbfrag.exchange.block_rows import read_blocks
 from rbfrag.exchange.block_table import write_block_table
 from rbfrag.exchange.fragility_function import (
     FragilityFunction,
@@ -33,6 +32,7 @@ from rbfrag.exchange.nrml import nrml_text, read_nrml
 from rbfrag.exchange.openquake_events import FILES, JobFiles, read_events
 from rbfrag.exchange.pelicun_table import pelicun_text, read_pelicun
 from rbfrag.exchange.shakemap import read_shakemap
+from rbfrag.exchange.table_answers import predict_table
 from rbfrag.hazards.branch_weights import realization_weights
 from rbfrag.hazards.curve import hazard_curve
 from rbfrag.hazards.curve_file import read_hazard_curves
@@ -248,10 +248,10 @@ READERS: tuple[Reader, ...] = (
     Reader("pelicun", ".csv", lambda: (pelicun_text(_functions()).encode(),), read_pelicun),
     Reader("ShakeMap", ".xml", lambda: SHAKEMAP, read_shakemap),
     Reader("ShakeMap uncertainty", ".xml", lambda: UNCERTAINTY, _read_uncertainty),
-    Reader("blocks CSV", ".csv", lambda: BLOCKS, waiting_blocks),
-    Reader("blocks Parquet", ".parquet", lambda: _blocks(".parquet"), waiting_blocks),
-    Reader("blocks Excel", ".xlsx", lambda: _blocks(".xlsx"), waiting_blocks),
-    Reader("blocks GeoJSON", ".geojson", lambda: GEOJSON, waiting_blocks),
+    Reader("blocks CSV", ".csv", lambda: BLOCKS, read_blocks),
+    Reader("blocks Parquet", ".parquet", lambda: _blocks(".parquet"), read_blocks),
+    Reader("blocks Excel", ".xlsx", lambda: _blocks(".xlsx"), read_blocks),
+    Reader("blocks GeoJSON", ".geojson", lambda: GEOJSON, read_blocks),
     Reader("block draws", ".csv", lambda: BLOCKS, read_draws),
     Reader("predicted CSV", ".csv", lambda: BLOCKS, _predict),
     Reader("predicted Parquet", ".parquet", lambda: _blocks(".parquet"), _predict),

@@ -17,8 +17,8 @@ from fastapi.testclient import TestClient
 import rbfrag
 from rbfrag.db.location import REFERENCE
 from rbfrag.errors import RbfragError
-from rbfrag.exchange.batch import predict_table
 from rbfrag.exchange.block_rows import read_blocks
+from rbfrag.exchange.table_answers import predict_table
 from rbfrag.fragility.prediction import Prediction
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.hazards.curve import HazardCurve

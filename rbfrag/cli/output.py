@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from os import PathLike
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
 from rbfrag.errors import InputError
@@ -60,9 +61,10 @@ def print_table(
 
 
 def print_rows(rows: Sequence[Mapping[str, object]]) -> None:
-    """Print rows under their names; reasons only where there is one."""
+    """Print rows under their names, cut to a terminal; reasons only where there is one."""
     names = [name for name in rows[0] if name != "reason" or any(row[name] for row in rows)]
-    print_table(names, [[row[name] for name in names] for row in rows])
+    width = get_terminal_size().columns if sys.stdout.isatty() else None
+    print_table(names, [[row[name] for name in names] for row in rows], width=width)
 
 
 def _cut(text: str, size: int) -> str:

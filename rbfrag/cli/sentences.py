@@ -202,11 +202,28 @@ def motion_in_words(document: Mapping[str, Any], *, flags: int) -> str:
     )
 
 
+def answer_in_short(row: Mapping[str, Any]) -> dict[str, object]:
+    """Return what people read of the answer for one block of a table.
+
+    Args:
+        row: one of ``blocks`` of `rbfrag predict --blocks --json`.
+    """
+    ends = [percent(row[name]) for name in ("ci_low", "ci_high") if row[name] is not None]
+    return {
+        "block": row["block_id"],
+        "kind": row["kind"],
+        "mode": row["mode"],
+        "probability": None if row["probability"] is None else percent(row["probability"]),
+        "interval": " to ".join(dict.fromkeys(ends)) or None,
+        "reason": row["reason"],
+    }
+
+
 def table_in_words(summary: Mapping[str, Any]) -> str:
     """Return how many rows of a table of blocks are answered.
 
     Args:
-        summary: what `rbfrag predict --batch --json` prints.
+        summary: what `rbfrag predict --blocks --json` prints.
     """
     rows, answered, outside = summary["rows"], summary["answered"], summary["without_answer"]
     if not outside:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.block_table import BLOCK_FIELDS, read_columns
+from rbfrag.exchange.block_table import BLOCK_FIELDS, opened_table
+from rbfrag.fragility.unusable import in_list
 from rbfrag.question.blocks import has_shape, many_blocks
 
 FloatArray = NDArray[np.float64]
 
-_COLUMNS = tuple(column for column in BLOCK_FIELDS if not column.endswith("_sigma"))
+_FIELDS = tuple(name for name in BLOCK_FIELDS.values() if not name.endswith("_sigma"))
 
 
 def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], FloatArray]:
@@ -28,13 +28,13 @@ def read_draws(path: str | os.PathLike[str]) -> tuple[dict[str, FloatArray], Flo
         InputError: the file cannot be read, describes no block, or weights that are none.
         MissingExtraError: a Parquet file without pyarrow.
     """
-    columns: dict[str, Any] = read_columns(path, (), optional=(*_COLUMNS, "weight"))
+    with opened_table(path, (*_FIELDS, "weight"), ()) as table:
+        columns, faults, lines = table.whole()
+    if faults:
+        places = [f"{table.word} {lines[i]}" for i in sorted(faults)]
+        raise InputError(f"{path}, {in_list(places, (faults[i] for i in sorted(faults)))}")
     weight = columns.pop("weight", None)
-    drawn = {
-        BLOCK_FIELDS[column]: values
-        for column, values in columns.items()
-        if not np.isnan(values).all()
-    }
+    drawn = {name: values for name, values in columns.items() if not np.isnan(values).all()}
     if not drawn:
         raise InputError(
             f"{path}: no row says anything of a block: a table of draws has p2_1_s2 and kr, or the "

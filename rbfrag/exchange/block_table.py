@@ -1,14 +1,15 @@
-"""The columns of a table of blocks, in a file, as GeoJSON points or as given; rectangles in it."""
+"""A table of blocks, in a file, as GeoJSON points or as given: which column states which field."""
 
 from __future__ import annotations
 
 import csv
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,23 +19,30 @@ from rbfrag.exchange.excel_text import as_text, as_written, changed_texts
 from rbfrag.exchange.points import SUFFIXES as GEOJSON
 from rbfrag.exchange.points import read_points
 from rbfrag.exchange.tables.files import (
+    open_table,
     place_word,
-    table_parts,
     table_path,
     table_source,
     table_writer,
 )
-from rbfrag.exchange.tables.parts import Part, Parts, cells_of
+from rbfrag.exchange.tables.parts import Part, Parts, TableFile, cells_of
 from rbfrag.files import reading, written_whole
-from rbfrag.fragility.unusable import in_list
-from rbfrag.question.fields import BlockFields, column_of
-from rbfrag.question.table import Column, Header, Numeric, columns_in
+from rbfrag.fragility.lookup import block_of
+from rbfrag.question.blocks import SHAPES, kinds_by_numbers
+from rbfrag.question.fields import BlockFields, column_of, columns_declared, names_of
+from rbfrag.question.table import Header, columns_in
 
-BLOCK_FIELDS = {column_of(name): name for name in BlockFields.__optional_keys__}
+BLOCK_FIELDS = {column_of(name): name for name in names_of(BlockFields)}
 """The fields that describe blocks, by what written tables call them."""
 
-TABLE = "a block table"
-"""What messages say that a file should hold."""
+IF_EMPTY = {name: 0.0 for name in columns_declared() if name.endswith("_sigma")} | {
+    "count": 1.0,
+    "weight": 1.0,
+}
+"""What an empty cell of a field stands for."""
+
+_LARGE = 1 << 20
+"""Bytes of CSV that are worth loading pyarrow for."""
 
 
 def write_block_table(
@@ -62,137 +70,172 @@ def write_block_table(
     return target
 
 
-def read_columns(
-    path: str | os.PathLike[str],
-    names: Sequence[str],
-    *,
-    optional: Sequence[str] = (),
-    texts: Sequence[str] = (),
-    faults: dict[int, str] | None = None,
-) -> dict[str, NDArray[Any]]:
-    """Return columns of a block table by name; an empty number is NaN.
+@dataclass(frozen=True, eq=False)
+class BlockTable:
+    """A table of blocks that is open.
 
     Args:
-        path: file ending in ``.csv``, ``.xlsx`` or ``.parquet``.
-        names: columns of numbers that must be there.
-        optional: further columns of numbers, where the table has them.
-        texts: columns of texts, where the table has them.
-        faults: takes what is wrong with rows, by their index; their numbers are NaN. None refuses
-            a table that has such rows.
-
-    Raises:
-        InputError: the file cannot be read, lacks a column, or cells hold no numbers; the
-            message names the lines.
-        MissingExtraError: a Parquet file without pyarrow, a workbook without openpyxl.
-    """
-    table = read_cells(path, (*names, *optional), texts, needed=names)
-    if faults is not None:
-        faults.update(table.faults)
-    elif table.faults:
-        wrong = {table.place(i): fault for i, fault in sorted(table.faults.items())}
-        raise InputError(f"{path}, {in_list(wrong, wrong.values())}")
-    return table.columns
-
-
-class Cells(NamedTuple):
-    """The cells of some columns.
-
-    Args:
-        columns: arrays of numbers, NaN where there is none, and of texts, by name.
-        faults: what is wrong with rows, by their index.
-        lines: number of each row in its file.
-        word: what that is the number of: line, row or feature.
-        header: all columns of the table, as it calls them.
-        stated: which of them state which fields.
+        name: what messages call it.
+        word: what its rows are counted by: line, row or feature.
+        file: what is open.
+        stated: which columns state which fields.
+        texts: fields that are texts.
     """
 
-    columns: dict[str, NDArray[Any]]
-    faults: dict[int, str]
-    lines: Sequence[int]
+    name: str
     word: str
-    header: Sequence[str]
+    file: TableFile
     stated: Header
+    texts: Collection[str]
 
-    def place(self, i: int) -> str:
-        """Return where a row stands, as its file shows it."""
-        return f"{self.word} {self.lines[i]}"
+    @property
+    def header(self) -> list[str]:
+        """What its columns are called."""
+        return self.file.header
 
+    @property
+    def numeric(self) -> frozenset[str]:
+        """The columns that hold numbers, as it calls them."""
+        return frozenset(
+            column.header for name, column in self.stated.columns.items() if name not in self.texts
+        )
 
-def read_cells(
-    source: str | os.PathLike[str] | Mapping[str, Any],
-    numbers: Sequence[str],
-    texts: Sequence[str],
-    *,
-    needed: Sequence[str] = (),
-) -> Cells:
-    """Return the cells of some columns of a table, of those that it has.
+    @property
+    def parts(self) -> Parts:
+        """Its rows, some thousand at a time."""
+        return self.file.parts(self.numeric)
 
-    Args:
-        source: a table's file, a file of GeoJSON points, or columns by name.
-        numbers: columns of numbers.
-        texts: columns of texts.
-        needed: those that must be there.
-    """
-    with ExitStack() as stack:
-        name, word, header, parts = _opened(source, numbers, stack)
-        stated = columns_in(header, name, (*numbers, *texts))
-        known = {
-            each: stated.columns.get(each, Column(each, 1.0))
-            for each in (*numbers, *texts)
-            if each in header or each in stated.columns
-        }
-        for each in needed:
-            if each not in known:
-                have = ", ".join(header) or "none"
-                raise InputError(f"{name}: there is no column {each}; the columns are {have}")
+    def numbers(self, part: Part) -> tuple[dict[str, NDArray[np.float64]], dict[int, str]]:
+        """Return the numbers of some rows by field, and what is wrong with rows by their index."""
+        numbers, faults = {}, dict(part.faults)
+        for name, (header, factor) in self.stated.columns.items():
+            if name in self.texts:
+                continue
+            values, others = part.numbers(header)
+            faults = others | faults
+            values = values if factor == 1.0 else values * factor
+            if name in IF_EMPTY:
+                values = np.where(np.isnan(values), IF_EMPTY[name], values)
+            numbers[name] = values
+        return numbers, faults
+
+    def text(self, part: Part, name: str) -> list[str] | None:
+        """Return the texts of some rows; None where the table has no column of that field."""
+        column = self.stated.columns.get(name)
+        if column is None:
+            return None
+        what = f"{self.name}: a cell of {name}"
+        return [
+            checked_name(as_written(str(cell).strip()), what)
+            for cell in cells_of(part.cells[column.header])
+        ]
+
+    def remarks(self, read: Collection[str]) -> tuple[str, ...]:
+        """Return what is to be said of its columns.
+
+        Args:
+            read: the fields that the answer depends on, or hands on.
+        """
+        return (
+            *self.file.remarks,
+            *self.stated.remarks,
+            *self.stated.unread(self.header, read),
+        )
+
+    def check(self, given: Collection[str] = (), kind: str | None = None) -> None:
+        """Refuse a table that describes no blocks.
+
+        Args:
+            given: fields that are stated of all blocks.
+            kind: how the blocks fail; None for what they are given by.
+        """
+        known = {*self.stated.columns, *given}
+        if not kinds_by_numbers(known) and not any(known.issuperset(shape) for shape in SHAPES):
+            block = block_of(known, kind)
+            missing = next(name for name in block.names if name not in known)
+            sides = ", nor height_m and width_m" if "kr" in block.names else ""
+            self._refuse(f"{column_of(missing)}{sides}")
+
+    def need(self, names: Collection[str]) -> None:
+        """Refuse a table without some columns."""
+        for name in names:
+            if name not in self.stated.columns:
+                self._refuse(name)
+
+    def _refuse(self, missing: str) -> None:
+        have = ", ".join(self.header) or "none"
+        raise InputError(f"{self.name}: there is no column {missing}; the columns are {have}")
+
+    def whole(self) -> tuple[dict[str, NDArray[Any]], dict[int, str], list[int]]:
+        """Return its columns by field, what is wrong with rows, and the numbers of all rows."""
         collected: dict[str, list[NDArray[Any]]] = {
-            each: [np.empty(0, dtype=object if each in texts else np.float64)] for each in known
+            name: [np.empty(0, dtype=object if name in self.texts else np.float64)]
+            for name in self.stated.columns
         }
         faults: dict[int, str] = {}
         lines: list[int] = []
-        for part in parts:
-            wrong = dict(part.faults)
-            for each, arrays in collected.items():
-                if each in texts:
-                    cells = [
-                        checked_name(as_written(str(cell).strip()), f"{name}: a cell of {each}")
-                        for cell in cells_of(part.cells[known[each].header])
-                    ]
-                    arrays.append(np.array(cells, dtype=object))
-                else:
-                    values, others = part.numbers(known[each].header)
-                    wrong = others | wrong
-                    arrays.append(values * known[each].factor)
+        for part in self.parts:
+            numbers, wrong = self.numbers(part)
+            for name, arrays in collected.items():
+                arrays.append(
+                    numbers[name]
+                    if name in numbers
+                    else np.array(self.text(part, name), dtype=object)
+                )
             faults |= {len(lines) + i: fault for i, fault in wrong.items()}
             lines.extend(part.lines)
-        columns = {each: np.concatenate(arrays) for each, arrays in collected.items()}
-        return Cells(columns, faults, lines, word, header, stated)
+        return {n: np.concatenate(arrays) for n, arrays in collected.items()}, faults, lines
 
 
-def _opened(
-    source: str | os.PathLike[str] | Mapping[str, Any], numbers: Sequence[str], stack: ExitStack
-) -> tuple[str, str, list[str], Parts]:
-    """Return what a table is called, what its rows are, its columns and its parts."""
-    if isinstance(source, str | os.PathLike):
-        path = Path(source)
-        if path.suffix.lower() in GEOJSON:
-            part = read_points(path)
-            return str(path), "feature", [*part.cells], iter([part])
-        path = table_source(path)
-        stack.enter_context(_reading(path))
-        header, parts, _ = table_parts(path, Numeric(numbers), stack)
-        return str(path), place_word(path), header, parts
-    part = given_part(source)
-    return "blocks", "row", [*part.cells], iter([part])
+@contextmanager
+def opened_table(
+    source: str | os.PathLike[str] | Mapping[str, Any],
+    read: Collection[str],
+    texts: Collection[str] = ("block_id", "site_id", "kind", "mode"),
+    *,
+    sheet: str | None = None,
+) -> Iterator[BlockTable]:
+    """Open a table of blocks.
+
+    Args:
+        source: a table's file, a file of GeoJSON points, or columns by name, such as a pandas
+            table.
+        read: fields of numbers, and other columns by their own names, that may be read.
+        texts: the same of texts.
+        sheet: of a workbook, the name of the sheet; None for the first.
+
+    Raises:
+        InputError: the file cannot be read, or a column cannot be meant as it is called.
+        MissingExtraError: a Parquet file without pyarrow, a workbook without openpyxl.
+    """
+    with ExitStack() as stack:
+        name, word = "blocks", "row"
+        if not isinstance(source, str | os.PathLike):
+            file = _of_one_part(given_part(source))
+        elif (path := Path(source)).suffix.lower() in GEOJSON:
+            name, word = str(path), "feature"
+            file = _of_one_part(read_points(path))
+        else:
+            path = table_source(path)
+            name, word = str(path), place_word(path)
+            stack.enter_context(_reading(path))
+            fast = path.is_file() and path.stat().st_size > _LARGE
+            file = open_table(path, stack, sheet=sheet, fast=fast)
+        stated = columns_in(file.header, name, (*read, *texts))
+        yield BlockTable(name, word, file, stated, texts)
 
 
 @contextmanager
 def _reading(source: Path) -> Iterator[None]:
     try:
-        with reading(source, TABLE):
+        with reading(source, "a block table"):
             yield
     except csv.Error as error:
         raise InputError(f"{source}: not a CSV file: {error}") from None
+
+
+def _of_one_part(part: Part) -> TableFile:
+    return TableFile([*part.cells], lambda _: iter([part]))
 
 
 def given_part(columns: Mapping[str, Any]) -> Part:

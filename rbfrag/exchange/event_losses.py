@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rbfrag.errors import InputError, UnknownModelError
-from rbfrag.exchange.block_rows import PORTFOLIO, BlockRows
+from rbfrag.exchange.block_rows import PORTFOLIO, BlockRows, Blocks
 from rbfrag.exchange.given_blocks import given_blocks
 from rbfrag.exchange.openquake_events import JobFiles, read_events
-from rbfrag.files import as_path
 from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.unusable import FROM_SUMS
 from rbfrag.hazards.conversions import component as component_named
@@ -39,7 +38,7 @@ class LossKeywords(BlockKeywords[V], AnsweringFields, _Lasted, total=False):
 
 def losses(
     folder: str | PathLike[str] | None = None,
-    blocks: str | PathLike[str] | Mapping[str, Any] | None = None,
+    blocks: Blocks | None = None,
     *,
     files: Mapping[str, str | PathLike[str]] | None = None,
     samples: int = 100,
@@ -92,8 +91,6 @@ def losses(
         DatabaseError: the database cannot be read.
     """
     given, answering, lasted = parts_of((), question, BlockKeywords, AnsweringFields, _Lasted)
-    if blocks is not None and not hasattr(blocks, "items"):
-        blocks = as_path(blocks, "blocks", "a table of blocks")
     job = JobFiles.of(folder, files)
     rows = given_blocks(given, blocks, reads=PORTFOLIO, one_kind=False)
     meaning = component_named("single" if component is None else component)

@@ -174,6 +174,7 @@ def rate_columns(
     columns["reason"] = np.full(size, "", dtype=object)
     if rows is None:
         return columns
-    refused = {**rows.refused, "site": rows.refused.get("site_id", np.full(rows.refused_count, ""))}
+    nowhere = np.full(rows.reasons.size, "", dtype=object)
+    columns_of_rows = {**rows.columns, "site": rows.columns.get("site_id", nowhere)}
     row = sites[0].columns["row"] if len(sites) == 1 else np.full(size, -1)
-    return replace(rows, refused=refused).with_refused(columns, row)
+    return replace(rows, columns=columns_of_rows).with_refused(columns, row)

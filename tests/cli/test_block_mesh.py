@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import rbfrag
-from rbfrag.exchange.block_table import read_columns
+from tests.block_tables import read_columns
 from tests.cli.conftest import Refuses, Shell
 from tests.conftest import ROOT
 from tests.meshes import box, write_obj

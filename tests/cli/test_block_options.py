@@ -140,9 +140,8 @@ ALPHA1 = ("--alpha1", "-10", "--alpha3", "20", "--r3", "1")
         ((*ALPHA1, "--beta", "3"), "--phi is missing"),
         (("--p2", "3", "--kr", "0.1", "--phi", "30"), "--phi does not go with --p2"),
         (("--p2", "3", "--kr", "0.1", "--units", "g"), "--units goes with --motion"),
-        (("--p2", "3", "--kr", "0.1", "--out", "a.csv"), "--out goes with --batch"),
-        (("--batch", "a.csv"), "--batch goes with --out"),
-        ((*SIDES, "--batch", "a.csv", "--out", "b.csv"), "--height does not go with --batch"),
+        (("--p2", "3", "--kr", "0.1", "--out", "a.csv"), "--out goes with --blocks"),
+        ((*SIDES, "--batch", "a.csv", "--out", "b.csv"), "--blocks does not go with --height"),
         ((), "--p2 is missing"),
     ],
 )
@@ -194,6 +193,4 @@ def test_tables_of_rectangles(shell: Shell, files: Path) -> None:
 def test_a_table_without_blocks_says_what_it_needs(refuses: Refuses, files: Path) -> None:
     (files / "blocks.csv").write_text("block_id,height_m\nA,2\n")
     message = refuses("hazard", "curve.csv", "--blocks", "blocks.csv")
-    assert (
-        "there is no column p2_1_s2: a table of blocks has p2_1_s2 and kr, or height_m" in message
-    )
+    assert "there is no column p2_1_s2, nor height_m and width_m; the columns are" in message

@@ -13,9 +13,9 @@ import pytest
 import rbfrag
 from rbfrag.db.engine import opened_database
 from rbfrag.db.models import save_model
-from rbfrag.exchange.block_table import read_columns
 from rbfrag.hazards import report
 from rbfrag.hazards.report import once_in
+from tests.block_tables import read_columns
 from tests.cli.conftest import Refuses, Shell
 from tests.fragility.conftest import model_row
 

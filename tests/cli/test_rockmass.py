@@ -12,10 +12,10 @@ import pytest
 from rbfrag.db.engine import opened_database
 from rbfrag.db.model_file import ModelRow
 from rbfrag.db.models import save_model
-from rbfrag.exchange.block_table import read_columns
 from rbfrag.rockmasses.counts import crossings, mode_counts
 from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.rockmasses.scenario import scenario
+from tests.block_tables import read_columns
 from tests.cli.conftest import Refuses, Shell
 
 EXAMPLE = Path(__file__).resolve().parent.parent.parent / "docs" / "examples" / "rockmass.toml"

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from rbfrag.exchange.block_table import read_columns
 from rbfrag.motions.recognise import read_motion
 from rbfrag.rockmasses.failures import failures
 from rbfrag.rockmasses.file import read_rock_mass
 from rbfrag.rockmasses.shaking import FailureLimits, plan_shaking, run_blocks
+from tests.block_tables import read_columns
 from tests.cli.conftest import Refuses, Shell
 from tests.synthetic import shaking, write_at2
 

@@ -14,7 +14,7 @@ import rbfrag
 from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
-from rbfrag.exchange.block_table import read_columns
+from tests.block_tables import read_columns
 from tests.cli.conftest import Refuses, Shell
 from tests.exchange.test_shakemap_grid import GRID, UNCERTAINTY
 from tests.fragility.conftest import model_row

@@ -15,10 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.batch import predict_table
+from rbfrag.exchange.block_draws import read_draws
 from rbfrag.exchange.block_rows import BlockRows, read_blocks
-from rbfrag.exchange.block_table import read_columns, write_block_table
+from rbfrag.exchange.block_table import write_block_table
+from rbfrag.exchange.table_answers import predict_table
 from rbfrag.fragility.unusable import in_list, unusable_in_words
+from tests.block_tables import read_columns
 
 NAMES = ("block_id", "p2_1_s2", "kr", "mode", "weight", "lon", "lat")
 SOUND = ("A", 3.0, 0.1, "topple", 1.0, 20.0, 40.5)
@@ -269,7 +271,7 @@ def test_columns_that_must_be_whole_are_refused_with_all_their_lines(tmp_path: P
     path = tmp_path / "a.csv"
     path.write_text("kr,p2\n0.1,3\nx,3\n0.1\n?,3\n")
     with pytest.raises(InputError) as refusal:
-        read_columns(path, ("kr",))
+        read_draws(path)
     assert str(refusal.value) == (
         f"{path}, line 3: kr = 'x' is not a number; line 4: 1 cells under 2 columns; "
         "line 5: kr = '?' is not a number"

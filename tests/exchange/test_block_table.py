@@ -16,8 +16,9 @@ from hypothesis import strategies as st
 
 from rbfrag.errors import InputError
 from rbfrag.exchange import block_table
-from rbfrag.exchange.block_rows import waiting_blocks
-from rbfrag.exchange.block_table import read_columns, write_block_table
+from rbfrag.exchange.block_rows import read_blocks
+from rbfrag.exchange.block_table import write_block_table
+from tests.block_tables import read_columns
 
 TABLE = {
     "block_id": np.arange(1, 4),
@@ -131,7 +132,7 @@ def test_without_pyarrow_the_extra_is_named(tmp_path: Path) -> None:
 import sys
 sys.modules["pyarrow"] = None
 from rbfrag.errors import MissingExtraError
-from rbfrag.exchange.block_table import read_columns
+from tests.block_tables import read_columns
 from rbfrag.exchange.tables.files import table_path
 table_path("a.csv")
 for act in (lambda: table_path("a.parquet"), lambda: read_columns("a.parquet", ("kr",))):
@@ -158,9 +159,9 @@ def test_rectangles_of_a_free_standing_kind(tmp_path: Path) -> None:
         "height_m,width_m,dip_deg,kind,restitution\n"
         "3,0.6,-5,,\n3,0.6,-5,rocking,\n3,0.6,-5,rocking,0.9\n"
     )
-    columns = waiting_blocks(path)
+    columns = read_blocks(path).whole()
     backed, free, _ = columns["kr"].tolist()
     alpha, dip = np.arctan(0.2), np.radians(5.0)
     assert (backed, free) == pytest.approx((np.tan(alpha + dip), np.tan(alpha - dip)))
     assert columns["restitution"][1:] == pytest.approx([1.0 - 1.5 * np.sin(alpha) ** 2, 0.9])
-    assert waiting_blocks(path, "rocking")["kr"][0] == pytest.approx(free)
+    assert read_blocks(path, "rocking").whole()["kr"][0] == pytest.approx(free)

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rbfrag.exchange.batch import predict_table
-from rbfrag.exchange.block_rows import waiting_blocks
+from rbfrag.exchange.block_rows import read_blocks
 from rbfrag.exchange.block_table import write_block_table
 from rbfrag.exchange.excel_text import as_text, as_written, formula_warnings
+from rbfrag.exchange.table_answers import predict_table
 from tests.cli.conftest import Shell
 from tests.synthetic import shaking, write_at2
 
@@ -45,7 +45,7 @@ def test_a_table_is_read_back(tmp_path: Path) -> None:
     }
     path = write_block_table(columns, tmp_path / "blocks.csv", excel_text=True)
     assert "\n'=1+1,3.0,0.1\n" in path.read_text()
-    assert waiting_blocks(path)["block_id"].tolist() == names.tolist()
+    assert read_blocks(path).whole()["block_id"].tolist() == names.tolist()
     assert write_block_table(columns, tmp_path / "b.csv").read_text().count("\n=1+1,") == 1
 
 

@@ -14,10 +14,11 @@ import openpyxl
 import pytest
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.batch import predict_table
-from rbfrag.exchange.block_rows import waiting_blocks
-from rbfrag.exchange.block_table import read_columns, write_block_table
+from rbfrag.exchange.block_rows import read_blocks
+from rbfrag.exchange.block_table import write_block_table
+from rbfrag.exchange.table_answers import predict_table
 from rbfrag.exchange.tables import workbook
+from tests.block_tables import read_columns
 
 HEAD = ("block_id", "p2_1_s2", "kr", "pgv_m_s", "remark")
 
@@ -51,13 +52,15 @@ def test_a_workbook_is_answered_row_by_row_as_csv_is(tmp_path: Path) -> None:
         ("d", 3, True, 0.6, 2.5),
         ("e", 3, 0.1, None, None),
         ("f", 3, 0.1, 0.6, None, "beside"),
+        ("g", 3, "1,234", 0.6, None),
+        (" ", "", None, None, None),
     )
     book = openpyxl.load_workbook(source)
     book.active["E2"].data_type = "s"  # a text, as our own writer has it, not a formula
     book.save(source)
     told = answer(source, tmp_path / "out.xlsx")
-    assert (told["rows"], told["answered"]) == (6, 1)
-    assert "5 of 6 blocks could not be used" in str(told["warnings"])
+    assert (told["rows"], told["answered"]) == (7, 2)
+    assert "5 of 7 blocks could not be used" in str(told["warnings"])
     assert "row 3: kr is the date 2024-03-01" in str(told["warnings"])
     rows = rows_of(tmp_path / "out.xlsx")
     plain = tmp_path / "plain.csv"
@@ -69,27 +72,28 @@ def test_a_workbook_is_answered_row_by_row_as_csv_is(tmp_path: Path) -> None:
     assert rows[0]["in_domain"] is True
     assert (rows[0]["block_id"], rows[0]["remark"], rows[3]["remark"]) == (1, "=1+1", 2.5)
     assert rows[2]["remark"] == "007"
-    assert [row["probability"] for row in rows[1:]] == [None] * 5
+    assert rows[2]["probability"] == rows[0]["probability"]  # a decimal comma
+    assert [row["probability"] is None for row in rows] == [False, True, False, *[True] * 4]
     reasons = [str(row["reason"]) for row in rows]
     assert reasons[0] == "None"
     assert "kr is the date 2024-03-01 00:00:00, not a number" in reasons[1]
-    assert "kr = '0,1' is not a number: a decimal comma" in reasons[2]
+    assert "kr = '1,234' is 1.234 or 1234: write it as a number" in reasons[6]
     assert "kr is TRUE, not a number" in reasons[3]
     assert "pgv_m_s" in reasons[4]
     assert "6 cells under 5 columns" in reasons[5]
     for name in ("out.csv", "out.parquet"):
         answer(source, tmp_path / name)
         found = read_columns(tmp_path / name, ("probability",), texts=("reason",))
-        assert np.isfinite(found["probability"]).tolist() == [True] + [False] * 5
-        assert found["reason"].tolist()[1:] == reasons[1:]
+        assert np.isfinite(found["probability"]).tolist() == [True, False, True] + [False] * 4
+        assert found["reason"].tolist()[3:] == reasons[3:]
     again = answer(tmp_path / "out.xlsx", tmp_path / "again.xlsx")
-    assert (again["rows"], again["answered"]) == (6, 2)  # the cell beside the table is gone
+    assert (again["rows"], again["answered"]) == (7, 3)  # the cell beside the table is gone
 
 
 def test_formulas_are_read_as_their_values(tmp_path: Path) -> None:
     source = save(tmp_path / "a.xlsx", ("p2_1_s2", "kr"), (3, "=0.05*2"))
     with pytest.raises(InputError, match=r"formula in cell B2 was never computed: open the"):
-        waiting_blocks(source)
+        read_blocks(source)
     computed = tmp_path / "b.xlsx"
     with zipfile.ZipFile(source) as old, zipfile.ZipFile(computed, "w") as new:
         for member in old.infolist():
@@ -98,7 +102,7 @@ def test_formulas_are_read_as_their_values(tmp_path: Path) -> None:
                 assert b"<f>0.05*2</f><v" in text
                 text = text.replace(b"<v />", b"<v>0.1</v>").replace(b"<v></v>", b"<v>0.1</v>")
             new.writestr(member, text)
-    assert waiting_blocks(computed)["kr"].tolist() == [0.1]
+    assert read_blocks(computed).whole()["kr"].tolist() == [0.1]
 
 
 @pytest.mark.parametrize("mark", ["", "\ufeff"])
@@ -134,7 +138,7 @@ def test_a_point_among_decimal_commas_is_not_guessed_at(tmp_path: Path) -> None:
     assert "kr = '1.234' has a decimal point, and the table has decimal commas" in str(told)
     source.write_text('p2_1_s2,kr\n3,"0,1"\n')
     with pytest.raises(InputError, match="line 2: kr = '0,1' is not a number: a decimal comma"):
-        waiting_blocks(source)
+        read_blocks(source)
 
 
 def test_one_bad_row_of_many(tmp_path: Path) -> None:
@@ -156,7 +160,7 @@ def test_other_files_are_refused_in_one_sentence(tmp_path: Path, content: bytes)
     source = tmp_path / "a.xlsx"
     source.write_bytes(content)
     with pytest.raises(InputError, match="not an Excel workbook"):
-        waiting_blocks(source)
+        read_blocks(source)
 
 
 def test_what_no_sheet_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,7 +171,7 @@ def test_what_no_sheet_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert list(tmp_path.iterdir()) == []
     monkeypatch.setattr(workbook, "MOST_BYTES", 100)
     with pytest.raises(InputError, match="unpacks to more"):
-        waiting_blocks(save(tmp_path / "b.xlsx", ("p2_1_s2", "kr"), (3, 0.1)))
+        read_blocks(save(tmp_path / "b.xlsx", ("p2_1_s2", "kr"), (3, 0.1)))
 
 
 def test_without_openpyxl_the_extra_is_named(tmp_path: Path) -> None:
@@ -175,9 +179,9 @@ def test_without_openpyxl_the_extra_is_named(tmp_path: Path) -> None:
 import sys
 sys.modules["openpyxl"] = None
 from rbfrag.errors import MissingExtraError
-from rbfrag.exchange.block_rows import waiting_blocks
+from rbfrag.exchange.block_rows import read_blocks
 from rbfrag.exchange.tables.files import table_path
-for act in (lambda: table_path("a.xlsx"), lambda: waiting_blocks("a.xlsx")):
+for act in (lambda: table_path("a.xlsx"), lambda: read_blocks("a.xlsx")):
     try:
         act()
     except MissingExtraError as error:

@@ -113,6 +113,7 @@ def losses(
         ...,
         metavar="FILE",
     ),
+    sheet: str | None = option(options.SHEET, metavar="NAME"),
     files: Files,
     time: Time,
     sampling: Sampling,
@@ -132,12 +133,14 @@ def losses(
     by the model's dependence: what the earthquake shares, what a site shares, what each block has.
     The answer is the same for any number of workers.
     """
+    from rbfrag.exchange.block_rows import PORTFOLIO, read_blocks
     from rbfrag.exchange.event_losses import losses as answered
 
     check_files(table=out, plot=plot, excel_text=excel_text)
+    rows = read_blocks(blocks, meaning.kind, reads=PORTFOLIO, sheet=sheet)
     with ProgressBar("losses", "events") as bar:
         answer = answered(
-            folder, blocks, files=files.named(), samples=sampling.samples,
+            folder, rows, files=files.named(), samples=sampling.samples,
             expected=sampling.expected, seed=sampling.seed,
             investigation_time=time.investigation_time, ses=time.ses,
             imt=meaning.imt.split(","), component=meaning.component, kind=meaning.kind,

@@ -242,6 +242,7 @@ def plot_modes(
         "as  rbfrag rockmass --out  writes it.",
         metavar="FILE",
     ),
+    sheet: str | None = option(options.SHEET, metavar="NAME"),
     rockmass: str | None = option(
         "Show the blocks of a rock mass file (.toml, .csv).", metavar="FILE"
     ),
@@ -252,7 +253,9 @@ def plot_modes(
     from rbfrag.plots.canvas import plot_path
 
     plot_path(out)
-    shown = charted_blocks(blocks, rockmass, phi=phi, phi_back=phi_back, no_back=no_back)
+    shown = charted_blocks(
+        blocks, rockmass, phi=phi, phi_back=phi_back, no_back=no_back, sheet=sheet
+    )
     plot.modes(
         out, phi_deg=phi, beta_deg=beta, phi_back_deg=phi_back, back_fracture=not no_back,
         alpha1_deg=shown.alpha1_deg, alpha3_deg=shown.alpha3_deg,

@@ -5,13 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from rbfrag.cli.output import check_files, print_json, print_pairs, print_warnings, show_prediction
+from rbfrag.cli.output import (
+    check_files,
+    print_json,
+    print_pairs,
+    print_rows,
+    print_warnings,
+    show_prediction,
+)
 from rbfrag.cli.parameters import options
 from rbfrag.cli.parameters.block import WAYS, BlockOptions, UncertaintyOptions
 from rbfrag.cli.parameters.stack import option, stacked
-from rbfrag.cli.sentences import table_in_words
+from rbfrag.cli.sentences import answer_in_short, table_in_words
 from rbfrag.errors import InputError
 from rbfrag.question.fields import option_of
+
+SHOWN = 40
+"""So many rows of a table are printed."""
 
 EXAMPLE = "Example:  rbfrag predict --height 2.4 --width 0.5 --dip 3 --pgv 0.6"
 
@@ -64,16 +74,19 @@ class Record:
 class Table:
     """A table of blocks, and one of answers."""
 
-    batch: str | None = option(
-        "Block table (.csv, .xlsx or .parquet) with columns p2_1_s2 and kr (or height_m and "
-        "width_m; or ky and displacement_m; or ks and ps2_1_s2), restitution, p2_sigma, kr_sigma "
-        "and the like, and any of pgv_m_s, sa03_g, sa10_g, sa20_g, sa30_g, pga_g, tm_s, pgd_m; "
-        "what is the same for all rows may be an option.",
+    blocks: str | None = option(
+        "Table of blocks (.csv, .xlsx, .parquet, .geojson) with columns p2_1_s2 and kr (or "
+        "height_m and width_m; or ky and displacement_m; or ks and ps2_1_s2), restitution, "
+        "p2_sigma, kr_sigma and the like, and any of pgv_m_s, sa03_g, sa10_g, sa20_g, sa30_g, "
+        "pga_g, tm_s, pgd_m; what is the same for all rows may be an option.",
+        word=("--blocks", "--batch"),
         metavar="FILE",
     )
+    sheet: str | None = option(options.SHEET, metavar="NAME")
     out: str | None = option(
-        "With --batch: table to write, the same columns with probability, ci_low, "
-        "ci_high, event_low, event_high, in_domain, reason and, of uncertain blocks, block_sd.",
+        "With --blocks: table to write, the same columns with kind, mode, probability, ci_low, "
+        "ci_high, event_low, event_high, in_domain, reason and, of uncertain blocks, block_sd. "
+        "Default: a list of the answers; --json lists the first 10,000.",
         metavar="FILE",
     )
     excel_text: bool = option(options.EXCEL_TEXT, False)
@@ -117,21 +130,17 @@ def predict(
         "rotation_deg": failure.rotation, "model": answering.model, "level": answering.level,
         "db": answering.db,
     }  # fmt: skip
-    if table.batch is not None and table.out is not None:
-        from rbfrag.exchange.batch import predict_table
+    if table.blocks is not None:
+        from rbfrag.exchange.table_answers import predict_table
 
         check_files(table=table.out, excel_text=table.excel_text)
         if block.beta is not None:
             given["beta_deg"] = block.beta
         summary = predict_table(
-            table.batch,
-            table.out,
-            given=given,
-            kind=failure.kind,
-            excel_text=table.excel_text,
-            **question,
-        )
-        _show_summary(summary, json=printing.json)
+            table.blocks, table.out, given=given, kind=failure.kind, sheet=table.sheet,
+            excel_text=table.excel_text, **question,
+        )  # fmt: skip
+        _show_table(summary, json=printing.json)
         return
     if record.motion is None and not measures.given():
         raise InputError(
@@ -186,12 +195,17 @@ def _completed(
     return kind, given, ()
 
 
-def _show_summary(summary: dict[str, Any], *, json: bool) -> None:
-    warnings = summary.pop("warnings")
+def _show_table(summary: dict[str, Any], *, json: bool) -> None:
     if json:
-        print_json({**summary, "warnings": warnings})
+        print_json(summary)
         return
+    warnings, rows = summary.pop("warnings"), summary.pop("blocks", None)
     print(table_in_words(summary))
     print()
+    if rows is not None:
+        print_rows([answer_in_short(row) for row in rows[:SHOWN]])
+        if more := summary["rows"] - len(rows[:SHOWN]):
+            print(f"... and {more:,} more: --out FILE writes them all")
+        print()
     print_pairs(summary)
     print_warnings(warnings)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from rbfrag.cli.parameters.options import EXCEL_TEXT
+from rbfrag.cli.parameters.options import EXCEL_TEXT, SHEET
 from rbfrag.cli.parameters.stack import option
 from rbfrag.errors import InputError
 from rbfrag.question.fields import column_of, name_of, option_of
@@ -208,6 +208,7 @@ class TableOptions(BlockOptions):
         "answer a row.",
         metavar="FILE",
     )
+    sheet: str | None = option(SHEET, metavar="NAME")
 
     def given_blocks(
         self,
@@ -235,8 +236,9 @@ class TableOptions(BlockOptions):
         if self.blocks is not None:
             table: Any = self.blocks
             rows = read_blocks(
-                table, kind, reads=reads, one_kind=one_kind, only=only, for_all=stated
-            )
+                table, kind, reads=reads, one_kind=one_kind, only=only, for_all=stated,
+                sheet=self.sheet,
+            )  # fmt: skip
             return GivenBlocks(rows.blocks, False, (), rows)
         described = self.described()
         remarks: tuple[str, ...] = ()
@@ -384,7 +386,13 @@ class ChartedBlocks(NamedTuple):
 
 
 def charted_blocks(
-    blocks: str | None, rockmass: str | None, *, phi: float, phi_back: float | None, no_back: bool
+    blocks: str | None,
+    rockmass: str | None,
+    *,
+    phi: float,
+    phi_back: float | None,
+    no_back: bool,
+    sheet: str | None = None,
 ) -> ChartedBlocks:
     """Return the blocks of one of two files.
 
@@ -394,13 +402,16 @@ def charted_blocks(
         phi: friction angle that the chart is drawn for [deg].
         phi_back: that of the back plane [deg]; None for the same.
         no_back: whether the chart has no back fracture.
+        sheet: the option --sheet.
     """
     warnings: list[str] = []
     names = ("alpha1_deg", "alpha3_deg")
     if blocks is not None:
-        from rbfrag.exchange.block_table import read_columns
+        from rbfrag.exchange.block_table import opened_table
 
-        columns = read_columns(blocks, names, faults={})
+        with opened_table(blocks, names, (), sheet=sheet) as table:
+            table.need(names)
+            columns, _, _ = table.whole()
     elif rockmass is not None:
         from rbfrag.rockmasses.file import read_rock_mass
         from rbfrag.rockmasses.report import block_columns

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from rbfrag.motions.polarity import Polarity as PolarityName
 
+SHEET = "Sheet of a workbook that holds the table. Default: the first."
+
 EXCEL_TEXT = (
     "In CSV: write texts that begin with = + - or @ with an apostrophe, so that Excel does not "
     "compute them; rbfrag takes it off when it reads the table."

@@ -54,10 +54,13 @@ class Need(NamedTuple):
 
 FILES = ("--block", "--polygon")
 TABLES = ("--blocks", "--rockmass")
+OF_TABLES = ("hazard", "survival", "shakemap", "nrml", "pelicun")
+"""Commands in which a table says all of its blocks; in predict some may be said of all rows."""
 
 CONFLICTS = (
     Conflict(("--ky",), (*SHAPE, *FILES), ONCE),
-    Conflict((*SHAPE, *FILES, *TABLES), NUMBERS, ONCE),
+    Conflict((*SHAPE, *FILES, "--rockmass"), NUMBERS, ONCE),
+    Conflict(("--blocks",), NUMBERS, ONCE, OF_TABLES),
     Conflict(SHAPE[:-1], FILES, "the file has the shape"),
     Conflict(("--polygon",), ("--block",), ONCE),
     Conflict(TABLES, (*SHAPE, *FILES), ONCE),
@@ -65,7 +68,7 @@ CONFLICTS = (
     Conflict(
         ("--block-draws",), (*NUMBERS, *SHAPE, *FILES, *PLANES, *SIGMAS), "the table has the block"
     ),
-    Conflict(("--block-draws",), ("--batch",), "one question is about one block"),
+    Conflict(("--block-draws",), ("--blocks",), "one question is about one block"),
     Conflict(("--block-draws",), ("--ky", "--restitution"), "the table has the block"),
     Conflict(("--draws",), ("--csv", "--plot", "--film"), "they show one run", ("respond",)),
     Conflict(
@@ -84,7 +87,7 @@ CONFLICTS = (
     Conflict(PLANES, NUMBERS, "numbers say all about the block"),
     Conflict(PLANES, TABLES, "the file has the planes", ("hazard", "shakemap", "nrml", "pelicun")),
     Conflict(PLANES[1:], ("--ky",), "the strength follows from --ky and --beta"),
-    Conflict((*SHAPE, *FILES, *PLANES[1:], "--motion"), ("--batch",), "the table has the blocks"),
+    Conflict((*PLANES[1:], "--motion"), ("--blocks",), "the table has the blocks", ("predict",)),
     Conflict(("--samples", "--seed", "--plot"), ("--expected",), "curves and samples need draws"),
     Conflict(
         ("--motion",),
@@ -101,8 +104,8 @@ NEEDS = (
         ("--ses",), ("--investigation-time",), "--investigation-time", "both say how long it took"
     ),
     Need(("--investigation-time",), ("--ses",), "--ses", "both say how long the events took"),
-    Need(("--batch",), ("--out",), "--out", "--out FILE names the table of answers"),
-    Need(("--out",), ("--batch",), "--batch", "--batch FILE names the table of blocks"),
+    Need(("--out",), ("--blocks",), "--blocks", "--blocks FILE names the table", ("predict",)),
+    Need(("--sheet",), ("--blocks",), "--blocks", "it is a sheet of that workbook"),
     Need(("--excel-text",), ("--out",), "--out", "--out FILE names the table that it is about"),
     Need(("--excel-text",), ("--csv",), "--csv", "--csv FILE names the table that it is about"),
     Need(

@@ -13,13 +13,15 @@ import typer
 from rbfrag.cli.parameters.refusals import refuse
 
 
-def option(help: str, default: Any = None, *, word: str | None = None, **about: Any) -> Any:
+def option(
+    help: str, default: Any = None, *, word: str | tuple[str, ...] | None = None, **about: Any
+) -> Any:
     """Declare an option: a field of a dataclass, or a parameter of a command.
 
     Args:
         help: what it is, with its unit.
         default: its value where it is not given; ``...`` for an option that must be given.
-        word: what it is called; None for the name of the field.
+        word: what it is called, or all that it is called; None for the name of the field.
         about: what else typer takes, such as metavar.
     """
     return _declared(typer.Option, help, default, about | {"word": word})
@@ -90,7 +92,8 @@ def _parameter(name: str, annotation: Any, declared: Any) -> inspect.Parameter:
     if isinstance(declared, Field) and declared.metadata:
         about = dict(declared.metadata)
         make, word = about.pop("make"), about.pop("word", None)
-        names = (word or "--" + name.replace("_", "-"),) if make is typer.Option else ()
+        words = word if isinstance(word, tuple) else (word or "--" + name.replace("_", "-"),)
+        names = words if make is typer.Option else ()
         annotation = Annotated[annotation, make(*names, **about)]
     return inspect.Parameter(
         name,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Container, Mapping, Sequence
-from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from collections.abc import Container, Generator, Mapping, Sequence
+from contextlib import ExitStack
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -14,93 +14,96 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import MissingExtraError
-from rbfrag.exchange.tables import parts
-from rbfrag.exchange.tables.parquet import arrow_array, arrow_columns
+from rbfrag.exchange.tables.parquet import arrow_array, arrow_columns, blank_rows
 from rbfrag.exchange.tables.parts import (
-    TEXTS,
+    Dialect,
     Part,
     Parts,
+    Rows,
+    TableFile,
     Write,
     cells_of,
     columns_to_write,
+    keys,
+    parts_of_rows,
     pyarrow,
+    split_header,
 )
+from rbfrag.question.table import ROWS_ABOVE, fields_stated, header_row
 
 _PEEK = 1 << 16
 _BOM = b"\xef\xbb\xbf"
-
-
-@dataclass(frozen=True)
-class Dialect:
-    """How a CSV file is written.
-
-    Args:
-        delimiter: what stands between cells: a comma, a semicolon or a tab.
-        decimal: what stands before decimals: a point or a comma.
-        marked: whether it begins with the mark of UTF-8 (BOM) that spreadsheets write.
-    """
-
-    delimiter: str = ","
-    decimal: str = "."
-    marked: bool = False
-
-    @property
-    def is_default(self) -> bool:
-        """Whether it is the one with commas and points that we write by ourselves."""
-        return self.delimiter == "," and not self.marked
 
 
 def dialect_of(origin: Path) -> Dialect:
     """Return how a file is written, of its header and its first cells."""
     with origin.open("rb") as file:
         start = file.read(_PEEK)
-    head, _, rest = start.removeprefix(_BOM).decode("utf-8", "replace").partition("\n")
-    delimiter = max(",;\t", key=head.count)
+    lines = start.removeprefix(_BOM).decode("utf-8", "replace").splitlines() or [""]
+
+    def rows(delimiter: str) -> list[list[str]]:
+        return list(csv.reader(lines[:ROWS_ABOVE], delimiter=delimiter))
+
+    delimiter = max(",;\t", key=lambda each: (fields_stated(rows(each)), lines[0].count(each)))
     decimal = "."
     if delimiter != ",":
         edge = f'[{delimiter}"\\s]'
+        below = "\n".join(lines[header_row(rows(delimiter)) + 1 :])
         points, commas = (
-            re.search(f"(?:^|{edge})[+-]?\\d*[{mark}]\\d+(?:[eE][+-]?\\d+)?(?:{edge}|$)", rest)
+            re.search(f"(?:^|{edge})[+-]?\\d*[{mark}]\\d+(?:[eE][+-]?\\d+)?(?:{edge}|$)", below)
             for mark in ".,"
         )
         decimal = "." if points and not commas else ","
     return Dialect(delimiter, decimal, start.startswith(_BOM))
 
 
-def csv_parts(
-    origin: Path, numeric: Container[str], stack: ExitStack, *, fast: bool
-) -> tuple[list[str], Parts, Dialect]:
-    """Return the names of the columns, the parts, and how the file is written.
+def open_csv(origin: Path, stack: ExitStack, *, fast: bool) -> TableFile:
+    """Return a CSV file that is open; the stack closes it.
 
-    The stack closes the file at the end. A table of commas is, if it shall be fast, read by pyarrow
-    where that is installed, in a tenth of the time; from the first cell on that is no number, it is
-    read cell by cell as other tables are.
+    A table of commas is, if it shall be fast, read by pyarrow where that is installed, in a tenth
+    of the time; from the first cell on that is no number, it is read cell by cell as others are.
     """
     dialect = dialect_of(origin)
     file = stack.enter_context(origin.open(newline="", encoding="utf-8-sig"))
     reader = csv.reader(file, delimiter=dialect.delimiter)
-    header = [cell.strip() for cell in next(reader, [])]
-    while header and not header[-1]:  # spreadsheets write delimiters behind the last column
-        header.pop()
-    if fast and dialect.delimiter == ",":
-        with suppress(MissingExtraError):
-            arrow, _ = pyarrow()
-            return header, _by_arrow(origin, header, numeric, reader, arrow), dialect
-    return header, _cell_by_cell(header, reader, dialect), dialect
+    names, line, rows, remarks = split_header(_rows(reader), "line")
+
+    def read(numeric: Container[str]) -> Parts:
+        done: int | None = 0
+        if fast and dialect.delimiter == ",":
+            done = yield from _by_arrow(origin, names, line, numeric)
+        if done is not None:
+            yield from parts_of_rows(names, islice(rows, done, None), decimal=dialect.decimal)
+
+    return TableFile(names, read, remarks, dialect)
+
+
+def _rows(reader: Any) -> Rows:
+    line = 0
+    for row in reader:
+        # blank lines are passed over, which spreadsheets write with all their delimiters
+        if row == [""] or "".join(row).strip():
+            yield line + 1, row
+        line = reader.line_num
 
 
 def _by_arrow(
-    origin: Path, header: list[str], numeric: Container[str], reader: Any, arrow: Any
-) -> Parts:
-    from pyarrow import csv as arrow_csv
-
-    kinds = {name: arrow.float64() if name in numeric else arrow.string() for name in header}
-    first, done = 2, 0
+    origin: Path, names: Sequence[str], line: int, numeric: Container[str]
+) -> Generator[Part, None, int | None]:
+    """Yield parts as long as that goes; return how many rows they have, None for all there are."""
+    try:
+        arrow, _ = pyarrow()
+        from pyarrow import csv as arrow_csv
+    except MissingExtraError:
+        return 0
+    columns = keys(names)
+    kinds = {name: arrow.float64() if name in numeric else arrow.string() for name in columns}
+    above, done = line + sum(name.count("\n") for name in names), 0
     try:
         batches = arrow_csv.open_csv(
             origin,
             read_options=arrow_csv.ReadOptions(
-                column_names=header, skip_rows=1, block_size=1 << 25, use_threads=False
+                column_names=columns, skip_rows=above, block_size=1 << 25, use_threads=False
             ),
             parse_options=arrow_csv.ParseOptions(newlines_in_values=True, ignore_empty_lines=False),
             convert_options=arrow_csv.ConvertOptions(
@@ -109,69 +112,28 @@ def _by_arrow(
         )
         for batch in batches:
             if not _is_a_line_each(batch, arrow):
-                break
-            cells: dict[str, Any] = {}
-            for name, column in zip(header, batch.columns, strict=True):
-                if name in numeric:
-                    cells[name] = np.array(column.to_numpy(zero_copy_only=False))
-                else:
-                    cells[name] = column.to_pylist() if name in TEXTS else column
+                return done
+            cells: dict[str, Any] = {
+                name: np.array(column.to_numpy(zero_copy_only=False)) if name in numeric else column
+                for name, column in zip(columns, batch.columns, strict=True)
+            }
+            first = above + done + 1
             if batch.num_rows:
                 yield Part(range(first, first + batch.num_rows), cells)
-            first += batch.num_rows
             done += batch.num_rows
-        else:
-            return
     except arrow.ArrowException:
-        pass
-    # cell by cell from the first row that was not handed out
-    yield from _cell_by_cell(header, reader, Dialect(), done)
+        return done
+    return None
 
 
 def _is_a_line_each(batch: Any, arrow: Any) -> bool:
     """Whether each row is one line of the file, and none of them is blank."""
     from pyarrow import compute
 
-    blank = np.ones(batch.num_rows, dtype=bool)
-    for column in batch.columns:
-        if not arrow.types.is_string(column.type):
-            blank &= compute.is_null(column).to_numpy(zero_copy_only=False)
-            continue
-        if compute.any(compute.match_substring(column, "\n")).as_py():
-            return False
-        blank &= compute.equal(column, "").to_numpy(zero_copy_only=False)
-    return not blank.any()
-
-
-def _cell_by_cell(header: list[str], reader: Any, dialect: Dialect, done: int = 0) -> Parts:
-    width = len(header)
-    rows: list[list[str]] = []
-    lines: list[int] = []
-    faults: dict[int, str] = {}
-
-    def part() -> Part:
-        columns = map(list, zip(*rows, strict=True))
-        return Part(lines, dict(zip(header, columns, strict=True)), faults, dialect.decimal)
-
-    number, end = 0, reader.line_num
-    for row in reader:
-        line, end = end + 1, reader.line_num
-        if not row or (width > 1 and not "".join(row).strip()):
-            continue  # a blank line, which spreadsheets write with all its delimiters
-        number += 1
-        if number <= done:
-            continue
-        if len(row) != width:
-            if len(row) < width or any(row[width:]):
-                faults[len(rows)] = f"{len(row)} cells under {width} columns"
-            row = [*row[:width], *[""] * (width - len(row))]
-        rows.append(row)
-        lines.append(line)
-        if len(rows) == parts.ROWS:
-            yield part()
-            rows, lines, faults = [], [], {}
-    if rows:
-        yield part()
+    texts = [each for each in batch.columns if arrow.types.is_string(each.type)]
+    if any(compute.any(compute.match_substring(each, "\n")).as_py() for each in texts):
+        return False
+    return not blank_rows(arrow, batch).any()
 
 
 def csv_writer(

@@ -8,10 +8,10 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from rbfrag.errors import InputError
-from rbfrag.exchange.tables.csv_file import Dialect, csv_parts, csv_writer
-from rbfrag.exchange.tables.parquet import parquet_parts, parquet_writer
-from rbfrag.exchange.tables.parts import Parts, Write, pyarrow
-from rbfrag.exchange.tables.workbook import openpyxl, workbook_parts, workbook_writer
+from rbfrag.exchange.tables.csv_file import csv_writer, open_csv
+from rbfrag.exchange.tables.parquet import open_parquet, parquet_writer
+from rbfrag.exchange.tables.parts import Dialect, TableFile, Write, pyarrow
+from rbfrag.exchange.tables.workbook import open_workbook, openpyxl, workbook_writer
 from rbfrag.files import output_path
 
 SUFFIXES = (".csv", ".xlsx", ".parquet")
@@ -43,22 +43,29 @@ def table_path(path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def table_parts(
-    source: Path, numeric: Container[str], stack: ExitStack, *, fast: bool = False
-) -> tuple[list[str], Parts, Dialect]:
-    """Return the columns of a table, its parts, and how to write CSV that is like it.
+def open_table(
+    source: Path, stack: ExitStack, *, sheet: str | None = None, fast: bool = False
+) -> TableFile:
+    """Return a table that is open.
 
     Args:
         source: the file.
-        numeric: columns that hold numbers.
-        stack: closes the file at the end.
+        stack: closes it at the end.
+        sheet: of a workbook, the name of the sheet; None for the first.
         fast: read CSV by pyarrow where it is installed, which takes a third of a second to load.
+
+    Raises:
+        InputError: the file cannot be read, or has no such sheet.
+        MissingExtraError: a Parquet file without pyarrow, a workbook without openpyxl.
     """
     suffix = source.suffix.lower()
-    if suffix == ".csv":
-        return csv_parts(source, numeric, stack, fast=fast)
-    opened = parquet_parts if suffix == ".parquet" else workbook_parts
-    return *opened(source, numeric, stack), Dialect()
+    if suffix == ".xlsx":
+        return open_workbook(source, stack, sheet)
+    if sheet is not None:
+        raise InputError(f"{source} has no sheet {sheet!r}: only workbooks (.xlsx) have sheets")
+    return (
+        open_parquet(source, stack) if suffix == ".parquet" else open_csv(source, stack, fast=fast)
+    )
 
 
 def table_writer(

@@ -12,19 +12,17 @@ from numpy.typing import NDArray
 
 from rbfrag.errors import InputError
 from rbfrag.exchange.tables import parts
-from rbfrag.exchange.tables.parts import TEXTS, Part, Parts, Write, pyarrow
+from rbfrag.exchange.tables.parts import Part, Parts, TableFile, Write, keys, pyarrow
 
 
-def parquet_parts(
-    origin: Path, numeric: Container[str], stack: ExitStack
-) -> tuple[list[str], Parts]:
-    """Return the names of the columns of a Parquet file, and its parts."""
+def open_parquet(origin: Path, stack: ExitStack) -> TableFile:
+    """Return a Parquet file that is open; the stack closes it."""
     arrow, parquet = pyarrow()
     try:
         file = stack.enter_context(parquet.ParquetFile(origin))
     except (arrow.ArrowException, UnicodeError) as error:
         raise InputError(f"{origin}: not a Parquet file: {error}") from None
-    header = list(file.schema_arrow.names)
+    names = list(file.schema_arrow.names)
 
     def batches() -> Iterator[Any]:
         try:
@@ -34,15 +32,18 @@ def parquet_parts(
                 f"{origin}: the Parquet file is damaged: {error}; write it again"
             ) from None
 
-    def read() -> Parts:
+    def read(numeric: Container[str]) -> Parts:
         first = 1
         for group in batches():
+            lines: Sequence[int] = range(first, first + group.num_rows)
+            first += group.num_rows
+            blank = blank_rows(arrow, group)
+            if blank.any():
+                lines = [line for line, nothing in zip(lines, blank, strict=True) if not nothing]
+                group = group.filter(arrow.array(~blank))
             cells: dict[str, Any] = {}
-            for name, column in zip(header, group.columns, strict=True):
-                is_text = arrow.types.is_string(column.type) or arrow.types.is_large_string(
-                    column.type
-                )
-                if name in TEXTS or (name in numeric and is_text):
+            for name, column in zip(keys(names), group.columns, strict=True):
+                if name in numeric and _is_text(arrow, column):
                     cells[name] = column.to_pylist()
                 elif name in numeric:
                     try:
@@ -52,10 +53,28 @@ def parquet_parts(
                     cells[name] = np.array(column, dtype=np.float64)
                 else:
                     cells[name] = column
-            yield Part(range(first, first + group.num_rows), cells)
-            first += group.num_rows
+            yield Part(lines, cells)
 
-    return header, read()
+    return TableFile(names, read)
+
+
+def _is_text(arrow: Any, column: Any) -> bool:
+    return bool(arrow.types.is_string(column.type) or arrow.types.is_large_string(column.type))
+
+
+def blank_rows(arrow: Any, batch: Any) -> NDArray[np.bool_]:
+    """Return which rows have no cell that is filled."""
+    import pyarrow.compute as compute
+
+    blank = np.ones(batch.num_rows, dtype=np.bool_)
+    for column in batch.columns:
+        if not blank.any():
+            break
+        empty = compute.is_null(column, nan_is_null=True)
+        if _is_text(arrow, column):
+            empty = compute.or_(empty, compute.equal(compute.fill_null(column, ""), ""))
+        blank &= empty.to_numpy(zero_copy_only=False)
+    return blank
 
 
 def parquet_writer(

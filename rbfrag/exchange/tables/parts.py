@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import datetime
+import re
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import chain, islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import MissingExtraError
+from rbfrag.question.table import ROWS_ABOVE, header_row
 
 ROWS = 1 << 18
 """Rows that are read, answered and written at a time."""
-
-TEXTS = ("mode", "kind")
-"""Columns of texts that are looked into: which model may answer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,13 +28,13 @@ class Part:
         lines: number of each row in its file: of its first line in CSV, of its row of the sheet.
         cells: columns by name: arrays of numbers, lists of cells, or arrays of Arrow.
         faults: what is wrong with a whole row, by its index.
-        decimal: what stands before the decimals of a number that is a text.
+        decimal: what may stand before the decimals of a number that is a text.
     """
 
     lines: Sequence[int]
     cells: dict[str, Any]
     faults: Mapping[int, str] = field(default_factory=dict)
-    decimal: str = "."
+    decimal: str = ".,"
 
     def numbers(self, column: str) -> tuple[NDArray[np.float64], dict[int, str]]:
         """Return the numbers of a column, NaN where a cell is empty, and what the others are.
@@ -44,11 +45,9 @@ class Part:
         cells = self.cells[column]
         if isinstance(cells, np.ndarray):
             return cells, {}
-        if self.decimal == ".":
-            try:
+        if "." in self.decimal:
+            with suppress(AttributeError, ValueError):  # else they are looked at one by one
                 return np.array([float(c) if c.strip() else np.nan for c in cells]), {}
-            except (AttributeError, ValueError):
-                pass  # an empty cell or number of a sheet, or a text: one by one
         values, faults = np.full(len(cells), np.nan), {}
         for i, cell in enumerate(cells):
             try:
@@ -62,6 +61,109 @@ Parts = Iterator[Part]
 
 Write = Callable[[Part, Mapping[str, NDArray[Any]]], None]
 """Writes one part of the table, and its answers."""
+
+Rows = Iterator[tuple[int, Sequence[Any]]]
+"""Rows of a table that are not empty, each with its number in the file."""
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a CSV file is written.
+
+    Args:
+        delimiter: what stands between cells: a comma, a semicolon or a tab.
+        decimal: what stands before decimals: a point or a comma.
+        marked: whether it begins with the mark of UTF-8 (BOM) that spreadsheets write.
+    """
+
+    delimiter: str = ","
+    decimal: str = "."
+    marked: bool = False
+
+    @property
+    def is_default(self) -> bool:
+        """Whether it is the one with commas and points that we write by ourselves."""
+        return self.delimiter == "," and not self.marked
+
+
+@dataclass(eq=False)
+class TableFile:
+    """A table that is open.
+
+    Args:
+        names: what its columns are called; empty for one without a name.
+        read: returns its parts, by the columns that hold numbers.
+        remarks: what is to be said of it; all of it when its parts have been read.
+        dialect: how to write CSV that is like it.
+    """
+
+    names: Sequence[str]
+    read: Callable[[Container[str]], Parts]
+    remarks: list[str] = field(default_factory=list)
+    dialect: Dialect = field(default_factory=Dialect)
+
+    @property
+    def header(self) -> list[str]:
+        """What the columns that have a name are called."""
+        return [name for name in self.names if name]
+
+    def parts(self, numeric: Container[str]) -> Parts:
+        """Yield the parts without the columns that have no name."""
+        nameless = [key for key, name in zip(keys(self.names), self.names, strict=True) if not name]
+        for part in self.read(numeric):
+            for key in nameless:
+                remark = f"{key} is neither read nor written"
+                if any(cells_of(part.cells.pop(key))) and remark not in self.remarks:
+                    self.remarks.append(remark)
+            yield part
+
+
+def keys(names: Sequence[str]) -> list[str]:
+    """Return what cells are found by: the names of columns, or which has none."""
+    return [name or f"column {i} without a name" for i, name in enumerate(names, 1)]
+
+
+def split_header(rows: Rows, word: str) -> tuple[list[str], int, Rows, list[str]]:
+    """Return the names of columns, the number of their row, the rows below, and what to say.
+
+    Args:
+        rows: the rows of a table.
+        word: what their numbers count.
+    """
+    first = list(islice(rows, ROWS_ABOVE))
+    at = header_row([cells for _, cells in first])
+    line, cells = first[at] if first else (0, ())
+    names = ["" if cell is None else str(cell).strip() for cell in cells]
+    while names and not names[-1]:  # spreadsheets write delimiters behind the last column
+        names.pop()
+    remarks = [f"the names of the columns stand in {word} {line}: what is above is not read"]
+    return names, line, chain(first[at + 1 :], rows), remarks if at else []
+
+
+def parts_of_rows(
+    names: Sequence[str], rows: Rows, *, empty: str | None = "", decimal: str = ".,"
+) -> Parts:
+    """Yield the parts of a table that is read row by row.
+
+    Args:
+        names: of its columns.
+        rows: the rows below them.
+        empty: an empty cell; where it is None a row may end before the last column.
+        decimal: as of :class:`Part`.
+    """
+    width = len(names)
+    while some := list(islice(rows, ROWS)):
+        faults, kept = {}, []
+        for i, (_, row) in enumerate(some):
+            if len(row) != width:
+                size = max((j for j, cell in enumerate(row, 1) if cell or cell == 0), default=0)
+                if size > width or (len(row) < width and empty is not None):
+                    faults[i] = f"{max(size, len(row[:width]))} cells under {width} columns"
+                row = [*row[:width], *[empty] * (width - len(row))]
+            kept.append(row)
+        columns = map(list, zip(*kept, strict=True))
+        lines = [line for line, _ in some]
+        yield Part(lines, dict(zip(keys(names), columns, strict=True)), faults, decimal)
 
 
 def _number(cell: object, decimal: str) -> float:
@@ -77,21 +179,21 @@ def _number(cell: object, decimal: str) -> float:
     text = str(cell).strip()
     if not text:
         return np.nan
-    shown = f"= {text[:40]!r}"
-    try:
-        if decimal == ".":
-            return float(text)
-        if "." not in text:
-            return float(text.replace(",", "."))
-    except ValueError:
-        pass
-    if decimal != "." and _is_number(text):
+    shown, pointed = f"= {text[:40]!r}", text.replace(",", ".")
+    is_number = _is_number(text)
+    if is_number and ("." in decimal or "." not in text):
+        return float(text)
+    if is_number:
         raise ValueError(f"{shown} has a decimal point, and the table has decimal commas")
-    if _is_number(text.replace(",", ".")):
+    if "." in text or not _is_number(pointed):
+        raise ValueError(f"{shown} is not a number")
+    if "," not in decimal:
         raise ValueError(
             f"{shown} is not a number: a decimal comma goes with semicolons between the cells"
         )
-    raise ValueError(f"{shown} is not a number")
+    if decimal != "," and re.fullmatch(r"[+-]?[1-9]\d{0,2},\d{3}", text):
+        raise ValueError(f"{shown} is {pointed} or {text.replace(',', '')}: write it as a number")
+    return float(pointed)
 
 
 def _is_number(text: str) -> bool:

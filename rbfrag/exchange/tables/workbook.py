@@ -1,4 +1,4 @@
-"""A table of blocks as an Excel workbook (.xlsx): its first sheet, names in the first row."""
+"""A table of blocks as a sheet of an Excel workbook (.xlsx)."""
 
 from __future__ import annotations
 
@@ -18,8 +18,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rbfrag.errors import InputError, MissingExtraError
-from rbfrag.exchange.tables import parts
-from rbfrag.exchange.tables.parts import Part, Parts, Write, cells_of, columns_to_write
+from rbfrag.exchange.tables.parts import (
+    Part,
+    Parts,
+    Rows,
+    TableFile,
+    Write,
+    cells_of,
+    columns_to_write,
+    parts_of_rows,
+    split_header,
+)
 
 MOST_ROWS = 1 << 20
 """Rows of a sheet, its first with the names."""
@@ -48,30 +57,50 @@ def openpyxl() -> Any:
     return library
 
 
-def workbook_parts(
-    origin: Path, numeric: Container[str], stack: ExitStack
-) -> tuple[list[str], Parts]:
-    """Return the names of the columns of the first sheet, and its parts.
+def open_workbook(origin: Path, stack: ExitStack, sheet: str | None) -> TableFile:
+    """Return a sheet that is open; the stack closes its workbook.
 
     Formulas are read as the values that Excel has computed and stored; rows without any cell are
     passed over.
 
+    Args:
+        origin: the workbook.
+        stack: see there.
+        sheet: name of the sheet; None for the first.
+
     Raises:
-        InputError: no workbook, or one with a formula that was never computed.
+        InputError: no workbook, one without that sheet, or with a formula that was never computed.
     """
     library = openpyxl()
     with _damage(origin):
         _check(origin)
         book = library.load_workbook(origin, read_only=True, data_only=True, keep_links=False)
         stack.callback(book.close)
-        if not book.worksheets:
+        sheets = {each.title: each for each in book.worksheets}
+        if not sheets:
             raise InputError(f"{origin}: the workbook has no sheet")
-        sheet = book.worksheets[0]
-        sheet.reset_dimensions()  # what programs state there is not always so
-        rows = enumerate(sheet.iter_rows(values_only=True), 1)
-        names = next((row for _, row in rows if _is_filled(row)), ())
-    header = ["" if name is None else str(name).strip() for name in _filled(names)]
-    return header, _parts(origin, header, rows, numeric)
+        if sheet is not None and sheet not in sheets:
+            raise InputError(
+                f"{origin}: there is no sheet {sheet!r}; the sheets are {', '.join(sheets)}"
+            )
+        chosen = book.worksheets[0] if sheet is None else sheets[sheet]
+        chosen.reset_dimensions()  # what programs state there is not always so
+        names, _, rows, remarks = split_header(_rows(origin, chosen), "row")
+
+    def read(numeric: Container[str]) -> Parts:
+        for part in parts_of_rows(names, rows, empty=None):
+            texts = {n: [*map(_text, c)] for n, c in part.cells.items() if n not in numeric}
+            part.cells.update(texts)
+            yield part
+
+    return TableFile(names, read, remarks)
+
+
+def _rows(origin: Path, sheet: Any) -> Rows:
+    with _damage(origin):
+        for number, row in enumerate(sheet.iter_rows(values_only=True), 1):
+            if any(cell is not None and str(cell).strip() for cell in row):
+                yield number, row
 
 
 @contextmanager
@@ -107,47 +136,6 @@ def _check(origin: Path) -> None:
                             "computed: open the workbook in Excel and save it"
                         )
                     before = more[-4096:]
-
-
-def _parts(origin: Path, header: list[str], rows: Any, numeric: Container[str]) -> Parts:
-    width = len(header)
-    texts = [i for i, name in enumerate(header) if name not in numeric]
-    with _damage(origin):
-        ended = not width
-        while not ended:
-            kept: list[list[Any]] = []
-            lines: list[int] = []
-            faults: dict[int, str] = {}
-            ended = True
-            for number, row in rows:
-                if not _is_filled(row):
-                    continue
-                cells = list(row)
-                if _is_filled(cells[width:]):
-                    faults[len(kept)] = f"{len(_filled(cells))} cells under {width} columns"
-                cells = [*cells[:width], *[None] * (width - len(cells))]
-                for i in texts:
-                    cells[i] = _text(cells[i])
-                kept.append(cells)
-                lines.append(number)
-                if len(kept) == parts.ROWS:
-                    ended = False
-                    break
-            if kept:
-                columns = map(list, zip(*kept, strict=True))
-                yield Part(lines, dict(zip(header, columns, strict=True)), faults)
-
-
-def _is_filled(row: Sequence[Any]) -> bool:
-    return any(cell is not None for cell in row)
-
-
-def _filled(row: Sequence[Any]) -> Sequence[Any]:
-    """Return a row without the empty cells at its end."""
-    size = len(row)
-    while size and row[size - 1] is None:
-        size -= 1
-    return row[:size]
 
 
 def _text(cell: Any) -> str:

@@ -13,10 +13,11 @@ from rbfrag.db.engine import opened_database
 from rbfrag.db.location import REFERENCE
 from rbfrag.db.models import save_model
 from rbfrag.errors import InputError, MissingExtraError
-from rbfrag.exchange.batch import ANSWERS, predict_table
-from rbfrag.exchange.block_table import read_columns, write_block_table
+from rbfrag.exchange.block_table import write_block_table
+from rbfrag.exchange.table_answers import ANSWERS, predict_table
 from rbfrag.exchange.tables import csv_file, parts
 from rbfrag.question.question import predict
+from tests.block_tables import read_columns
 from tests.fragility.conftest import model_row
 
 HEAD = "block_id,p2_1_s2,kr,pgv_m_s"

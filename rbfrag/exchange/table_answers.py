@@ -1,0 +1,213 @@
+"""Predictions for a table of blocks: the table again with the answers appended, or their list."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rbfrag.errors import InputError
+from rbfrag.exchange.block_rows import PLACE, PORTFOLIO, TEXTS
+from rbfrag.exchange.block_table import BlockTable, opened_table
+from rbfrag.exchange.excel_text import as_text, as_written, changed_texts, formula_warnings
+from rbfrag.exchange.tables.files import table_path, table_writer
+from rbfrag.exchange.tables.parts import Part, Write
+from rbfrag.files import as_path, written_whole
+from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.fragility.unusable import FIRST, refuse, unusable_in_words
+from rbfrag.question.fields import BlockFields, ShakingFields, column_of, names_of
+from rbfrag.question.question import ask
+
+_NUMBERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
+
+ANSWERS = ("kind", "mode", *_NUMBERS, "in_domain", "reason")
+"""The columns that are appended; a table that has them gets new ones."""
+
+OF_UNCERTAIN = "block_sd"
+"""The column that is appended too where blocks are uncertain."""
+
+MOST_LISTED = 10_000
+"""So many answers are listed; a file has them all."""
+
+
+def predict_table(
+    source: str | PathLike[str],
+    target: str | PathLike[str] | None = None,
+    *,
+    given: Mapping[str, float],
+    kind: str | None = None,
+    sheet: str | None = None,
+    excel_text: bool = False,
+    **question: Any,
+) -> dict[str, Any]:
+    """Answer every block of a table, and write the table with the answers or list these.
+
+    A row that cannot be answered, as one with a cell that is no number, keeps an empty probability
+    and says why; a row whose `mode` is another than that of the model's kind is not answered.
+
+    Args:
+        source: table, ``.csv``, ``.xlsx``, ``.parquet`` or ``.geojson``, with columns that describe
+            blocks, and measures; CSV also with semicolons and decimal commas.
+        target: table to write, ``.csv``, ``.xlsx`` or ``.parquet``, whole or not at all; CSV is
+            written as the CSV that was read. None lists the answers.
+        given: what is the same for all rows, by the names of :func:`rbfrag.predict`.
+        kind: how the blocks fail; None for what they are given by.
+        sheet: of a workbook, the name of the sheet; None for the first.
+        excel_text: write texts that spreadsheets take for formulas with an apostrophe (CSV).
+        question: ``rotation_deg``, ``model``, ``level`` and ``db`` of :func:`rbfrag.predict`.
+
+    Returns:
+        Counts: rows, answered, without an answer, in_domain; kind, model, term, method; without a
+        target ``blocks``, one mapping a row, of the first :data:`MOST_LISTED`; warnings.
+
+    Raises:
+        InputError: a file that cannot be read or written, a missing column, no row that can be
+            answered.
+    """
+    origin = as_path(source, "source", "a table of blocks")
+    goal = None if target is None else table_path(target)
+    if goal is not None and origin.exists() and goal.exists() and origin.samefile(goal):
+        raise InputError(f"out {goal} is the table itself: name another file", fields=("out",))
+    read = names_of(BlockFields, ShakingFields)
+    counts = np.zeros(3, dtype=np.int64)
+    refused: dict[str, str] = {}
+    rows: list[dict[str, Any]] = []
+    formulas: list[str] = []
+    chosen: dict[str, dict[str, None]]
+    chosen = {name: {} for name in ("kind", "model", "term", "method", "notes", "read")}
+    with opened_table(origin, read, sheet=sheet) as table, ExitStack() as stack:
+        _check(table, given, kind)
+        uncertain = any(name.endswith("_sigma") for name in (*table.stated.columns, *given))
+        columns = (*ANSWERS, OF_UNCERTAIN) if uncertain else ANSWERS
+        if goal is None:
+            write = _listed(table, columns, rows)
+        else:
+            partial = stack.enter_context(written_whole(goal))
+            write = _written(table, columns, partial, stack, formulas, excel_text=excel_text)
+        for part in table.parts:
+            predicted, answer = _answer(table, part, given, kind, question)
+            write(part, answer)
+            for name, words in chosen.items():
+                own = getattr(predicted, name)
+                own = own.split(", ") if isinstance(own, str) else own
+                words.update(dict.fromkeys(filter(None, own)))
+            finite = np.isfinite(answer["probability"])
+            for i in np.flatnonzero(~finite)[: FIRST - len(refused)].tolist():
+                refused[f"{table.word} {part.lines[i]}"] = answer["reason"][i]
+            counts += [finite.size, int(finite.sum()), int(answer["in_domain"].sum())]
+        total, answered, inside = counts.tolist()
+        if not total:
+            raise InputError(f"{origin}: there is no block in the file")
+        if not answered:
+            refuse(str(origin), [*refused], [*refused.values()], total)
+    known = (*chosen.pop("read"), *names_of(ShakingFields), *TEXTS, *PLACE, *PORTFOLIO)
+    notes = chosen.pop("notes")
+    missing = unusable_in_words(total - answered, total, [*refused], [*refused.values()])
+    return {
+        "rows": total,
+        "answered": answered,
+        "without_answer": total - answered,
+        "in_domain": inside,
+        **{name: ", ".join(each) for name, each in chosen.items()},
+        **({"blocks": rows} if goal is None else {}),
+        "warnings": [*table.remarks(known), *notes, *missing, *formulas],
+    }
+
+
+def _check(table: BlockTable, given: Mapping[str, float], kind: str | None) -> None:
+    """Refuse a table that does not describe blocks, or in which something is said twice."""
+    doubled = next((name for name in table.header if table.header.count(name) > 1), None)
+    if doubled is not None:
+        raise InputError(f"{table.name}: the column {doubled} is there twice")
+    for name in given:
+        if name in table.stated.columns:
+            raise InputError(
+                f"{column_of(name)} is an option and a column of {table.name}: give it once"
+            )
+    table.check(given, kind)
+
+
+def _answer(
+    table: BlockTable,
+    part: Part,
+    given: Mapping[str, float],
+    kind: str | None,
+    question: Mapping[str, Any],
+) -> tuple[PredictionArray, dict[str, NDArray[Any]]]:
+    """Return the answers for some rows, and their columns."""
+    values, faults = table.numbers(part)
+    kinds, modes = table.text(part, "kind"), table.text(part, "mode")
+    requested = kind if kinds is None else [each or kind for each in kinds]
+    predicted = ask({**values, **given}, kind=requested, mode=modes, rows=True, **question)
+    assert isinstance(predicted, PredictionArray)
+    answer: dict[str, NDArray[Any]] = {
+        name: getattr(predicted, name) for name in (*_NUMBERS, "in_domain", "reason")
+    }
+    for name, stated, own in (
+        ("kind", kinds, predicted.kinds),
+        ("mode", modes, predicted.modes),
+    ):
+        texts = np.array(stated or [""], dtype=object)
+        answer[name] = np.where(texts == "", own, texts)
+    sd = predicted.block_sd
+    answer[OF_UNCERTAIN] = np.zeros(predicted.probability.shape) if sd is None else sd
+    bad = [*faults]
+    for name in (*_NUMBERS, OF_UNCERTAIN):
+        answer[name][bad] = np.nan
+    answer["in_domain"][bad] = False
+    answer["reason"][bad] = [*faults.values()]
+    return predicted, answer
+
+
+def _written(
+    table: BlockTable,
+    answers: Sequence[str],
+    partial: Path,
+    stack: ExitStack,
+    formulas: list[str],
+    *,
+    excel_text: bool,
+) -> Write:
+    """Return what writes parts and their answers to a file; enters what is to be said of it."""
+    kept = [name for name in table.header if name not in (*ANSWERS, OF_UNCERTAIN)]
+    write = table_writer(
+        partial, kept, answers, numeric=table.numeric, stack=stack, dialect=table.file.dialect,
+        fast=True,
+    )  # fmt: skip
+    is_csv = partial.suffix.lower() == ".csv"
+
+    def write_part(part: Part, answer: Mapping[str, NDArray[Any]]) -> None:
+        cells = changed_texts({name: part.cells[name] for name in kept}, as_written)
+        if is_csv and excel_text:
+            cells = changed_texts(cells, as_text)
+        elif is_csv and not formulas:
+            formulas.extend(formula_warnings(cells))
+        write(replace(part, cells=cells), answer)
+
+    return write_part
+
+
+def _listed(table: BlockTable, answers: Sequence[str], rows: list[dict[str, Any]]) -> Write:
+    """Return what enters the answers for parts into a list, up to :data:`MOST_LISTED`."""
+    before = [0]
+
+    def list_part(part: Part, answer: Mapping[str, NDArray[Any]]) -> None:
+        size = min(len(part.lines), MOST_LISTED - len(rows))
+        names = table.text(part, "block_id") or [
+            str(before[0] + i + 1) for i in range(len(part.lines))
+        ]
+        columns = [answer[name][:size].tolist() for name in answers]
+        rows.extend(
+            {"block_id": name}
+            | {n: None if v != v else v for n, v in zip(answers, row, strict=True)}
+            for name, *row in zip(names[:size], *columns, strict=True)
+        )
+        before[0] += len(part.lines)
+
+    return list_part
