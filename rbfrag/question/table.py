@@ -78,10 +78,8 @@ class Header(NamedTuple):
         loud = [name for name in left if _sounds_like_input(name)]
         texts = []
         if loud:
-            texts.append(
-                f"NOT READ: {_listed(loud)}: the answer does not depend on "
-                f"{'this column' if len(loud) == 1 else 'these columns'}"
-            )
+            which = "it" if len(loud) == 1 else "them"
+            texts.append(f"NOT READ: {_listed(loud)}: the answer does not depend on {which}")
         if quiet := [name for name in left if name not in loud]:
             texts.append(f"not read: {_listed(quiet)}")
         return tuple(texts)
@@ -139,12 +137,12 @@ def _called(text: str) -> str | None:
 def header_row(rows: Sequence[Sequence[object]]) -> int:
     """Return which of the first rows of a table holds the names of its columns.
 
-    That is the first which is not empty; where it states no number, and not two fields, it is a
-    title above the first that states two, or above the only one that states a number.
+    That is the first which is not empty; one that states no number is a title above the first that
+    states two fields, or above the only one that states a number.
     """
     first = next((i for i, row in enumerate(rows) if any(map(_text, row))), 0)
     stated = [_fields_in(row) for row in rows]
-    if not stated or len(stated[first]) > 1 or _has_number(stated[first]):
+    if not stated or _has_number(stated[first]):
         return first
     below = [
         i

@@ -130,6 +130,26 @@ def test_csv_is_answered_as_it_is_written(
     assert second
 
 
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_rows_above_the_names_of_csv(tmp_path: Path, delimiter: str) -> None:
+    """A large table too, which pyarrow reads."""
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    row = "3;0.1;0.6".replace(";", delimiter)
+    row = row if delimiter == "," else row.replace(".", ",")
+    names = "p2;kr;pgv".replace(";", delimiter)
+    title = 'Survey, of 12.5. and\n"two\nlines"\n\n'
+    for count in (3, 150_000):
+        source.write_text("\n".join([title + names, *[row] * count, ""]))
+        told = answer(source, target)
+        assert (told["rows"], told["answered"]) == (count, count)
+        assert told["warnings"] == [
+            "the names of the columns stand in line 5: what is above is not read"
+        ]
+        assert target.read_text().count("\n") == count + 1
+    source.write_text("\n".join([title + names, row, row.replace("3", "x")]))
+    assert "line 7: p2 = 'x'" in str(answer(source, target)["warnings"])
+
+
 def test_a_point_among_decimal_commas_is_not_guessed_at(tmp_path: Path) -> None:
     source = tmp_path / "a.csv"
     source.write_text("p2_1_s2;kr;pgv_m_s\n3;0,1;0,6\n3;1.234;0,6\n")

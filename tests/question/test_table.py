@@ -12,7 +12,7 @@ from rbfrag.exchange.block_rows import read_blocks
 from rbfrag.exchange.table_answers import predict_table
 from rbfrag.question.fields import column_of, columns_declared, declared
 from rbfrag.question.question import predict
-from rbfrag.question.table import columns_in, field_of
+from rbfrag.question.table import columns_in, field_of, header_of, header_row
 from rbfrag.solver.block.geometry import Block
 from rbfrag.solver.stability.single import stability
 
@@ -32,6 +32,11 @@ from rbfrag.solver.stability.single import stability
         ("sa03", "sa03_g", None),
         ("Block", "block_id", None),
         ("p2_1_s2", "p2", None),
+        ("H_m", "height_m", "m"),
+        ("Width, cm", "width_m", "cm"),
+        ("PGV cm/s", "pgv_m_s", "cm/s"),
+        ("pga_m_s2", "pga_g", "m/s2"),
+        ("Block [no.]", "block_id", "no."),
     ],
 )
 def test_a_column_states_a_field_under_any_of_its_names(
@@ -52,6 +57,7 @@ def test_no_name_stands_for_two_fields() -> None:
     [
         (["hieght_m", "width_m"], "did you mean height_m"),
         (["height_m", "restitutoin"], "did you mean restitution"),
+        (["hieght_cm", "width_m"], "did you mean height"),
         (["dip", "beta"], "both state the dip of the base"),
         (["kr", "kr"], "kr is there twice"),
         (["Height [ft]"], "'ft'"),
@@ -69,6 +75,38 @@ def test_other_columns_are_named_loudly_where_they_sound_like_input() -> None:
     loud, quiet = stated.unread(header, ("p2", "kr"))
     assert loud.startswith("NOT READ: dip direction")
     assert quiet == "not read: note"
+
+
+def test_columns_of_written_answers_are_not_worth_a_word(tmp_path: Path) -> None:
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    source.write_text("block_id,p2_1_s2,kr,pgv_m_s,weight,lon,lat\na,3,0.1,0.6,1,20,40\n")
+    assert predict_table(source, target, given={})["warnings"] == []
+    assert read_blocks(target).remarks == ("NOT READ: pgv_m_s: the answer does not depend on it",)
+
+
+def test_a_name_for_a_column_states_its_field_and_unit() -> None:
+    for name in columns_declared():
+        assert columns_in([header_of(name)], "a.csv", [name]).columns[name].factor == 1.0
+
+
+NAMES = ["Block", "H [m]", "W [m]"]
+
+
+@pytest.mark.parametrize(
+    ("rows", "number"),
+    [
+        ([NAMES, ["A", "2", "0.5"]], 0),
+        ([["North wall"], [], ["by", "A. S."], NAMES, ["A", "2", "0.5"]], 3),
+        ([["Site", "Name"], NAMES, ["A", "2", "0.5"]], 1),  # a title that states no number
+        ([["block", "p2_1_s2"], NAMES], 0),  # nothing changes where the first row states one
+        ([["North wall"], ["stone", "kr"], ["x", "0.1"]], 1),
+        ([["stone", "size", "shade"], ["B", "2", "W"]], 0),  # numbers are no names
+        ([[], ["anything", None], ["3", 3]], 1),
+        ([], 0),
+    ],
+)
+def test_the_row_of_the_names(rows: list[list[object]], number: int) -> None:
+    assert header_row(rows) == number
 
 
 def answered(

@@ -99,6 +99,19 @@ class Meaning:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """The table of blocks."""
+
+    blocks: str = option(
+        "Table of blocks (.csv, .xlsx, .parquet) with p2_1_s2 [1/s²] and kr, or height_m and "
+        "width_m [m], site_id, and if wanted count, weight, loss, loss_sigma, kind.",
+        ...,
+        metavar="FILE",
+    )
+    sheet: str | None = option(options.SHEET, metavar="NAME")
+
+
 @stacked
 def losses(
     *,
@@ -107,13 +120,7 @@ def losses(
         None,
         metavar="[FOLDER]",
     ),
-    blocks: str = option(
-        "Table of blocks (.csv, .xlsx, .parquet) with p2_1_s2 [1/s²] and kr, or height_m and "
-        "width_m [m], site_id, and if wanted count, weight, loss, loss_sigma, kind.",
-        ...,
-        metavar="FILE",
-    ),
-    sheet: str | None = option(options.SHEET, metavar="NAME"),
+    table: Table,
     files: Files,
     time: Time,
     sampling: Sampling,
@@ -137,7 +144,7 @@ def losses(
     from rbfrag.exchange.event_losses import losses as answered
 
     check_files(table=out, plot=plot, excel_text=excel_text)
-    rows = read_blocks(blocks, meaning.kind, reads=PORTFOLIO, sheet=sheet)
+    rows = read_blocks(table.blocks, meaning.kind, reads=PORTFOLIO, sheet=table.sheet)
     with ProgressBar("losses", "events") as bar:
         answer = answered(
             folder, rows, files=files.named(), samples=sampling.samples,

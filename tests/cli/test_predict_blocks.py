@@ -1,0 +1,98 @@
+"""`rbfrag predict --blocks`: workbooks as people write them, and answers on the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import openpyxl
+import pytest
+
+from tests.cli.conftest import Refuses, Shell
+
+ROWS: tuple[tuple[Any, ...], ...] = (
+    (None, "Survey of the north wall"),
+    (),
+    (None, "by", "A. Smith", "2024"),
+    (None, "Name", "H (m)", "Width [cm]", None, "Dip", "friction", "remark"),
+    (None, "A7", "2,4", 50, None, 3, 35, "loose"),
+    (None, None, None, None, None, None, None, " "),
+    (None, "B2", 3, 60, "beside", 5, 35),
+)
+"""A title, rows and columns that are empty, units, a decimal comma, a cell without a header."""
+
+ASKED = ("--blocks", "survey.xlsx", "--sheet", "north wall")
+
+
+@pytest.fixture
+def book(shell: Shell, tmp_path: Path) -> Path:
+    book = openpyxl.Workbook()
+    book.active.append(["Contents"])
+    sheet = book.create_sheet("north wall")
+    for row in ROWS:
+        sheet.append(row)
+    book.save(tmp_path / "survey.xlsx")
+    (tmp_path / "curve.csv").write_text("pgv_m_s,annual_rate\n0.1,0.1\n0.5,0.01\n2,0.0001\n")
+    return tmp_path
+
+
+def of_one(shell: Shell, height: str, width: str, dip: str) -> Any:
+    return shell.json(
+        "predict", "--height", height, "--width", width, "--dip", dip, "--phi", "35", "--pgv", ".6"
+    )
+
+
+@pytest.mark.usefixtures("book")
+def test_a_sheet_with_titles_is_answered_as_its_blocks_are_alone(shell: Shell) -> None:
+    found = shell.json("predict", *ASKED, "--pgv", "0.6")
+    assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
+    for row, sides in zip(found["blocks"], (("2.4", ".5", "3"), ("3", ".6", "5")), strict=True):
+        alone = of_one(shell, *sides)
+        for name in ("probability", "ci_low", "ci_high", "event_low", "event_high"):
+            assert row[name] == pytest.approx(alone[name], rel=1e-12)
+        assert (row["kind"], row["mode"], row["reason"]) == ("toppling", "topple", "")
+    assert found["warnings"] == [
+        "the names of the columns stand in row 4: what is above is not read",
+        "column 5 without a name is neither read nor written",
+        "the column Width [cm] is converted from cm to m",
+        "not read: remark",
+    ]
+
+
+@pytest.mark.usefixtures("book")
+def test_the_list_on_the_terminal(shell: Shell, monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = shell("predict", *ASKED, "--pgv", "0.6").stdout.splitlines()
+    assert lines[:4] == [
+        "All 2 blocks are answered.",
+        "",
+        "block  kind      mode    probability  interval",
+        "A7     toppling  topple  1.1 %        0.2 % to 3.3 %",
+    ]
+    monkeypatch.setattr("rbfrag.cli.commands.predict.SHOWN", 1)
+    monkeypatch.setattr("rbfrag.exchange.table_answers.MOST_LISTED", 1)
+    assert "... and 1 more: --out FILE" in shell("predict", *ASKED, "--pgv", "0.6").stdout
+    cut = shell.json("predict", *ASKED, "--pgv", "0.6")
+    assert (cut["rows"], len(cut["blocks"])) == (2, 1)
+
+
+@pytest.mark.usefixtures("book")
+def test_every_command_reads_the_sheet(shell: Shell, refuses: Refuses) -> None:
+    found = shell.json("hazard", "curve.csv", *ASKED)
+    assert [row["block_id"] for row in found["blocks"]] == ["A7", "B2"]
+    shell("survival", "curve.csv", *ASKED, "--age", "100")
+    shell("export", "pelicun", *ASKED, "--out", "a.csv")
+    for command in (
+        ("predict", "--pgv", "0.6"),
+        ("hazard", "curve.csv"),
+        ("survival", "curve.csv", "--age", "100"),
+        ("shakemap", "grid.xml", "--out", "a.csv"),
+        ("losses", "."),
+        ("export", "nrml", "--out", "a.xml"),
+        ("plot", "modes", "--phi", "30", "--out", "a.png"),
+    ):
+        message = refuses(*command, "--blocks", "survey.xlsx", "--sheet", "south wall")
+        assert "no sheet 'south wall'; the sheets are Sheet, north wall" in message
+    Path("a.csv").write_text("p2,kr\n3,0.1\n")
+    only = refuses("predict", "--pgv", "0.6", "--blocks", "a.csv", "--sheet", "x")
+    assert "only workbooks (.xlsx) have sheets" in only
+    assert "--sheet goes with --blocks" in refuses("predict", "--p2", "3", "--sheet", "x")
