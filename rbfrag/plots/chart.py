@@ -240,7 +240,7 @@ def _is_fitted(
 ) -> np.ndarray:
     """Return where intensities x and velocities y, of one shape, are of the fitted ones."""
     kr = np.nan_to_num(y) * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
-    answers = model_answers(model, held.p2, kr, held.measures(model, x))
+    answers = model_answers(model, held.values(model, x, kr))
     fitted: np.ndarray = answers.in_domain & np.isfinite(y)
     return fitted
 

@@ -1,11 +1,13 @@
-"""Fragility curve of one block: probability of toppling over the strength of the shaking."""
+"""Fragility curve of one block: probability of failure over the strength of the shaking."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from os import PathLike
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +16,7 @@ from numpy.typing import NDArray
 from rbfrag.errors import InputError
 from rbfrag.fragility.measures import SPECTRAL
 from rbfrag.fragility.model import FragilityModel
-from rbfrag.fragility.prediction_array import PredictionArray
+from rbfrag.hazards.shaking import rise_in_words
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
 from rbfrag.plots.canvas import (
     BLUE,
@@ -28,6 +30,9 @@ from rbfrag.plots.canvas import (
 )
 from rbfrag.plots.labels import as_written
 from rbfrag.plots.model_lines import model_answers
+from rbfrag.question.keywords import LEVEL
+from rbfrag.question.words import numbers_in_words
+from rbfrag.solver.kinds import mode_of_kind
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -63,17 +68,21 @@ _POINTS = 241
 _START = 1e-6
 
 
+FAILS = {"topple": "topples", "slide": "slides too far", "slump": "slumps"}
+"""What a block does, by its mode."""
+
+_SUBSCRIPT = re.compile(r"([kp])_([a-z])")
+
+
 @in_own_style
 def plot_curve(
     model: FragilityModel,
-    p2: float,
-    kr: float,
+    block: Mapping[str, float],
     path: str | PathLike[str],
     *,
     over: str | None = None,
     fixed: Mapping[str, float] | None = None,
-    restitution: float | None = None,
-    level: float = 0.95,
+    level: float = LEVEL,
     beside: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
 ) -> Path:
     """Draw the fragility curve of one block with two bands.
@@ -85,13 +94,11 @@ def plot_curve(
 
     Args:
         model: the model.
-        p2: frequency parameter p² of the block [1/s²].
-        kr: its rocking acceleration coefficient.
+        block: what the model reads of the block, by field.
         path: file to write: .png, .pdf or .svg.
         over: the measure along the abscissa, by name; None for the one that the model's term
             names first.
         fixed: the other measures that the term reads, by name, held at one value.
-        restitution: that of a free-standing block, if it is stated.
         level: level of both bands.
         beside: other fragilities of the same measure to be drawn for comparison, by name:
             probabilities at levels of it.
@@ -122,9 +129,10 @@ def plot_curve(
     lines = max((as_written(name, _LETTERS).count("\n") + 1 for name in beside or {}), default=0)
     figure = new_figure(7.0, 4.6 + _LINE_IN * lines * math.ceil(len(beside or {}) / 2))
     axes = figure.add_subplot()
-    block = {"p2": p2, "kr": kr} | ({} if restitution is None else {"restitution": restitution})
     draw_curve(axes, model, block, varied, held, level=level, beside=beside)
-    y = kr * STANDARD_GRAVITY_M_S2 / np.sqrt(p2)
+    y_m_s = _velocity_m_s(model, block)
+    about_block = _SUBSCRIPT.sub(r"$\1_\2$", numbers_in_words(block, 3))
+    about_block += "" if y_m_s is None else f", $y$ = {y_m_s:.3g} m/s"
     conditions = ", ".join(FIXED.get(name, name + " = {:g}").format(held[name]) for name in others)
     about = model.row.diagnostics
     counts = (
@@ -133,8 +141,7 @@ def plot_curve(
         else ""
     )
     axes.set_title(
-        f"block $p^2$ = {p2:.3g} s$^{{-2}}$, $k_r$ = {kr:.3g}, $y$ = {y:.3g} m/s"
-        + (f"; {conditions}" if conditions else "")
+        "\n".join(wrap(f"block {about_block}{f'; {conditions}' if conditions else ''}", 85))
         + "\n"
         + as_written(f"model {model.name}{counts}", 85),
         fontsize=10,
@@ -150,7 +157,7 @@ def draw_curve(
     varied: str,
     held: Mapping[str, float],
     *,
-    level: float = 0.95,
+    level: float = LEVEL,
     beside: Mapping[str, Callable[[FloatArray], FloatArray]] | None = None,
     at: float = 0.0,
 ) -> None:
@@ -159,7 +166,7 @@ def draw_curve(
     Args:
         axes: empty axes.
         model: the model.
-        block: numbers of the block by name, ``p2`` [1/s²] and ``kr`` among them.
+        block: what the model reads of the block, by field.
         varied: the measure along the abscissa, by name.
         held: the other measures that the model reads.
         level: level of both bands.
@@ -169,7 +176,7 @@ def draw_curve(
     end = max(_right_end(model, block, varied, held), 1.15 * at)
     x = np.linspace(0.0, end, _POINTS)
     x[0] = _START * end
-    answer = _answers(model, block, {varied: x, **held}, level)
+    answer = model_answers(model, {**block, varied: x, **held}, level=level)
     known = answer.in_domain
     percent = f"{100.0 * level:g} %"
     if not np.isnan(answer.event_low).all():
@@ -190,33 +197,40 @@ def draw_curve(
         colour, style = _COLOURS[i % len(_COLOURS)], _STYLES[i // len(_COLOURS)]
         axes.plot(x, other(x), style, color=colour, lw=1.4, label=as_written(name, _LETTERS))
     axes.set(xlim=(0.0, end), ylim=(0.0, 1.0))
-    axes.set(xlabel=AXIS[varied], ylabel="probability that the block topples")
+    fails = FAILS.get(mode_of_kind(model.row.kind), "fails")
+    axes.set(xlabel=AXIS[varied], ylabel=f"probability that the block {fails}")
     light_grid(axes)
     if at > 0.0:
-        p = float(_answers(model, block, {varied: np.array([at]), **held}, level).probability[0])
+        pointed = model_answers(model, {**block, varied: np.array([at]), **held}, level=level)
+        p = float(pointed.probability[0])
         axes.plot([at, at, 0.0], [0.0, p, p], color=RED, lw=0.9, ls="--")
         axes.plot(at, p, "o", ms=8, color=RED, mec="white", mew=1.2, zorder=9)
 
 
-def _answers(
-    model: FragilityModel,
-    block: Mapping[str, float],
-    measures: Mapping[str, FloatArray | float],
-    level: float = 0.95,
-) -> PredictionArray:
-    others = {name: value for name, value in block.items() if name not in ("p2", "kr")}
-    return model_answers(model, block["p2"], block["kr"], {**measures, **others}, level=level)
+def rise_of_curve(model: FragilityModel, block: Mapping[str, float]) -> tuple[str, ...]:
+    """Return what is to be said where the curve rises again towards weak shaking."""
+    numbers = {name: np.array([value]) for name, value in block.items()}
+    return rise_in_words(model, numbers, 1e-3, 10.0, "the curve is too high there")
+
+
+def _velocity_m_s(model: FragilityModel, block: Mapping[str, float]) -> float | None:
+    """Return the velocity k g/p of a block [m/s]; None of one without a size."""
+    of = model.method.block
+    if of.size is None:
+        return None
+    return block[of.strength] * STANDARD_GRAVITY_M_S2 / math.sqrt(block[of.size])
 
 
 def _right_end(
     model: FragilityModel, block: Mapping[str, float], varied: str, held: Mapping[str, float]
 ) -> float:
     """Where the curve has nearly reached its top, found by doubling."""
-    kr = block["kr"]
-    y_m_s = kr * STANDARD_GRAVITY_M_S2 / math.sqrt(block["p2"])
-    unit = y_m_s if varied in ("pgv_m_s", "xp_m_s") else 0.1 * y_m_s if varied == "pgd_m" else kr
+    k, y_m_s = block[model.method.block.strength], _velocity_m_s(model, block)
+    if y_m_s is None:
+        y_m_s = 0.1 * k
+    unit = y_m_s if varied in ("pgv_m_s", "xp_m_s") else 0.1 * y_m_s if varied == "pgd_m" else k
     x = unit * 2.0 ** np.arange(0.0, 12.0, 0.5)
-    answer = _answers(model, block, {varied: x, **held})
+    answer = model_answers(model, {**block, varied: x, **held})
     high = np.flatnonzero(answer.probability > 0.97)
     if high.size:
         return float(x[high[0]])

@@ -18,30 +18,22 @@ from rbfrag.fragility.model import FragilityModel
 from rbfrag.fragility.prediction import answer_given
 from rbfrag.fragility.prediction_array import PredictionArray
 from rbfrag.motions.units import STANDARD_GRAVITY_M_S2
+from rbfrag.question.keywords import LEVEL
 
 FloatArray = NDArray[np.float64]
 
 
 def model_answers(
-    model: FragilityModel,
-    p2: float,
-    kr: FloatArray | float,
-    measures: Mapping[str, FloatArray | float],
-    *,
-    level: float = 0.95,
+    model: FragilityModel, values: Mapping[str, FloatArray | float], *, level: float = LEVEL
 ) -> PredictionArray:
-    """Return the answers of one model for blocks of one size.
+    """Return the answers of one model.
 
     Args:
         model: the model.
-        p2: frequency parameter [1/s²].
-        kr: rocking acceleration coefficients, a number or an array.
-        measures: measures of the motion by name; at least one of them, or kr, an array.
+        values: numbers of blocks and measures of motions by name, at least one of them an array.
         level: confidence level.
     """
-    shape = np.broadcast_shapes(np.shape(kr), *(np.shape(value) for value in measures.values()))
-    blocks = {"p2": np.full(shape, p2), "kr": np.broadcast_to(kr, shape)}
-    answer = answer_given(model, {**blocks, **measures}, level)
+    answer = answer_given(model, values, level)
     assert isinstance(answer, PredictionArray)
     return answer
 
@@ -66,7 +58,7 @@ class HeldMeasures:
         pga_g: PGA [g], or None for one in proportion to PGV.
         pgv_over_pga_s: PGV/(PGA g) [s] where PGA is in proportion.
         tm_s: mean period [s].
-        others: what else is known of the block, such as its restitution.
+        others: what else is known of the block.
         words: what is held, for the caption; empty where nothing matters.
         size_is_given: whether the figure is of blocks of this size, and not of any.
     """
@@ -96,6 +88,12 @@ class HeldMeasures:
         if "tm_s" in others:
             measures["tm_s"] = np.full(x_m_s.shape, self.tm_s)
         return measures | {name: np.full(x_m_s.shape, value) for name, value in self.others.items()}
+
+    def values(
+        self, model: FragilityModel, x_m_s: FloatArray, kr: FloatArray
+    ) -> dict[str, FloatArray | float]:
+        """Return these motions, and blocks of the size that is held with these k_r."""
+        return {"p2": self.p2, "kr": kr, **self.measures(model, x_m_s)}
 
 
 def held_measures(
@@ -163,9 +161,7 @@ def depends_on_size(model: FragilityModel) -> bool:
     least, most = (
         model_answers(
             model,
-            p2,
-            _RATIOS * math.sqrt(p2) / STANDARD_GRAVITY_M_S2,
-            HeldMeasures(p2).measures(model, x),
+            HeldMeasures(p2).values(model, x, _RATIOS * math.sqrt(p2) / STANDARD_GRAVITY_M_S2),
         ).probability
         for p2 in (0.3, 10.0)
     )
@@ -209,7 +205,7 @@ def failure_line(
 
     def toppling(y_m_s: FloatArray, x_m_s: FloatArray) -> FloatArray:
         kr = y_m_s * math.sqrt(held.p2) / STANDARD_GRAVITY_M_S2
-        return model_answers(model, held.p2, kr, held.measures(model, x_m_s)).probability
+        return model_answers(model, held.values(model, x_m_s, kr)).probability
 
     return _of_probability(probability, toppling, x_m_s)
 

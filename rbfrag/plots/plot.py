@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, Required, TypedDict, Unpack
 
 from numpy.typing import ArrayLike
 
@@ -21,6 +21,9 @@ from rbfrag.hazards.curve_file import CurveLike, as_curves
 from rbfrag.motions.polarity import POLARITIES, Polarity
 from rbfrag.motions.recognise import MotionLike, as_motion
 from rbfrag.plots.canvas import plot_path
+from rbfrag.question.fields import AnsweringFields, ShakingFields
+from rbfrag.question.keywords import LEVEL, BlockKeywords, model_for, parts_of
+from rbfrag.question.question import described
 from rbfrag.solver.block.geometry import Block
 
 if TYPE_CHECKING:
@@ -148,80 +151,79 @@ VARIED = {
 """What a curve may run over."""
 
 
+class _OneCurve(TypedDict, total=False):
+    """Measures that are held, and what the curve is drawn into."""
+
+    out: Out
+    sa_g: Mapping[float, float] | None
+
+
+class CurveKeywords(
+    BlockKeywords[float | None],
+    ShakingFields[float | None],
+    AnsweringFields,
+    _OneCurve,
+    total=False,
+):
+    """What a curve is of, what is held, and which model it is of."""
+
+
 def curve(
-    p2: float,
-    kr: float,
+    p2: float | None = None,
+    kr: float | None = None,
     out: Out = None,
+    /,
     *,
     over: str | None = None,
-    pgv_m_s: float | None = None,
-    pga_g: float | None = None,
-    tm_s: float | None = None,
-    pgd_m: float | None = None,
-    sa_g: Mapping[float, float] | None = None,
-    kind: str | None = None,
-    restitution: float | None = None,
-    model: str | None = None,
-    level: float = 0.95,
     beside: Callable[[str], Mapping[str, Callable[[Any], Any]]] | None = None,
-    db: str | PathLike[str] | None = None,
+    **question: Unpack[CurveKeywords],
 ) -> Picture:
     """Draw the fragility curve of one block over a measure of the shaking, with two bands.
 
     Args:
-        p2: frequency parameter p² of the block [1/s²].
-        kr: its toppling yield acceleration coefficient.
-        out: as for :func:`fit`.
+        p2: frequency parameter p² of the block [1/s²], if it is not given by name.
+        kr: its toppling yield acceleration coefficient, likewise.
+        out: as for :func:`fit`; it may be given by name.
         over: what the curve runs over: pgv, pga, pgd, sa03, sa10, sa20 or sa30; None for pgv, or
             what the model reads first.
-        pgv_m_s: peak ground velocity that is held [m/s].
-        pga_g: peak ground acceleration that is held [g].
-        tm_s: mean period that is held [s].
-        pgd_m: peak ground displacement that is held [m].
-        sa_g: spectral accelerations that are held [g] by period [s].
-        kind: ``rocking`` for a free-standing block; None for one that a slope backs, or what the
-            model is of.
-        restitution: speed after an impact of a free-standing block over that before it.
-        model: name of the model; None for the best for what is given.
-        level: confidence level of the bands.
         beside: gives other fragilities to compare with, by name, for the measure that the curve
             runs over.
-        db: as for :func:`fit`.
+        question: fields of the block, with ``kind``, the measures that are held, and ``model``,
+            ``level`` and ``db``, as :func:`rbfrag.predict` has them.
     """
-    from rbfrag.plots.curve import plot_curve
+    from rbfrag.plots.curve import plot_curve, rise_of_curve
 
-    stated = {"pgv_m_s": pgv_m_s, "pga_g": pga_g, "tm_s": tm_s, "pgd_m": pgd_m}
-    held: dict[str, Any] = {name: value for name, value in stated.items() if value is not None}
-    if sa_g is not None:
-        held |= spectral(sa_g)
+    numbers = [each for each in (p2, kr) if each is not None]
+    block, held, answering, drawing = parts_of(
+        numbers, question, BlockKeywords, ShakingFields, AnsweringFields, _OneCurve
+    )
+    held |= spectral(drawing.get("sa_g") or {})
+    kind = block.pop("kind", None)
+    blocks = described(block, kind)
+    (group,) = blocks.groups
     varied = None if over is None else VARIED.get(over)
     if over is not None and varied is None:
-        raise InputError(f"--over {over}: a curve runs over {', '.join(VARIED)}")
-    if model is None:
-        varied = varied or "pgv_m_s"
-        chosen = find_model(None, ["p2", "kr", varied, *held], db, kind=kind)
-    else:
-        chosen = find_model(model, MEASURES, db, kind=kind)
+        raise InputError(f"over = {over}: a curve runs over {', '.join(VARIED)}")
+    if "model" in answering:
+        chosen = model_for(answering, (*group.numbers, *MEASURES), group.kind)
         varied = varied or chosen.term.inputs[0]
+    else:
+        varied = varied or "pgv_m_s"
+        chosen = model_for(answering, (*group.numbers, varied, *held), group.kind)
     if varied in held:
         raise InputError(
-            f"{varied} is what the curve runs over: leave its value out, or add --over"
+            f"{varied} is what the curve runs over: leave its value out, or say what else it runs "
+            "over"
         )
     others = {} if beside is None else beside(varied)
     return _drawn(
-        out,
+        drawing.get("out", out),
         lambda path: plot_curve(
-            chosen,
-            p2,
-            kr,
-            path,
-            over=varied,
-            fixed=held,
-            restitution=restitution,
-            level=level,
-            beside=others,
+            chosen, group.numbers, path, over=varied, fixed=held,
+            level=answering.get("level", LEVEL), beside=others,
         ),
-    )
+        (*blocks.remarks, *rise_of_curve(chosen, group.numbers)),
+    )  # fmt: skip
 
 
 def sensitivity(
@@ -346,36 +348,30 @@ def response(
     )
 
 
-def modes(
-    out: Out = None,
-    *,
-    phi_deg: float,
-    beta_deg: float = 0.0,
-    phi_back_deg: float | None = None,
-    back_fracture: bool = True,
-    alpha1_deg: ArrayLike | None = None,
-    alpha3_deg: ArrayLike | None = None,
-) -> Picture:
+class Planes(TypedDict, total=False):
+    """The planes that modes are drawn for, and blocks to show on them."""
+
+    phi_deg: Required[float]
+    beta_deg: float
+    phi_back_deg: float | None
+    back_fracture: bool
+    alpha1_deg: ArrayLike | None
+    alpha3_deg: ArrayLike | None
+
+
+def modes(out: Out = None, **planes: Unpack[Planes]) -> Picture:
     """Draw failure modes and yield accelerations over the block angles α1 and α3.
 
     Args:
         out: as for :func:`fit`.
-        phi_deg: friction angle of the base [deg].
-        beta_deg: dip of the base for the yield accelerations [deg].
-        phi_back_deg: friction angle of the back plane [deg]; None for that of the base.
-        back_fracture: whether there is a fracture behind the block.
-        alpha1_deg: angles of the heel of blocks to show [deg].
-        alpha3_deg: angles of their toe [deg].
+        planes: ``phi_deg``, friction angle of the base [deg]; ``beta_deg``, its dip for the yield
+            accelerations [deg]; ``phi_back_deg``, friction angle of the back plane [deg], None for
+            that of the base; ``back_fracture``, whether there is a fracture behind the block;
+            ``alpha1_deg`` and ``alpha3_deg``, angles of heel and toe of blocks to show [deg].
     """
     from rbfrag.plots.modes import plot_modes
 
-    return _drawn(
-        out,
-        lambda path: plot_modes(
-            path, phi_deg=phi_deg, beta_deg=beta_deg, phi_back_deg=phi_back_deg,
-            back_fracture=back_fracture, alpha1_deg=alpha1_deg, alpha3_deg=alpha3_deg,
-        ),
-    )  # fmt: skip
+    return _drawn(out, lambda path: plot_modes(path, **planes))
 
 
 def rotation(

@@ -58,12 +58,31 @@ def test_a_curve_runs_over_what_is_named(shell: Shell, refuses: Refuses, tmp_pat
 def test_a_curve_of_a_free_standing_block(shell: Shell, refuses: Refuses, tmp_path: Path) -> None:
     path = tmp_path / "free.svg"
     shape = ("--db", REFERENCE, "--height", "1", "--width", "0.25", "--out", path)
-    for more in (("--kind", "rocking", "--restitution", "0.9"), ("--no-back",)):
+    for more in (
+        ("--kind", "rocking", "--restitution", "0.9"), ("--restitution", "0.9"), ("--no-back",),
+    ):  # fmt: skip
         done = shell("plot", "curve", *shape, *more)
         assert "model rocking-pgv" in path.read_text(encoding="utf-8")
         assert "no plane backs the block" not in done.stderr
-    told = refuses("plot", "curve", *shape, "--restitution", "0.9")
-    assert "restitution" in told
+    told = refuses("plot", "curve", *shape, "--kind", "toppling", "--restitution", "0.9")
+    assert "restitution does not go with kind toppling" in told
+
+
+def test_curves_of_blocks_that_slide_and_slump(
+    shell: Shell, refuses: Refuses, tmp_path: Path
+) -> None:
+    path = tmp_path / "other.svg"
+    drawn = ("plot", "curve", "--db", REFERENCE, "--out", path)
+    done = shell(*drawn, "--ky", "0.2", "--displacement", "0.1")
+    assert "P of model sliding-pgv rises again below PGV = 0.12 m/s" in done.stderr
+    assert "slides too far" in path.read_text(encoding="utf-8")
+    shell(*drawn, "--height", "2.5", "--width", "2.5", "--dip", "20", "--phi", "32",
+          "--displacement", "0.1", "--pga", "0.5")  # fmt: skip
+    assert "model sliding-pgv_pga" in path.read_text(encoding="utf-8")
+    shell(*drawn, "--ks", "0.2", "--ps2", "3")
+    assert "the block slumps" in path.read_text(encoding="utf-8")
+    told = refuses(*drawn, "--ky", "0.2", "--displacement", "0.1", "--over", "sa10")
+    assert "no stored sliding model works with sa10_g" in told
 
 
 def test_yield_over_rotation(shell: Shell, refuses: Refuses, tmp_path: Path) -> None:

@@ -14,11 +14,13 @@ from rbfrag.plots.curve import plot_curve
 from rbfrag.question.question import predict
 from tests.plots.critical_values import straight_line_model
 
+BLOCK = {"p2": 3.0, "kr": 0.1}
+
 
 def test_curve_and_band_are_those_of_predict(tmp_path, caught) -> None:
     figures = caught(module)
     model = straight_line_model()
-    plot_curve(model, 3.0, 0.1, tmp_path / "c.png", level=0.9)
+    plot_curve(model, BLOCK, tmp_path / "c.png", level=0.9)
     axes = figures[0].axes[0]
     dashed, solid = (line for line in axes.lines if len(line.get_xdata()) > 2)
     x, y = dashed.get_data()
@@ -38,7 +40,7 @@ def test_curve_and_band_are_those_of_predict(tmp_path, caught) -> None:
 def test_the_range_of_one_earthquake_is_a_second_band(tmp_path, caught) -> None:
     figures = caught(module)
     model = replace(straight_line_model(), event_spread=EventSpread.of(0.1))
-    plot_curve(model, 3.0, 0.1, tmp_path / "c.png", level=0.9)
+    plot_curve(model, BLOCK, tmp_path / "c.png", level=0.9)
     axes = figures[0].axes[0]
     event, interval = axes.collections
     assert "one single earthquake (90 %)" in event.get_label()
@@ -56,7 +58,7 @@ def test_the_range_of_one_earthquake_is_a_second_band(tmp_path, caught) -> None:
 
 def test_other_measures_are_held(tmp_path, caught) -> None:
     figures = caught(module)
-    plot_curve(straight_line_model("pga_tm"), 3.0, 0.1, tmp_path / "c.png", fixed={"tm_s": 0.5})
+    plot_curve(straight_line_model("pga_tm"), BLOCK, tmp_path / "c.png", fixed={"tm_s": 0.5})
     axes = figures[0].axes[0]
     assert axes.get_xlabel() == "peak ground acceleration, PGA [g]"
     assert "$T_m$ = 0.5 s" in axes.get_title()
@@ -64,7 +66,7 @@ def test_other_measures_are_held(tmp_path, caught) -> None:
 
 def test_a_missing_measure_is_named(tmp_path) -> None:
     with pytest.raises(InputError, match="tm_s"):
-        plot_curve(straight_line_model("pga_tm"), 3.0, 0.1, tmp_path / "c.png")
+        plot_curve(straight_line_model("pga_tm"), BLOCK, tmp_path / "c.png")
     assert not list(tmp_path.iterdir())
 
 
@@ -73,10 +75,10 @@ def test_as_many_curves_beside_it_as_styles_and_no_more(tmp_path, caught, overla
     names = [f"fragility {i} of a file with rather long names of $ states" for i in range(21)]
     beside = {name: lambda x: np.clip(x, 0.0, 1.0) for name in names}
     with pytest.raises(InputError, match=r"21 fragilities .* at most 20"):
-        plot_curve(straight_line_model(), 3.0, 0.1, tmp_path / "c.png", beside=beside)
+        plot_curve(straight_line_model(), BLOCK, tmp_path / "c.png", beside=beside)
     assert not list(tmp_path.iterdir())
     del beside[names[-1]]
-    plot_curve(straight_line_model(), 3.0, 0.1, tmp_path / "c.png", beside=beside)
+    plot_curve(straight_line_model(), BLOCK, tmp_path / "c.png", beside=beside)
     (figure,) = figures
     axes = figure.axes[0]
     drawn = [line for line in axes.lines if line.get_label().startswith("fragility")]

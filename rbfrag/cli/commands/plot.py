@@ -9,7 +9,7 @@ import typer
 
 from rbfrag.cli.output import print_json, print_table, print_warnings, say_when_compiling
 from rbfrag.cli.parameters import options
-from rbfrag.cli.parameters.block import WAYS, BlockOptions, NoBack, ShapeOptions, StandingOptions
+from rbfrag.cli.parameters.block import WAYS, BlockOptions, FailureOptions, NoBack, ShapeOptions
 from rbfrag.cli.parameters.motion import find_motion, find_shaking
 from rbfrag.cli.parameters.stack import command_group, option, stacked
 from rbfrag.errors import InputError
@@ -89,7 +89,7 @@ def plot_curve(
     *,
     out: Out,
     block: BlockOptions,
-    standing: StandingOptions,
+    standing: FailureOptions,
     held: options.Measures,
     over: str | None = option(
         "What the curve runs over: pgv, pga, pgd, sa03, sa10, sa20 or sa30. Default: pgv, or what "
@@ -109,9 +109,7 @@ def plot_curve(
     One band is the interval of P as far as the data tell it, the other the share of such blocks
     that may fail in one single earthquake. The other measures are held at the values given.
     """
-    from rbfrag.fragility.measures import SPECTRAL
     from rbfrag.plots import plot
-    from rbfrag.solver.kinds import facts_of
 
     def others(measure: str) -> Any:
         if beside is None:
@@ -120,18 +118,11 @@ def plot_curve(
 
         return of_measure(beside, measure)
 
-    kind, numbers, remarks = block.toppling(standing.kind)
-    if standing.restitution is not None:
-        if kind is None or not facts_of(kind).free_standing:
-            raise InputError("--restitution goes with blocks that stand free: --kind rocking")
-        numbers |= {"restitution": standing.restitution}
-    fixed: dict[str, Any] = held.given()
-    spectrum = {period: fixed.pop(name) for period, name in SPECTRAL.items() if name in fixed}
-    plot.curve(
-        numbers.pop("p2"), numbers.pop("kr"), out, over=over, **fixed, sa_g=spectrum or None,
-        kind=kind, **numbers, model=model, level=level, beside=others, db=db,
-    )  # fmt: skip
-    print_warnings(remarks)
+    question: dict[str, Any] = {**block.fields(standing), **held.given()}
+    picture = plot.curve(
+        out=out, over=over, model=model, level=level, beside=others, db=db, **question
+    )
+    print_warnings(picture.warnings)
     print(out)
 
 

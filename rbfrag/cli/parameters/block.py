@@ -138,6 +138,15 @@ class UncertaintyOptions:
 class BlockOptions(ShapeOptions, NumberOptions):
     """A block by numbers or by its shape."""
 
+    def fields(self, standing: StandingOptions) -> dict[str, Any]:
+        """Return what is stated of the block, by field."""
+        described = self.described()
+        planes: dict[str, Any] = {"beta_deg": self.beta}
+        if described is not None:
+            planes = {"block": described.block, **described.conditions}
+        numbers = {"p2": self.p2, "kr": self.kr, "kind": standing.kind, **standing.stated, **planes}
+        return {name: value for name, value in numbers.items() if value is not None}
+
     def toppling(
         self, kind: str | None = None
     ) -> tuple[str | None, dict[str, float], tuple[str, ...]]:
