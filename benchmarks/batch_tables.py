@@ -1,4 +1,4 @@
-"""Time and memory of `rbfrag predict --batch`.
+"""Time and memory of `rbfrag predict --blocks`.
 
     python -m benchmarks.batch_tables --folder FOLDER [--rows 10000000] [--db DATABASE]
 
@@ -47,7 +47,7 @@ def main() -> None:
             "import resource, sys; from rbfrag.cli.main import app; app(standalone_mode=False); "
             "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stderr)"
         )
-        command = [sys.executable, "-c", code, "predict", "--batch", f"blocks.{suffix}", "--out",
+        command = [sys.executable, "-c", code, "predict", "--blocks", f"blocks.{suffix}", "--out",
                    f"answers.{suffix}"]  # fmt: skip
         if given.db:
             command += ["--db", str(Path(given.db).resolve())]

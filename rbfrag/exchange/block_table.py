@@ -7,7 +7,7 @@ import math
 import os
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +80,7 @@ class BlockTable:
         file: what is open.
         stated: which columns state which fields.
         texts: fields that are texts.
+        filled: fields of numbers that a cell has been read of.
     """
 
     name: str
@@ -87,6 +88,7 @@ class BlockTable:
     file: TableFile
     stated: Header
     texts: Collection[str]
+    filled: set[str] = field(default_factory=set)
 
     @property
     def header(self) -> list[str]:
@@ -114,9 +116,10 @@ class BlockTable:
             values, others = part.numbers(header)
             faults = others | faults
             values = values if factor == 1.0 else values * factor
-            if name in IF_EMPTY:
-                values = np.where(np.isnan(values), IF_EMPTY[name], values)
-            numbers[name] = values
+            empty = np.isnan(values)
+            if others or not empty.all():
+                self.filled.add(name)
+            numbers[name] = np.where(empty, IF_EMPTY[name], values) if name in IF_EMPTY else values
         return numbers, faults
 
     def text(self, part: Part, name: str) -> list[str] | None:
@@ -136,11 +139,9 @@ class BlockTable:
         Args:
             read: the fields that the answer depends on, or hands on.
         """
-        return (
-            *self.file.remarks,
-            *self.stated.remarks,
-            *self.stated.unread(self.header, read),
-        )
+        empty = {c.header for name, c in self.stated.columns.items() if name not in self.filled}
+        named = [name for name in self.header if name not in empty]
+        return (*self.file.remarks, *self.stated.remarks, *self.stated.unread(named, read))
 
     def check(self, given: Collection[str] = (), kind: str | None = None) -> None:
         """Refuse a table that describes no blocks.

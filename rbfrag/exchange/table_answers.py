@@ -29,6 +29,8 @@ _NUMBERS = ("probability", "ci_low", "ci_high", "event_low", "event_high")
 ANSWERS = ("kind", "mode", *_NUMBERS, "in_domain", "reason")
 """The columns that are appended; a table that has them gets new ones."""
 
+_SHAKING = names_of(ShakingFields)
+
 OF_UNCERTAIN = "block_sd"
 """The column that is appended too where blocks are uncertain."""
 
@@ -79,6 +81,7 @@ def predict_table(
     refused: dict[str, str] = {}
     rows: list[dict[str, Any]] = []
     formulas: list[str] = []
+    empty: set[str] = set()
     chosen: dict[str, dict[str, None]]
     chosen = {name: {} for name in ("kind", "model", "term", "method", "notes", "read")}
     with opened_table(origin, read, sheet=sheet) as table, ExitStack() as stack:
@@ -91,7 +94,7 @@ def predict_table(
             partial = stack.enter_context(written_whole(goal))
             write = _written(table, columns, partial, stack, formulas, excel_text=excel_text)
         for part in table.parts:
-            predicted, answer = _answer(table, part, given, kind, question)
+            predicted, answer = _answer(table, part, given, kind, question, empty)
             write(part, answer)
             for name, words in chosen.items():
                 own = getattr(predicted, name)
@@ -106,7 +109,7 @@ def predict_table(
             raise InputError(f"{origin}: there is no block in the file")
         if not answered:
             refuse(str(origin), [*refused], [*refused.values()], total)
-    known = (*chosen.pop("read"), *names_of(ShakingFields), *TEXTS, *PLACE, *PORTFOLIO)
+    known = (*chosen.pop("read"), *_SHAKING, *TEXTS, *PLACE, *PORTFOLIO)
     notes = chosen.pop("notes")
     missing = unusable_in_words(total - answered, total, [*refused], [*refused.values()])
     return {
@@ -125,11 +128,6 @@ def _check(table: BlockTable, given: Mapping[str, float], kind: str | None) -> N
     doubled = next((name for name in table.header if table.header.count(name) > 1), None)
     if doubled is not None:
         raise InputError(f"{table.name}: the column {doubled} is there twice")
-    for name in given:
-        if name in table.stated.columns:
-            raise InputError(
-                f"{column_of(name)} is an option and a column of {table.name}: give it once"
-            )
     table.check(given, kind)
 
 
@@ -139,9 +137,17 @@ def _answer(
     given: Mapping[str, float],
     kind: str | None,
     question: Mapping[str, Any],
+    empty: set[str],
 ) -> tuple[PredictionArray, dict[str, NDArray[Any]]]:
     """Return the answers for some rows, and their columns."""
     values, faults = table.numbers(part)
+    for name in [name for name in values if name in given or name in _SHAKING]:
+        if name not in table.filled:  # an empty column says nothing
+            empty.add(name)
+            del values[name]
+        elif name in given or name in empty:
+            what = "an option and a column of" if name in given else "empty in the first rows of"
+            raise InputError(f"{column_of(name)} is {what} {table.name}: give it once, or of all")
     kinds, modes = table.text(part, "kind"), table.text(part, "mode")
     requested = kind if kinds is None else [each or kind for each in kinds]
     predicted = ask({**values, **given}, kind=requested, mode=modes, rows=True, **question)

@@ -96,3 +96,19 @@ def test_every_command_reads_the_sheet(shell: Shell, refuses: Refuses) -> None:
     only = refuses("predict", "--pgv", "0.6", "--blocks", "a.csv", "--sheet", "x")
     assert "only workbooks (.xlsx) have sheets" in only
     assert "--sheet goes with --blocks" in refuses("predict", "--p2", "3", "--sheet", "x")
+
+
+@pytest.mark.parametrize("suffix", ["xlsx", "csv"])
+def test_a_template_is_answered(shell: Shell, refuses: Refuses, suffix: str) -> None:
+    name = f"blocks.{suffix}"
+    assert f"predict --blocks {name}" in shell("block", "--template", name).stdout
+    found = shell.json("predict", "--blocks", name, "--pgv", "0.6")
+    (row,) = found["blocks"]
+    assert found["warnings"] == []  # nothing is said of columns that are empty
+    alone = of_one(shell, "2.4", "0.5", "3")
+    assert row["block_id"] == "example"
+    assert row["probability"] == pytest.approx(alone["probability"], rel=1e-12)
+    assert "--template does not go with --height" in refuses(
+        "block", "--template", name, "--height", "2"
+    )
+    assert "none of .xlsx, .csv" in refuses("block", "--template", "a.parquet")

@@ -110,6 +110,22 @@ def test_a_measure_for_all_rows(answer: Answer, tmp_path: Path) -> None:
     assert float(rows_of(target)[0]["probability"]) == pytest.approx(expected, rel=1e-12)
 
 
+def test_an_empty_column_says_nothing(
+    answer: Answer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, target = tmp_path / "a.csv", tmp_path / "b.csv"
+    head, rows = "p2_1_s2,kr,pgv_m_s,pga_g\n", "3,0.1,,\n3,0.2,,\n"
+    source.write_text(head + rows)
+    assert answer(source, target, pgv_m_s=0.6)["answered"] == 2
+    source.write_text(head + rows + "3,0.1,0.5,\n")
+    with pytest.raises(InputError, match="pgv_m_s is an option and a column of"):
+        answer(source, target, pgv_m_s=0.6)
+    monkeypatch.setattr(parts, "ROWS", 2)
+    source.write_text(head + rows.replace(",,", ",0.6,") + "3,0.1,0.6,0.5\n")
+    with pytest.raises(InputError, match="pga_g is empty in the first rows of"):
+        answer(source, target)
+
+
 def test_other_modes_are_not_answered(answer: Answer, tmp_path: Path) -> None:
     source, target = tmp_path / "a.csv", tmp_path / "b.csv"
     source.write_text(f"mode,{HEAD}\nslide,A,3,0.1,0.6\ntopple,B,3,0.1,0.6\n")

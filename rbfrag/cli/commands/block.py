@@ -43,6 +43,11 @@ def block(
         "Draw the block on its planes with its contacts and the resultant at yield, or the "
         "contacts of a mesh and k_r over azimuth (.png, .pdf, .svg)."
     ),
+    template: str | None = option(
+        "Write an empty table of blocks with units and an example row, which  rbfrag predict "
+        "--blocks  reads when it is filled in (.xlsx, .csv).",
+        metavar="FILE",
+    ),
     printing: options.Printing,
 ) -> None:
     """Print a block's failure mode, yield accelerations and size.
@@ -53,6 +58,16 @@ def block(
     Of a mesh, which stands free: volume, mass, inertia, and for each azimuth kr, p2 and
     restitution about its contacts with the ground.
     """
+    if template is not None:
+        from rbfrag.exchange.block_template import COLUMNS, write_template
+
+        written = str(write_template(template))
+        if printing.json:
+            print_json({"template": written, "columns": list(COLUMNS)})
+        else:
+            print(f"{written}: write a row for each block in place of the example, then  rbfrag")
+            print(f"predict --blocks {written}  with a measure of the motion, as --pgv 0.6")
+        return
     if mesh.mesh is not None:
         _mesh(mesh.mesh, mesh, density, plot, json=printing.json)
         return

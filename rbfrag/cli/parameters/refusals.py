@@ -68,6 +68,11 @@ CONFLICTS = (
     Conflict(
         ("--block-draws",), (*NUMBERS, *SHAPE, *FILES, *PLANES, *SIGMAS), "the table has the block"
     ),
+    Conflict(
+        ("--template",),
+        (*SHAPE, *FILES, *PLANES, "--cohesion", "--density", "--kv", "--mesh", "--plot"),
+        "it is an empty table",
+    ),
     Conflict(("--block-draws",), ("--blocks",), "one question is about one block"),
     Conflict(("--block-draws",), ("--ky", "--restitution"), "the table has the block"),
     Conflict(("--draws",), ("--csv", "--plot", "--film"), "they show one run", ("respond",)),

@@ -1,0 +1,54 @@
+"""An empty table of blocks that people fill in: columns with their units, and an example."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from rbfrag.exchange.block_table import write_block_table
+from rbfrag.exchange.tables.workbook import openpyxl
+from rbfrag.files import output_path, written_whole
+from rbfrag.question.blocks import RECTANGLE
+from rbfrag.question.fields import (
+    FailureFields,
+    PlaneFields,
+    columns_declared,
+    declared,
+    names_of,
+    word_of,
+)
+from rbfrag.question.table import header_of
+
+COLUMNS = ("block_id", *RECTANGLE, *names_of(PlaneFields, FailureFields), "pgv_m_s", "pga_g")
+"""Fields that have a column; the others are listed on a sheet of their own."""
+
+EXAMPLE = {"block_id": "example", "height_m": 2.4, "width_m": 0.5, "beta_deg": 3.0, "phi_deg": 35.0}
+
+
+def write_template(path: str | os.PathLike[str]) -> Path:
+    """Write a table of one example, whole or not at all, and return its path.
+
+    A workbook has a second sheet that tells what else a column may state.
+
+    Args:
+        path: file to write, ``.xlsx`` or ``.csv``.
+    """
+    target = output_path(path, (".xlsx", ".csv"), "table")
+    names, row = map(header_of, COLUMNS), [EXAMPLE.get(name, "") for name in COLUMNS]
+    if target.suffix.lower() == ".csv":
+        columns = {name: np.array([cell]) for name, cell in zip(names, row, strict=True)}
+        return write_block_table(columns, target)
+    book = openpyxl().Workbook()
+    sheet, others = book.active, book.create_sheet("columns")
+    sheet.title, sheet.freeze_panes, others.freeze_panes = "blocks", "A2", "A2"
+    sheet.append([*names])
+    sheet.append(row)
+    others.append(["column", "what it states", "also called"])
+    for name in columns_declared():
+        about = declared()[name]
+        others.append([header_of(name), about.sentence(word_of), ", ".join(about.others)])
+    with written_whole(target, "table") as partial:
+        book.save(partial)
+    return target
